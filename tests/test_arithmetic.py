@@ -29,7 +29,7 @@ from eomgen.study import timing
 from eomgen.study.cost.arithmetic import (
     BASELINE,
     Arithmetic,
-    Way,
+    Solver,
     arithmetic,
     solve_operations,
 )
@@ -124,9 +124,9 @@ def judged(scene: str, states: int = 30, *, single: bool = False) -> Arithmetic:
     return arithmetic(*scene_of(scene), states=states, single=single)
 
 
-def way(found: Arithmetic, name: str, precision: str = "float64") -> Way:
-    """One of the ways."""
-    return next(w for w in found.ways if (w.name, w.precision) == (name, precision))
+def solver(found: Arithmetic, name: str, precision: str = "float64") -> Solver:
+    """One of the solvers."""
+    return next(w for w in found.solvers if (w.name, w.precision) == (name, precision))
 
 
 def bare(scene: str, route: str = "auto") -> System:
@@ -391,7 +391,7 @@ def test_float32_loses_29_bits() -> None:
     """The same number of ulps, each of them 2^29 times as large."""
     found = judged("two_body", single=True)
     for route in ("closed", "ldl", "aba", BASELINE):
-        double, single = way(found, route), way(found, route, "float32")
+        double, single = solver(found, route), solver(found, route, "float32")
         assert double.operations == single.operations
         for ours, theirs in zip(double.errors, single.errors, strict=True):
             assert 1 / 4 < theirs.median / ours.median < 4
@@ -406,8 +406,8 @@ def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
     """A few ulps at most states, some hundred at the worst; and every route is there."""
     found = judged(scene, single=scene == "two_body")
     assert found.agreed > 55
-    assert {w.name for w in found.ways} == {*ROUTES, BASELINE}
-    for w in found.ways:
+    assert {w.name for w in found.solvers} == {*ROUTES, BASELINE}
+    for w in found.solvers:
         assert not w.words and w.seconds and w.batch_seconds
         for errors, sample in zip(w.errors, found.samples, strict=True):
             assert 0 < errors.median < 15
@@ -420,9 +420,9 @@ def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
 def test_solution_by_hand_keeps_what_a_light_cart_loses() -> None:
     """The closed form has every digit; whatever adds the cart's mass to the pole's has lost it."""
     found = judged(CART.replace("MASS", "1e-6").replace("ANGLE", "90"), 60)
-    seeded, own = way(found, "closed").errors
+    seeded, own = solver(found, "closed").errors
     assert max(seeded.worst, own.worst) < 5
-    worse = way(found, BASELINE).errors
+    worse = solver(found, BASELINE).errors
     assert worse[1].worst > 1e4 * own.worst
     assert worse[1].median > 25 * own.median
     assert np.max(found.samples[1].condition) > 1e4
@@ -432,9 +432,9 @@ def test_solution_by_hand_keeps_what_a_light_cart_loses() -> None:
 def test_a_way_that_fails_says_why() -> None:
     """1 kg and 1e-20 are 1 kg: M is singular to all but the closed form, at the run's rest."""
     found = judged(CART.replace("MASS", "1e-20").replace("ANGLE", "0"), 5)
-    assert way(found, "closed").errors[1].worst == 0
+    assert solver(found, "closed").errors[1].worst == 0
     for name, words in ((BASELINE, "Singular matrix"), ("ldl", "division by zero")):
-        failed = way(found, name)
+        failed = solver(found, name)
         assert failed.errors[1].failed == len(found.samples[1].y)
         assert words in failed.words and "of" in failed.words
         assert np.isnan(failed.errors[1].worst) and failed.errors[1].at is None
@@ -446,8 +446,8 @@ def test_the_same_seed_the_same_numbers() -> None:
     other = arithmetic(*scene_of("pendulum"), states=5, seed=1)
     for k in (0, 1):
         np.testing.assert_array_equal(one.samples[k].y, two.samples[k].y)
-        for w in one.ways:
-            np.testing.assert_array_equal(w.errors[k].ulps, way(two, w.name).errors[k].ulps)
+        for w in one.solvers:
+            np.testing.assert_array_equal(w.errors[k].ulps, solver(two, w.name).errors[k].ulps)
     assert not np.any(one.samples[0].y == other.samples[0].y)
     np.testing.assert_array_equal(one.samples[1].y, other.samples[1].y)
 

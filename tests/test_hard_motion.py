@@ -300,29 +300,29 @@ def test_what_differs_from_the_run_that_goes_on_is_reported(
     saved = tmp_path / "first/swing.npz"
     given += ["--from", str(saved), "--t-end", "2", "-o", str(tmp_path / "second")]
 
-    def told(*changed: str) -> str:
+    def output(*changed: str) -> str:
         capsys.readouterr()
         code = main([*given, *changed])
         said = capsys.readouterr()
         assert code == (1 if said.err else 0)
         return said.out + said.err
 
-    assert "as if the run had not ended" in told(*base)
+    assert "as if the run had not ended" in output(*base)
     anew = "starts anew from the state at t = 1 s: that run had "
-    assert f"{anew}b_mass = 2.0, not 50.0" in told(*base, "--set", "b_mass=50")
-    assert f"{anew}drive = 0.5, not 0.0" in told(*base[:2], *base[4:])
-    assert f"{anew}--rtol 1e-08, not 1e-06" in told(*base, "--rtol", "1e-6")
-    assert f"{anew}--max-step at its default, not 0.01" in told(*base, "--max-step", "0.01")
+    assert f"{anew}b_mass = 2.0, not 50.0" in output(*base, "--set", "b_mass=50")
+    assert f"{anew}drive = 0.5, not 0.0" in output(*base[:2], *base[4:])
+    assert f"{anew}--rtol 1e-08, not 1e-06" in output(*base, "--rtol", "1e-6")
+    assert f"{anew}--max-step at its default, not 0.01" in output(*base, "--max-step", "0.01")
     text = scene.read_text()
     scene.write_text(text.replace("j_angle = 1.0", "j_angle = 0.9"))
-    assert f"{anew}another initial state" in told(*base)
+    assert f"{anew}another initial state" in output(*base)
     scene.write_text(SPRUNG)
     assert (
         f"eomgen: --from: {saved} is a run of another 'swing': it differs in effect 'coil'; "
-        "give a run of this scene" in told(*base)
+        "give a run of this scene" in output(*base)
     )
     scene.write_text(f"{text}[camera]\nheight = 3.0\n")
-    assert "as if the run had not ended" in told(*base)
+    assert "as if the run had not ended" in output(*base)
 
 
 @pytest.mark.parametrize(

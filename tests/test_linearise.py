@@ -299,9 +299,9 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 def test_an_equilibrium_says_that_it_is_at_rest(capsys: pytest.CaptureFixture[str]) -> None:
     """A top that spins is not what was linearised; one that is still is no matter to mention."""
     spins = "note        at rest, without the initial tip_wz = 60; --at initial keeps the motion\n"
-    for more, told in (([], True), (["--at", "rest"], True), (["--at", "initial"], False)):
+    for more, reported in (([], True), (["--at", "rest"], True), (["--at", "initial"], False)):
         assert main(["linearise", "spinning_top", "--route", "aba", *more]) == 0
-        assert (spins in capsys.readouterr().out) == told
+        assert (spins in capsys.readouterr().out) == reported
     assert main(["linearise", "acrobot", "--route", "aba"]) == 0
     assert "note" not in capsys.readouterr().out
 

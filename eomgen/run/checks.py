@@ -111,7 +111,7 @@ def check_no_step(integrator: str, dt: float | None) -> None:
 def check_steps(
     integrator: str, span: float, dt: float | None, samples: int | None, max_steps: int
 ) -> tuple[float, int]:
-    """Return the step and k, where every k-th state is kept. Raises `RunError` for an invalid step."""
+    """The step, and k if every k-th state is kept. Raises `RunError` for an invalid step."""
     if dt is None:
         raise RunError(f"dt: {integrator} needs a step; give e.g. --dt 0.001")
     if not (math.isfinite(dt) and dt > 0):
