@@ -392,7 +392,7 @@ def test_a_module_that_gives_no_number_misses_its_bound() -> None:
     state = hard_states(module, 1, 1, 0, 1.0)[1]
     module.derivative = lambda *_: np.full(2, np.nan)
     found = judged(model, Truth(model), "aba", {"aba": module}, full, state)
-    assert found is not None and np.isnan(found.off["aba"]).all()
+    assert found is not None and np.isnan(found.errors["aba"]).all()
     assert found.residuals["aba"].error == np.inf
 
 

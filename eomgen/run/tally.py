@@ -27,7 +27,8 @@ class Tally:
     steps, derivatives, jacobians  as in `Trajectory.counts`
     factorisations  LU factorisations, by methods that count them
     rows            rows kept
-    held, looks     calls of `Contacts.held`, and of `Contacts.gaps` and `rates`
+    held, gap_checks
+                    calls of `Contacts.held`, and of `Contacts.gaps` and `rates`
     switches        calls of `Switching.of_state`
     low, high       (ny,), least and greatest value of each state at the ends of steps; None before
                     the run
@@ -41,7 +42,7 @@ class Tally:
     factorisations: int = 0
     rows: int = 0
     held: int = 0
-    looks: int = 0
+    gap_checks: int = 0
     switches: int = 0
     low: FloatArray | None = field(default=None, repr=False)
     high: FloatArray | None = field(default=None, repr=False)
@@ -72,8 +73,8 @@ class Tally:
         if contacts is not None:
             contacts = replace(
                 contacts,
-                gaps=self._counted("looks", contacts.gaps),
-                rates=self._counted("looks", contacts.rates),
+                gaps=self._counted("gap_checks", contacts.gaps),
+                rates=self._counted("gap_checks", contacts.rates),
                 held=self._counted("held", contacts.held),
             )
         if switching is not None and switching.of_state is not None:

@@ -75,13 +75,13 @@ def advance(
     """
     times = [t + c * h for c in method.c]
     near = y.astype(float)
-    moments = np.array(times, dtype=float)
-    guessed = forecast(float(t), near, moments)
-    correct = _solver(method, problem, float(h), moments, guessed)
+    node_times = np.array(times, dtype=float)
+    guessed = forecast(float(t), near, node_times)
+    correct = _solver(method, problem, float(h), node_times, guessed)
     if (
         precise.corner_branches is None
     ):  # with corners, doubles might take another branch than this step
-        guessed = _in_doubles(method, problem, float(h), moments, near, guessed, correct, scale)
+        guessed = _in_doubles(method, problem, float(h), node_times, near, guessed, correct, scale)
     moves = guessed.astype(object) - y  # in extended precision: sums of doubles would be doubles
     last = math.inf
     for _ in range(MOST_CORRECTIONS):
