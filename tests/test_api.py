@@ -179,7 +179,7 @@ def test_a_run_is_followed_and_stopped() -> None:
 
     run = eomgen.simulate("pendulum", t_end=5.0, follow=follow)
     assert seen == sorted(seen) and len(seen) == run.report["steps"]
-    assert not run.finished and "ended by who follows it" in run.message
+    assert not run.finished and "ended by the function that follows it" in run.message
     assert (run.outcome.kind, run.outcome.remedy) == ("ended", "")
     assert run.t[-1] <= seen[-1] and np.isfinite(run.y).all()
     whole = eomgen.simulate("pendulum", t_end=5.0, follow=lambda t, y: None)

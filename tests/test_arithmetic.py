@@ -1,4 +1,4 @@
-"""How exact each route's accelerations are: the truth, the counting, and what is found by them."""
+"""Accuracy of each route's accelerations: the reference, the errors in ulps, the results."""
 
 import csv
 import math
@@ -29,7 +29,7 @@ from eomgen.study import timing
 from eomgen.study.cost.arithmetic import (
     BASELINE,
     Arithmetic,
-    Way,
+    Solver,
     arithmetic,
     solve_operations,
 )
@@ -103,34 +103,34 @@ FORMULA = (
 
 @pytest.fixture(autouse=True)
 def in_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Times are not looked at here, and few states will do."""
+    """Times do not matter here, and few states suffice."""
     monkeypatch.setattr(timing, "TIMING", 0.0)
     monkeypatch.setattr(sampling, "MOST_OPERATIONS", 200_000)
 
 
 def model_of(scene: str) -> Model:
-    """A built-in scene's model, or one of a text."""
+    """The model of a built-in scene or of a text."""
     return elaborate(read(scene))
 
 
 def scene_of(scene: str) -> tuple[Model, Simulation]:
-    """The same, and how the scene is to be run."""
+    """The same, and the scene's simulation settings."""
     return model_of(scene), read(scene).simulation
 
 
 @cache
 def judged(scene: str, states: int = 30, *, single: bool = False) -> Arithmetic:
-    """A scene's arithmetic."""
+    """The comparison of solvers for a scene."""
     return arithmetic(*scene_of(scene), states=states, single=single)
 
 
-def way(found: Arithmetic, name: str, precision: str = "float64") -> Way:
-    """One of the ways."""
-    return next(w for w in found.ways if (w.name, w.precision) == (name, precision))
+def solver(found: Arithmetic, name: str, precision: str = "float64") -> Solver:
+    """One of the solvers."""
+    return next(w for w in found.solvers if (w.name, w.precision) == (name, precision))
 
 
 def bare(scene: str, route: str = "auto") -> System:
-    """A scene's derivative by a route, and nothing else."""
+    """The derivative of a scene by a route, without other outputs."""
     model = replace(model_of(scene), outputs=(), route=route, form="velocity")
     return compile_program(model, jacobian=False).system
 
@@ -143,7 +143,7 @@ def states_of(system: System, count: int = 5) -> tuple[np.ndarray, np.ndarray]:
 
 
 def in_digits(system: System, program: Program, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """v̇ of a program in 60 digits, as columns."""
+    """v̇ of a program in 60 digits, in columns."""
     nq, nv = len(system.model.coordinates), len(system.model.velocities)
     run, names = evaluator(program, "derivative"), [state.name for state in system.states]
     given = {**system.model.defaults, **{i.name: 0.0 for i in system.model.inputs}}
@@ -158,7 +158,7 @@ def in_digits(system: System, program: Program, t: np.ndarray, y: np.ndarray) ->
 
 
 def test_truth_of_a_compound_pendulum() -> None:
-    """θ̈ = -m g l sin θ / (I + m l²) with the very doubles of the scene."""
+    """θ̈ = -m g l sin θ / (I + m l²) with exactly the doubles of the scene."""
     y = np.array([[0.3, 1.0], [2.0, -3.0], [-1e-9, 0.0]])
     mass, g, length, inertia = map(MP.mpf, (1.3, 9.81, 0.7, 0.07))
     factor = -mass * g * length / (inertia + mass * length * length)
@@ -168,7 +168,7 @@ def test_truth_of_a_compound_pendulum() -> None:
 
 @pytest.mark.parametrize("scene", ["two_body", "furuta_pendulum", "tumbling_body", CART])
 def test_truth_agrees_with_other_routes(scene: str) -> None:
-    """LᵀDL from no recording; and the program itself where no number of the scene was folded."""
+    """LᵀDL without a recording, and the program itself if no constant of the scene was folded."""
     scene = scene.replace("MASS", "0.3").replace("ANGLE", "20")
     system = bare(scene, "ldl")
     truth, (t, y) = Truth(system.model), states_of(system)
@@ -180,7 +180,7 @@ def test_truth_agrees_with_other_routes(scene: str) -> None:
 
 
 def test_a_wrong_last_digit_is_seen() -> None:
-    """Of each constant of a program in turn, while 40 digits agree without that."""
+    """In each constant of a program in turn; without it 40 digits agree."""
     system = bare("two_body", "aba")
     (t, y), program = states_of(system, 2), system.program
     true = Truth(system.model)(t, y)
@@ -204,7 +204,7 @@ def test_a_wrong_last_digit_is_seen() -> None:
 
 
 def test_exact_tape_folds_what_is_exact() -> None:
-    """0.5 · 4 = 2, and a third is none of the doubles."""
+    """0.5 · 4 = 2 is folded, a third is not, as it is no double."""
     for tape, folded in ((Tape(), True), (ExactTape(), False)):
         number = tape.constant
         assert tape.values[(number(0.5) * number(4.0)).index] == 2.0
@@ -220,7 +220,7 @@ def test_exact_tape_folds_what_is_exact() -> None:
 
 
 def test_no_truth_at_a_singular_state() -> None:
-    """None where nothing resists, and the truth beside it."""
+    """None at a singular state, and the reference beside it."""
     polar = """
     name = "polar"
     initial = { q = { r = 1.0 } }
@@ -257,7 +257,7 @@ def test_no_truth_at_a_singular_state() -> None:
 
 
 def test_ulp_is_the_distance_of_neighbours() -> None:
-    """At powers of two, between them, in both formats."""
+    """At powers of two and between them, in both formats."""
     rng = np.random.default_rng(1)
     for x in (1.0, 0.5, 1.9999999, 1024.0, 3e-300, *rng.lognormal(0, 30, 50)):
         assert ulp(MP.mpf(x), 53) == np.spacing(x)
@@ -267,7 +267,7 @@ def test_ulp_is_the_distance_of_neighbours() -> None:
 
 
 def test_errors_by_hand() -> None:
-    """Neighbours are 1 off, below a power of two half; the worst of a vector; each of its unit."""
+    """Neighbours differ by 1 ulp, below a power of two by half; vectors, by unit."""
     units = ["rad/s", "m/s", "rad/s"]
     true = exact(np.array([[3.0, 1.0], [5e8, 5e8], [0.25, -1.0]]))
     found = true.astype(float)
@@ -287,7 +287,7 @@ def test_errors_by_hand() -> None:
 
 
 def test_errors_beside_nothing() -> None:
-    """What dies down counts as a thousandth of what it was; and of nothing, all is too much."""
+    """The scale is at least a thousandth of the median; an error in an exact 0 is infinite."""
     still = exact(np.array([[0.0, 0.0, 0.0]]))
     assert vector_errors(np.zeros((1, 3)), still, ["m/s"], 53).tolist() == [0, 0, 0]
     assert vector_errors(np.full((1, 3), 1e-17), still, ["m/s"], 53)[0] == math.inf
@@ -299,7 +299,7 @@ def test_errors_beside_nothing() -> None:
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7])
 def test_operations_of_a_dense_solution(n: int) -> None:
-    """Elimination, and back, with every operation counted."""
+    """Elimination and back substitution, with every operation counted."""
     count = 0
 
     class Number(float):
@@ -340,7 +340,7 @@ def test_operations_of_a_dense_solution(n: int) -> None:
 
 @pytest.mark.parametrize("scene", ["two_body", "tumbling_body", "functions"])
 def test_program_and_module_go_the_same_steps(scene: str) -> None:
-    """Bit by bit in doubles; in float32 as far as constants are rounded once or step by step."""
+    """To the bit in doubles; in float32 but for the rounding of constants."""
     text = ALL_FUNCTIONS.replace("FORMULA", FORMULA)
     system = bare(text if scene == "functions" else scene)
     module: Any = load_module(python_module(system))
@@ -391,7 +391,7 @@ def test_float32_loses_29_bits() -> None:
     """The same number of ulps, each of them 2^29 times as large."""
     found = judged("two_body", single=True)
     for route in ("closed", "ldl", "aba", BASELINE):
-        double, single = way(found, route), way(found, route, "float32")
+        double, single = solver(found, route), solver(found, route, "float32")
         assert double.operations == single.operations
         for ours, theirs in zip(double.errors, single.errors, strict=True):
             assert 1 / 4 < theirs.median / ours.median < 4
@@ -403,11 +403,11 @@ def test_float32_loses_29_bits() -> None:
 
 @pytest.mark.parametrize("scene", ["double_pendulum", "two_body", "tumbling_body"])
 def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
-    """A few ulps at most states, some hundred at the worst; and every route is there."""
+    """A few ulps at most states, some hundred at the worst; every route is compared."""
     found = judged(scene, single=scene == "two_body")
     assert found.agreed > 55
-    assert {w.name for w in found.ways} == {*ROUTES, BASELINE}
-    for w in found.ways:
+    assert {w.name for w in found.solvers} == {*ROUTES, BASELINE}
+    for w in found.solvers:
         assert not w.words and w.seconds and w.batch_seconds
         for errors, sample in zip(w.errors, found.samples, strict=True):
             assert 0 < errors.median < 15
@@ -418,42 +418,42 @@ def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
 
 
 def test_solution_by_hand_keeps_what_a_light_cart_loses() -> None:
-    """The closed form has every digit; whatever adds the cart's mass to the pole's has lost it."""
+    """The closed form keeps every digit; routes that add the cart's mass to the pole's lose it."""
     found = judged(CART.replace("MASS", "1e-6").replace("ANGLE", "90"), 60)
-    seeded, own = way(found, "closed").errors
+    seeded, own = solver(found, "closed").errors
     assert max(seeded.worst, own.worst) < 5
-    worse = way(found, BASELINE).errors
+    worse = solver(found, BASELINE).errors
     assert worse[1].worst > 1e4 * own.worst
     assert worse[1].median > 25 * own.median
     assert np.max(found.samples[1].condition) > 1e4
     assert found.samples[1].until > 2  # twice through below
 
 
-def test_a_way_that_fails_says_why() -> None:
-    """1 kg and 1e-20 are 1 kg: M is singular to all but the closed form, at the run's rest."""
+def test_a_solver_that_fails_says_why() -> None:
+    """1 kg + 1e-20 kg = 1 kg: at the rest of the run, M is singular but for the closed form."""
     found = judged(CART.replace("MASS", "1e-20").replace("ANGLE", "0"), 5)
-    assert way(found, "closed").errors[1].worst == 0
+    assert solver(found, "closed").errors[1].worst == 0
     for name, words in ((BASELINE, "Singular matrix"), ("ldl", "division by zero")):
-        failed = way(found, name)
+        failed = solver(found, name)
         assert failed.errors[1].failed == len(found.samples[1].y)
         assert words in failed.words and "of" in failed.words
         assert np.isnan(failed.errors[1].worst) and failed.errors[1].at is None
 
 
 def test_the_same_seed_the_same_numbers() -> None:
-    """And another one others."""
+    """And another seed gives others."""
     one, two = (arithmetic(*scene_of("pendulum"), states=5) for _ in range(2))
     other = arithmetic(*scene_of("pendulum"), states=5, seed=1)
     for k in (0, 1):
         np.testing.assert_array_equal(one.samples[k].y, two.samples[k].y)
-        for w in one.ways:
-            np.testing.assert_array_equal(w.errors[k].ulps, way(two, w.name).errors[k].ulps)
+        for w in one.solvers:
+            np.testing.assert_array_equal(w.errors[k].ulps, solver(two, w.name).errors[k].ulps)
     assert not np.any(one.samples[0].y == other.samples[0].y)
     np.testing.assert_array_equal(one.samples[1].y, other.samples[1].y)
 
 
 def test_states_of_its_own_run() -> None:
-    """Evenly among the calls, within the run; fewer calls for it end it sooner."""
+    """Evenly spaced among the calls within the run; fewer calls allowed end it sooner."""
     system, wanted = bare("cart_pole"), read("cart_pole").simulation
     module: Any = load_module(python_module(system))
     calls, derivative = [], module.derivative
@@ -477,7 +477,7 @@ def test_states_of_its_own_run() -> None:
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Table, figure, and a row a state from which the worst can be found again."""
+    """Table, figure, and a row for each state, from which the worst one can be found."""
     asked = ["accuracy", "two_body", "--arithmetic", "--float32", "--states", "6"]
     assert main([*asked, "-o", str(tmp_path)]) == 0
     output = capsys.readouterr()
@@ -506,7 +506,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_command_reports_what_is_not_there(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Another form, contacts, routes; and what cannot be asked for."""
+    """Another form, contacts, missing routes; and invalid options."""
     other = ["--states", "3", "-o", str(tmp_path)]
     assert main(["accuracy", "bouncing_two_body", "--arithmetic", *other]) == 0
     text = " ".join(capsys.readouterr().out.split())
@@ -519,7 +519,7 @@ def test_command_reports_what_is_not_there(
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_functions_in_sixty_digits(name: str) -> None:
-    """Every function of formulas, alone and in a program, against mpmath's in 80 digits."""
+    """Every function of formulas, alone and in a program, against mpmath in 80 digits."""
     tape, count = Tape(), FUNCTIONS[name]
     node = tape.apply(name, *(tape.input(x, Stage.POSITIONS) for x in "abc"[:count]))
     run = evaluator(finish(tape, {"f": Output((), (node.index,))}, ()), "f")
@@ -545,7 +545,7 @@ def test_functions_in_sixty_digits(name: str) -> None:
 
 @pytest.mark.parametrize("bits", (24, 53, 400))
 def test_programs_in_sixty_digits(bits: int) -> None:
-    """Sums, products and quotients keep their digits, whatever digits the caller works in."""
+    """Sums, products and quotients keep their digits in any precision of the caller."""
     tape = Tape()
     x, three, tiny = tape.input("x", Stage.POSITIONS), tape.constant(3.0), tape.constant(1e-300)
     nodes = (-x / three, x * x * tiny, x / three - x * tape.constant(0.3))
@@ -559,7 +559,7 @@ def test_programs_in_sixty_digits(bits: int) -> None:
 
 
 def test_no_value_in_sixty_digits() -> None:
-    """Where a step has none, there is none, even if later steps hid it."""
+    """If an operation has no value, nor has the result, even if later operations would hide it."""
     tape = Tape()
     x, one = tape.input("x", Stage.POSITIONS), tape.constant(1.0)
     root = tape.apply("sqrt", x - one)

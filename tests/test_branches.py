@@ -1,7 +1,7 @@
-"""Steps of adaptive methods: as long as their error allows, and nothing brief is passed over.
+"""Steps of adaptive methods are as long as their error allows, and pass over no branch.
 
-Pulses have areas in closed form; contacts, stops, ropes and kicks of random trees are compared with
-runs whose steps are so short that they can miss nothing.
+Areas of pulses are known in closed form. Contacts, stops, ropes and kicks of random trees are
+compared with runs with very short steps.
 """
 
 import math
@@ -60,14 +60,14 @@ PULSES = {
 
 @cache
 def module(scene: str):
-    """A scene's module."""
+    """The module of a scene."""
     return load_module(compile_scene(parse_scene(scene)))
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("shape", PULSES)
 def test_pulses_are_found(shape: str, method: str) -> None:
-    """However short, and wherever in a run that is otherwise one step to the method."""
+    """However short it is, and wherever, in a run that takes a single step without it."""
     torque, area = PULSES[shape]
     rng = np.random.default_rng(sum(map(ord, shape + method)))
     for _ in range(40 if FULL else 1):
@@ -82,14 +82,14 @@ def test_pulses_are_found(shape: str, method: str) -> None:
 
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_every_pulse_of_many_is_found(method: str) -> None:
-    """One part in a hundred of each period of 0.1 s."""
+    """A pulse in each period of 0.1 s, one hundredth of it long."""
     scene = WHEEL.format(torque="step(sin(20*pi*t) - cos(pi/100))")
     run = integrate(as_problem(module(scene)), method, 1.0, rtol=1e-6, samples=2)
     assert run.y[-1, 1] == pytest.approx(0.01 / INERTIA, rel=1e-3)
 
 
 def test_extrapolation_sees_a_jump_anywhere_in_a_step() -> None:
-    """Its rows ask for no derivative near the ends of a step; its rows between are right, too."""
+    """Its table has no derivative near the ends of a step; dense output is correct, too."""
     problem = as_problem(module(WHEEL.format(torque="step(t - a)")), {"a": 1.0, "w": 1.0})
     for at in np.linspace(0.5, 9.0, 20):
         problem = as_problem(module(WHEEL.format(torque="step(t - a)")), {"a": at, "w": 1.0})
@@ -152,9 +152,7 @@ v = { ball_y_dot = 3.0 }
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("scene", [QUADROTOR, ROPE], ids=["quadrotor", "rope"])
 def test_steps_are_as_long_as_their_error_allows(scene: str, method: str) -> None:
-    """A saturated controller and a rope that stays taut: as many steps as if nothing could be
-    passed over.
-    """
+    """A saturated controller and a taut rope take as many steps as without the check."""
     problem = as_problem(module(scene))
     free = integrate(replace(problem, corners=False, switching=None), method, 10.0, rtol=1e-6)
     run = integrate(problem, method, 10.0, rtol=1e-6)
@@ -165,8 +163,8 @@ def test_steps_are_as_long_as_their_error_allows(scene: str, method: str) -> Non
 
 
 def tree(seed: int) -> str:
-    """A random tree in the plane that meets stops, the ground, a rope and a kick, each but briefly
-    or not at all.
+    """A random planar tree that meets stops, the ground, a rope and a kick, each briefly or not at
+    all.
     """
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, 4))
@@ -210,8 +208,8 @@ def tree(seed: int) -> str:
 
 @pytest.mark.parametrize("seed", range(60 if FULL else 1))
 def test_brief_contacts_of_random_trees(seed: int) -> None:
-    """As close to runs in very short steps as runs in 1000 steps are, but for what the motion
-    magnifies, which a run at another tolerance tells.
+    """As close to a run with very short steps as a run with 1000 steps, except where the motion
+    amplifies errors, which a run with another tolerance shows.
     """
     problem, t_end = as_problem(module(tree(seed))), some(1.5, 3.0)
     y = problem.initial.copy()
@@ -228,9 +226,9 @@ def test_brief_contacts_of_random_trees(seed: int) -> None:
         assert off <= max(1e-6, 1e4 * noise, 30 * before), (method, off, before, noise)
 
 
-def test_what_turns_fast_is_looked_at_in_every_turn() -> None:
-    """A rotor that nothing turns but a cam of 4° once a turn: to a method its motion is a straight
-    line, and one step spans the whole run.
+def test_fast_rotation_is_checked_in_every_revolution() -> None:
+    """A rotor that only a cam of 4° accelerates, once per revolution: without it, the method would
+    cover the whole run in one step.
     """
     scene = WHEEL.format(torque="-0.01*step(cos(q) - cos(pi/90))")
     problem = replace(as_problem(module(scene)), initial=np.array([1.0, 3.0]))
@@ -242,8 +240,8 @@ def test_what_turns_fast_is_looked_at_in_every_turn() -> None:
 
 
 @pytest.mark.usefixtures("blank_figures")
-def test_a_step_that_cannot_be_followed_is_held_and_reported(capsys, tmp_path) -> None:
-    """A cam that turns a million times: no steps can see it all, and the run says so."""
+def test_a_step_that_cannot_be_followed_is_limited_and_reported(capsys, tmp_path) -> None:
+    """With a million revolutions of a cam, steps are limited, and the run reports that."""
     scene = tmp_path / "wheel.toml"
     cam = WHEEL.format(torque="-1e-9*step(cos(q) - cos(pi/90))")
     scene.write_text(cam + "[initial]\nv = { q_dot = 1e6 }\n[simulation]\nt_end = 5\n")
@@ -258,8 +256,8 @@ def test_a_step_that_cannot_be_followed_is_held_and_reported(capsys, tmp_path) -
     assert held and 40 <= int(held[1]) <= int(held[2]) <= 80
 
 
-def test_without_switching_functions_steps_are_held() -> None:
-    """Where the corners of a derivative are not known, and where a step is cut, it is counted."""
+def test_without_switching_functions_steps_are_limited() -> None:
+    """Limited steps and steps that are cut are counted."""
     problem = Problem(
         name="kicked",
         states=("q", "v"),
@@ -277,7 +275,7 @@ def test_without_switching_functions_steps_are_held() -> None:
 
 
 def test_functions_of_intervals_enclose() -> None:
-    """What a function makes of numbers in an interval lies in what it makes of the interval."""
+    """The image of every number in an interval lies in the image of the interval."""
     rng = np.random.default_rng(5)
     for name, arity in FUNCTIONS.items():
         for _ in range(200):
@@ -293,7 +291,7 @@ def test_functions_of_intervals_enclose() -> None:
 
 
 def test_arithmetic_of_intervals_encloses() -> None:
-    """Sums, products and quotients, with numbers, too, and those of something with itself."""
+    """Sums, products and quotients of intervals and numbers, and of an interval with itself."""
     rng = np.random.default_rng(6)
     for _ in range(2000):
         (a, b), (r, s) = rng.normal(size=2), 10 ** rng.uniform(-6, 0.5, 2)
@@ -306,7 +304,7 @@ def test_arithmetic_of_intervals_encloses() -> None:
 
 
 def test_changes_in_time_are_found_where_they_are() -> None:
-    """All zeros of a wave within a step, to its last digits, however many."""
+    """All zeros of a wave within a step, to the last digits, however many."""
     sine = BY_INTERVALS["sin"]
     schedule = Schedule(lambda t: [sine(t * 40.0)])
     found, whole = schedule.changes(0.01, 3.0)
@@ -317,7 +315,7 @@ def test_changes_in_time_are_found_where_they_are() -> None:
 
 
 def test_scenes_without_corners_have_no_such_functions() -> None:
-    """Nor are their bytes other ones for it."""
+    """And their bytes are the same as without the check."""
     smooth = module(WHEEL.format(torque="sin(t)"))
     assert not hasattr(smooth, "switching_functions")
     assert not hasattr(smooth, "switching_functions_of_time")

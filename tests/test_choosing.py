@@ -1,4 +1,4 @@
-"""`--accuracy`, `--budget`, `--estimate`: what is chosen holds, and what is wrong is told."""
+"""`--accuracy`, `--budget`, `--estimate`: the choice meets its bound, and errors are reported."""
 
 import math
 import re
@@ -329,7 +329,7 @@ def rows(folder: Path) -> FloatArray:
 
 
 def test_the_same_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The options that are told make the same run, to the last bit, works or not, few rows or many.
+    """The options printed make the same run, to the last bit, works or not, few rows or many.
 
     Which they are is the same each time.
     """
@@ -341,9 +341,9 @@ def test_the_same_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     for name, more in (("many", ("--samples", "300")), ("few", ("--works", "--samples", "5"))):
         one = made(name, "--accuracy", "5e-6", *more)
         out = capsys.readouterr().out
-        (told,) = re.findall(r"chosen: (--integrator .*)", out)
+        (options,) = re.findall(r"chosen: (--integrator .*)", out)
         assert re.search(r"error estimate \S+ of the motion's scale at the end, at most", out)
-        two = made(f"{name} again", *told.split(), "--samples", "300")
+        two = made(f"{name} again", *options.split(), "--samples", "300")
         assert len(one) == int(more[-1]) and np.array_equal(two[-1], one[-1])
         assert name == "few" or np.array_equal(one, two)
 
@@ -427,7 +427,7 @@ def test_what_cannot_be_asked(
 
 
 def test_a_scene_that_breaks_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Where no method gets to the end, the farthest run is kept, and its reason told."""
+    """Where no method gets to the end, the farthest run is kept, and its reason reported."""
     scene = tmp_path / "breaks.toml"
     text = STIFF.replace("damping = 0.1", 'damping = 0.1, law = "1 / (0.001 - deflection)"')
     scene.write_text(text)

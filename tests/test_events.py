@@ -20,7 +20,7 @@ from eomgen.run.works import Powers
 
 G = 9.81
 FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
-# Leapfrog knows no contacts.
+# Leapfrog cannot run contacts.
 GENERAL = [name for name in INTEGRATORS if name != "leapfrog"]
 A_FEW = some([n for n in GENERAL if not n.endswith(("_differences", "_6", "euler"))], GENERAL)
 EXACT = {"rtol": 1e-12, "atol": 1e-14}
@@ -112,7 +112,7 @@ def times(trajectory, kind="impact"):
 
 
 def dense(problem, integrator, t_end, **options):
-    """A run of whose rows none was deeper than the tolerance."""
+    """A run in which no row penetrates by more than the tolerance."""
     trajectory = run(problem, integrator, t_end, samples=5001, **options)
     gaps = [problem.contacts.gaps(t, y) for t, y in zip(trajectory.t, trajectory.y, strict=True)]
     assert np.min(gaps) >= -TOLERANCE
@@ -120,7 +120,7 @@ def dense(problem, integrator, t_end, **options):
 
 
 def bounces(count, height, e):
-    """Times of the bounces of a ball let go, and where they gather."""
+    """The times of the bounces of a dropped ball, and their limit."""
     fall = math.sqrt(2 * height / G)
     at = fall * (1 + 2 * e * (1 - e ** np.arange(count)) / (1 - e))
     return at, fall * (1 + e) / (1 - e)
@@ -131,7 +131,7 @@ def bounces(count, height, e):
 
 @pytest.mark.parametrize("e", [0.3, 0.8])
 def test_bouncing_ball(e):
-    """Every bounce at its time, with its speed, and the end of bouncing where it is stated."""
+    """Time and speed of every bounce, and the end of the bouncing at the documented speed."""
     trajectory = dense(ball(1.0, e), "DOP853", 5.0, **EXACT)
     at = times(trajectory)
     exact, end = bounces(len(at), 1.0, e)
@@ -170,8 +170,8 @@ def test_energy_after_bounces():
 
 @pytest.mark.parametrize("name", GENERAL)
 def test_every_integrator_bounces_and_rests(name):
-    """Euler's method, of order 1, is right to its step; those that solve a parabola exactly are
-    right to rounding.
+    """Euler's method, of order 1, is accurate to its step; methods that are exact for parabolas are
+    accurate to rounding.
     """
     order = getattr(INTEGRATORS[name], "order", 4)
     dt = 1e-3 if order == 1 else 1e-2
@@ -185,7 +185,7 @@ def test_every_integrator_bounces_and_rests(name):
 
 
 def test_bounces_are_as_exact_as_the_method():
-    """On a spring through air, where nothing is a polynomial: the order of each method."""
+    """On a spring with drag, where nothing is a polynomial: each method has its order."""
 
     def force(t, q, v):
         return -G - 30 * (q - 0.4) - 0.7 * v
@@ -209,7 +209,7 @@ def test_bounces_are_as_exact_as_the_method():
 @pytest.mark.parametrize("margin", [-1e-6, 0.0, 1e-6])
 @pytest.mark.parametrize("name", ["DOP853", "rk4", "Radau"])
 def test_grazing(name, margin):
-    """A thrown ball under a ceiling: struck, touched or missed by a micrometre, in one step."""
+    """A ball thrown at a ceiling hits, touches or misses it by a micrometre, in one step."""
     top = 5.0**2 / (2 * G)
     problem = mechanism([0.0], [5.0], [[-1.0]], [top + margin], force=weight, bounce=0.5)
     trajectory = run(problem, name, 1.0, dt=1.0, **({} if name in FIXED else EXACT))
@@ -223,8 +223,8 @@ def test_grazing(name, margin):
         assert trajectory.y[-1] == pytest.approx([5 - G / 2, 5 - G], abs=1e-8)
 
 
-def test_a_bounce_within_the_first_look_is_not_missed():
-    """Up from the ground and down again within a twentieth of an enormous step."""
+def test_a_bounce_before_the_first_check_is_not_missed():
+    """Up from the ground and down again within a twentieth of a very long step."""
     problem = ball(0.0, 1.0, v=0.2)
     trajectory = integrate(problem, "rk4", 2.5, dt=2.5)
     np.testing.assert_allclose(times(trajectory)[:50], 0.4 / G * np.arange(1, 51), rtol=1e-11)
@@ -292,7 +292,7 @@ LEVER = np.array([2.0, 0.6, 0.3])
 
 
 def test_a_plate_on_four_corners():
-    """One force too many: the singular system of a rest, and a landing that rocks out."""
+    """Redundant contacts: a singular system at rest, and a landing that rocks until it rests."""
     rest = run(plate([0, 0, 0], [0, 0, 0], 0.5), "DOP853", 1.0)
     assert rest.y[-1] == pytest.approx(np.zeros(6), abs=1e-12)
     assert [e.kind for e in rest.events] == ["rest"] * 4
@@ -327,7 +327,7 @@ def slope(angle, mu, v, slip_speed=1e-4):
 
 @pytest.mark.parametrize("name", ["rk4", "DOP853", "Radau", "BDF"])
 def test_block_slides_on_a_slope(name):
-    """Down it with g (sin - mu cos), to the size of the friction's smoothing."""
+    """With the acceleration g (sin - mu cos), to the width of the friction's smoothing."""
     trajectory = run(slope(0.5, 0.3, -1.0), name, 1.0, rtol=1e-10)
     down = G * (math.sin(0.5) - 0.3 * math.cos(0.5))
     assert trajectory.y[-1] == pytest.approx([-1 - down / 2, 0, -1 - down, 0], abs=3e-8)
@@ -336,7 +336,7 @@ def test_block_slides_on_a_slope(name):
 
 @pytest.mark.parametrize("name", ["Radau", "BDF", "LSODA"])
 def test_block_comes_to_a_stop_on_a_slope(name):
-    """Pushed up a slope that holds it: v²/2g(sin + mu cos) far, then it creeps as is stated."""
+    """Pushed up a slope that holds it: it moves v²/2g(sin + mu cos), then creeps as documented."""
     slip_speed, sine, cosine = 1e-4, math.sin(0.3), math.cos(0.3)
     trajectory = run(slope(0.3, 0.6, 2.0, slip_speed), name, 1.5)
     part = sine / (0.6 * cosine)
@@ -352,7 +352,7 @@ def shaken(t):
 
 @pytest.mark.parametrize("name", A_FEW)
 def test_mass_leaves_a_shaken_table(name):
-    """Where the table falls faster than g; then it flies, and meets it again."""
+    """It lifts when the table accelerates downward by more than g, flies, and lands again."""
     problem = mechanism([0.0], [1.2], [[1.0]], force=weight, ground=shaken, bounce=0.0)
     lift = math.asin(G / 14.4) / 12
     fixed, order = name in FIXED, getattr(INTEGRATORS[name], "order", 4)
@@ -388,7 +388,7 @@ def test_what_flies_off_is_not_struck_again_where_it_was():
 
 
 def hump(v):
-    """A point mass on a circle's top, without friction."""
+    """A point mass on top of a circle, without friction."""
 
     def gap(t, y):
         return np.array([math.hypot(y[0], y[1]) - 1])
@@ -445,7 +445,7 @@ def test_mass_slides_off_a_hump(name):
 
 
 def every_solution(matrix, offset):
-    """By trying each set of contacts that push."""
+    """All solutions, by trying each set of contacts that push."""
     for acts in product((False, True), repeat=len(offset)):
         acts = np.array(acts)
         forces = np.zeros(len(offset))
@@ -458,7 +458,7 @@ def every_solution(matrix, offset):
 @pytest.mark.parametrize("method", [complementary, lambda m, o: _lemke(m, o, np.abs(o).max())])
 @pytest.mark.parametrize("rank", [6, 3])
 def test_forces_push_and_never_pull(method, rank):
-    """Against all sets of contacts, one after the other: accelerations are the same."""
+    """Accelerations agree with those of an exhaustive search over sets of contacts."""
     noise = np.random.default_rng(rank)
     pushed = 0
     for _ in range(100):
@@ -486,7 +486,7 @@ def test_there_may_be_no_forces():
 
 
 def airy(names=("gravity", "air", "ground")):
-    """A ball that slides on landing: weight, drag, and the ground that takes energy."""
+    """A ball that slides after landing: weight, drag, and a ground that dissipates energy."""
 
     def drag(v):
         return -0.3 * np.hypot(v[0], v[1]) * v
@@ -508,7 +508,7 @@ def airy(names=("gravity", "air", "ground")):
 
 @pytest.mark.parametrize("names", [("gravity", "air", "ground"), ("gravity", "air")])
 def test_works_sum_to_the_change_of_energy(names):
-    """At every row, through air, impacts, sliding and rest; the ground's is booked as its own."""
+    """At every row, through drag, impacts, sliding and rest; the ground has its own work."""
     problem, powers = airy(names)
     trajectory = run(problem, "DOP853", 2.3, powers=powers, **EXACT)
     assert trajectory.work_names == ("gravity", "air", "ground")
@@ -521,10 +521,10 @@ def test_works_sum_to_the_change_of_energy(names):
     gravity, air, ground = trajectory.works[-1]
     assert gravity == pytest.approx(G, abs=1e-9)
     assert air < -0.1
-    # On the ground from its rest on it only slides: friction, and air, take what there is.
+    # From its rest on it only slides on the ground: friction and drag dissipate its energy.
     start = int(np.searchsorted(trajectory.t, trajectory.events[-1].t, side="right"))
     assert trajectory.works[start, 2] - ground > 0.01
-    # Without asking there are none, and the run is the same.
+    # Works are not computed by default, and the run is the same.
     plain = run(problem, "DOP853", 2.3, **EXACT)
     assert plain.works is None
     assert plain.work_names == ()
@@ -567,13 +567,13 @@ def test_starts_too_deep():
         "stopped at t = 0, q0=-0.02, v0=0: contact ground_ball starts 0.02 deep; "
         "move its bodies apart in the initial state"
     )
-    # What is within the tolerance is taken back, by (1 + αt) exp(-αt).
+    # A penetration within the tolerance decays like (1 + αt) exp(-αt).
     left = run(ball(-1e-9, 0.5), "rk4", 1.0).y[-1, 0]
     assert left == pytest.approx(-1e-9 * 11 * math.exp(-10), rel=1e-3)
 
 
 def test_no_forces():
-    """A contact that a push closes, as Painlevé's rod may have it."""
+    """A contact that a push closes, as in Painlevé's paradox."""
     problem = ball(0.0, 0.5)
 
     def held(t, y, forces):
@@ -596,7 +596,7 @@ def test_impacts_without_end():
 
 
 def test_bouncing_without_end(monkeypatch):
-    """A rest speed below what can be told from none."""
+    """With a rest speed that is negligible."""
     assert message(ball(1.0, 0.9999), t_end=1e5, rest_speed=1.0, max_steps=500).endswith(
         "500 steps did not suffice; try another --integrator, or a looser --rtol and --atol"
     )

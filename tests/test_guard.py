@@ -1,4 +1,4 @@
-"""Runs guarded against lost digits: stopped, repaired, and left alone where nothing is lost."""
+"""Guarded runs: stopped or repaired where digits are lost, otherwise unchanged."""
 
 from dataclasses import replace
 from functools import cache
@@ -50,25 +50,25 @@ r_child = [-0.5, 0]
 
 @cache
 def heavy(route: str) -> tuple[Any, Program]:
-    """Its module by a route, and the program of it."""
+    """The module of the heavy chain by a route, and its program."""
     model = replace(elaborate(parse_scene(HEAVY)), route=route)
     system = compile_program(model, jacobian=False).system
     return load_module(python_module(system)), system.program
 
 
 def run(module: Any, guard: Guard | None) -> Any:
-    """Ten steps, longer than the heavy tip's tight links would allow for good."""
-    return integrate(unlooked(module), "rk4", 0.1, dt=0.01, guard=guard)
+    """Ten steps, too long for stability over a longer time."""
+    return integrate(unchecked(module), "rk4", 0.1, dt=0.01, guard=guard)
 
 
-def unlooked(module: Any) -> Problem:
-    """What no step is found too long for: without slopes."""
+def unchecked(module: Any) -> Problem:
+    """The problem without the check of stability, by a zero Jacobian."""
     return replace(as_problem(module), jacobian=lambda t, y: np.full((len(y), len(y)), np.nan))
 
 
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 def test_a_run_that_loses_digits_is_stopped_and_says_what_to_do(route: str) -> None:
-    """Before a step is taken from there: no row is wrong."""
+    """Before the next step, so that no row is wrong."""
     module, program = heavy(route)
     guard = guard_of(module, program)
     y = module.initial_state()
@@ -83,13 +83,11 @@ def test_a_run_that_loses_digits_is_stopped_and_says_what_to_do(route: str) -> N
 
 
 def test_a_repaired_run_is_right() -> None:
-    """Against the same method all in extended precision, and against the route that loses
-    nothing.
-    """
+    """It agrees with a run in extended precision, and with a route that loses no digits."""
     module, program = heavy("aba")
     guard = guard_of(module, program, repairs=True)
     repaired, plain = run(module, guard), run(module, None)
-    problem = replace(unlooked(module), derivative=guard.exact)
+    problem = replace(unchecked(module), derivative=guard.exact)
     true = integrate(problem, "rk4", 0.1, dt=0.01).y
     scale = np.max(np.abs(true), axis=0)
     assert repaired.finished and "were repaired in extended precision" in repaired.message
@@ -103,7 +101,7 @@ def test_a_repaired_run_is_right() -> None:
 
 @pytest.mark.parametrize("integrator", ["rk4", "DOP853", "LSODA"])
 def test_a_healthy_run_is_the_same_with_and_without(integrator: str) -> None:
-    """Byte for byte, counts included, whether the guard would stop or repair."""
+    """To the byte, including counts, whether the guard would stop or repair."""
     model = elaborate(read_scene("babyboot"))
     system = compile_program(replace(model, outputs=())).system
     module = load_module(python_module(system))
@@ -118,7 +116,7 @@ def test_a_healthy_run_is_the_same_with_and_without(integrator: str) -> None:
 
 
 def spiky(bad: tuple[float, float]) -> tuple[Problem, Guard]:
-    """x' = 1, which doubles get wrong by 1e-3 while x lies between two values."""
+    """x' = 1, which doubles get wrong by 1e-3 while x is between two values."""
 
     def derivative(t: float, y: np.ndarray) -> np.ndarray:
         return np.array([1.001 if bad[0] < y[0] < bad[1] else 1.0])
@@ -128,7 +126,7 @@ def spiky(bad: tuple[float, float]) -> tuple[Problem, Guard]:
 
 
 def test_digits_lost_for_a_while_are_repaired_for_a_while() -> None:
-    """The step into the stretch is made again; after it doubles are trusted again."""
+    """The step that loses digits is repeated; later the run returns to doubles."""
     problem, guard = spiky((0.45, 0.65))
     calls = []
     exact = guard.exact
@@ -145,7 +143,7 @@ def test_digits_lost_for_a_while_are_repaired_for_a_while() -> None:
 
 
 def test_tight_tolerances_ask_for_more_digits() -> None:
-    """A derivative 1e-9 off serves a run at rtol 1e-9, and not one at 1e-12."""
+    """A derivative with an error of 1e-9 suffices for rtol 1e-9, but not for 1e-12."""
     problem, guard = spiky((-1.0, 2.0))
     slightly = replace(problem, derivative=lambda t, y: np.array([1.0 + 1e-9]))
     guard = replace(guard, repairs=False)
@@ -155,7 +153,7 @@ def test_tight_tolerances_ask_for_more_digits() -> None:
 
 
 def test_a_domain_that_is_left_and_a_quaternion_that_drifts_are_reported() -> None:
-    """Each as what it is."""
+    """Each with its own message."""
     problem, guard = spiky((2.0, 3.0))
     gone = replace(guard, exact=lambda t, y: np.array([np.nan if y[0] > 0.5 else 1.0]))
     found = integrate(problem, "rk4", 1.0, dt=0.1, guard=replace(gone, repairs=False))
@@ -177,7 +175,7 @@ def test_a_domain_that_is_left_and_a_quaternion_that_drifts_are_reported() -> No
 
 
 def test_what_doubles_cannot_evaluate_counts_as_lost() -> None:
-    """Not a number, or an error, is no answer."""
+    """A nan or an error of the derivative counts as a loss of all digits."""
     problem, guard = spiky((2.0, 3.0))
     for wrong in (lambda t, y: np.array([np.nan]), lambda t, y: np.array([1.0 / 0.0])):
         monitor = RoundingMonitor(guard, replace(problem, derivative=wrong), LOST)
@@ -185,7 +183,7 @@ def test_what_doubles_cannot_evaluate_counts_as_lost() -> None:
 
 
 def test_contacts_cannot_be_repaired() -> None:
-    """A line says so, and what can be done."""
+    """A message says so, and what to do instead."""
     model = elaborate(read_scene("bouncing_two_body"))
     system = compile_program(replace(model, outputs=()), jacobian=False).system
     module = load_module(python_module(system))

@@ -1,4 +1,4 @@
-"""Fast and slow motions, large numbers, long runs, and runs that go on where one ended."""
+"""Fast and slow motions, large numbers, long runs, and runs that continue earlier ones."""
 
 from dataclasses import replace
 from functools import cache
@@ -35,7 +35,7 @@ g = 9.81
 
 @cache
 def problem(scene: str) -> Problem:
-    """A scene by its name or text."""
+    """The problem of a scene, given by name or as text."""
     return as_problem(light(scene).module)
 
 
@@ -50,7 +50,7 @@ def ran(asked: Problem, method: str, t_end: float, **given: Any) -> Trajectory:
 
 @pytest.mark.parametrize("scene", ["spinning_top", "tumbling_body"])
 def test_spins_of_1e5_keep_their_digits(scene: str) -> None:
-    """v̇ against 60 digits, in parts of its largest component; squares of 1e5 rad/s cancel."""
+    """v̇ against 60 digits, relative to its largest component; squares of 1e5 rad/s cancel."""
     made, spin = light(scene), 1e5
     noise, nq = np.random.default_rng(3), len(made.model.coordinates)
     rows = []
@@ -65,7 +65,7 @@ def test_spins_of_1e5_keep_their_digits(scene: str) -> None:
 
 
 def test_a_top_at_1e5_rad_per_s_keeps_its_energy() -> None:
-    """Over some 160 turns."""
+    """Over about 160 revolutions."""
     asked, module = problem("spinning_top"), light("spinning_top").module
     y = asked.initial.copy()
     y[list(module.STATES).index("tip_wz")] = 1e5
@@ -77,7 +77,7 @@ def test_a_top_at_1e5_rad_per_s_keeps_its_energy() -> None:
 
 @pytest.mark.parametrize(("spin", "sleeps"), [(100.0, True), (40.0, False)])
 def test_a_sleeping_top(spin: float, sleeps: bool) -> None:
-    """Upright, it stays exactly so; nudged, it stays near if I₃ω > 2 √(m g h I), and else falls."""
+    """Upright, it stays so exactly; displaced, it stays near if I₃ω > 2 √(m g h I), or it falls."""
     asked, module = problem("spinning_top"), light("spinning_top").module
     p, names = module.PARAMETERS, list(module.STATES)
     critical = 2 * np.sqrt(p["m"] * 9.81 * p["h"] * (p["I_1"] + p["m"] * p["h"] ** 2)) / p["I_3"]
@@ -93,7 +93,7 @@ def test_a_sleeping_top(spin: float, sleeps: bool) -> None:
 
 
 def test_late_times_lose_nothing() -> None:
-    """What knows no time runs at 1e6 s as at 0, but for the rounding of its steps' ends."""
+    """Autonomous motion is the same at 1e6 s as at 0, but for the rounding of the steps' ends."""
     early = ran(problem(PENDULUM), "DOP853", 5.0, rtol=1e-12, atol=1e-14)
     late = ran(problem(PENDULUM), "DOP853", 1e6 + 5, t_start=1e6, rtol=1e-12, atol=1e-14)
     rate = np.max(np.abs(early.y[:, 1]))
@@ -101,8 +101,8 @@ def test_late_times_lose_nothing() -> None:
 
 
 def test_angles_of_1e8_lose_what_their_digits_force() -> None:
-    """v̇ at the very number is right to rounding; the motion is that of the same angle within a
-    turn, to what 1e8 rounds by.
+    """v̇ is accurate to rounding; the motion is that of the same angle modulo 2π, to the rounding
+    error of 1e8.
     """
     made = light(PENDULUM)
     noise = np.random.default_rng(5)
@@ -123,7 +123,7 @@ def test_angles_of_1e8_lose_what_their_digits_force() -> None:
 
 
 def test_quaternions_stay_unit() -> None:
-    """Of a tumbling body, at each row of up to a million steps."""
+    """For a tumbling body, at each row of up to a million steps."""
     asked = problem("tumbling_body")
     steps = some(20_000, 1_000_000)
     run = ran(asked, "semi_implicit_euler", steps * 1e-4, dt=1e-4, samples=1001)
@@ -137,7 +137,7 @@ def test_quaternions_stay_unit() -> None:
 
 @pytest.mark.parametrize(("method", "dt"), [("leapfrog", 0.05), ("gauss_4", 0.2)])
 def test_symplectic_methods_keep_the_energy(method: str, dt: float) -> None:
-    """In a band whose middle does not move: the last tenth of a run is as the first."""
+    """The error stays in a band without drift: the last tenth of a run is like the first."""
     steps = some({"leapfrog": 20_000, "gauss_4": 2_000}[method], 1_000_000)
     run = ran(problem(PENDULUM), method, steps * dt, dt=dt)
     energy = 0.55 * run.y[:, 1] ** 2 - 9.81 * np.cos(run.y[:, 0])
@@ -149,8 +149,8 @@ def test_symplectic_methods_keep_the_energy(method: str, dt: float) -> None:
 
 
 def test_the_redundant_state_drifts_and_the_reduced_one_does_not() -> None:
-    """The handout's twelve numbers let the joint come apart by the method's error, which its eight
-    cannot: there the joint is closed whatever the error.
+    """With the handout's twelve numbers the joint opens by the method's error. With its eight
+    numbers it is closed whatever the error.
     """
     gaps = {}
     for form, count in (("redundant", 12), ("momentum", 8)):
@@ -164,7 +164,7 @@ def test_the_redundant_state_drifts_and_the_reduced_one_does_not() -> None:
 
 
 def _gap(module: Any, run: Trajectory) -> float:
-    """How far apart the joint's two points come, m."""
+    """The distance between the joint's two points, m."""
     found, p = 0.0, module.PARAMETERS
     for t, y in zip(run.t, run.y, strict=True):
         (xa, ya, a), (xb, yb, b) = module.body_poses(t, y)
@@ -189,7 +189,7 @@ GOING_ON = {
 
 @pytest.mark.parametrize("method", GOING_ON)
 def test_a_run_goes_on_to_the_same_bytes(method: str) -> None:
-    """Ended twice on the way, at times that are no step's, or once not."""
+    """A run that ended twice on the way, not at ends of steps, agrees with one that did not."""
     asked, given = problem(PENDULUM), GOING_ON[method]
     whole = ran(asked, method, 3.0, **given)
     run = ran(asked, method, 1.0, **given)
@@ -210,7 +210,7 @@ LEGS = {
 
 @pytest.mark.parametrize("method", LEGS)
 def test_legs_of_no_whole_step_keep_what_the_next_goes_on_from(method: str) -> None:
-    """Shorter than a step, at the start too, where the method chooses its first one."""
+    """Shorter than a step, also at the start, where the method chooses its first step."""
     scene, ends, given = LEGS[method]
     asked = problem(scene)
     whole = ran(asked, method, ends[-1], **given)
@@ -222,9 +222,7 @@ def test_legs_of_no_whole_step_keep_what_the_next_goes_on_from(method: str) -> N
 
 @pytest.mark.parametrize(("method", "rtol"), [("DOP853", 1e-8), ("gragg_bulirsch_stoer", 1e-6)])
 def test_a_step_that_the_end_cut_short_is_not_gone_on_from(method: str, rtol: float) -> None:
-    """Even where it was refused then, and is tried again in a length that still knows of the end:
-    whatever the end.
-    """
+    """Even if it was rejected and retried with another length, which depends on the end, too."""
     asked = problem(PENDULUM)
     whole = ran(asked, method, 1.5, rtol=rtol)
     for t_end in np.linspace(0.2, 1.4, 40):
@@ -234,7 +232,7 @@ def test_a_step_that_the_end_cut_short_is_not_gone_on_from(method: str, rtol: fl
 
 
 def test_a_bouncing_run_goes_on_to_the_same_bytes() -> None:
-    """In flight, and when it lies: what is held, and since where, goes along."""
+    """In flight and at rest: the file has the contacts that are held, and since when."""
     asked, dt = problem("bouncing_two_body"), 2.0**-9
     whole = ran(asked, "rk4", 2.0, dt=dt)
     for t_end in (0.75, 1.5):
@@ -245,7 +243,9 @@ def test_a_bouncing_run_goes_on_to_the_same_bytes() -> None:
 
 @pytest.mark.usefixtures("blank_figures")
 def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The same bytes from the file; what cannot go on so says why, and nothing is overwritten."""
+    """The file gives the same bytes. If the run cannot be continued exactly, the message says why.
+    No file is overwritten.
+    """
     scene = tmp_path / "swing.toml"
     scene.write_text(PENDULUM)
     ends: dict[str, Trajectory] = {}
@@ -258,12 +258,12 @@ def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
         assert main(["simulate", str(scene), *given]) == 0
         ends[folder] = load_npz(tmp_path / folder / "swing.npz")
     assert ends["second"].y[-1].tobytes() == ends["whole"].y[-1].tobytes()
-    assert "goes on from t = 0.999 s as if the run had not ended" in capsys.readouterr().out
+    assert "continues from t = 0.999 s as if the run had not ended" in capsys.readouterr().out
     again = ["simulate", str(scene), "--from", str(tmp_path / "first/swing.npz")]
     assert main([*again, "--t-end", "2", "-o", str(tmp_path / "first")]) == 1
     assert "would be overwritten; give another folder with -o" in capsys.readouterr().err
     assert main([*again, "--t-end", "2", "-o", str(tmp_path / "other")]) == 0
-    assert "begins anew from the state at t = 1 s: that run was by rk4" in capsys.readouterr().out
+    assert "starts anew from the state at t = 1 s: that run used rk4" in capsys.readouterr().out
     assert main([*again, "--t-end", "0.5", "-o", str(tmp_path / "other")]) == 1
     assert "t_end: 0.5 is not after t_start = 1" in capsys.readouterr().err
     wrong = ["simulate", "pendulum", "--from", str(tmp_path / "first/swing.npz")]
@@ -300,29 +300,29 @@ def test_what_differs_from_the_run_that_goes_on_is_reported(
     saved = tmp_path / "first/swing.npz"
     given += ["--from", str(saved), "--t-end", "2", "-o", str(tmp_path / "second")]
 
-    def told(*changed: str) -> str:
+    def output(*changed: str) -> str:
         capsys.readouterr()
         code = main([*given, *changed])
         said = capsys.readouterr()
         assert code == (1 if said.err else 0)
         return said.out + said.err
 
-    assert "as if the run had not ended" in told(*base)
-    anew = "begins anew from the state at t = 1 s: that run had "
-    assert f"{anew}b_mass = 2.0, not 50.0" in told(*base, "--set", "b_mass=50")
-    assert f"{anew}drive = 0.5, not 0.0" in told(*base[:2], *base[4:])
-    assert f"{anew}--rtol 1e-08, not 1e-06" in told(*base, "--rtol", "1e-6")
-    assert f"{anew}--max-step at its default, not 0.01" in told(*base, "--max-step", "0.01")
+    assert "as if the run had not ended" in output(*base)
+    anew = "starts anew from the state at t = 1 s: that run had "
+    assert f"{anew}b_mass = 2.0, not 50.0" in output(*base, "--set", "b_mass=50")
+    assert f"{anew}drive = 0.5, not 0.0" in output(*base[:2], *base[4:])
+    assert f"{anew}--rtol 1e-08, not 1e-06" in output(*base, "--rtol", "1e-6")
+    assert f"{anew}--max-step at its default, not 0.01" in output(*base, "--max-step", "0.01")
     text = scene.read_text()
     scene.write_text(text.replace("j_angle = 1.0", "j_angle = 0.9"))
-    assert f"{anew}another initial state" in told(*base)
+    assert f"{anew}another initial state" in output(*base)
     scene.write_text(SPRUNG)
     assert (
         f"eomgen: --from: {saved} is a run of another 'swing': it differs in effect 'coil'; "
-        "give a run of this scene" in told(*base)
+        "give a run of this scene" in output(*base)
     )
     scene.write_text(f"{text}[camera]\nheight = 3.0\n")
-    assert "as if the run had not ended" in told(*base)
+    assert "as if the run had not ended" in output(*base)
 
 
 @pytest.mark.parametrize(
@@ -352,5 +352,5 @@ def test_what_a_run_cannot_have_left_is_refused(
     capsys.readouterr()
     assert main([*given, "--t-end", "2", "-o", str(tmp_path / "b"), "--from", str(saved)]) == 1
     assert capsys.readouterr().err == (
-        f"eomgen: {saved}: what it holds to go on from does not fit rk4; simulate again\n"
+        f"eomgen: {saved}: its data for continuing do not fit rk4; simulate again\n"
     )

@@ -1,4 +1,4 @@
-"""Integrators against exact solutions, invariants, and everything that can go wrong in a run."""
+"""Integrators against exact solutions and invariants, and all errors of a run."""
 
 import io
 import math
@@ -37,7 +37,7 @@ from eomgen.run.trajectory import Outcome
 FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
 ADAPTIVE = [name for name in INTEGRATORS if name not in FIXED]
 ALL = [*FIXED, *ADAPTIVE]
-# Leapfrog serves few problems.
+# Leapfrog can integrate few problems.
 GENERAL = [name for name in ALL if name != "leapfrog"]
 GAUSS = {"implicit_midpoint": implicit_midpoint, "gauss_4": gauss_4, "gauss_6": gauss_6}
 
@@ -49,7 +49,7 @@ PENDULUM = Problem(
     jacobian=lambda t, y: np.array([[0.0, 1.0], [-math.cos(y[0]), 0.0]]),
     initial=np.array([1.2, 0.0]),
 )
-# The order of the states is nobody's business: velocity first here.
+# The order of the states does not matter: velocity first here.
 OSCILLATOR = Problem(
     name="oscillator",
     states=("rate", "place"),
@@ -113,7 +113,7 @@ def pendulum_energy(y):
 @pytest.mark.parametrize("name", FIXED)
 def test_order_is_the_stated_one(name):
     t_end = 2.0
-    # So many that a higher order shows itself, and so few that rounding does not hide the highest.
+    # Enough steps to show a higher order, but so few that rounding does not hide the highest.
     steps = np.array(
         {1: [320, 640, 1280, 2560], 6: [5, 7, 10, 14]}.get(
             INTEGRATORS[name].order, [40, 80, 160, 320]
@@ -179,7 +179,7 @@ def test_the_jacobian_saves_derivative_calls(name):
     assert trajectory.counts["jacobians"] > 10
     assert trajectory.counts["derivatives"] < calls
 
-    # What differencing costs counts as derivatives: all that SciPy asks for, and two for its start.
+    # Evaluations for differences count as derivatives, and so do two for SciPy's first step.
     differing = integrate(van_der_pol, f"{name}_differences", 100.0, rtol=1e-5, atol=1e-7)
     assert differing.y[-1] == pytest.approx(without.y[:, -1], rel=1e-12)
     assert differing.counts["jacobians"] == 0
@@ -217,7 +217,7 @@ def test_symplectic_energy_is_bounded_without_trend(name):
 
 
 def growth(name):
-    """How much a step makes of a small area of states, less 1: differences of order 4."""
+    """The relative change of a small area of states in a step, by differences of order 4."""
     change, e = INTEGRATORS[name].prepare(PENDULUM), 1e-4
 
     def step(*shift):
@@ -278,7 +278,7 @@ PLANET = Problem(
 
 @pytest.mark.parametrize("name", [*GAUSS, "leapfrog"])
 def test_angular_momentum_of_a_planet_is_kept(name):
-    """Eccentricity 0.6, 5 turns; the momentum is 0.8, and bilinear."""
+    """Eccentricity 0.6, 5 revolutions; the momentum is 0.8, and bilinear."""
     orbit = run(PLANET, name, 31.0, dt=0.04).y
     momentum = orbit[:, 0] * orbit[:, 3] - orbit[:, 1] * orbit[:, 2]
     assert momentum == pytest.approx(0.8, rel=2e-14)
@@ -289,7 +289,7 @@ def test_angular_momentum_of_a_planet_is_kept(name):
 
 @pytest.mark.parametrize("name", GAUSS)
 def test_the_length_of_a_quaternion_is_kept(name):
-    """Without being scaled: q' = q w / 2 is linear in q, and |q| quadratic."""
+    """Without normalisation: q' = q w / 2 is linear in q, and |q|² quadratic."""
 
     def matrix(t):
         x, y, z = math.cos(t), 2 * math.sin(3 * t), 1.5
@@ -309,8 +309,8 @@ def test_the_length_of_a_quaternion_is_kept(name):
 
 @pytest.mark.parametrize("name", ["euler", "rk4", "gauss_4"])
 def test_rounding_does_not_drift(name):
-    """Every step is cut off at the last digit of y, always the same way: what is cut off comes
-    back, so that the end is as if it were summed in many digits.
+    """Every step is rounded at the last digit of y in the same direction. Compensated sums give the
+    same end as sums in many digits.
     """
     away = Problem(
         name="away",
@@ -344,7 +344,7 @@ def test_gauss_is_stable_where_stiff(name):
         "gauss_6": (1 + z**2 / 10, z / 2 + z**3 / 120),
     }[name]
     assert trajectory.y[-1, 0] == pytest.approx(((even + odd) / (even - odd)) ** 100, rel=1e-10)
-    # On a linear problem the first iteration is exact, and the second only sees that.
+    # On a linear problem the first iteration is exact, and the second only confirms it.
     stages = len(GAUSS[name].METHOD.b)
     assert trajectory.counts["jacobians"] <= 2 * stages * trajectory.counts["steps"]
 
@@ -360,7 +360,7 @@ def test_newton_needs_the_right_jacobian():
     right = run(PENDULUM, "implicit_midpoint", 5.0, dt=0.1)
     slow = replace(PENDULUM, jacobian=lambda t, y: PENDULUM.jacobian(t, y) * [[1], [1.1]])
     wrong = run(slow, "implicit_midpoint", 5.0, dt=0.1)
-    # It still gets there, since only the residual decides; quadratic convergence is lost.
+    # It still converges, since only the residual matters, but not quadratically.
     assert wrong.y[-1] == pytest.approx(right.y[-1], abs=1e-11)
     assert right.counts["jacobians"] <= 4.5 * right.counts["steps"]
     assert wrong.counts["jacobians"] > 1.3 * right.counts["jacobians"]
@@ -467,7 +467,7 @@ def raising(error):
 
 @pytest.mark.parametrize("name", GENERAL)
 def test_blow_up_keeps_the_finite_rows(name):
-    # LSODA gets stuck one rounding before t = 1; the others run into it or past it.
+    # LSODA stops one rounding before t = 1; the others stop at it or pass it.
     trajectory = run(BLOW_UP, name, 2.0, rtol=1e-6, atol=1e-6)
     last_t, last_y = trajectory.t[-1], trajectory.y[-1, 0]
     assert not trajectory.finished
@@ -530,7 +530,7 @@ def test_a_derivative_that_turns_nan_ends_the_run(name):
 
 
 def _misled(slope):
-    """Van der Pol's oscillator, with a Jacobian that is not its own."""
+    """Van der Pol's oscillator with a wrong Jacobian."""
     return Problem(
         name="van der Pol",
         states=("x", "v"),
@@ -568,7 +568,7 @@ def test_a_singular_matrix_is_in_the_message(method):
 
 
 def test_runs_in_threads_keep_their_remarks_apart():
-    """Each has its own, however they take turns, and Python's filters are left alone."""
+    """Each has its own remarks in any interleaving, and Python's warning filters stay unchanged."""
     filters = list(warnings.filters)
     asked = [(_opposite, "LSODA", {}), (_singular, "Radau", {"max_steps": 300})] * 2
     asked += [(_singular, "BDF", {"max_steps": 300}), (_opposite, "Radau", {"max_steps": 100})]
@@ -584,7 +584,7 @@ def test_runs_in_threads_keep_their_remarks_apart():
 
 
 def test_what_a_derivative_warns_of_is_the_callers():
-    """A run that finishes says nothing of it; Python does, as it is told to."""
+    """A run that finishes does not report it; it stays a Python warning."""
 
     def derivative(t, y):
         warnings.warn("close to the edge", stacklevel=1)
@@ -700,7 +700,7 @@ def test_tableau_of_lower_order_serves():
 
 
 def test_trees():
-    """How many there are is known (Hairer, Norsett, Wanner I, table II.2.3), and so is, for each
+    """The number of trees is known (Hairer, Norsett, Wanner I, table II.2.3), and so is, for each
     order, the sum of α = n! / (σ γ) = (n - 1)!, σ the symmetry of a tree (Butcher, 2003, 304).
     """
 
@@ -717,7 +717,7 @@ def test_trees():
 
 
 def scipys(solver, order):
-    """A method of SciPy's as a tableau."""
+    """A method of SciPy as a tableau."""
     stages = len(solver.B)
     a = np.zeros((stages, stages))
     a[: len(solver.A), : solver.A.shape[1]] = solver.A[:stages, :stages]
@@ -744,7 +744,7 @@ PROVED = {
 
 @pytest.mark.parametrize("name", PROVED)
 def test_tableaus_prove_their_order(name):
-    """Of the order stated and of none higher; a fault in the tenth digit of any number is seen."""
+    """They have the stated order and no higher one; an error in the tenth digit is detected."""
     whole = PROVED[name]
     ButcherTableau(**whole)
     with pytest.raises(ValueError, match=f"not of order {whole['order'] + 1}"):
@@ -827,7 +827,7 @@ TIGHT = {"rtol": 1e-13, "atol": 1e-13}
 
 
 def test_extrapolation_takes_long_steps():
-    """Of a high order: few steps where DOP853 needs many. `test_published` counts derivatives."""
+    """Of high order: few steps where DOP853 needs many. `test_published` counts derivatives."""
     found = {
         name: integrate(PENDULUM, name, 20.0, **TIGHT, samples=2)
         for name in ("DOP853", "gragg_bulirsch_stoer")
@@ -856,7 +856,7 @@ def test_dense_output_is_as_accurate_as_the_steps(rtol):
 
 
 def test_extrapolation_backs_off_from_where_there_is_no_derivative():
-    """Its long steps look far ahead; the motion turns well before."""
+    """Its long steps evaluate far ahead; the motion turns back well before."""
 
     def derivative(t, y):
         return np.array([y[1], -y[0] / math.sqrt(1.01 - y[0] ** 2)])
@@ -903,7 +903,7 @@ def test_canonical_momenta_tell_the_same_motion(tumbling):
 
 @pytest.mark.parametrize(("form", "name"), energy.RUNS)
 def test_energy_over_many_periods(tumbling, form, name):
-    """A small form of `campaigns/energy.py`, which runs 1e5 of them."""
+    """A short version of `campaigns/energy.py`, which runs 1e5 of them."""
     periods = some(60, 2000)
     times, change = energy.run(tumbling[form], name, periods, energy.STEPS[name])
     found = energy.drift(times, change)
@@ -959,8 +959,8 @@ def test_running_needs_no_sympy():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_newton_ends_where_a_component_should_be_nothing():
-    """With a Jacobian by differences it shrinks by a factor for ever, and never to its own eps."""
+def test_newton_ends_where_a_component_should_be_zero():
+    """With a Jacobian by differences it shrinks by a constant factor, and never to its own eps."""
     problem = Problem(
         name="rest",
         states=("x", "v"),

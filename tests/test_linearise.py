@@ -24,7 +24,7 @@ from eomgen.scene.schema import SHOWN
 
 @cache
 def module_of(scene: str, text: str = "", outputs: bool = True) -> GeneratedModule:
-    """The module of a built-in scene, or of a text; by `aba`, which is quick to derive."""
+    """The module of a built-in scene or of a text, by `aba`, which is fast to derive."""
     model = elaborate(parse_scene(text) if text else read_scene(scene))
     wanted = ("input_jacobian",) if outputs and model.inputs else ()
     model = replace(model, outputs=(*SHOWN, *wanted), route="aba")
@@ -32,12 +32,12 @@ def module_of(scene: str, text: str = "", outputs: bool = True) -> GeneratedModu
 
 
 def accelerations(module: GeneratedModule, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """v̇ of the state."""
+    """v̇ at the state."""
     return module.derivative(0.0, y, None, u)[len(module.POSITIONS) :]
 
 
 def test_cart_and_pole_as_in_textbooks() -> None:
-    """Upright, from a bad guess: A and B as Franklin, Powell, Emami-Naeini have them, rank 4."""
+    """Upright, from a bad guess: A and B as in Franklin, Powell, Emami-Naeini, rank 4."""
     module = module_of("cart_pole")
     p = module.PARAMETERS
     m, cart, inertia, arm, g = (p[name] for name in ("m_pole", "m_cart", "I_pole", "l", "g"))
@@ -104,7 +104,7 @@ def test_a_hanging_chain_has_the_roots_of_laguerre() -> None:
 
 @pytest.mark.parametrize("scene", ["cart_pole", "acrobot", "furuta_pendulum", "spinning_top"])
 def test_equilibria_from_bad_guesses(scene: str) -> None:
-    """Twenty wild ones each: at rest, cyclic coordinates untouched; settled, never unstable."""
+    """From 20 random guesses: at rest, cyclic coordinates unchanged; settled ones are stable."""
     module = module_of(scene)
     rng = np.random.default_rng(11)
     for _ in range(20):
@@ -120,7 +120,7 @@ def test_equilibria_from_bad_guesses(scene: str) -> None:
 
 
 def test_the_nearest_equilibrium_is_near() -> None:
-    """Half a radian away from either, a pendulum's is found without passing over others."""
+    """From half a radian away, each equilibrium of a pendulum is found, and not the other."""
     module = module_of("acrobot")
     for upright in (0.0, math.pi):
         for turn in (-0.5, 0.5):
@@ -129,7 +129,7 @@ def test_the_nearest_equilibrium_is_near() -> None:
 
 
 def test_the_hanging_figure_comes_to_rest() -> None:
-    """38 degrees of freedom, 6 quaternions: nothing lowers its centre of mass, nothing grows."""
+    """38 degrees of freedom, 6 quaternions: a minimum of potential energy without growing modes."""
     module = module_of("hanging_figure")
     start = module.initial_state()
     y, _ = equilibrium(module, start, settle=True)
@@ -162,7 +162,7 @@ def test_the_sleeping_top() -> None:
 
 
 def test_reduced_linearisation_against_the_motion_itself() -> None:
-    """Neighbours of a top that spins upright, which is steady, part from it as exp(A t) says."""
+    """Motions near a top that spins upright, a steady motion, diverge from it like exp(A t)."""
     module = module_of("spinning_top")
     y = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 70.0])
     a = linearise(module, y).reduced().A
@@ -212,7 +212,7 @@ def test_inputs_are_trimmed_and_coordinates_held() -> None:
 
 
 def test_messages() -> None:
-    """Each names what is wrong and what to do."""
+    """Each says what is wrong and what to do."""
     cart, top = module_of("cart_pole"), module_of("spinning_top")
     falling = module_of("quadruped")
     cases = [
@@ -245,7 +245,7 @@ def test_messages() -> None:
 
 
 def test_modes_and_control_of_plain_matrices() -> None:
-    """An oscillator with damping, an unstable real mode, drift; and what an input cannot reach."""
+    """A damped oscillator, an unstable real mode, drift; and the controllable rank."""
     assert modes(np.zeros((0, 0))) == [] and stability([]) == "stable"
     (mode,) = modes(np.array([[0.0, 1.0], [-4.0, -0.4]]))
     assert (mode.rate, mode.damping) == pytest.approx((-0.2, 0.1))
@@ -264,7 +264,7 @@ def test_modes_and_control_of_plain_matrices() -> None:
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What it prints, and what it writes, which other programs can load."""
+    """Its output, and its files, which other programs can load."""
     command = ["linearise", "furuta_pendulum", "--route", "aba"]
     target = tmp_path / "furuta.npz"
     assert main([*command, "-o", str(target)]) == 0
@@ -297,17 +297,19 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_an_equilibrium_says_that_it_is_at_rest(capsys: pytest.CaptureFixture[str]) -> None:
-    """A top that spins is not what was linearised; one that is still is no matter to mention."""
+    """A message if the top spins in the scene, since the linearisation does not; none if it is at
+    rest.
+    """
     spins = "note        at rest, without the initial tip_wz = 60; --at initial keeps the motion\n"
-    for more, told in (([], True), (["--at", "rest"], True), (["--at", "initial"], False)):
+    for more, reported in (([], True), (["--at", "rest"], True), (["--at", "initial"], False)):
         assert main(["linearise", "spinning_top", "--route", "aba", *more]) == 0
-        assert (spins in capsys.readouterr().out) == told
+        assert (spins in capsys.readouterr().out) == reported
     assert main(["linearise", "acrobot", "--route", "aba"]) == 0
     assert "note" not in capsys.readouterr().out
 
 
 def test_an_input_found_to_be_zero_is_shown_as_zero(capsys: pytest.CaptureFixture[str]) -> None:
-    """Without the rounding that the search leaves; one that is given is shown as it is."""
+    """Without the rounding errors of the search; a given input is shown as it is."""
     assert main(["linearise", "cart_pole", "--route", "aba", "--trim", "push"]) == 0
     assert "inputs      push = 0\n" in capsys.readouterr().out
     command = ["linearise", "cart_pole", "--route", "aba", "--at", "initial"]
@@ -316,7 +318,7 @@ def test_an_input_found_to_be_zero_is_shown_as_zero(capsys: pytest.CaptureFixtur
 
 
 def test_the_command_on_quaternions_and_states(capsys: pytest.CaptureFixture[str]) -> None:
-    """Small rotations for quaternions; a notice for one that was scaled; degrees."""
+    """Small rotations for quaternions; a notice if one was normalised; degrees."""
     options = ["--state", "tip_qw=2", "--state", "tip_qx=0", "--at", "initial"]
     assert main(["linearise", "spinning_top", "--route", "aba", *options]) == 0
     shown = capsys.readouterr()
@@ -332,7 +334,7 @@ def test_the_command_on_quaternions_and_states(capsys: pytest.CaptureFixture[str
 
 
 def test_a_figure_is_reported_in_short(capsys: pytest.CaptureFixture[str]) -> None:
-    """76 states: no matrix on the screen, lines of at most 100 columns, modes counted."""
+    """76 states: no matrix is printed, lines have at most 100 columns, modes are counted."""
     assert main(["linearise", "hanging_figure", "--at", "rest"]) == 0
     out = capsys.readouterr().out
     assert "A is 76 x 76; -o FILE.npz or -o FILE.csv writes them" in out
@@ -394,7 +396,7 @@ WEIGHT, ABOUT_PIN = 9.81 * 0.25, 0.02 + 0.25**2
 @pytest.mark.parametrize("settle", [False, True])
 @pytest.mark.parametrize("controller", ["pid", "lag", "own"])
 def test_states_of_controllers_come_to_rest_too(controller: str, settle: bool) -> None:
-    """Where moments balance, and A by hand: I q'' = M - m g l cos q with the law of M."""
+    """At the balance of moments, and A by hand: I q'' = M - m g l cos q with the law of M."""
     module = module_of(controller, CONTROLLED[controller])
     y, _ = equilibrium(module, np.array([0.3, 5.0, -1.0]), settle=settle)
     q, v, x = y
@@ -444,7 +446,7 @@ def test_states_of_controllers_on_the_command_line(
 def test_a_steady_motion_is_reported_from_one_that_is_not(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A top that sleeps goes on as it is; one that leans does not, nor what only passes through."""
+    """A sleeping top is steady; a leaning one is not, nor is a state in passing."""
     top = ["linearise", "spinning_top", "--at", "initial", "--state", "tip_wz=70"]
     assert main([*top, "--state", "tip_qw=1", "--state", "tip_qx=0"]) == 0
     assert "note        a steady motion: no velocity changes" in capsys.readouterr().out

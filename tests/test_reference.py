@@ -1,5 +1,5 @@
-"""References: extended numbers against 60 digits, the motion against exact and published ones, and
-whether what is stated of its error is true.
+"""References: extended precision against 60 digits, the motion against exact and published ones,
+and whether the stated error holds.
 """
 
 from dataclasses import replace
@@ -90,9 +90,7 @@ def long_rows(
     how: tuple[tuple[int, ...], float],
     exactly: Precise | None = None,
 ) -> np.ndarray:
-    """The motion at some times in extended precision, in parts of the scale where they are
-    compared.
-    """
+    """The motion at some times in extended precision, relative to the scale used in comparisons."""
     model, module = made
     problem = as_problem(module)
     scale = measure.scales(module.STATES, module.UNITS, np.array([problem.initial + 1.0] * 2))
@@ -104,7 +102,7 @@ def long_rows(
 
 
 def to_mp(values: np.ndarray) -> np.ndarray:
-    """Extended numbers as those of mpmath, exactly."""
+    """Extended numbers converted exactly to mpmath."""
 
     def one(x: Any) -> Any:
         mantissa, exponent = x.as_mantissa_exp()
@@ -118,7 +116,7 @@ SCENES = some(("babyboot", "chain_in_wind", "two_body_forced", FORCED), (*built_
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.split()[0])
 def test_the_derivative_is_the_program_in_long_numbers(scene: str) -> None:
-    """To 30 digits what 60 make of it, whatever the state, time, parameters and inputs."""
+    """It agrees with 60 digits to 30 digits, for any state, time, parameters and inputs."""
     rng = np.random.default_rng(1)
     made = engine(scene)
     module = made.module
@@ -136,7 +134,7 @@ def test_the_derivative_is_the_program_in_long_numbers(scene: str) -> None:
 
 
 def test_numbers_that_meet_stay_long() -> None:
-    """Two plain numbers of a formula that meet behind a corner are not rounded to a double."""
+    """Two constants of a formula that combine behind a corner are not rounded to a double."""
     made = engine(FORCED)
     with digits():
         found = precise(made.system.program, made.module, None, None, np.array([1.0, 1.0]))
@@ -146,7 +144,7 @@ def test_numbers_that_meet_stay_long() -> None:
 
 @pytest.mark.parametrize("stages", [5, 8, 12])
 def test_collocation_is_of_gauss(stages: int) -> None:
-    """Stages integrate polynomials of their degree, the end those of twice that, to 32 digits."""
+    """To 32 digits, stages integrate polynomials of their degree, the end those of twice that."""
     method = gauss(stages)
     with digits():
         for k in range(2 * stages):
@@ -161,7 +159,7 @@ def test_collocation_is_of_gauss(stages: int) -> None:
 
 
 def exact_pendulum(times: np.ndarray) -> np.ndarray:
-    """The scene's motion, in Jacobi's functions, 40 digits: it starts at rest at an angle."""
+    """The scene's motion by Jacobi's functions in 40 digits; it starts at rest at an angle."""
     with mp.workdps(40):
         start = mp.mpf(float(np.pi)) - 3 * mp.pi / 2  # from hanging down
         k, w = mp.sin(start / 2), mp.sqrt(mp.mpf(9.81))
@@ -175,7 +173,7 @@ def exact_pendulum(times: np.ndarray) -> np.ndarray:
 
 
 def test_the_pendulum_is_exact_and_its_error_stated() -> None:
-    """What the tighter and the looser run differ by is more than either is off from the truth."""
+    """The difference of the tighter and the looser run exceeds the error of either."""
     made = compiled("pendulum")
     times = np.linspace(0.0, 10.0, 21)
     exact = exact_pendulum(times)
@@ -229,7 +227,7 @@ def test_babyboot_as_others_recomputed_it() -> None:
 
 
 def test_corners_are_met_exactly() -> None:
-    """A block that falls on a spring again and again: parabolas and sines in 40 digits."""
+    """A block that falls on a spring repeatedly: parabolas and sines in 40 digits."""
     made = compiled(ONE_SIDED)
     times = np.linspace(0.0, 10.0, 51)
     tight, loose = (to_mp(long_rows(made, times, how)) for how in (TIGHT, LOOSE))
@@ -282,7 +280,7 @@ v = { x_dot = 1.0 }
 
 
 def test_damped_stops_let_go() -> None:
-    """To and fro between two: the force ends before its depth does, and within there is none."""
+    """Back and forth between two stops: the force ends before the penetration does."""
     made = compiled(STOPPED)
     times = np.linspace(0.0, 4.0, 41)
     tight = to_mp(long_rows(made, times, TIGHT))
@@ -335,7 +333,7 @@ slip_speed = 0.01
 
 
 def test_rigid_contacts_are_followed_in_doubles() -> None:
-    """A ball that bounces twice, against parabolas; the stated error is true."""
+    """A ball that bounces twice, against parabolas; the stated error holds."""
     model, module = compiled(BALL)
     found = reference(model, module, t_end=1.1)
     assert "rigid contacts" in found.origin
@@ -351,7 +349,7 @@ def test_rigid_contacts_are_followed_in_doubles() -> None:
 
 
 def test_doubles_stand_in() -> None:
-    """Where there is no time for extended precision, and what is stated then is true, too."""
+    """If there is no time for extended precision; the stated error holds, too."""
     made = compiled("pendulum")
     made_of = reference(*made, t_end=1.0, seconds=1e-6)
     assert "doubles" in made_of.origin and "s in extended precision" in made_of.origin
@@ -360,7 +358,7 @@ def test_doubles_stand_in() -> None:
 
 
 def test_kept_and_found_again(tmp_path: Path) -> None:
-    """A reference is computed once for what it depends on; a damaged file is computed anew."""
+    """A reference is computed once for the same data; a damaged file is computed anew."""
     model, module = compiled("pendulum")
 
     def made(**changes: Any) -> Any:
@@ -388,11 +386,11 @@ def test_kept_and_found_again(tmp_path: Path) -> None:
 
 
 def test_trouble() -> None:
-    """Ctrl-C passes; what the module refuses is said in a line; progress goes up to 1."""
+    """Ctrl-C passes through; errors of the module are reported in a line; progress goes up to 1."""
     model, module = compiled("pendulum")
-    told: list[float] = []
-    reference(model, module, t_end=0.5, progress=told.append)
-    assert told == sorted(told) and told[-1] == 1.0
+    reported: list[float] = []
+    reference(model, module, t_end=0.5, progress=reported.append)
+    assert reported == sorted(reported) and reported[-1] == 1.0
 
     def interrupt(done: float) -> None:
         if done > 0.2:

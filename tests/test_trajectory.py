@@ -1,4 +1,4 @@
-"""Trajectories: what they refuse to be, and files that give back every bit."""
+"""Trajectories: validation, and files that preserve every bit."""
 
 import csv
 import io
@@ -162,7 +162,7 @@ def test_damaged_npz_is_an_error_or_harmless(tmp_path):
 
 
 def test_every_flipped_bit_of_the_names_is_refused_or_harmless(tmp_path):
-    """Of all that follows the content, which no checksum of zip covers: names, places, lengths."""
+    """In what follows the content, which no checksum of zip covers: names, offsets, lengths."""
     path = tmp_path / "run.npz"
     save_npz(KEPT, path)
     whole = path.read_bytes()
@@ -217,7 +217,7 @@ def test_what_no_run_writes_is_refused_though_its_digest_is_right(change, tmp_pa
 
 
 def test_an_archive_that_would_grow_is_refused(tmp_path):
-    """Packed members, and a header that promises a terabyte."""
+    """Compressed members, and a header that claims a terabyte."""
     path = tmp_path / "run.npz"
     with path.open("wb") as file:
         np.savez_compressed(file, eomgen=np.array("trajectory 4"), t=np.zeros(10**6))
@@ -282,7 +282,7 @@ def test_csv_holds_works_that_were_asked_for(tmp_path):
 
 
 def test_csv_is_what_others_read(tmp_path):
-    """The first line names the columns, each line after it has a number for each, and no more."""
+    """A line of column names, then lines with exactly one number for each."""
     path = tmp_path / "run.csv"
     save_csv(replace(RUN, states=("crank", "rate")), path)
     assert not RUN.finished
@@ -296,7 +296,7 @@ def test_csv_is_what_others_read(tmp_path):
 
 
 def test_a_table_is_ours_by_the_archive_beside_it(tmp_path):
-    """Of a run of the same columns; a table that stands alone, or has others, is not."""
+    """If the archive has the same columns, but not without an archive, or with other columns."""
     path = tmp_path / "run.csv"
     path.write_text("t,crank\n0,1\n")
     assert "was not written by eomgen" in error_of(save_csv, RUN, path)

@@ -392,7 +392,7 @@ def test_a_module_that_gives_no_number_misses_its_bound() -> None:
     state = hard_states(module, 1, 1, 0, 1.0)[1]
     module.derivative = lambda *_: np.full(2, np.nan)
     found = judged(model, Truth(model), "aba", {"aba": module}, full, state)
-    assert found is not None and np.isnan(found.off["aba"]).all()
+    assert found is not None and np.isnan(found.errors["aba"]).all()
     assert found.residuals["aba"].error == np.inf
 
 
@@ -416,10 +416,10 @@ def test_a_horizon_that_chatters_keeps_to_its_time_and_reports_how_far_it_is() -
     """Dry friction that sticks turns at every step, in doubles too, which had all the time."""
     scene = scene_of(DRY)
     module = load_module(python_module(compile_program(scene[0]).system))
-    told: list[float] = []
+    reported: list[float] = []
     with pytest.raises(RunError, match=r"^horizon: no run of 10 s.*: more than 1 s in .*; give a"):
-        horizon_of(*scene, module, seconds=0.5, progress=told.append)
-    assert told and all(0.0 <= part < 1.0 for part in told)
+        horizon_of(*scene, module, seconds=0.5, progress=reported.append)
+    assert reported and all(0.0 <= part < 1.0 for part in reported)
 
 
 def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.MonkeyPatch) -> None:

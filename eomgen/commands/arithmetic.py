@@ -12,7 +12,7 @@ from eomgen.model.model import Model
 from eomgen.scene.schema import Simulation
 
 if TYPE_CHECKING:
-    from eomgen.study.cost.arithmetic import Arithmetic, Way
+    from eomgen.study.cost.arithmetic import Arithmetic, Solver
 
 HEADS = {
     "float64": "float64",
@@ -49,8 +49,8 @@ def print_arithmetic(given: Arguments, model: Model, simulation: Simulation, nam
     print(
         f"{name}: error of v̇ in units in the last place (ulp), by each route; chosen: {found.taken}"
     )
-    for precision in dict.fromkeys(way.precision for way in found.ways):
-        _print_ways(found, precision)
+    for precision in dict.fromkeys(solver.precision for solver in found.solvers):
+        _print_solvers(found, precision)
     _print_notes(found, model)
     figure, table = (given.output / f"{name}_arithmetic.{suffix}" for suffix in ("png", "csv"))
     save_table(found, table, force=given.force)
@@ -58,26 +58,26 @@ def print_arithmetic(given: Arguments, model: Model, simulation: Simulation, nam
     print(f"    wrote {table}, {figure.name}")
 
 
-def _print_ways(found: "Arithmetic", precision: str) -> None:
+def _print_solvers(found: "Arithmetic", precision: str) -> None:
     kinds = "".join(f"{f'{len(s.y)} {s.kind}':>20}" for s in found.samples)
     print(f"    {HEADS[precision]}")
     print(f"    {'':<14}{'':>10}{'':>10}{'µs each':>12}{kinds}")
     heads = f"{'median':>10}{'worst':>10}" * len(found.samples)
     print(f"    {'':<14}{'operations':>10}{'µs':>10}{'of 1000':>12}{heads}")
-    for way in found.ways:
-        if way.precision == precision:
-            _print_way(way)
+    for solver in found.solvers:
+        if solver.precision == precision:
+            _print_solver(solver)
 
 
-def _print_way(way: "Way") -> None:
-    if way.operations is None:
-        print_wrapped(f"    {way.name:<14}", way.words)
+def _print_solver(solver: "Solver") -> None:
+    if solver.operations is None:
+        print_wrapped(f"    {solver.name:<14}", solver.words)
         return
-    errors = "".join(f"{ulps(e.median):>10}{ulps(e.worst):>10}" for e in way.errors)
-    each, many = _us(way.seconds, 1), _us(way.batch_seconds, 3)
-    print(f"    {way.name:<14}{way.operations:>10}{each:>10}{many:>12}{errors}")
-    if way.words:
-        print_wrapped(f"    {'':<14}", way.words)
+    errors = "".join(f"{ulps(e.median):>10}{ulps(e.worst):>10}" for e in solver.errors)
+    each, many = _us(solver.seconds, 1), _us(solver.batch_seconds, 3)
+    print(f"    {solver.name:<14}{solver.operations:>10}{each:>10}{many:>12}{errors}")
+    if solver.words:
+        print_wrapped(f"    {'':<14}", solver.words)
 
 
 def _print_notes(found: "Arithmetic", model: Model) -> None:

@@ -1,1 +1,1 @@
-"""Modules loaded and integrated: methods, events, contacts, trajectories."""
+"""Integration of generated modules: methods, events, contacts, trajectories."""

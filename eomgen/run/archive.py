@@ -1,7 +1,7 @@
-"""Arrays by name as NumPy's .npz, under one digest: what is damaged is refused, never misread.
+"""NumPy's .npz files with a digest, by which damage is detected.
 
-A .npz is a zip file, whose checksums cover what its members hold, but neither their names nor where
-they lie. The last member is a digest of all others: names, types, shapes and bytes.
+A .npz is a zip file. Its checksums cover the contents of its members, but not their names or
+positions. So the last member is a digest of the names, types, shapes and bytes of all others.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ _SUFFIX = ".npy"
 
 
 def packed(members: Mapping[str, Array]) -> bytes:
-    """Arrays as an archive, in their order; the same bytes for the same arrays."""
+    """An archive of arrays, in their order; the same arrays give the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, array in (*members.items(), (DIGEST, np.array(_digest(members)))):
@@ -33,10 +33,10 @@ def packed(members: Mapping[str, Array]) -> bytes:
 
 
 def unpacked(data: bytes) -> dict[str, Array]:
-    """The arrays of an archive, of no more bytes in all than it has, its digest among them.
+    """The arrays of an archive, including its digest. They never need more memory than its size.
 
-    Runs no code that it may hold. Raises `ValueError`, or whatever `zipfile` and NumPy raise, for
-    what is no such archive.
+    Never executes code from the archive. Raises `ValueError`, or any error of `zipfile` and NumPy,
+    if it is not such an archive.
     """
     members: dict[str, Array] = {}
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -45,23 +45,25 @@ def unpacked(data: bytes) -> dict[str, Array]:
         for about in archive.infolist():
             name = about.filename.removesuffix(_SUFFIX)
             if about.compress_type != zipfile.ZIP_STORED:
-                raise ValueError("a member is packed, which none is that this program writes")
+                raise ValueError("a member is compressed")
             if name in members or name == about.filename:
-                raise ValueError("a member's name is there twice, or none of NumPy's")
+                raise ValueError("a member's name occurs twice, or does not end in .npy")
             members[name] = _array(archive.read(about))
     return members
 
 
 def checked(members: dict[str, Array]) -> dict[str, Array]:
-    """The same without the digest. Raises `ValueError` if it is missing or of other arrays."""
+    """The arrays without the digest. Raises `ValueError` if it is missing or does not match."""
     rest = {name: array for name, array in members.items() if name != DIGEST}
     if DIGEST not in members or not np.array_equal(members[DIGEST], np.array(_digest(rest))):
-        raise ValueError("the digest is not that of the content")
+        raise ValueError("the digest does not match the content")
     return rest
 
 
 def _array(raw: bytes) -> Array:
-    """An array from a file of NumPy's; its header promises no more than there is."""
+    """An array from the bytes of a .npy file. Raises `ValueError` if its header does not match its
+    size.
+    """
     stream = io.BytesIO(raw)
     version = npy.read_magic(stream)
     if version != (1, 0):
@@ -70,7 +72,7 @@ def _array(raw: bytes) -> Array:
     start = stream.tell()
     size = math.prod(shape)
     if dtype.hasobject or size > len(raw) or size * dtype.itemsize != len(raw) - start:
-        raise ValueError("the header is not that of the content")
+        raise ValueError("the header does not match the content")
     return np.ndarray(shape, dtype, raw, start, order="F" if fortran else "C").copy()
 
 

@@ -1,4 +1,4 @@
-"""What a run is asked for, checked before it begins."""
+"""Checks of the arguments of a run, and defaults that depend on them."""
 
 import math
 
@@ -10,19 +10,19 @@ from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import FloatArray, Problem
 
 SMALLEST_RTOL = 2.3e-14
-"""SciPy raises any rtol below 100 times the machine epsilon; we would rather say so."""
+"""SciPy silently raises an rtol below 100 times the machine epsilon; here it is an error."""
 LEAST_STEPS = 1000
-"""Of an adaptive method where it cannot be told what longer steps pass over."""
+"""Least number of steps of an adaptive method if longer ones cannot be checked for branches."""
 MOST_SAMPLES = 1_000_000
 ATOL, OF_RTOL, LEAST_ATOL = 1e-12, 1e-3, 1e-15
-"""Of each state, in parts of its size: the most, a part of rtol, and the least. At a tighter rtol
-than 1e-9 an atol that stayed would be what errors come from; less than a few units in the last
-place of a state's size, or than what rounding makes of a stiff step, nothing can meet."""
+"""The default atol, relative to the size of each state: `OF_RTOL` rtol, but at most `ATOL` and at
+least `LEAST_ATOL`. For rtol below 1e-9 a constant atol would dominate the error; an atol below a
+few units in the last place, or below the rounding error of a stiff step, cannot be met."""
 
 
 def longest_steps(max_step: float | None, span: float) -> tuple[float, float]:
-    """The longest step of an adaptive method, s, and the longest where it cannot be told whether it
-    passes over a branch of the derivative. Raises `RunError` for a step that is none.
+    """The longest step of an adaptive method, s, and the longest one that cannot be checked for
+    branches that it passes over. Raises `RunError` if `max_step` is not positive.
     """
     if max_step is None:
         return math.inf, span / LEAST_STEPS
@@ -32,7 +32,7 @@ def longest_steps(max_step: float | None, span: float) -> tuple[float, float]:
 
 
 def check_times(t_start: float, t_end: float) -> None:
-    """Raise `RunError` for a span that is none."""
+    """Raise `RunError` unless t_start < t_end and both are finite."""
     for name, time in (("t_start", t_start), ("t_end", t_end)):
         if not math.isfinite(time):
             raise RunError(f"{name}: {time:g} is not a finite time")
@@ -41,28 +41,28 @@ def check_times(t_start: float, t_end: float) -> None:
 
 
 def numbers(**values: float | None) -> dict[str, FloatArray]:
-    """Numbers as arrays, nan for none."""
+    """Numbers as arrays of shape (), nan for None."""
     return {name: np.array(math.nan if x is None else x) for name, x in values.items()}
 
 
 def allowed_errors(
     problem: Problem, method: str, rtol: float, atol: float | None, span: float
 ) -> float | FloatArray:
-    """The absolute tolerance, of each state where none was given and they have sizes."""
+    """`atol` if given, else the default: for each state (ny,) if the problem has sizes."""
     if atol is not None:
         return atol
-    part = min(ATOL, max(OF_RTOL * rtol, LEAST_ATOL))
+    relative = min(ATOL, max(OF_RTOL * rtol, LEAST_ATOL))
     if not problem.sizes:
-        return part
+        return relative
     sizes = np.array(problem.sizes)
-    if part < ATOL and problem.noise is not None:
-        met = np.maximum(part * sizes, least_tolerance(method, rtol) * problem.noise(span))
-        return np.asarray(np.minimum(met, ATOL * sizes))
-    return np.asarray(part * sizes)
+    if relative < ATOL and problem.noise is not None:
+        least = least_tolerance(method, rtol) * problem.noise(span)
+        return np.asarray(np.minimum(np.maximum(relative * sizes, least), ATOL * sizes))
+    return np.asarray(relative * sizes)
 
 
 def check_tolerances(rtol: float, atol: float | None) -> None:
-    """Raise `RunError` for tolerances that are none, or that doubles cannot meet."""
+    """Raise `RunError` for tolerances that are not positive, or that doubles cannot meet."""
     for name, tolerance in (("rtol", rtol), ("atol", atol)):
         if tolerance is None:
             continue
@@ -73,7 +73,7 @@ def check_tolerances(rtol: float, atol: float | None) -> None:
 
 
 def check_samples(samples: int | None) -> None:
-    """Raise `RunError` for too few rows, or too many."""
+    """Raise `RunError` for too few or too many rows."""
     if samples is not None and samples < 2:
         raise RunError(f"samples: {samples} is too few; give at least 2, the first and the last")
     if samples is not None and samples > MOST_SAMPLES:
@@ -81,21 +81,25 @@ def check_samples(samples: int | None) -> None:
 
 
 def check_rest_speed(rest_speed: float | None) -> None:
-    """Raise `RunError` for a speed that is none."""
+    """Raise `RunError` for a speed that is not positive."""
     if rest_speed is not None and not (math.isfinite(rest_speed) and rest_speed > 0):
         raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
 
 
 def check_repairs(problem: Problem, resumed: bool) -> None:
-    """Raise `RunError` for a run that extended numbers cannot repair."""
+    """Raise `RunError` for a run that cannot be repaired in extended precision."""
     if problem.contacts is not None:
-        raise RunError("guard: what contacts do cannot be repaired; let it stop instead (--guard)")
+        raise RunError(
+            "guard: a run with rigid contacts cannot be repaired; let it stop instead (--guard)"
+        )
     if resumed:
-        raise RunError("guard: what goes on is not repaired; let it stop instead (--guard)")
+        raise RunError(
+            "guard: a run that continues another cannot be repaired; let it stop instead (--guard)"
+        )
 
 
 def check_no_step(integrator: str, dt: float | None) -> None:
-    """Raise `RunError` for an equal step given to a method that chooses its own."""
+    """Raise `RunError` if a step is given for a method that chooses its own."""
     if dt is not None:
         fixed = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
         raise RunError(
@@ -107,7 +111,7 @@ def check_no_step(integrator: str, dt: float | None) -> None:
 def check_steps(
     integrator: str, span: float, dt: float | None, samples: int | None, max_steps: int
 ) -> tuple[float, int]:
-    """Return the step and that every how-manieth is kept."""
+    """The step, and k if every k-th state is kept. Raises `RunError` for an invalid step."""
     if dt is None:
         raise RunError(f"dt: {integrator} needs a step; give e.g. --dt 0.001")
     if not (math.isfinite(dt) and dt > 0):

@@ -113,9 +113,9 @@ def integrate(
         # Evaluations to check stability do not count. They need a Jacobian with all digits, which
         # doubles do not give where the derivative is repaired.
         checked = None if unstable or not method.explicit or repairs else problem
-        begin, remembered = equal_steps(asked, method, counted, checked)
+        begin, settings = equal_steps(asked, method, counted, checked)
     else:
-        begin, remembered = adaptive_steps(asked, method, problem, remarks.append)
+        begin, settings = adaptive_steps(asked, method, problem, remarks.append)
 
     gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else GAP_CHECKS
     stepper = events.Stepper(begin, gap_checks, calls.derivatives.of)
@@ -128,7 +128,7 @@ def integrate(
         tally.begin(problem.initial)
     report = progress or _ignore
     outcome, trouble = _follow(run, advances, calls, problem, method, asked.t_end, report, tally)
-    kept = _kept(run, problem, {**remembered, **numbers(rest_speed=rest_speed)})
+    kept = _kept(run, problem, {**settings, **numbers(rest_speed=rest_speed)})
     notes = (trouble, monitor.words() if monitor else "", *dict.fromkeys(remarks))
     message = " ".join("; ".join(filter(None, notes)).split())
     return _trajectory(run, problem, integrator, calls, outcome, message, kept)
@@ -170,7 +170,7 @@ def _trajectory(
     )
 
 
-def _kept(run: "_Run", problem: Problem, remembered: Resume) -> Resume:
+def _kept(run: "_Run", problem: Problem, settings: Resume) -> Resume:
     """What a later run needs to continue, and to check that it is the same motion; empty if it
     cannot continue.
     """
@@ -181,7 +181,7 @@ def _kept(run: "_Run", problem: Problem, remembered: Resume) -> Resume:
     stops = (ArithmeticError, ValueError, StepFailure, KeyboardInterrupt)
     with np.errstate(all="ignore"), suppress(*stops):
         rate = np.array(problem.derivative(float(kept["t"]), kept["y"]))
-    return {**kept, **remembered, "derivative": rate}
+    return {**kept, **settings, "derivative": rate}
 
 
 def _monitor(

@@ -1,8 +1,8 @@
-"""Interval arithmetic: numbers known to lie between two bounds, and what functions make of them.
+"""Interval arithmetic: intervals that enclose the results of operations and functions.
 
-Run over intervals, a straight-line program encloses everything it computes over all the times or
-states that they contain (Moore, Kearfott, Cloud, Introduction to Interval Analysis, chapters 5 and
-6). Bounds are widened by a few units in the last place for rounding.
+A straight-line program run over intervals encloses all values that it computes for the times or
+states in them (Moore, Kearfott, Cloud, Introduction to Interval Analysis, chapters 5 and 6). Bounds
+are widened by a few units in the last place for rounding.
 """
 
 import math
@@ -15,7 +15,7 @@ _WIDER = 4 * 2.0**-52
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """All numbers from `low` to `high`; from -∞ to ∞ where nothing is known."""
+    """All numbers from `low` to `high`; from -∞ to ∞ if nothing is known."""
 
     low: float
     high: float
@@ -61,7 +61,7 @@ def _as_interval(value: "Interval | float") -> Interval:
 
 
 def _hull(*values: float) -> Interval:
-    """The smallest interval that contains some numbers, and what rounding may have cut off them."""
+    """The smallest interval that contains some numbers, widened for their rounding errors."""
     if any(map(math.isnan, values)):
         return ANYTHING
     low, high = min(values), max(values)
@@ -72,7 +72,7 @@ def _hull(*values: float) -> Interval:
 
 
 def _growing(function: Callable[[float], float], low: float, high: float) -> Callable[..., Any]:
-    """A function that grows all the way from `low` to `high`, where it is defined."""
+    """The interval version of a function that is increasing on its domain, `low` to `high`."""
 
     def applied(x: Interval | float) -> Interval:
         a = _as_interval(x)
@@ -99,7 +99,7 @@ def _log(a: float) -> float:
 
 
 def _wave(peak: float, function: Callable[[float], float]) -> Callable[..., Any]:
-    """Sine or cosine, whose first maximum lies at `peak`."""
+    """The interval version of sine or cosine, with a maximum at `peak`."""
 
     def applied(x: Interval | float) -> Interval:
         a = _as_interval(x)
@@ -108,8 +108,8 @@ def _wave(peak: float, function: Callable[[float], float]) -> Callable[..., Any]
         ends = function(a.low), function(a.high)
         reach = _WIDER * (abs(a.low) + abs(a.high))
 
-        def contains(place: float) -> bool:
-            first = place + 2 * math.pi * math.ceil((a.low - reach - place) / (2 * math.pi))
+        def contains(x: float) -> bool:
+            first = x + 2 * math.pi * math.ceil((a.low - reach - x) / (2 * math.pi))
             return first <= a.high + reach
 
         high = 1.0 if contains(peak) else max(ends)
@@ -137,7 +137,7 @@ def _abs(x: Interval | float) -> Interval:
 
 def _atan2(y: Interval | float, x: Interval | float) -> Interval:
     a, b = _as_interval(y), _as_interval(x)
-    if b.low <= 0 and a.low <= 0 <= a.high:  # the origin, or the cut behind it
+    if b.low <= 0 and a.low <= 0 <= a.high:  # contains the origin or the branch cut
         return Interval(-math.pi, math.pi)
     return _hull(*(math.atan2(s, c) for s in (a.low, a.high) for c in (b.low, b.high)))
 
@@ -179,4 +179,4 @@ BY_INTERVALS: dict[str, Callable[..., Interval]] = {
     "step": _step,
     "select": _select,
 }
-"""The functions of formulas."""
+"""Interval versions of the functions of formulas, by name."""

@@ -1,4 +1,4 @@
-"""Which coordinates of a run left the limits of their joints, and when."""
+"""Coordinates of a run that left the limits of their joints."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,9 +28,9 @@ class Excursion:
 def excursions(
     trajectory: Trajectory, limits: Mapping[str, tuple[float, float]]
 ) -> list[Excursion]:
-    """What the rows of a trajectory show of each state in `limits` that left them, in their order.
+    """The states in `limits`, in their order, of which a row of the trajectory is outside.
 
-    A form of the state that has no such coordinate shows nothing of it.
+    Names in `limits` that are not states of the trajectory are ignored.
     """
     found = []
     for state, (low, high) in limits.items():

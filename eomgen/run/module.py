@@ -1,4 +1,4 @@
-"""A generated module as a loaded Python module."""
+"""Loading a generated module, and its initial-value problem."""
 
 import inspect
 from collections.abc import Callable, Iterable, Sequence
@@ -17,11 +17,11 @@ from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 
 COUNTED = frozenset({"derivative", "jacobian"})
-"""Functions whose operations tell what a run costs."""
+"""Functions whose operations determine the cost of a run."""
 
 
 class GeneratedModule(Protocol):
-    """The contract of a generated module, as far as running and showing need it."""
+    """The interface of a generated module, as far as simulation and figures need it."""
 
     NAME: str
     FORM: str
@@ -44,9 +44,9 @@ class GeneratedModule(Protocol):
 
 
 def load_module(source: str, name: str = "generated") -> GeneratedModule:
-    """Load a generated module from its source, which this program wrote itself.
+    """Load a generated module from its source, which must be written by this program.
 
-    Raises `RunError` if the scene's own parameters leave its equations without a solution.
+    Raises `RunError` if the equations have no solution at the scene's parameters.
     """
     try:
         module = load_source(source, name)
@@ -65,7 +65,7 @@ def _by_differences(module: GeneratedModule) -> Callable[[float, FloatArray], Fl
 
 
 def _unsolvable(error: Exception) -> str:
-    """Why there is no derivative at the start, as far as the module itself tells."""
+    """The reason why there is no derivative at the start, as far as the module knows."""
     if isinstance(error, ZeroDivisionError):
         return (
             "the mass matrix is singular at the initial state, or an effect infinite: change that, "
@@ -84,12 +84,13 @@ def as_problem(
 ) -> Problem:
     """The initial-value problem of a module, at given parameters and constant inputs.
 
-    `explain` and `origin` are kept in the problem. A module that was made without its Jacobian has
-    one by differences: enough to iterate with.
+    `explain` and `origin` are kept in the problem. If the module has no Jacobian, it is computed by
+    differences, which suffices for Newton's iteration.
 
-    Raises `RunError` if the module refuses them, or has no derivative to start from.
+    Raises `RunError` if the module refuses parameters or inputs, or if it has no derivative at the
+    initial state.
     """
-    if parameters is None and inputs is None:  # the module's shortest way
+    if parameters is None and inputs is None:  # the module's fastest call
         exactly = module.derivative
         jacobian = getattr(module, "jacobian", _by_differences(module))
     else:
@@ -103,7 +104,7 @@ def as_problem(
     def derivative(t: float, y: FloatArray) -> FloatArray:
         try:
             return exactly(t, y)
-        except FloatingPointError:  # y is so large that a method had better not have tried it
+        except FloatingPointError:  # y is too large; with nan a method rejects the step
             return np.full(len(y), np.nan)
 
     try:
@@ -140,8 +141,8 @@ def as_problem(
 
 
 def as_powers(module: Any, parameters: Any = None, inputs: Any = None) -> Powers | None:
-    """The powers of a module's effects, at given parameters and constant inputs; None if it was
-    generated without them or without the kinetic energy, or has no effects.
+    """The powers of a module's effects at given parameters and constant inputs; None if it has no
+    effects, or was generated without their powers or without the kinetic energy.
     """
     wanted = ("effect_powers", "kinetic_energy")
     if not (module.EFFECT_NAMES and all(hasattr(module, name) for name in wanted)):
@@ -154,7 +155,7 @@ def as_powers(module: Any, parameters: Any = None, inputs: Any = None) -> Powers
 
 
 def _switching(module: Any, parameters: Any, inputs: Any) -> Switching | None:
-    """The switching functions of a module, if its derivative has any."""
+    """The switching functions of a module; None if its derivative has none."""
     of_state = getattr(module, "switching_functions", None)
     of_time = getattr(module, "_switching_functions_of_time", None)
     if of_state is None and of_time is None:
@@ -171,7 +172,7 @@ def _switching(module: Any, parameters: Any, inputs: Any) -> Switching | None:
 def _over_intervals(
     module: Any, kernel: Any, parameters: Any, inputs: Any
 ) -> Callable[[Interval], Sequence[Interval]]:
-    """A kernel of functions of time alone as one of intervals of time."""
+    """A kernel that depends on time alone, as a function of intervals of time."""
     wanted = inspect.signature(kernel).parameters
     functions = {name: BY_INTERVALS[name] for name in BY_INTERVALS if name in wanted}
     name = kernel.__name__.removeprefix("_")
@@ -185,7 +186,7 @@ def _over_intervals(
 
 
 def _contacts(module: Any, parameters: Any, inputs: Any, size: float) -> Contacts | None:
-    """The rigid contacts of a module of this size, m, if it has any."""
+    """The rigid contacts of a module of this size, m; None if it has none."""
     names = getattr(module, "CONTACTS", None)
     if not names:
         return None
@@ -208,12 +209,12 @@ def _contacts(module: Any, parameters: Any, inputs: Any, size: float) -> Contact
 def given_values(
     module: GeneratedModule, parameters: Any = None, inputs: Any = None
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Values that are given to a module in one way or another, by name."""
+    """The given parameters and inputs of a module by name, from any form that it accepts."""
     return _by_name(module.PARAMETERS, parameters), _by_name(module.INPUTS, inputs)
 
 
 def _by_name(names: Iterable[str], values: Any) -> dict[str, float]:
-    """Values by name, or in order of the names; none at all if None."""
+    """Values by name, from a mapping or in the order of the names; empty if None."""
     if values is None:
         return {}
     pairs = values.items() if hasattr(values, "keys") else zip(names, values, strict=False)

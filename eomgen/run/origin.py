@@ -1,19 +1,19 @@
-"""What the motion of a run comes of: a scene, parameters and inputs."""
+"""What the motion of a run depends on: a scene, parameters and inputs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 UNITS = "units of parameters"
 START = "initial state"
-"""The part of a scene that a motion under way no longer depends on, but sizes do."""
+"""The part of a scene that does not affect how a motion continues, but does affect sizes."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """What makes a motion, once it is under way, what it is.
+    """What a motion depends on.
 
-    scene               digests of the parts of a scene, by what they are called; looks, names of
-                        files and settings of the solver are none
+    scene               digests of the parts of a scene, by their descriptions; appearance, file
+                        names and integrator settings are not among them
     parameters, inputs  values, by name
     """
 

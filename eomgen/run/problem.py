@@ -1,4 +1,4 @@
-"""What an integrator needs to know of a mechanism: its derivative, its Jacobian, its start."""
+"""The initial-value problem of a mechanism, as integrators need it."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +13,7 @@ from eomgen.run.intervals import Interval
 from eomgen.run.origin import Origin
 
 FloatArray = NDArray[np.float64]
-"""An array of 64-bit floats; every state vector is one."""
+"""An array of 64-bit floats, such as a state."""
 
 
 class Explanation(NamedTuple):
@@ -36,25 +36,25 @@ def unexplained(t: float, y: FloatArray, initial: FloatArray) -> None:
 
 
 SHORTEST = 1e-150
-"""A quaternion shorter than this says no orientation: its square is no number."""
+"""A quaternion shorter than this gives no orientation: its square underflows."""
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """What a mechanism's nc rigid contacts do; a contact touches where its gap is 0.
+    """The nc rigid contacts of a mechanism; a contact touches if its gap is 0.
 
-    names, effects  of each contact, and of the effect that its work is booked under
-    gaps            (t, y) -> (nc,), m or rad, > 0 apart
+    names, effects  names of the contacts, and of the effects to which their works belong
+    gaps            (t, y) -> (nc,), m or rad, positive if apart
     rates           (t, y) -> (nc,), their time derivatives
-    impact          (t, y, contact, bounce) -> (ny,), the state after contact number `contact` has
-                    struck, its restitution multiplied by `bounce` (0: perfectly plastic)
-    held            (t, y, forces (nc,)) -> (ny + 2 nc + nd,), affine in the forces (N or N m):
-                    under normal forces of the contacts, and the friction they cause, the state's
-                    derivative, the gaps' second derivatives, the powers (W) of the contacts and
-                    of the drives
-    drives          effects (nd) that drive joints: what they do depends on the contacts' forces
-    sizes           of the mechanism, in each gap's unit: gaps are judged in parts of it, see
-                    `contacts.TOLERANCE`; 1 of each if not given
+    impact          (t, y, contact, bounce) -> (ny,), the state after an impact of contact number
+                    `contact`, whose restitution is multiplied by `bounce` (0: perfectly plastic)
+    held            (t, y, forces (nc,)) -> (ny + 2 nc + nd,): under normal forces of the contacts
+                    (N or N m) and the friction they cause, the derivative of the state, the
+                    second derivatives of the gaps, and the powers of the contacts and of the
+                    drives, W; all affine in the forces
+    drives          effects (nd) that drive joints: their powers depend on the contact forces
+    sizes           size of the mechanism in the unit of each gap, to which tolerances are
+                    relative, see `contacts.TOLERANCE`; 1 if not given
     """
 
     names: tuple[str, ...]
@@ -69,12 +69,12 @@ class Contacts:
 
 @dataclass(frozen=True, eq=False)
 class Switching:
-    """The switching functions of a derivative, which is smooth as long as none of them passes 0.
+    """The switching functions of a derivative, which is smooth while none of them crosses 0.
 
     of_state  (t, y) -> (ns,), those that depend on the state; None if there are none
-    timed     whether they depend on time, too
-    angles    indices of the states that are angles, rad, which sines are taken of
-    of_time   those that depend on time alone, over an interval of it; None if there are none
+    timed     whether these depend on time, too
+    angles    indices of the states that are angles, rad
+    of_time   those that depend on time alone, as a function of an interval; None if there are none
     """
 
     of_state: Callable[[float, FloatArray], FloatArray] | None = None
@@ -87,29 +87,30 @@ class Switching:
 class Problem:
     """The initial-value problem y' = f(t, y), y(t_start) = initial.
 
-    name        what messages and files call it
+    name        name in messages and files
     states      names of the ny states, in order
-    positions   indices of the states that are positions; the others, velocities, momenta and
-                the states of controllers, are what a force changes
+    positions   indices of the states that are positions; the others are velocities, momenta and
+                states of controllers
     derivative  f(t, y) -> (ny,), in SI units per second
     jacobian    df/dy(t, y) -> (ny, ny), exact
     initial     (ny,), kept as a read-only copy
     quaternions indices of the four components of each unit quaternion among the states
-    contacts    what must not pass through each other; None where nothing can touch
+    contacts    rigid contacts; None if there are none
     explain     see `Explain`
-    sizes       (ny,), of each state, in its unit, what the default of atol is a part of; 1 of each
-                if not given
-    noise       gives (ny,), the most that rounding of the derivative moves each state in a step at
-                the start of a run of some s (`run.noise`); None where that is not known
-    operations  of one call of a function, by its name, as far as they are known
+    sizes       (ny,), size of each state in its unit, to which the default atol is relative; 1 if
+                not given
+    noise       returns (ny,), for the length of a run in s, the greatest change of each state in a
+                step at the start by rounding errors of the derivative (`run.noise`); None if not
+                known
+    operations  number of operations in a call of a function, by its name, as far as known
     columns     whether the Jacobian is computed along all directions at once
-    corners     whether the derivative has corners or jumps, as one-sided forces have: a long step
-                might leap over what begins and ends within it
-    switching   where these corners are; None where that is not known
-    origin      what it was made of, which a run that goes on is held to; None if not known
+    corners     whether the derivative has corners or jumps, as with one-sided forces: a long step
+                might pass over what begins and ends within it
+    switching   the switching functions of these corners; None if not known
+    origin      what the motion depends on, to check runs that continue; None if not known
 
-    Raises `RunError` if `initial` has not one finite number per state, or if a quaternion has no
-    length there.
+    Raises `RunError` if `initial` does not have one finite number for each state, or if a
+    quaternion in it is 0.
     """
 
     name: str
@@ -151,11 +152,11 @@ class Problem:
         object.__setattr__(self, "initial", initial)
 
     def unit(self, y: FloatArray) -> FloatArray:
-        """Return the state `y` (ny,) with its quaternions scaled to unit length.
+        """The state `y` (ny,) with normalised quaternions; those that are not finite stay as is.
 
-        The exact motion stays on that sphere; a step leaves it by its own error, and scaling, which
-        goes back to the nearest point, keeps the order of the method: Hairer, Lubich, Wanner,
-        Geometric Numerical Integration, section IV.4. What is not finite is left as it is.
+        The exact motion stays on the unit sphere. A step leaves it by its error, and projection to
+        the nearest point of the sphere keeps the order of the method: Hairer, Lubich, Wanner,
+        Geometric Numerical Integration, section IV.4.
         """
         if not self.quaternions:
             return y

@@ -1,4 +1,4 @@
-"""A bar on the terminal while something long runs, and silence in a pipe."""
+"""A progress bar on the terminal for long work; nothing if standard error is a pipe."""
 
 import shutil
 import sys
@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 Progress = Callable[[float], None]
-"""Told the fraction done, 0 to 1."""
+"""Called with the fraction done, 0 to 1."""
 
 _BAR = 30
 WIDEST = 500
-"""Columns of a terminal that are used."""
+"""Greatest number of columns used."""
 
 
 def throttled(progress: Progress, interval: float = 0.1) -> Progress:
-    """Return `progress` made deaf for `interval` seconds after each call it hears, but for 1."""
+    """`progress` without the calls within `interval` s of the one before, except for fraction 1."""
     due = 0.0
 
     def report(fraction: float) -> None:
@@ -30,9 +30,9 @@ def throttled(progress: Progress, interval: float = 0.1) -> Progress:
 
 @contextmanager
 def terminal_progress(label: str) -> Iterator[Progress]:
-    """Give a callable that draws a one-line bar on standard error, wiped when the block ends.
+    """Yield a function that draws a bar on one line of standard error, erased when the block ends.
 
-    Where standard error is no terminal the callable does nothing.
+    If standard error is no terminal, the function does nothing.
     """
     with terminal_line() as write:
 
@@ -46,7 +46,7 @@ def terminal_progress(label: str) -> Iterator[Progress]:
 
 @contextmanager
 def terminal_notice(text: str) -> Iterator[None]:
-    """Show a line on standard error while the block runs, if that is a terminal."""
+    """Show a line on standard error during the block, if that is a terminal."""
     with terminal_line() as write:
         write(text)
         yield
@@ -54,16 +54,16 @@ def terminal_notice(text: str) -> Iterator[None]:
 
 @contextmanager
 def terminal_line() -> Iterator[Callable[[str], None]]:
-    """Give a function that rewrites one line on standard error, wiped when the block ends.
+    """Yield a function that rewrites one line on standard error, erased when the block ends.
 
-    Where standard error is no terminal it does nothing.
+    If standard error is no terminal, it does nothing.
     """
     stream = sys.stderr
     if not stream.isatty():
         yield lambda text: None
         return
-    # One column short of the edge, or the line would wrap and \r could not come back over it; and
-    # COLUMNS may say anything.
+    # One column less, because \r does not return to the start of a line that wraps. COLUMNS may
+    # have any value.
     width = min(shutil.get_terminal_size().columns, WIDEST) - 1
 
     def write(text: str) -> None:

@@ -1,4 +1,4 @@
-"""Runs that go on where an earlier one ended."""
+"""Runs that continue an earlier one."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from eomgen.run.stepping import ANEW, can_go_on
 from eomgen.run.trajectory import Trajectory
 
 LISTED = 4
-"""Differences that are named; of more, their number is."""
+"""Number of differences that are named; of the others, only the number is given."""
 
 
 class Asked(Protocol):
@@ -38,11 +38,11 @@ class Asked(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a run begins: the problem with its initial state, what `integrate` is told, and what
-    there is to say of it.
+    """The start of a run that continues another: the problem with its initial state, arguments of
+    `integrate`, and a message.
 
-    capped  whether steps of that run were held to a part of its length; None if the words do not
-            say that it is as if it had not ended
+    capped  whether the other run limited steps to a fraction of its length; None if this run is not
+            exactly what that one would have become
     """
 
     problem: Problem
@@ -51,10 +51,10 @@ class Start:
     capped: bool | None = None
 
     def reported(self, run: Trajectory) -> str:
-        """What there is to say once it has run."""
+        """The message after the run."""
         capped = self.capped is not None and (self.capped or run.counts["capped"])
         if capped and np.isnan(run.resume.get("max_step", np.nan)):
-            return f"{self.words}, but that steps are held to a part of that run's length"
+            return f"{self.words}, except that the length of that run limits the steps"
         return self.words
 
 
@@ -67,13 +67,15 @@ def going_on(
     max_step: float | None = None,
     rest_speed: float | None = None,
 ) -> Start:
-    """How a problem goes on where a run ended that was read from `path`.
+    """The start of a run that continues the run `ended`, read from `path`.
 
-    With the same scene, parameters, inputs, method and step or tolerances it goes on from the last
-    whole step, to the same bytes as if that run had not ended: all methods of equal steps do, and
-    without rigid contacts RK45, DOP853 and gragg_bulirsch_stoer. What differs is told; then, as
-    with the other methods, the run begins anew at the last state.
-    Raises `RunError` if the run is one of another scene, or what it kept does not fit its method.
+    With the same scene, parameters, inputs, method and step or tolerances it continues from the
+    last whole step, to the same bytes as if that run had not ended. All methods with equal steps
+    can do that, and without rigid contacts RK45, DOP853 and gragg_bulirsch_stoer. With other
+    methods, or if something differs, the run starts anew from the last state, and the message says
+    why.
+
+    Raises `RunError` if the run is one of another scene, or if its file does not fit its method.
     """
     _check_scene(ended, path, problem)
     _check_kept(ended, path, problem)
@@ -85,18 +87,18 @@ def going_on(
     begin = float(ended.t[-1])
     why = _reasons(ended, problem, asked, settings)
     if why:
-        words = f"begins anew from the state at t = {begin:g} s: {why}"
+        words = f"starts anew from the state at t = {begin:g} s: {why}"
         return Start(replace(problem, initial=ended.y[-1]), {"t_start": begin}, words)
     begin = float(ended.resume["t"])
-    words = f"goes on from t = {begin:g} s as if the run had not ended"
+    words = f"continues from t = {begin:g} s as if the run had not ended"
     exactly = False
     if not _same_bits(ended, problem):
         words = (
-            f"goes on from t = {begin:g} s; the derivative there has other last bits than in that "
-            "run, by another --route, version or machine"
+            f"continues from t = {begin:g} s; the derivative there differs in its last bits from "
+            "that run, by another --route, version or machine"
         )
     elif asked.dt is None and problem.contacts and ANEW not in ended.resume:
-        words += ", within its tolerances: the last contacts were found in a step that the end cut"
+        words += ", within its tolerances: the end shortened a step in which contacts were located"
     else:
         exactly = True
     capped = bool(ended.counts["capped"]) if exactly else None
@@ -104,7 +106,7 @@ def going_on(
 
 
 def _check_scene(ended: Trajectory, path: Path, problem: Problem) -> None:
-    """Raise `RunError` if a run is of another scene than the problem, and say in what."""
+    """Raise `RunError`, which names the differences, if a run is not of the problem's scene."""
     if ended.states != problem.states:
         raise RunError(
             f"--from: {path} has the states of '{ended.name}', {_few(ended.states)}, not those of "
@@ -136,16 +138,16 @@ def _check_scene(ended: Trajectory, path: Path, problem: Problem) -> None:
 def _reasons(
     ended: Trajectory, problem: Problem, asked: Asked, settings: Mapping[str, float | None]
 ) -> str:
-    """Why a problem cannot go on as if a run had not ended; "" if it can."""
+    """The reason why a problem cannot continue a run exactly; "" if it can."""
     then, now = ended.origin, problem.origin
     if ended.integrator != asked.integrator:
-        return f"that run was by {ended.integrator}"
+        return f"that run used {ended.integrator}"
     if not ended.resume:
         method = find_integrator(ended.integrator)
-        kept = f"{ended.integrator} keeps a history of its own, which no file holds"
-        return "that run was repaired on its way" if can_go_on(method) else kept
+        history = f"{ended.integrator} depends on earlier steps, which are not in the file"
+        return "that run was repaired by its guard" if can_go_on(method) else history
     if then is None or now is None:
-        return "it is not known of what scene that run is"
+        return "the scene of that run is not known"
     found = [
         f"--{name.replace('_', '-')} {_value(_kept(ended, name))}, not {_value(value)}"
         for name, value in settings.items()
@@ -159,18 +161,18 @@ def _reasons(
         ]
     measured = problem.contacts or (asked.dt is None and asked.atol is None)
     if measured and then.scene.get(START) != now.scene.get(START):
-        found.append("another initial state, by which tolerances are measured")
+        found.append("another initial state, to which tolerances are relative")
     return f"that run had {_listed(found)}" if found else ""
 
 
 def _kept(ended: Trajectory, name: str) -> float | None:
-    """A setting of the run; none is kept as nan."""
+    """A setting of the run; None if it was not given."""
     value = float(ended.resume[name]) if name in ended.resume else np.nan
     return None if np.isnan(value) else value
 
 
 def _same_bits(ended: Trajectory, problem: Problem) -> bool:
-    """Whether the derivative where the run goes on is what it was, to the last bit; or unknown."""
+    """Whether the derivative at the start has the same bits as in that run, or is not known."""
     if np.isnan(ended.resume["derivative"]).any():
         return True
     try:
@@ -181,7 +183,7 @@ def _same_bits(ended: Trajectory, problem: Problem) -> bool:
 
 
 def _check_kept(ended: Trajectory, path: Path, problem: Problem) -> None:
-    """Raise `RunError` unless what a run left is what its method needs to go on."""
+    """Raise `RunError` unless a run's file holds what its method needs to continue."""
     method = find_integrator(ended.integrator)
     if not ended.resume or not can_go_on(method):
         return
@@ -191,14 +193,14 @@ def _check_kept(ended: Trajectory, path: Path, problem: Problem) -> None:
     )
     if not (fits and _is_sane(ended.resume, problem)):
         raise RunError(
-            f"{path}: what it holds to go on from does not fit {ended.integrator}; simulate again"
+            f"{path}: its data for continuing do not fit {ended.integrator}; simulate again"
         )
 
 
 def _needed(
     ended: Trajectory, problem: Problem, method: FixedStep | Adaptive
 ) -> Iterator[tuple[str, tuple[int, ...] | None]]:
-    """What goes on needs by name, and its shapes; None where any will do."""
+    """The names and shapes of the arrays that are needed to continue; None for any shape."""
     ny = len(ended.states)
     yield from dict.fromkeys(("y", "derivative"), (ny,)).items()
     yield from dict.fromkeys(
@@ -222,16 +224,18 @@ def _needed(
 
 
 def _is_sane(kept: Mapping[str, Any], problem: Problem) -> bool:
-    """Whether numbers are such as a run leaves."""
-    free = {"dt", "rtol", "atol", "max_step", "rest_speed"}
-    endless = {"longest", "until", "turned", "checked"}
+    """Whether the numbers are in the ranges that a run can leave."""
+    optional = {"dt", "rtol", "atol", "max_step", "rest_speed"}
+    may_be_infinite = {"longest", "until", "turned", "checked"}
     for name, value in kept.items():
         if name == "derivative":
             continue
-        if name in free:
+        if name in optional:
             sane = np.isnan(value) or (np.isfinite(value) and value > 0)
+        elif name in may_be_infinite:
+            sane = not np.isnan(value).any()
         else:
-            sane = not np.isnan(value).any() if name in endless else np.isfinite(value).all()
+            sane = np.isfinite(value).all()
         if not sane:
             return False
     lengths = [kept[name] for name in ("h_abs", "length", "longest", "unseen") if name in kept]

@@ -1,4 +1,4 @@
-"""How the steps that a run asks for are begun."""
+"""The steps of a run, from its arguments."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,15 +23,16 @@ from eomgen.run.problem import Problem
 
 ADAPTIVE_SAMPLES = 1001
 ANEW = "anew"
-"""Says in a `Resume` that no step was whole: what goes on from it begins like the run that left it.
+"""The key in a `Resume` of a run that made no whole step: a later run then begins as that one did.
 """
 
 
 @dataclass(frozen=True)
 class Asked:
-    """The steps of a run, as `integrate` describes them; `grid` is where equal ones count from, s.
+    """The arguments of `integrate` that determine the steps; `grid`, s, is the time from which
+    equal steps are counted.
 
-    Raises `RunError` for what no method can serve.
+    Raises `RunError` for arguments that are invalid for every method.
     """
 
     integrator: str
@@ -53,18 +54,18 @@ class Asked:
 
     @property
     def span(self) -> float:
-        """How long the run is, s."""
+        """Length of the run, s."""
         return self.t_end - self.t_start
 
 
 def equal_steps(
-    asked: Asked, method: FixedStep, problem: Problem, looked_at: Problem | None
+    asked: Asked, method: FixedStep, problem: Problem, checked: Problem | None
 ) -> tuple[Begin, Resume]:
-    """Equal steps from `asked.grid`, wherever they are begun, and what a run from their end needs.
+    """A function that begins equal steps, and the settings that a later run compares.
 
-    looked_at  the problem whose Jacobian tells whether a step is too long, if that is to be asked
+    checked  the problem by whose Jacobian the stability of steps is checked; None for no check
 
-    Raises `RunError` for a step that is none.
+    Raises `RunError` for an invalid step.
     """
     if asked.max_step is not None:
         raise RunError(f"max_step: {asked.integrator} takes equal steps; give --dt instead")
@@ -82,22 +83,22 @@ def equal_steps(
             t_end=asked.t_end,
             dt=dt,
             every=every,
-            checked=problem if looked_at and problem.contacts else looked_at,
+            checked=problem if checked and problem.contacts else checked,
             stability=method.stability,
             resume=resume,
         )
 
-    return begin, _remembered(asked, dt)
+    return begin, _settings(asked, dt)
 
 
 def adaptive_steps(
     asked: Asked, method: Adaptive, problem: Problem, remark: Remark
 ) -> tuple[Begin, Resume]:
-    """Steps that a method chooses itself, and what a run from their end needs.
+    """A function that begins adaptive steps, and the settings that a later run compares.
 
-    remark  told what the method has to say of its steps
+    remark  called with the method's remarks
 
-    Raises `RunError` for a step given, or a longest one that is none.
+    Raises `RunError` if `dt` is given, or `max_step` is invalid.
     """
     check_no_step(asked.integrator, asked.dt)
     times = np.linspace(asked.t_start, asked.t_end, asked.samples or ADAPTIVE_SAMPLES)
@@ -122,21 +123,21 @@ def adaptive_steps(
             resume=resume,
         )
 
-    return begin, {**_remembered(asked, None), **numbers(longest=longest, unseen=unseen)}
+    return begin, {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
 
 
-def _remembered(asked: Asked, dt: float | None) -> Resume:
+def _settings(asked: Asked, dt: float | None) -> Resume:
     given = {"rtol": asked.rtol, "atol": asked.atol, "max_step": asked.max_step}
     return numbers(grid=asked.grid, dt=dt, **given)
 
 
 def can_go_on(method: FixedStep | Adaptive) -> bool:
-    """Whether a run by a method can go on where another one ended, as if it had not."""
+    """Whether a run by a method can continue another one exactly, as if that had not ended."""
     return isinstance(method, FixedStep) or bool(method.memory)
 
 
 def begun(asked: Asked, problem: Problem) -> Resume:
-    """What a later run needs to go on from the start of this one, where no step has been whole."""
+    """What a later run needs to continue if this one makes no whole step."""
     if asked.resume is not None:
         return asked.resume
     return {"t": np.array(asked.t_start), "y": problem.initial, ANEW: np.array(1.0)}

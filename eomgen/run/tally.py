@@ -1,4 +1,4 @@
-"""What a run takes, counted rather than timed, and how far its motion goes."""
+"""Counts of what a run evaluates, and the extent of its motion."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -10,26 +10,28 @@ from eomgen.run.integrators.interface import Advance, EndedRunError
 from eomgen.run.problem import FloatArray, Problem
 
 Follow = Callable[[float, FloatArray], object]
-"""Told time, s, and state (ny,) after each step; what it returns ends the run if it is true."""
+"""Called with time, s, and state (ny,) after each step; a true result ends the run."""
 
 
 def _unlimited(tally: "Tally", t: float) -> None:
-    """Let every run go on."""
+    """A check that ends no run."""
 
 
 @dataclass
 class Tally:
-    """Counts of one run; `integrate` keeps it up to date at every step.
+    """Counts of a run, which `integrate` updates at every step.
 
-    check           told this tally and the time, s, after each step; raises `EndedRunError` to
-                    end the run
-    follow          told the time and the state after each step; may end the run, too
+    check           called with this tally and the time, s, after each step; raises `EndedRunError`
+                    to end the run
+    follow          called with the time and the state after each step; may end the run
     steps, derivatives, jacobians  as in `Trajectory.counts`
-    factorisations  LU factors made by methods that report them
+    factorisations  LU factorisations, by methods that count them
     rows            rows kept
-    held, looks     calls of `Contacts.held`, and of `Contacts.gaps` and `rates`
+    held, gap_checks
+                    calls of `Contacts.held`, and of `Contacts.gaps` and `rates`
     switches        calls of `Switching.of_state`
-    low, high       (ny,), between which each state was at the ends of steps; None before the first
+    low, high       (ny,), least and greatest value of each state at the ends of steps; None before
+                    the run
     """
 
     check: Callable[["Tally", float], None] = _unlimited
@@ -40,19 +42,19 @@ class Tally:
     factorisations: int = 0
     rows: int = 0
     held: int = 0
-    looks: int = 0
+    gap_checks: int = 0
     switches: int = 0
     low: FloatArray | None = field(default=None, repr=False)
     high: FloatArray | None = field(default=None, repr=False)
 
     def begin(self, y: FloatArray) -> None:
-        """Take note of the initial state."""
+        """Record the initial state."""
         self.low = self.high = y
 
     def take(self, advance: Advance, derivatives: int, jacobians: int) -> None:
-        """Take note of a step or strike, and of the calls made so far.
+        """Record a step or an impact, and the numbers of calls so far.
 
-        Raises `EndedRunError` where `check` does, or where `follow` says so.
+        Raises `EndedRunError` if `check` or `follow` ends the run.
         """
         assert self.low is not None and self.high is not None
         self.steps += advance.is_step
@@ -63,16 +65,16 @@ class Tally:
         self.high = np.maximum(self.high, advance.y)
         self.check(self, advance.t)
         if self.follow and self.follow(advance.t, advance.y.copy()):
-            raise EndedRunError("ended by who follows it")
+            raise EndedRunError("ended by the function that follows it")
 
     def counting(self, problem: Problem) -> Problem:
-        """The same problem, calls of its contacts and of its switching functions counted here."""
+        """The same problem, but calls of its contacts and switching functions are counted."""
         contacts, switching = problem.contacts, problem.switching
         if contacts is not None:
             contacts = replace(
                 contacts,
-                gaps=self._counted("looks", contacts.gaps),
-                rates=self._counted("looks", contacts.rates),
+                gaps=self._counted("gap_checks", contacts.gaps),
+                rates=self._counted("gap_checks", contacts.rates),
                 held=self._counted("held", contacts.held),
             )
         if switching is not None and switching.of_state is not None:

@@ -1,4 +1,4 @@
-"""What a run leaves behind, and the files it is kept in."""
+"""The result of a run, and the files that hold it."""
 
 import csv
 import io
@@ -17,9 +17,9 @@ from eomgen.run.problem import FloatArray
 
 FORMAT = "trajectory 4"
 LARGEST = 2**32
-"""Bytes of the largest file that is read: a run of a million samples of 500 states."""
+"""Size of the largest file that is read, bytes: a million samples of 500 states."""
 RESUME = "resume_"
-"""Begins the names of members of a file that a later run goes on from."""
+"""Prefix of the members of a file from which a later run continues."""
 COUNTS = ("steps", "derivatives", "jacobians", "impacts", "capped", "cut")
 Kind = Literal["impact", "rest", "lift"]
 Ending = Literal["finished", "interrupted", "ended", "stopped"]
@@ -28,10 +28,10 @@ ENDINGS: tuple[Ending, ...] = get_args(Ending)
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run came to its end.
+    """How a run ended.
 
-    kind    "finished": at its end time; "interrupted": by the user; "ended": by who watches or
-            follows it; "stopped": it could not go on
+    kind    "finished": at its end time; "interrupted": by the user; "ended": by a function that
+            follows it; "stopped": by an error
     reason  why it did not finish
     remedy  what to change; "" if that is not known
     """
@@ -46,11 +46,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Event:
-    """What happened to a contact at time `t`, s.
+    """An event of a contact at time `t`, s.
 
-    kind   "impact": it struck; "rest": from here on it is held, the force that keeps it closed
-           being known at every moment; "lift": it no longer is
-    speed  with which it closed, m/s or rad/s; 0 for a lift
+    kind   "impact": it struck; "rest": from here on it is held by its contact force; "lift": it is
+           no longer held
+    speed  the speed with which it closed, m/s or rad/s; 0 for a lift
     """
 
     t: float
@@ -63,25 +63,25 @@ class Event:
 class Trajectory:
     """The states of a mechanism at n times; arrays are read-only copies, in SI units.
 
-    name, states  of the problem that was integrated
+    name, states  name and states of the problem
     t             (n,), n >= 1, in s, never decreasing
-    y             (n, ny), one row of finite numbers per time
-    integrator    the method that made it
+    y             (n, ny), a row of finite numbers for each time
+    integrator    name of the method
     finished      whether it reached the end time
-    message       why not, and what to change; "" if there is nothing to say
-    counts        how many `steps` were made, `derivatives` and `jacobians` evaluated, and `impacts`
-                  met; how many steps were as long as any may be (`capped`), and how many made
-                  again, shorter, so as not to pass over a branch of the derivative (`cut`)
-    events        what happened to contacts, in time; the rows just before and just after an impact
-                  have the same t
-    works         (n, m), J: what each effect has done since the start; None if it was not asked for
+    message       why not, and what to change, or a remark; else ""
+    counts        numbers of `steps`, `derivatives`, `jacobians` and `impacts`; of steps of the
+                  greatest length allowed (`capped`); and of attempts repeated because they passed
+                  over a branch of the derivative (`cut`)
+    events        events of contacts, in order of time; the rows just before and just after an
+                  impact have the same t
+    works         (n, m), J: work of each effect since the start; None if not requested
     work_names    names of these m effects
-    resume        what a later run goes on from, to the same bytes as this one would have: arrays by
-                  name, see `integrate`; none where the method cannot
-    origin        what motion it is of; None if that was not known
-    outcome       how it came to its end
+    resume        arrays by name from which a later run continues exactly, see `integrate`; empty if
+                  the method cannot
+    origin        what the motion depends on; None if not known
+    outcome       how it ended
 
-    Raises `ValueError` if these do not fit together.
+    Raises `ValueError` if the values are inconsistent.
     """
 
     name: str
@@ -133,7 +133,7 @@ class Trajectory:
 
     @property
     def held(self) -> dict[str, float]:
-        """The contacts that are at rest at the end, and since when, s."""
+        """The contacts held at the end, each with the time from which on it is held, s."""
         held: dict[str, float] = {}
         for event in self.events:
             if event.kind == "rest":
@@ -146,10 +146,11 @@ class Trajectory:
 def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
     """Write `trajectory` as NumPy's .npz, the same bytes for the same trajectory.
 
-    Raises `RunError` if `path` cannot be written or holds a foreign file (then give `force`).
+    Raises `RunError` if `path` cannot be written, or if it holds a file of other origin and `force`
+    is not given.
     """
     events = trajectory.events
-    # Members keep this order: `eomgen` comes first, where it marks the file as ours.
+    # `eomgen` must come first: it marks the file as ours.
     members: dict[str, Array] = {
         "eomgen": np.array(FORMAT),
         "t": trajectory.t,
@@ -177,7 +178,7 @@ def _names(names: Any) -> Array:
 
 
 def _origin_members(origin: Origin) -> dict[str, Array]:
-    """The members of a file that hold where a motion comes from."""
+    """The members of a file that hold an origin."""
     members = {"scene": _names([*origin.scene.items()]).reshape(-1, 2)}
     for kind in ("parameters", "inputs"):
         values: Mapping[str, float] = getattr(origin, kind)
@@ -187,15 +188,15 @@ def _origin_members(origin: Origin) -> dict[str, Array]:
 
 
 def load_npz(path: Path) -> Trajectory:
-    """Return the trajectory that `save_npz` wrote; runs no code that the file may hold.
+    """The trajectory that `save_npz` wrote. Never executes code from the file.
 
-    What is read is what was written, by a digest over all of it. Raises `RunError` if the file is
-    missing, not a trajectory of ours, or damaged.
+    A digest detects damage. Raises `RunError` if the file is missing, no trajectory written by
+    eomgen, or damaged.
     """
     data = read_plain(path, LARGEST)
     if not is_ours(data):
         raise RunError(f"{path}: is no trajectory written by eomgen")
-    # What a broken archive makes zipfile and NumPy raise has no common base.
+    # The errors that zipfile and NumPy raise for a broken archive have no common base class.
     try:
         members = unpacked(data)
         form = _text(members["eomgen"])
@@ -209,9 +210,9 @@ def load_npz(path: Path) -> Trajectory:
 
 
 def _trajectory(members: dict[str, Array]) -> Trajectory:
-    """The trajectory of an archive's members, each of the type that it was written as, no others.
+    """The trajectory in the members of an archive.
 
-    Raises `ValueError` or `KeyError` if it holds none.
+    Raises `ValueError` or `KeyError` if a member is missing, unknown, or of another type.
     """
     rest = dict(members)
     del rest["eomgen"]
@@ -248,14 +249,14 @@ def _trajectory(members: dict[str, Array]) -> Trajectory:
 
 
 def _outcome(texts: Sequence[str]) -> Outcome:
-    """How a run ended. Raises `ValueError` for an end that there is not."""
+    """The outcome of a run. Raises `ValueError` for an unknown kind."""
     kind, reason, remedy = texts
     (known,) = (ending for ending in ENDINGS if ending == kind)
     return Outcome(known, reason, remedy)
 
 
 def _origin(rest: dict[str, Array]) -> Origin:
-    """Where a motion comes from; takes its members out."""
+    """The origin of a motion, whose members are removed from `rest`."""
     values = []
     for kind in ("parameters", "inputs"):
         names = _strings(rest.pop(f"{kind}_names"), 1)
@@ -264,14 +265,14 @@ def _origin(rest: dict[str, Array]) -> Origin:
 
 
 def _floats(array: Array, dimensions: int | None = None) -> FloatArray:
-    """An array of doubles. Raises `ValueError` for any other."""
+    """An array of doubles. Raises `ValueError` for another type or number of axes."""
     if array.dtype != np.float64 or dimensions not in (None, array.ndim):
         raise ValueError("no doubles, or not in that shape")
     return array
 
 
 def _strings(array: Array, dimensions: int) -> list[Any]:
-    """Texts, or lists of them. Raises `ValueError` for anything else."""
+    """A list of texts, or of lists of texts. Raises `ValueError` for anything else."""
     if array.dtype.kind != "U" or array.ndim != dimensions:
         raise ValueError("no texts, or not in that shape")
     found: list[Any] = array.tolist()
@@ -286,12 +287,12 @@ def _text(array: Array) -> str:
 
 
 def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
-    """Write `trajectory` as a table: a line of names, one row of t and y per time, and where works
-    were asked for, of these: work_<effect>, J.
+    """Write `trajectory` as a table: a line of names, then for each time a row with t, y and, if
+    there are works, work_<effect>, J.
 
-    Numbers are the shortest that read back exactly. `pandas.read_csv(path)` loads it, and
-    `np.genfromtxt(path, delimiter=",", names=True)`. All else that there is to say of a trajectory
-    stands in the archive that `save_npz` writes. Raises `RunError` as `save_npz` does.
+    Numbers are the shortest that read back exactly. `pandas.read_csv(path)` and
+    `np.genfromtxt(path, delimiter=",", names=True)` read the table. The rest of the trajectory is
+    only in the archive that `save_npz` writes. Raises `RunError` as `save_npz` does.
     """
     buffer = io.StringIO()
     table = csv.writer(buffer, lineterminator="\n")
@@ -302,9 +303,9 @@ def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
 
 
 def is_own_table(path: Path) -> bool:
-    """Whether a table has the columns of a trajectory of ours beside it, in the .npz of its name.
+    """Whether a table is ours: its columns are those of a trajectory in the .npz of the same name.
 
-    A table that others read has no room for a mark of whose it is.
+    A mark in the table itself would disturb other programs that read it.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:

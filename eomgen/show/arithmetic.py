@@ -12,7 +12,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from eomgen.files import write_whole
 from eomgen.run.problem import FloatArray
 from eomgen.show.style import FAINT, INK, PALETTE, plain, style, write_figure
-from eomgen.study.cost.arithmetic import Arithmetic, Way
+from eomgen.study.cost.arithmetic import Arithmetic, Solver
 
 LEAST = 0.05
 """Smaller errors are drawn here: a logarithmic axis has no 0."""
@@ -24,21 +24,21 @@ def save_figure(found: Arithmetic, path: Path, *, force: bool = False) -> None:
 
     Raises `RunError` as `write_figure` does.
     """
-    ways = [way for way in found.ways if way.operations is not None]
+    solvers = [solver for solver in found.solvers if solver.operations is not None]
     with style():
         engine = ConstrainedLayoutEngine(rect=(0.015, 0.0, 0.985, 1.0))  # for labels of two lines
-        figure = Figure(figsize=(10.0, 1.7 + 0.42 * len(ways)), layout=engine)
+        figure = Figure(figsize=(10.0, 1.7 + 0.42 * len(solvers)), layout=engine)
         panels = figure.subplots(1, len(found.samples), sharey=True, sharex=True, squeeze=False)[0]
         for k, (axes, sample) in enumerate(zip(panels, found.samples, strict=True)):
-            for i, way in enumerate(ways):
-                _bar(axes, i, way.errors[k].ulps, COLOURS[way.precision])
+            for i, solver in enumerate(solvers):
+                _bar(axes, i, solver.errors[k].ulps, COLOURS[solver.precision])
             axes.set_title(f"{len(sample.y)} states, {sample.kind}")
             axes.set_xscale("log")
             axes.set_xlabel("error of v̇, units in the last place of its precision")
             axes.grid(axis="y", visible=False)
-        panels[0].set_xlim(LEAST / 1.5, _farthest(ways))
-        panels[0].set_yticks(range(len(ways)), [_label(way) for way in ways])
-        panels[0].set_ylim(len(ways) - 0.4, -0.6)  # shared: the first way is on top
+        panels[0].set_xlim(LEAST / 1.5, _farthest(solvers))
+        panels[0].set_yticks(range(len(solvers)), [_label(solver) for solver in solvers])
+        panels[0].set_ylim(len(solvers) - 0.4, -0.6)  # shared: the first solver is on top
         figure.suptitle(
             f"{plain(found.name)}: how exact the accelerations are, and what they take",
             x=0.01,
@@ -47,17 +47,17 @@ def save_figure(found: Arithmetic, path: Path, *, force: bool = False) -> None:
         write_figure(figure, path, force=force)
 
 
-def _label(way: Way) -> str:
+def _label(solver: Solver) -> str:
     time = ""
-    if way.seconds is not None:
-        us = 1e6 * way.seconds
+    if solver.seconds is not None:
+        us = 1e6 * solver.seconds
         time = f", {us:.1f} µs" if us < 99.95 else f", {us:.0f} µs"
-    return f"{way.name}, {way.precision}\n{way.operations} operations{time}"
+    return f"{solver.name}, {solver.precision}\n{solver.operations} operations{time}"
 
 
-def _farthest(ways: list[Way]) -> float:
+def _farthest(solvers: list[Solver]) -> float:
     """The right limit of the axis, with room for the numbers beside the bars."""
-    all_ulps = np.concatenate([errors.ulps for way in ways for errors in way.errors])
+    all_ulps = np.concatenate([errors.ulps for solver in solvers for errors in solver.errors])
     finite = all_ulps[np.isfinite(all_ulps)]
     most = max(float(np.max(finite, initial=1.0)), 10.0)
     return float(most * (most / LEAST) ** 0.2)
@@ -91,13 +91,13 @@ def save_table(found: Arithmetic, path: Path, *, force: bool = False) -> None:
     The states are written exactly, so that the worst can be examined again. Errors in float32 are
     at the same states rounded to float32. Raises `RunError` as `write_whole` does.
     """
-    ways = [way for way in found.ways if way.operations is not None]
+    solvers = [solver for solver in found.solvers if solver.operations is not None]
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    heads = [f"{way.name} {way.precision}" for way in ways]
+    heads = [f"{solver.name} {solver.precision}" for solver in solvers]
     table.writerow(["state_kind", "t", "condition", *heads, *found.states])
     for k, sample in enumerate(found.samples):
-        columns = [way.errors[k].ulps for way in ways]
+        columns = [solver.errors[k].ulps for solver in solvers]
         for i, (t, y) in enumerate(zip(sample.t.tolist(), sample.y.tolist(), strict=True)):
             errors = [f"{column[i]:.6g}" for column in columns]
             table.writerow([sample.kind, repr(t), f"{sample.condition[i]:.6g}", *errors, *y])

@@ -75,13 +75,13 @@ def advance(
     """
     times = [t + c * h for c in method.c]
     near = y.astype(float)
-    moments = np.array(times, dtype=float)
-    guessed = forecast(float(t), near, moments)
-    correct = _solver(method, problem, float(h), moments, guessed)
+    node_times = np.array(times, dtype=float)
+    guessed = forecast(float(t), near, node_times)
+    correct = _solver(method, problem, float(h), node_times, guessed)
     if (
         precise.corner_branches is None
     ):  # with corners, doubles might take another branch than this step
-        guessed = _in_doubles(method, problem, float(h), moments, near, guessed, correct, scale)
+        guessed = _in_doubles(method, problem, float(h), node_times, near, guessed, correct, scale)
     moves = guessed.astype(object) - y  # in extended precision: sums of doubles would be doubles
     last = math.inf
     for _ in range(MOST_CORRECTIONS):
@@ -192,7 +192,7 @@ def _error(method: Gauss, moves: ExtendedArray, scale: FloatArray) -> float:
     return float(np.max(last * share * share))
 
 
-class _Way:
+class _Progress:
     """The current state of the integration, and the length and stages of the next step."""
 
     def __init__(
@@ -267,27 +267,27 @@ def rows(
     becomes too short, or if locating a branch change fails.
     """
     start = np.array(precise.initial, dtype=object)
-    way = _Way(ladder, mpfr(float(times[0])), start, mpfr(float(times[1] - times[0])))
-    forecast = Forecast(problem, scale, float(times[-1]), lambda: report(float(way.t)))
-    yield Row(start, 0, way.extent)
+    current = _Progress(ladder, mpfr(float(times[0])), start, mpfr(float(times[1] - times[0])))
+    forecast = Forecast(problem, scale, float(times[-1]), lambda: report(float(current.t)))
+    yield Row(start, 0, current.extent)
     for end in times[1:]:
         target = mpfr(float(end))
         change, tried, h = None, 0, mpfr(0)
-        while way.t < target:
-            report(float(way.t))
-            left = target - way.t
-            count = max(1, math.ceil(left / way.length * 0.999))
+        while current.t < target:
+            report(float(current.t))
+            left = target - current.t
+            count = max(1, math.ceil(left / current.length * 0.999))
             h = left / count if change is None else h + h * change.beyond
-            method = gauss(way.stages)
+            method = gauss(current.stages)
             try:
                 step = advance(
-                    method, precise, problem, forecast, scale, way.t, way.y, h, tolerance
+                    method, precise, problem, forecast, scale, current.t, current.y, h, tolerance
                 )
                 error = step.error
             except (ArithmeticError, ValueError):  # raised by f, by LU factors, or as `NoStep`
                 error = math.inf
             if not error <= tolerance:
-                way.again(h, error, tolerance)
+                current.again(h, error, tolerance)
                 change = None
                 continue
             if precise.corner_branches:
@@ -297,14 +297,14 @@ def rows(
                 )
                 tried += again
                 if tried > TURNINGS:
-                    raise NoStep(f"corners turn again and again at t = {float(way.t):.6g}")
+                    raise NoStep(f"corners change branch too often at t = {float(current.t):.6g}")
                 if again:
                     continue
-            way.take(h, step, tolerance, spare=way.length > left)
+            current.take(h, step, tolerance, spare=current.length > left)
             tried = 0
-            if count == 1 and abs(target - way.t) <= abs(target) * 2.0 ** (3 - BITS):
-                way.t = target
-        yield Row(way.y, way.made, way.extent)
+            if count == 1 and abs(target - current.t) <= abs(target) * 2.0 ** (3 - BITS):
+                current.t = target
+        yield Row(current.y, current.made, current.extent)
 
 
 def _changed(

@@ -23,7 +23,7 @@ ENTRY = 0.01
 """Of a Jacobian: each of its entries."""
 FACTORS, FLOP = 25.0, 5e-4
 """Of an LU factorisation: a call, and each multiplication."""
-HELD, LOOK = 110.0, 20.0
+HELD, GAP_CHECK = 110.0, 20.0
 """Of contacts: solving the complementarity problem for their forces, and a check of the gaps."""
 SWITCH = 70.0
 """Of a check whether a step crossed a branch: the call, and the evaluation of its result."""
@@ -97,7 +97,7 @@ def meter(problem: Problem, method: str) -> Callable[[Tally], float]:
             + tally.jacobians * jacobian
             + tally.factorisations * factors
             + tally.held * HELD
-            + tally.looks * LOOK
+            + tally.gap_checks * GAP_CHECK
             + tally.switches * SWITCH
         )
 

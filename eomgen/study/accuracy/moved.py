@@ -35,7 +35,7 @@ def moved_problem(
     module: GeneratedModule, model: Model, parameters: Any = None, inputs: Any = None
 ) -> Callable[[int], Problem]:
     """A function that gives, by number, the problem of a model's module with constants perturbed in
-    one of several ways, from the same initial state. Each problem is made once.
+    one of several patterns of signs, from the same initial state. Each problem is made once.
     """
     program = cache(partial(program_of, model))
     return cache(partial(_made, module, program, model, parameters, inputs))
@@ -47,27 +47,27 @@ def _made(
     model: Model,
     parameters: Any,
     inputs: Any,
-    way: int,
+    seed: int,
 ) -> Problem:
     true = problem_of(module, parameters, inputs, model)
-    twin = moved(module, program(), parameters, way)
+    twin = moved(module, program(), parameters, seed)
     return replace(problem_of(twin, parameters, inputs, model), initial=true.initial)
 
 
 def moved(
-    module: GeneratedModule, program: Program, parameters: Any = None, way: int = 0
+    module: GeneratedModule, program: Program, parameters: Any = None, seed: int = 0
 ) -> GeneratedModule:
     """The module of a program with the constants that belong to some parameters perturbed.
 
     Each constant is moved by `TIMES` its rounding error or by a unit in its last place, whichever
-    is more. The signs are random, with `way` as the seed. Exact constants stay. Rounding errors of
+    is more. The signs are random, from `seed`. Exact constants stay. Rounding errors of
     the steps need no perturbation: runs with other steps do not share them.
     """
     given = cast(Any, module)
     own = given._parameters(parameters) if parameters is not None else given._DEFAULT
     values = {name: constants for name, constants in own.items() if isinstance(constants, tuple)}
     off = _roundings(program, module, parameters)
-    random, known = np.random.default_rng(way), dict[float, float]()
+    random, known = np.random.default_rng(seed), dict[float, float]()
     for value in (value for constants in values.values() for value in constants):
         if value not in known:
             distance = off.get(value, 0.0)

@@ -223,8 +223,8 @@ class Search:
 
     def sample(self, run: Tried) -> None:
         """Make further runs that show the effect of rounding on a run."""
-        ways = range(1, 1 + SAMPLES) if self.case.moved is not None else ()
-        self.samples[id(run)] = [self._moved(self.case, run.setting, way) for way in ways]
+        seeds = range(1, 1 + SAMPLES) if self.case.moved is not None else ()
+        self.samples[id(run)] = [self._moved(self.case, run.setting, seed) for seed in seeds]
 
     @property
     def disturbed(self) -> float:
@@ -247,9 +247,9 @@ class Search:
                     self._disturbed = difference(run.trajectory, twin.trajectory, self.scale)
         return self._disturbed
 
-    def _moved(self, case: Case, setting: Setting, way: int) -> Tried:
+    def _moved(self, case: Case, setting: Setting, seed: int) -> Tried:
         """A run with constants perturbed by rounding errors."""
-        made = case.run(setting, due=self.started + self.budget, moved=way)
+        made = case.run(setting, due=self.started + self.budget, moved=seed)
         if made.interrupted:
             raise KeyboardInterrupt
         return made

@@ -79,8 +79,8 @@ class Errors:
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way to compute v̇: a route of the program, or `BASELINE`.
+class Solver:
+    """A solver of M v̇ + h = F: a route of the program, or `BASELINE`.
 
     operations     of a call; None if the model does not admit it: `words` say why
     seconds        of a call for one state
@@ -108,7 +108,7 @@ class Arithmetic:
     taken: str
     states: tuple[str, ...]
     samples: tuple[Sample, ...]
-    ways: tuple[Way, ...]
+    solvers: tuple[Solver, ...]
     agreed: float
 
 
@@ -121,7 +121,7 @@ def arithmetic(
     single: bool = False,
     progress: Progress = lambda fraction: None,
 ) -> Arithmetic:
-    """Compare all ways to v̇ at `states` seeded states and as many states of the scene's own run,
+    """Compare all solvers at `states` seeded states and as many states of the scene's own run,
     which is made as `wanted`. With `single`, compare them in float32, too, at the same states
     rounded to float32.
 
@@ -135,7 +135,7 @@ def arithmetic(
     taken = compile_program(model, jacobian=False).system
     others, missing = compiled(model, but=taken.route)
     there = {taken.route: loaded(taken), **others}
-    ways = {route: there[route] for route in ROUTES if route in there}
+    solvers = {route: there[route] for route in ROUTES if route in there}
     terms = loaded(
         compile_program(replace(model, route="aba", outputs=TERMS), jacobian=False).system
     )
@@ -145,7 +145,7 @@ def arithmetic(
     samples, truths = judging_states(
         truth,
         wanted,
-        ways[taken.route].module,
+        solvers[taken.route].module,
         count,
         seed,
         lambda part: progress(0.2 + 0.4 * part),
@@ -157,7 +157,9 @@ def arithmetic(
             f"to {agreed:.0f} only, too few to judge by; make masses and lengths less uneven"
         )
     samples = [replace(s, condition=condition_numbers(terms.module, s)) for s in samples]
-    found = [Way(route, "float64", None, None, None, (), words) for route, words in missing.items()]
+    found = [
+        Solver(route, "float64", None, None, None, (), words) for route, words in missing.items()
+    ]
     for precision in ("float64", "float32") if single else ("float64",):
         progress(0.7 if precision == "float64" else 0.8)
         if precision == "float32":
@@ -166,15 +168,15 @@ def arithmetic(
         else:
             samples_in_it = samples
         pairs = list(zip(samples_in_it, truths, strict=True))
-        found += [_judged(n, made, precision, pairs) for n, made in ways.items()]
+        found += [_judged(n, made, precision, pairs) for n, made in solvers.items()]
         found.append(_judged(BASELINE, terms, precision, pairs))
     progress(0.9)
     return Arithmetic(
         model.name,
         taken.route,
-        ways[taken.route].module.STATES,
+        solvers[taken.route].module.STATES,
         tuple(samples),
-        tuple(_timed(found, {**ways, BASELINE: terms}, samples[0].y)),
+        tuple(_timed(found, {**solvers, BASELINE: terms}, samples[0].y)),
         agreed,
     )
 
@@ -191,8 +193,8 @@ def _rounded(values: FloatArray) -> FloatArray:
     return values.astype(np.float32).astype(np.float64)
 
 
-def _judged(name: str, made: Made, precision: str, pairs: Sequence[tuple[Sample, Exact]]) -> Way:
-    """A way to v̇ with its errors, not timed yet."""
+def _judged(name: str, made: Made, precision: str, pairs: Sequence[tuple[Sample, Exact]]) -> Solver:
+    """A solver with its errors, without times."""
     model, bits = made.system.model, BITS[precision]
     units = [c.unit for c in model.velocities]
     compute = _doubles if precision == "float64" else _singles
@@ -209,7 +211,7 @@ def _judged(name: str, made: Made, precision: str, pairs: Sequence[tuple[Sample,
     if failed:
         of, why_not = sum(len(e.ulps) for e in errors), next(iter(whys), "not finite")
         words = f"no number at {failed} of {of} states: {why_not}"
-    return Way(name, precision, _operations(name, made), None, None, tuple(errors), words)
+    return Solver(name, precision, _operations(name, made), None, None, tuple(errors), words)
 
 
 def _operations(name: str, made: Made) -> int:
@@ -263,36 +265,36 @@ def _singles(name: str, made: Made, sample: Sample) -> tuple[Any, list[str]]:
     return found, whys
 
 
-def _timed(found: Sequence[Way], made: Mapping[str, Made], states: FloatArray) -> list[Way]:
+def _timed(found: Sequence[Solver], made: Mapping[str, Made], states: FloatArray) -> list[Solver]:
     """The same with the least times of calls, which take turns."""
     many = np.resize(states, (BATCH, states.shape[1])).T.copy()
-    timed, calls, places = list(found), [], []
+    timed, calls, slots = list(found), [], []
     with np.errstate(all="ignore"):
-        for i, way in enumerate(found):
-            if way.operations is None:
+        for i, solver in enumerate(found):
+            if solver.operations is None:
                 continue
-            call = _call(way, made[way.name])
-            start = made[way.name].module.initial_state()
+            call = _call(solver, made[solver.name])
+            start = made[solver.name].module.initial_state()
             for key, y in (("seconds", start), ("batch_seconds", many)):
-                given = y if way.precision == "float64" else y.astype(np.float32)
+                given = y if solver.precision == "float64" else y.astype(np.float32)
                 with suppress(ArithmeticError, ValueError, np.linalg.LinAlgError):
                     call(given)
                     calls.append(partial(call, given))
-                    places.append((i, key))
-        for (i, key), least in zip(places, least_seconds(calls), strict=True):
+                    slots.append((i, key))
+        for (i, key), least in zip(slots, least_seconds(calls), strict=True):
             part = least / BATCH if key == "batch_seconds" else least
             timed[i] = replace(timed[i], **{key: part})  # type: ignore[arg-type]
     return timed
 
 
-def _call(way: Way, made: Made) -> Callable[[Any], Any]:
+def _call(solver: Solver, made: Made) -> Callable[[Any], Any]:
     """A function that computes v̇ of one state, or of columns of states, at t = 0."""
     module = made.module
-    if way.precision == "float64":
-        if way.name == BASELINE:
+    if solver.precision == "float64":
+        if solver.name == BASELINE:
             return lambda y: _solved(module, 0.0, y)
         return lambda y: module.derivative(0.0, y)
-    if way.name != BASELINE:
+    if solver.name != BASELINE:
         return kernel_in_single(module, "derivative")
     matrix, bias, applied = (kernel_in_single(module, term) for term in TERMS)
     n = len(made.system.model.velocities)

@@ -131,7 +131,7 @@ def change(model: Model, whole: Run, other: Run, size: float) -> Change:
     apart = distances(model, one, two)
     moving = size > STILL
     late = np.flatnonzero(apart > SMALL * size) if moving else np.array([], dtype=int)
-    gaps = _places(one) - _places(two)
+    gaps = _positions(one) - _positions(two)
     gap = np.sqrt(np.sum(gaps * gaps, axis=-1))
     farthest = np.unravel_index(int(np.argmax(gap)), gap.shape)
     ends = [ended for ended in (other.ended, whole.ended) if ended not in ("", FAR_ENOUGH)]
@@ -149,7 +149,7 @@ def change(model: Model, whole: Run, other: Run, size: float) -> Change:
 def distances(model: Model, one: FloatArray, two: FloatArray) -> FloatArray:
     """The distance d between each row of two motions, (n,), m: root mean square over all mass."""
     total: FloatArray = np.zeros(len(one))
-    moved = np.sum((_places(one) - _places(two)) ** 2, axis=-1)
+    moved = np.sum((_positions(one) - _positions(two)) ** 2, axis=-1)
     turned = _attitudes(one) - _attitudes(two)
     masses = [model.value(body.mass) for body in model.bodies]
     for k, body in enumerate(model.bodies):
@@ -168,7 +168,7 @@ def _second_moment(inertia: Sequence[float]) -> FloatArray:
     return np.asarray(np.trace(matrix) / 2 * np.eye(3) - matrix)
 
 
-def _places(poses: FloatArray) -> FloatArray:
+def _positions(poses: FloatArray) -> FloatArray:
     """Centres of mass, (n, nb, 2) or (n, nb, 3)."""
     return poses[..., :2] if poses.ndim == 3 else poses[..., 3]
 

@@ -77,15 +77,15 @@ class Check:
 
 def forward_ulps(there: Sequence[Judged], route: str, model: Model) -> FloatArray:
     """Forward error of v̇ of a route at each state, (n,), ulps; infinite if v̇ is not finite."""
-    return in_ulps(np.array([one.off[route] for one in there]), there, model)
+    return in_ulps(np.array([one.errors[route] for one in there]), there, model)
 
 
-def in_ulps(off: FloatArray, there: Sequence[Judged], model: Model) -> FloatArray:
-    """Errors (n, nv) of v̇ in ulps (see `ulps`), (n,); infinite where they are not finite."""
+def in_ulps(deviations: FloatArray, there: Sequence[Judged], model: Model) -> FloatArray:
+    """The deviations (n, nv) of v̇ in ulps (see `ulps`), (n,); infinite if one is not finite."""
     true = np.array([one.vd for one in there]).T
     errors = np.zeros(len(there))
     for group, scale in group_scales(true, [c.unit for c in model.velocities]):
-        apart = np.max(np.abs(off[:, group]), axis=1)
+        apart = np.max(np.abs(deviations[:, group]), axis=1)
         with np.errstate(all="ignore"):
             parts = np.where(apart == 0.0, 0.0, apart / np.spacing(scale))
         errors = np.maximum(errors, np.where(np.isfinite(parts), parts, np.inf))

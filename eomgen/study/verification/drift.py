@@ -130,8 +130,8 @@ def _along(output: Any, t: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _lost(values: FloatArray, size: Any) -> float:
-    off = float(np.max(np.abs(values - values[0])))
-    return off / float(size) if size else off
+    change = float(np.max(np.abs(values - values[0])))
+    return change / float(size) if size else change
 
 
 def _components(dimensions: int, momenta: FloatArray) -> list[tuple[str, int, float]]:

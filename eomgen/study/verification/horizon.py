@@ -107,10 +107,10 @@ def horizon(
     if not run.finished:
         raise RunError(f"horizon: {METHOD}: {run.message}")
     rows = run.y[np.searchsorted(run.t, true.t)]
-    off = np.max(np.abs(rows - true.y) / true.scale, axis=1)
-    parted = np.flatnonzero(off > PARTED)
-    time = float(true.t[parted[0]]) if len(parted) else None
-    return Horizon(time, t_end, float(np.max(off)), true.error, f"{BITS}-bit Gauss collocation")
+    errors = np.max(np.abs(rows - true.y) / true.scale, axis=1)
+    apart = np.flatnonzero(errors > PARTED)
+    time = float(true.t[apart[0]]) if len(apart) else None
+    return Horizon(time, t_end, float(np.max(errors)), true.error, f"{BITS}-bit Gauss collocation")
 
 
 def _tight(problem: Problem, t_end: float, true: Reference) -> Trajectory:

@@ -21,7 +21,7 @@ from eomgen.run.problem import FloatArray
 from eomgen.scene.effects import Gravity
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.truth import Truth
-from eomgen.study.verification.ulps import HARDLY
+from eomgen.study.verification.ulps import LEAST_SCALE
 from eomgen.study.verification.virtual_work import FreeBodies
 
 ULP = 2.0**-52
@@ -45,7 +45,7 @@ class Judged:
     """The results at a state.
 
     vd         v̇ (nv,), exact but for rounding to doubles
-    off        by route, the error of its v̇ (nv,), nan where it is not finite
+    errors     by route, the error of its v̇ (nv,), nan where it is not finite
     data       change of v̇ (nv,) by one ulp in the data
     agreed     digits to which articulated bodies and virtual work agree, in 60 digits
     condition  2-norm condition number of the mass matrix scaled to a diagonal of ones
@@ -56,7 +56,7 @@ class Judged:
 
     state: State
     vd: FloatArray
-    off: Mapping[str, FloatArray]
+    errors: Mapping[str, FloatArray]
     data: FloatArray
     agreed: float
     condition: float
@@ -83,7 +83,7 @@ def judged(
         exact = _vd(truth, state, {})
         whole = extended(state.y)
         for indices in map(list, model.quaternions):
-            # Two formulas of a rotation differ for a quaternion that rounding made off unit length.
+            # Formulas of a rotation differ if rounding has changed the length of a quaternion.
             whole[indices] = whole[indices] / _root(whole[indices] @ whole[indices])
         free = FreeBodies(model, state.t, whole, state.u)
         numbers = whole, state.u, dict(model.defaults)
@@ -101,13 +101,13 @@ def judged(
         found = {route: _derivative(module, state) for route, module in modules.items()}
         nq, nv = len(model.coordinates), len(model.velocities)
         vd = {route: ydot[nq : nq + nv] for route, ydot in found.items()}
-        off = {route: doubles(extended(x) - exact) for route, x in vd.items()}
+        errors = {route: doubles(extended(x) - exact) for route, x in vd.items()}
         residuals = _residuals(free, near, vd, model)
         losses = _outputs(free, near, (modules[taken], full), found[taken], state)
         return Judged(
             state,
             doubles(exact),
-            off,
+            errors,
             doubles(data),
             agreed,
             *_condition(free.mass_matrix),
@@ -136,10 +136,10 @@ def _agreed(free: FreeBodies, vd: Array) -> float:
     compared with a part of the greatest row, in units of its own inertia.
     """
     root = extended([_root(x) for x in np.diag(free.mass_matrix)])
-    off = abs(_needed(free, vd)) / root
+    errors = abs(_needed(free, vd)) / root
     terms = (abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes) / root
-    terms = np.maximum(terms, HARDLY * np.max(terms))
-    worst = max((a / b for a, b in zip(off, terms, strict=True) if a), default=0)
+    terms = np.maximum(terms, LEAST_SCALE * np.max(terms))
+    worst = max((a / b for a, b in zip(errors, terms, strict=True) if a), default=0)
     return -_log10(worst) if worst else 60.0
 
 
@@ -273,15 +273,15 @@ def _loss(given: Any, true: Array, changes: Sequence[Array], scale: Array) -> Lo
     return Loss(ulps(extended(given) - true, scale), data)
 
 
-def ulps(off: Array, scale: Array) -> float:
+def ulps(error: Array, scale: Array) -> float:
     """The greatest of differences, each in ulps of its scale, which counts at least a thousandth of
     the greatest scale (see `ulps`). Where all scales are 0, any difference is infinite. nan if any
     difference is nan.
     """
-    off, scale = np.broadcast_arrays(off, np.maximum(scale, HARDLY * np.max(scale)))
+    error, scale = np.broadcast_arrays(error, np.maximum(scale, LEAST_SCALE * np.max(scale)))
     parts = [
         float(abs(x) / s / ULP) if s else np.inf
-        for x, s in zip(off.flat, scale.flat, strict=True)
+        for x, s in zip(error.flat, scale.flat, strict=True)
         if x
     ]
     return float(np.max(parts, initial=0.0))  # Python's own max could lose a nan

@@ -75,8 +75,8 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
         free = FreeBodies(model, state.t, y, state.u)
         vd = extended(ydot[nq : nq + nv])
         # Coordinates follow the velocities exactly: rounding of their rates is checked elsewhere.
-        way = np.concatenate([free.state_rates[:nq], vd, free.state_rates[nq + nv :]])
-        ahead, behind, step = _beside(model, state, y, way)
+        direction = np.concatenate([free.state_rates[:nq], vd, free.state_rates[nq + nv :]])
+        ahead, behind, step = _beside(model, state, y, direction)
         energy = momentum = None
         if not why_no_energy_law(model):
             change = (ahead.kinetic_energy - behind.kinetic_energy) / step
@@ -110,10 +110,10 @@ def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -
     if not hasattr(module, "jacobian"):
         return None
     rng = np.random.default_rng(1)
-    way = extended(rng.uniform(0.5, 1.0, len(y)) * rng.choice((-1.0, 1.0), len(y)))
+    direction = extended(rng.uniform(0.5, 1.0, len(y)) * rng.choice((-1.0, 1.0), len(y)))
     for indices in map(list, model.quaternions):  # tangent to the sphere of unit quaternions
-        way[indices] = way[indices] - y[indices] * (way[indices] @ y[indices])
-    ahead, behind, step = _beside(model, state, y, way, still=True)
+        direction[indices] = direction[indices] - y[indices] * (direction[indices] @ y[indices])
+    ahead, behind, step = _beside(model, state, y, direction, still=True)
     bend = ahead.state_rates - 2 * free.state_rates + behind.state_rates
     change = ahead.state_rates - behind.state_rates
     if max(abs(bend)) > SMOOTH * max(abs(change)):
@@ -124,26 +124,26 @@ def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -
         return float("inf")
     slopes = extended(given)
     nq, nv = len(model.coordinates), len(model.velocities)
-    scale = abs(slopes) @ abs(way) + abs(change)
+    scale = abs(slopes) @ abs(direction) + abs(change)
     rows = [c.unit for c in model.velocities]
     for unit in dict.fromkeys(rows):
         group = [nq + i for i, other in enumerate(rows) if other == unit]
         scale[group] = max(scale[group])
     assert len(rows) == nv
-    return ulps(slopes @ way - change, scale)
+    return ulps(slopes @ direction - change, scale)
 
 
 def _beside(
-    model: Model, state: State, y: Array, way: Array, *, still: bool = False
+    model: Model, state: State, y: Array, direction: Array, *, still: bool = False
 ) -> tuple[FreeBodies, FreeBodies, Extended]:
-    """The model a small step ahead along the rates `way` and one behind, and the time between, s.
+    """The model a small step ahead along `direction` and one behind, and the time between, s.
 
     Time advances by the same step unless `still`.
     """
-    step = _STEP / (1 + max(map(abs, way)))
+    step = _STEP / (1 + max(map(abs, direction)))
     time = mpfr(0) if still else step
-    ahead = FreeBodies(model, state.t + time, y + step * way, state.u)
-    behind = FreeBodies(model, state.t - time, y - step * way, state.u)
+    ahead = FreeBodies(model, state.t + time, y + step * direction, state.u)
+    behind = FreeBodies(model, state.t - time, y - step * direction, state.u)
     return ahead, behind, 2 * step
 
 

@@ -67,9 +67,9 @@ class Pose:
             self.position_b + self.rotation_b @ arm,
         )
 
-    def slid(self, axis: Array, way: Extended, column: int | None, rate: Array) -> "Pose":
-        """The pose moved by `way`, m, along an axis in its axes; its velocity is `column`."""
-        there = self.moved(axis * way)
+    def slid(self, axis: Array, distance: Extended, column: int | None, rate: Array) -> "Pose":
+        """The pose moved by `distance`, m, along an axis in its axes; its velocity is `column`."""
+        there = self.moved(axis * distance)
         if column is None:
             return there
         position_v = there.position_v.copy()

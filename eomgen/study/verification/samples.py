@@ -76,9 +76,9 @@ def agreement(truth: Truth, sample: Sample, true: Exact) -> float:
     sizes = np.max(np.abs(true), axis=0)
     worst = 0.0
     for k in {*range(min(CHECKED, len(sizes))), int(np.argmax(sizes))}:
-        off = np.max(np.abs(truth.factored(sample.t[k], sample.y[k]) - true[:, k]))
-        if off:
-            worst = max(worst, float(off / sizes[k]) if sizes[k] else 1.0)
+        difference = np.max(np.abs(truth.factored(sample.t[k], sample.y[k]) - true[:, k]))
+        if difference:
+            worst = max(worst, float(difference / sizes[k]) if sizes[k] else 1.0)
     return -math.log10(worst) if worst else float(DIGITS)
 
 

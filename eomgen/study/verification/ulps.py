@@ -19,7 +19,7 @@ from eomgen.run.problem import FloatArray
 from eomgen.scalars.extended import MP
 from eomgen.study.verification.truth import Exact
 
-HARDLY = 1e-3
+LEAST_SCALE = 1e-3
 """Least scale of a group, relative to its median size."""
 BITS = {"float64": 53, "float32": 24}
 """Of the significand of each format, including the leading bit."""
@@ -41,8 +41,8 @@ def vector_errors(found: FloatArray, true: Exact, units: Sequence[str], bits: in
     errors = np.where(finite, 0.0, np.nan)
     for group, scale in group_scales(true, units):
         for k in np.flatnonzero(finite):
-            off = max(abs(MP.mpf(float(found[i, k])) - true[i, k]) for i in group)
-            errors[k] = max(errors[k], _in_ulps(off, scale[k], bits))
+            error = max(abs(MP.mpf(float(found[i, k])) - true[i, k]) for i in group)
+            errors[k] = max(errors[k], _in_ulps(error, scale[k], bits))
     return errors
 
 
@@ -54,7 +54,7 @@ def group_scales(true: Any, units: Sequence[str]) -> list[tuple[list[int], Any]]
     for unit in dict.fromkeys(units):
         group = [i for i, u in enumerate(units) if u == unit]
         sizes = np.max(np.abs(true[group]), axis=0)
-        least = HARDLY * (sorted(sizes)[len(sizes) // 2] or max(sizes))
+        least = LEAST_SCALE * (sorted(sizes)[len(sizes) // 2] or max(sizes))
         found.append((group, np.maximum(sizes, least)))
     return found
 
@@ -67,7 +67,7 @@ def component_errors(found: FloatArray, true: Exact, bits: int) -> FloatArray:
     )
 
 
-def _in_ulps(off: Any, scale: Any, bits: int) -> float:
-    if not off:
+def _in_ulps(error: Any, scale: Any, bits: int) -> float:
+    if not error:
         return 0.0
-    return float(off / ulp(scale, bits)) if scale else float("inf")
+    return float(error / ulp(scale, bits)) if scale else float("inf")

@@ -196,7 +196,7 @@ def _states(run: SampledRun, module: GeneratedModule) -> list[State]:
 
 def _has(one: Judged, route: str) -> bool:
     """Whether a route gave a finite acceleration."""
-    return bool(np.isfinite(one.off[route]).all())
+    return bool(np.isfinite(one.errors[route]).all())
 
 
 def _notes(ran: Drift, model: Model) -> list[str]:
