@@ -1,4 +1,4 @@
-"""Exact derivatives on the tape, forward mode."""
+"""Exact derivatives by forward-mode automatic differentiation on the tape."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -8,7 +8,7 @@ from eomgen.scalars.functions import slope
 
 
 def jacobian(outputs: Sequence[Node], inputs: Sequence[Node]) -> list[list[Node]]:
-    """∂outputs/∂inputs, as new nodes on the same tape: one row an output."""
+    """The Jacobian ∂outputs/∂inputs as new nodes on the same tape, one row for each output."""
     if not outputs:
         return []
     one = outputs[0].tape.constant(1.0)
@@ -17,7 +17,11 @@ def jacobian(outputs: Sequence[Node], inputs: Sequence[Node]) -> list[list[Node]
 
 
 def tangent(outputs: Sequence[Node], directions: Mapping[int, Node]) -> list[Node]:
-    """How outputs change along directions, given for inputs by their index: a node an output."""
+    """The directional derivative of each output, as new nodes on the same tape.
+
+    `directions` maps the index of an input's node to the component of the direction along that
+    input; other inputs are held constant.
+    """
     if not outputs:
         return []
     tape = outputs[0].tape
@@ -31,7 +35,10 @@ def tangent(outputs: Sequence[Node], directions: Mapping[int, Node]) -> list[Nod
 
 
 def substituted(outputs: Sequence[Node], replacements: Mapping[int, Node]) -> list[Node]:
-    """The outputs computed anew with other nodes in place of some inputs, given by their index."""
+    """The outputs recorded again with some nodes replaced.
+
+    `replacements` maps the index of a node to the node that takes its place.
+    """
     if not outputs:
         return []
     tape = outputs[0].tape
@@ -45,7 +52,7 @@ def substituted(outputs: Sequence[Node], replacements: Mapping[int, Node]) -> li
 
 
 def _between(tape: Tape, outputs: Sequence[Node], inputs: Collection[int]) -> list[int]:
-    """The steps that outputs need, in order, up to some inputs."""
+    """The steps from `inputs`, exclusive, to `outputs`, in order."""
     needed: set[int] = set()
     stack = [node.index for node in outputs]
     while stack:

@@ -1,10 +1,11 @@
-"""One output of a program as a Python function over any scalars.
+"""One output of a program compiled to a Python function over any scalars.
 
-It takes the steps that `program.interpret` takes, several times as fast: they are written out as
-Python once. What depends on parameters alone is computed apart, once for many calls.
+It computes what `program.interpret` computes, several times as fast, because the steps are written
+as Python source once. Steps that depend on parameters alone are evaluated separately, once for many
+calls.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,13 +21,14 @@ Moving = Callable[[Sequence[Any], Sequence[Any], Sequence[Callable[..., Any]]], 
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """One output in two parts.
+    """One output of a program, split by what its steps depend on.
 
-    program    that it is of
-    known      steps that depend on parameters alone and are needed by others, in order
-    inputs     names of what `moving` is given besides, in order: time, state, inputs
-    functions  names of the functions that it calls, in order
-    moving     from the values of `known`, of `inputs`, and the functions, the output's entries
+    program    the program
+    known      steps that depend on parameters alone and that `moving` or the output uses, in order
+    inputs     names of the other inputs that `moving` takes, in order: time, states, inputs
+    functions  names of the functions that `moving` calls, in order
+    moving     computes the output's entries from the values of `known` and `inputs`, and the
+               functions
     """
 
     program: Program
@@ -36,13 +38,13 @@ class Kernel:
     moving: Moving
 
     def known_values(self, parameters: Mapping[str, Any], scalars: Scalars) -> tuple[Any, ...]:
-        """The values of `known` at values of the parameters, by name."""
+        """The values of `known` for parameter values given by name."""
         values = fixed_values(self.program, self.known, parameters, scalars)
         return tuple(values[i] for i in self.known)
 
 
 def kernel(program: Program, output: str) -> Kernel:
-    """The kernel of one output."""
+    """The kernel that computes one output."""
     nodes = program.outputs[output].nodes
     steps, live = program.steps, live_steps(program, nodes)
     moving = [i for i in live if steps[i].stage > Stage.PARAMETERS]
@@ -51,13 +53,13 @@ def kernel(program: Program, output: str) -> Kernel:
     given = [i for i in moving if steps[i].operation == "input"]
     computed = [i for i in moving if steps[i].operation != "input"]
     functions = tuple(f for f in FUNCTIONS if any(steps[i].operation == f for i in computed))
-    # Nothing that is written comes from the program's names: steps are called by their numbers.
+    # No name from the program enters the source: variables are numbered by step.
     lines = [
         "def moving(known, given, functions):",
-        f"    ({_unpacked(f's{i}' for i in known)}) = known",
-        f"    ({_unpacked(f's{i}' for i in given)}) = given",
-        f"    ({_unpacked(f'f_{name}' for name in functions)}) = functions",
-        *(f"    s{i} = {_written(steps[i])}" for i in computed),
+        f"    ({_targets(f's{i}' for i in known)}) = known",
+        f"    ({_targets(f's{i}' for i in given)}) = given",
+        f"    ({_targets(f'f_{name}' for name in functions)}) = functions",
+        *(f"    s{i} = {_source(steps[i])}" for i in computed),
         f"    return [{', '.join(f's{i}' for i in nodes)}]",
     ]
     module = load_source("\n".join(lines) + "\n", "kernel")
@@ -68,7 +70,7 @@ def kernel(program: Program, output: str) -> Kernel:
 def fixed_values(
     program: Program, wanted: Sequence[int], parameters: Mapping[str, Any], scalars: Scalars
 ) -> dict[int, Any]:
-    """The values of steps that depend on parameters alone, and of all that they need."""
+    """The values of steps that depend on parameters alone, and of all steps that they need."""
     values: dict[int, Any] = {}
     for i in live_steps(program, wanted):
         operation, operands, _, value = program.steps[i]
@@ -84,11 +86,12 @@ def fixed_values(
     return values
 
 
-def _unpacked(names: Any) -> str:
+def _targets(names: Iterable[str]) -> str:
+    """The names as targets of an unpacking assignment."""
     return "".join(f"{name}, " for name in names)
 
 
-def _written(step: Step) -> str:
+def _source(step: Step) -> str:
     parts = [f"s{o}" for o in step.operands]
     if step.operation == "neg":
         return f"-{parts[0]}"

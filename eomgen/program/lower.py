@@ -1,8 +1,8 @@
-"""From SymPy expressions to the tape.
+"""Lowering of SymPy expressions to the tape.
 
-SymPy's sums and products have many operands and no order of work. Here they get one: what depends
-on parameters alone is multiplied together first, so that it is computed once, and terms that share
-such a coefficient are added before they are multiplied by it.
+SymPy's sums and products have many operands in no particular order of evaluation. Lowering chooses
+one: factors that depend on parameters alone are multiplied first, so that their product is computed
+once, and terms with the same such coefficient are added before they are multiplied by it.
 """
 
 from collections.abc import Mapping
@@ -14,9 +14,10 @@ from eomgen.program.tape import Node, Stage, Tape, power, total
 
 
 class Lowering:
-    """Lowers expressions over symbols that are known nodes, or are defined by expressions.
+    """Lowers expressions to nodes of a tape.
 
-    A definition is lowered when it is first asked for; what nothing asks for costs nothing.
+    A symbol is either `known` as a node or `defined` by another expression. A definition is lowered
+    when an expression first uses it; an unused definition adds no steps.
     """
 
     def __init__(self, tape: Tape, known: Mapping[Any, Node], defined: Mapping[Any, Any]) -> None:
@@ -25,7 +26,10 @@ class Lowering:
         self._defined = defined
 
     def lower(self, expression: Any) -> Node:
-        """The node of an expression. Raises `KeyError` for a symbol that is not known."""
+        """The node that computes an expression.
+
+        Raises `KeyError` for a symbol that is neither known nor defined.
+        """
         node = self._nodes.get(expression)
         if node is None:
             node = self._nodes[expression] = self._lower(expression)
@@ -48,7 +52,7 @@ class Lowering:
         return self._tape.apply(name, self.lower(expression.args[0]))
 
     def _factors(self, expression: Any) -> tuple[Node, Node]:
-        """A product as (what depends on parameters alone, the rest)."""
+        """A product split in two: the factors that depend on parameters alone, and the rest."""
         one = self._tape.constant(1.0)
         tops: dict[bool, list[Node]] = {True: [], False: []}
         bottoms: dict[bool, list[Node]] = {True: [], False: []}
@@ -58,7 +62,7 @@ class Lowering:
                 tops[True].append(self._tape.constant(int(factor.p)))
                 bottoms[True].append(self._tape.constant(int(factor.q)))
                 continue
-            assert exponent.is_Integer, "roots stand in formulas only, which are no expressions"
+            assert exponent.is_Integer, "roots occur only in formulas, which are not lowered here"
             node = self.lower(base)
             side = tops if exponent > 0 else bottoms
             fixed = node.step.stage <= Stage.PARAMETERS
@@ -89,6 +93,6 @@ class Lowering:
 
 
 def _positive_first(nodes: list[Node], tape: Tape) -> Node:
-    """A sum begun with a term that is no negation, so that the others are subtracted from it."""
+    """The sum of nodes, negated ones last, so that they are subtracted from the others."""
     ordered = sorted(nodes, key=lambda node: node.step.operation == "neg")
     return total(ordered, tape)

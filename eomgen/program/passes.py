@@ -1,4 +1,4 @@
-"""Passes: each takes a finished program and returns a better one with the same values."""
+"""Optimisation passes: each returns a program with the same outputs in fewer operations."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
@@ -8,12 +8,12 @@ from eomgen.program.program import Output, Program, cost, finish, live_steps
 from eomgen.program.tape import Stage, Step, Tape
 
 Rule = Callable[[Tape, str, list[int]], int]
-"""An operation on steps of a tape, as a step."""
+"""Records an operation on steps of a tape and returns the step of its result."""
 
 
 @dataclass(frozen=True)
 class PassReport:
-    """What a pass left: steps in all, and operations of `derivative` and `jacobian` at run time."""
+    """The size of a program after a pass: steps, and operations per call of two outputs."""
 
     name: str
     steps: int
@@ -29,7 +29,7 @@ def optimise(program: Program) -> Program:
 
 
 def optimise_and_report(program: Program) -> tuple[Program, tuple[PassReport, ...]]:
-    """The same, and a line for the program as it came and one a pass."""
+    """Run all passes in order. Return a report of the program before them and after each."""
     reports = [_report("as lowered", program)]
     for run in PASSES:
         program = run(program)
@@ -38,7 +38,7 @@ def optimise_and_report(program: Program) -> tuple[Program, tuple[PassReport, ..
 
 
 def drop_dead_steps(program: Program) -> Program:
-    """Leave out what no output and no check needs."""
+    """Remove steps that no output and no check needs."""
     roots = [n for output in program.outputs.values() for n in output.nodes]
     keep = live_steps(program, [*roots, *(check.node for check in program.checks)])
     if len(keep) == len(program.steps):
@@ -57,48 +57,47 @@ def drop_dead_steps(program: Program) -> Program:
 
 
 def gather_parameters(program: Program) -> Program:
-    """k·(x·(l·y)) as (k·l)·(x·y), k + (x + l) as (k + l) + x where the inner result is used once:
-    what depends on parameters alone is computed once, ahead of every call.
+    """Rewrite k·(x·(l·y)) as (k·l)·(x·y) and k + (x + l) as (k + l) + x.
+
+    Operands that depend on parameters alone are combined, so that they are computed once and not at
+    every call. Only intermediate results that are used once are taken apart.
     """
-    lone = _Lone(program, ("mul", "add"))
+    used_once = _UsedOnce(program, ("mul", "add"))
 
     def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
-        if operation in ("mul", "add") and not lone.results.isdisjoint(nodes):
-            parts = _flattened(tape, operation, nodes, lone.results)
+        if operation in ("mul", "add") and not used_once.results.isdisjoint(nodes):
+            parts = _flattened(tape, operation, nodes, used_once.results)
             fixed = [n for n in parts if tape.steps[n].stage <= Stage.PARAMETERS]
             if len(fixed) > 1 and len(parts) > len(fixed):
                 rest = [n for n in parts if tape.steps[n].stage > Stage.PARAMETERS]
-                return tape.applied(
-                    operation, _all(tape, operation, fixed), _all(tape, operation, rest)
-                )
+                combine = partial(tape.applied, operation)
+                return combine(reduce(combine, fixed), reduce(combine, rest))
         return tape.applied(operation, *nodes)
 
-    return drop_dead_steps(_rebuilt(program, rule, lone.note))
+    return drop_dead_steps(_rebuilt(program, rule, used_once.note))
 
 
-def _flattened(tape: Tape, operation: str, nodes: list[int], lone: Collection[int]) -> list[int]:
-    """The operands of a product of products, or sum of sums, where nothing else uses the inner."""
+def _flattened(
+    tape: Tape, operation: str, nodes: list[int], used_once: Collection[int]
+) -> list[int]:
+    """The operands of nested products, or sums, where each inner result is used once."""
     parts: list[int] = []
     stack = nodes[::-1]
     while stack:
         node = stack.pop()
-        if node in lone and tape.steps[node].operation == operation:
+        if node in used_once and tape.steps[node].operation == operation:
             stack += reversed(tape.steps[node].operands)
         else:
             parts.append(node)
     return parts
 
 
-def _all(tape: Tape, operation: str, nodes: list[int]) -> int:
-    return reduce(partial(tape.applied, operation), nodes)
-
-
 def factor_sums(program: Program) -> Program:
-    """a·x ± a·y as a·(x ± y), where neither product is used elsewhere: one operation saved."""
-    lone = _Lone(program, ("mul",))
+    """Rewrite a·x ± a·y as a·(x ± y) where neither product is used elsewhere."""
+    used_once = _UsedOnce(program, ("mul",))
 
     def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
-        if operation in ("add", "sub") and lone.results.issuperset(nodes):
+        if operation in ("add", "sub") and used_once.results.issuperset(nodes):
             a, b = (tape.steps[n].operands for n in nodes)
             common = [i for i in a if i in b]
             if common:
@@ -107,11 +106,11 @@ def factor_sums(program: Program) -> Program:
                 return tape.applied("mul", shared, tape.applied(operation, left, right))
         return tape.applied(operation, *nodes)
 
-    return drop_dead_steps(_rebuilt(program, rule, lone.note))
+    return drop_dead_steps(_rebuilt(program, rule, used_once.note))
 
 
-class _Lone:
-    """Results of some operations that one other step uses and nothing else."""
+class _UsedOnce:
+    """The steps of a tape, results of given operations, that are used exactly once."""
 
     def __init__(self, program: Program, operations: Collection[str]) -> None:
         self.results: set[int] = set()
@@ -119,7 +118,7 @@ class _Lone:
         self._operations = operations
 
     def note(self, old: int, operation: str, new: int) -> None:
-        """Step `old` of the program has become step `new`, which is of an operation."""
+        """Note that step `old` of the program became step `new`, the result of `operation`."""
         if self._uses[old] == 1 and operation in self._operations:
             self.results.add(new)
         else:
@@ -134,6 +133,7 @@ PASSES: tuple[Callable[[Program], Program], ...] = (
 
 
 def _uses(program: Program) -> list[int]:
+    """How often each step is an operand or an output entry."""
     uses = [0] * len(program.steps)
     for step in program.steps:
         for o in step.operands:
@@ -145,7 +145,7 @@ def _uses(program: Program) -> list[int]:
 
 
 def _rebuilt(program: Program, rule: Rule, note: Callable[[int, str, int], None]) -> Program:
-    """The program built again on a fresh tape, each operation through `rule`."""
+    """The program recorded on a new tape, each operation by `rule`; `note` gets each step."""
     tape = Tape()
     new: list[int] = []
     for i, (operation, operands, stage, value) in enumerate(program.steps):

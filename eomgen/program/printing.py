@@ -1,4 +1,4 @@
-"""Outputs of a program as lines of source code: names, inlining, brackets."""
+"""Printing of programs as source code: variable names, inlining, parentheses."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,15 +9,14 @@ from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 
 SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 LONGEST_INLINE = 72
-"""Length in characters up to which a value that is used once is written where it is used."""
+"""Longest expression, in characters, that is inlined where its value is used once."""
 _SUM, _PRODUCT, _ATOM = 1, 2, 3
+"""Precedence levels of expressions."""
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a language writes functions, the words that may not name a variable, and the format of a
-    number.
-    """
+    """How a language spells each function, its reserved words, and the format of a number."""
 
     functions: Mapping[str, str]
     reserved: frozenset[str]
@@ -26,11 +25,17 @@ class Dialect:
 
 @dataclass(frozen=True)
 class Block:
-    """Source of some results: assignments in order, then one expression a result.
+    """Source code that computes some results.
 
-    `constants` are the nodes taken from the block of constants, `taken` those taken from another
-    block, `inputs` the names of the other inputs used, `functions` the functions called; all in
-    order of first appearance in the program. `nodes` are those that the lines compute.
+    lines      assignments in order, (variable, expression)
+    results    an expression for each result
+    constants  nodes that depend on parameters alone and are read by name
+    inputs     names of the other inputs that are read
+    functions  names of the functions that are called
+    nodes      nodes that the lines assign
+    taken      nodes that are read from another block
+
+    Nodes and names are in the order of the program.
     """
 
     lines: tuple[tuple[str, str], ...]
@@ -43,7 +48,7 @@ class Block:
 
 
 class Names:
-    """Variable names of a module, one for each node that needs one; the same in all its blocks."""
+    """Unique variable names for the nodes of a program, assigned when first requested."""
 
     def __init__(self, program: Program, dialect: Dialect) -> None:
         self._program = program
@@ -53,7 +58,8 @@ class Names:
         self._taken = {self.safe(str(s.value)) for s in program.steps if s.operation == "input"}
 
     def safe(self, name: str) -> str:
-        """A name of the scene as a variable; no name of a scene ends in an underscore."""
+        """A name of the scene as a variable: a reserved word gets a trailing underscore."""
+        # No name of a scene ends in an underscore, so this makes no duplicate.
         return f"{name}_" if name in self._dialect.reserved else name
 
     def __getitem__(self, node: int) -> str:
@@ -75,19 +81,19 @@ class Names:
                 self._taken.add(stem)
                 return stem
             stem += "_"
-        # Counting goes on where it stopped: a large program has thousands of such names.
+        # Continue from the last number used: a large program has thousands of such names.
         numbers = count(self._next.get(stem, number))
-        found = next(n for n in numbers if f"{stem}{n}" not in self._taken)
-        self._next[stem] = found + 1
-        name = f"{stem}{found}"
+        unused = next(n for n in numbers if f"{stem}{n}" not in self._taken)
+        self._next[stem] = unused + 1
+        name = f"{stem}{unused}"
         self._taken.add(name)
         return name
 
     def _described(self, node: int) -> str | None:
-        """`sin_theta` or `theta_dot_squared` for what is that simple."""
+        """A name such as `sin_theta` or `theta_dot_squared`; None unless the step is as simple."""
         step = self._program.steps[node]
         if step.operation in FUNCTIONS and len(step.operands) == 1:
-            words = self._angles(step.operands[0])
+            words = self._terms(step.operands[0])
             return None if words is None else "_".join((step.operation, *words))
         if step.operation == "mul" and step.operands[0] == step.operands[1]:
             factor = self._program.steps[step.operands[0]]
@@ -97,14 +103,15 @@ class Names:
             return None if name is None else f"{name}_squared"
         return None
 
-    def _angles(self, node: int) -> tuple[str, ...] | None:
+    def _terms(self, node: int) -> tuple[str, ...] | None:
+        """The names of a node's summands; None if one has no name."""
         step = self._program.steps[node]
         if step.operation == "input":
             return (str(step.value),)
         if node in self._program.names:
             return (self._program.names[node],)
         if step.operation == "add":
-            left, right = (self._angles(o) for o in step.operands)
+            left, right = (self._terms(o) for o in step.operands)
             return None if left is None or right is None else left + right
         return None
 
@@ -185,10 +192,9 @@ def print_block(
 def _expression(
     operation: str, operands: Sequence[tuple[str, int]], dialect: Dialect
 ) -> tuple[str, int]:
-    """Source of one operation and how tightly it binds.
+    """The source of one operation on operands given as (source, level), and its precedence level.
 
-    The order of evaluation is the program's: a right operand that is itself a sum in a sum, or a
-    product in a product, keeps its brackets.
+    Parentheses keep the program's order of evaluation: a + (b + c) is not written as a + b + c.
     """
     if operation in FUNCTIONS:
         return f"{dialect.functions[operation]}({', '.join(o[0] for o in operands)})", _ATOM

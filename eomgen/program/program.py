@@ -1,4 +1,4 @@
-"""A finished program: steps in order and the named outputs they compute."""
+"""A program: steps in order and the named outputs that they compute."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
@@ -13,7 +13,7 @@ from eomgen.scalars.protocol import Scalars
 
 @dataclass(frozen=True)
 class Output:
-    """An array that the program computes: its shape (() for a number) and its nodes, row by row."""
+    """An array that the program computes: its shape, () for a number, and its nodes in C order."""
 
     shape: tuple[int, ...]
     nodes: tuple[int, ...]
@@ -21,7 +21,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Check:
-    """A node that must be positive, or at least not negative where it `may_vanish`."""
+    """A node whose value must be positive, or not negative if it `may_vanish`."""
 
     about: str
     node: int
@@ -32,7 +32,8 @@ class Check:
 class Program:
     """Straight-line arithmetic. `steps[i]` uses only steps before `i`.
 
-    `checks` are what parameters of a user's own must keep: masses and inertias above zero.
+    `names` suggests a variable name for some steps. `checks` are conditions on parameter values,
+    such as positive masses and inertias.
     """
 
     steps: tuple[Step, ...]
@@ -41,7 +42,7 @@ class Program:
     checks: tuple[Check, ...]
 
     def __str__(self) -> str:
-        """The program as pseudo-code, one line a step."""
+        """The program as pseudo-code, one line for each step."""
         lines = []
         for i, step in enumerate(self.steps):
             what = step.value if step.value is not None else ""
@@ -54,22 +55,25 @@ class Program:
 
 
 def finish(tape: Tape, outputs: Mapping[str, Output], checks: Iterable[Check]) -> Program:
-    """The program of a tape."""
+    """The program that a tape has recorded."""
     return Program(tuple(tape.steps), dict(outputs), dict(tape.names), tuple(checks))
 
 
 def live_steps(
-    program: Program, nodes: Iterable[int], outside: Callable[[int], bool] | None = None
+    program: Program, nodes: Iterable[int], is_leaf: Callable[[int], bool] | None = None
 ) -> list[int]:
-    """The steps that some nodes need, in order; what lies behind those `outside` is left out."""
+    """The steps that some nodes need, in order, the nodes included.
+
+    A step for which `is_leaf` holds is included; its operands are not, unless others need them.
+    """
     live = bytearray(len(program.steps))
     for node in nodes:
         live[node] = 1
     steps, found = program.steps, []
     i = live.rfind(1)
-    while i >= 0:  # operands come before what they are used in
+    while i >= 0:  # backwards, because operands precede the steps that use them
         found.append(i)
-        if outside is None or not outside(i):
+        if is_leaf is None or not is_leaf(i):
             for operand in steps[i][1]:
                 live[operand] = 1
         i = live.rfind(1, 0, i)
@@ -77,9 +81,10 @@ def live_steps(
 
 
 def cost(program: Program, output: str) -> dict[str, int]:
-    """Operations of one output by kind, those that depend on parameters alone left out.
+    """The operations of one output, counted by kind.
 
-    The entry `total` is their sum, and `parameters` counts what depends on parameters alone.
+    Operations that depend on parameters alone are not counted by kind. The entry `total` is the sum
+    of the kinds; `parameters` is the number of operations on parameters alone.
     """
     live = [program.steps[i] for i in live_steps(program, program.outputs[output].nodes)]
     counts = Counter([step.operation for step in live if step.stage > Stage.PARAMETERS])
@@ -92,9 +97,9 @@ def cost(program: Program, output: str) -> dict[str, int]:
 def interpret(
     program: Program, output: str, inputs: Mapping[str, Any], scalars: Scalars
 ) -> list[Any]:
-    """Run the steps of one output over any scalars (floats, 60-digit numbers, arrays).
+    """Evaluate one output over any scalars (floats, 60-digit numbers, arrays).
 
-    Raises `KeyError` for an input that is not given.
+    `inputs` are values by name. Raises `KeyError` if one that the output needs is missing.
     """
     return interpreter(program, output, scalars)(inputs)
 
@@ -102,7 +107,7 @@ def interpret(
 def interpreter(
     program: Program, output: str, scalars: Scalars
 ) -> Callable[[Mapping[str, Any]], list[Any]]:
-    """`interpret` for many inputs: which steps to run, and how, is found once."""
+    """A function that evaluates one output as `interpret` does, prepared once for many calls."""
     live = live_steps(program, program.outputs[output].nodes)
     index = {i: k for k, i in enumerate(live)}
     start: list[Any] = [None] * len(live)

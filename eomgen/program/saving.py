@@ -1,8 +1,7 @@
-"""Programs as text, and back: the same steps, names and numbers to the last bit.
+"""Serialisation of programs as JSON; steps, names and numbers are restored bit for bit.
 
-The text is JSON of one object. A step is [operation, stage, operand, …]; a constant has its number
-in place of operands, an input its name. Reading executes nothing. Whatever `saved` did not write
-is refused.
+A step is [operation, stage, operand, …]; a constant has its value in place of operands, an input
+its name. Reading executes nothing and refuses any text that is not a valid program.
 """
 
 import json
@@ -16,15 +15,15 @@ from eomgen.scalars.functions import FUNCTIONS as ARGUMENTS
 
 FORMAT = "eomgen program 1"
 _COUNTS = {"neg": 1, **dict.fromkeys(ARITHMETIC, 2), **{f: ARGUMENTS[f] for f in FUNCTIONS}}
-"""Operands of each operation."""
+"""Number of operands of each operation."""
 
 
 class ProgramError(ValueError):
-    """A text that is no saved program; says what is wrong with it."""
+    """A text is not a saved program; the message says why."""
 
 
 def saved(program: Program) -> str:
-    """A program as text. Same program, same text."""
+    """A program as JSON text. Equal programs give equal text."""
     steps = [
         [operation, int(stage), *(operands if value is None else (value,))]
         for operation, operands, stage, value in program.steps
@@ -40,7 +39,7 @@ def saved(program: Program) -> str:
 
 
 def restored(text: str) -> Program:
-    """The program of a text. Raises `ProgramError` for any that `saved` did not write."""
+    """The program of a text that `saved` wrote. Raises `ProgramError` for any other text."""
     try:
         content = json.loads(text)
         if not (isinstance(content, dict) and content.get("format") == FORMAT):

@@ -1,7 +1,7 @@
-"""Switching functions: what a derivative's abs, min, max, step and select change branch by.
+"""Switching functions: their zeros are where a derivative's abs, min, max, step or select switch.
 
-Within a branch the derivative is smooth. A run asks these functions whether a long step has passed
-over a branch that begins and ends within it, as a brief contact does.
+Between these zeros the derivative is smooth. An integration evaluates the functions to detect a
+branch that begins and ends within one long step, such as a brief contact.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -12,14 +12,14 @@ from eomgen.program.tape import TIME, Stage, Step
 from eomgen.scalars.functions import CORNERS
 
 OF_STATE, OF_TIME = "switching_functions", "switching_functions_of_time"
-"""Outputs: those that depend on the state, or not."""
+"""Names of the outputs: switching functions of the state, and of time alone."""
 
 
 def with_switching_functions(program: Program, states: Collection[str]) -> Program:
-    """The program with what its `derivative` changes branch by as outputs, functions of the state
-    and of time alone apart: each is 0 where a branch ends. One that has none is left out.
+    """The program with the switching functions of its `derivative` as two further outputs.
 
-    states  names of the inputs that are the state
+    One output has the functions of the state, the other those of time alone; an output without
+    functions is left out. `states` names the inputs that are the state.
     """
     if "derivative" not in program.outputs:
         return program
@@ -54,20 +54,22 @@ def with_switching_functions(program: Program, states: Collection[str]) -> Progr
 
 
 def _depends(steps: Sequence[Step], names: Collection[str]) -> bytearray:
-    """Of each step 1 if it depends on any of some inputs, else 0."""
-    found = bytearray(len(steps))
+    """For each step 1 if it depends on one of the named inputs, else 0."""
+    depends = bytearray(len(steps))
     for i, (_, operands, _, value) in enumerate(steps):
-        found[i] = value in names or any(found[o] for o in operands)
-    return found
+        depends[i] = value in names or any(depends[o] for o in operands)
+    return depends
 
 
 def _compared(program: Program) -> Iterator[tuple[int, ...]]:
-    """What branches of the derivative depend on: a step that is compared with 0, or two that are
-    compared with each other. What depends on parameters alone is left out, signs are, too.
+    """The steps whose comparison selects a branch of the derivative.
+
+    One step is compared with 0, two steps with each other. Comparisons on parameters alone are left
+    out, and so is the sign of a step that is compared with 0.
     """
     steps = program.steps
 
-    def plain(i: int) -> int:
+    def unsigned(i: int) -> int:
         return steps[i].operands[0] if steps[i].operation == "neg" else i
 
     for i in live_steps(program, program.outputs["derivative"].nodes):
@@ -77,7 +79,7 @@ def _compared(program: Program) -> Iterator[tuple[int, ...]]:
         pair = operands if operation in ("min", "max") else operands[:1]
         rest = tuple(k for k in pair if not _is_zero(steps[k]))
         if any(steps[k].stage > Stage.PARAMETERS for k in rest):
-            yield rest if len(rest) == 2 else (plain(rest[0]),)
+            yield rest if len(rest) == 2 else (unsigned(rest[0]),)
 
 
 def _is_zero(step: Step) -> bool:

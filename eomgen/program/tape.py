@@ -1,8 +1,8 @@
-"""The tape: straight-line arithmetic in which every operation is interned and folded at birth.
+"""The tape: straight-line arithmetic with hash-consing and constant folding.
 
 A `Node` is an abstract scalar: it adds, subtracts, multiplies, divides, and has sin, cos, sqrt.
-What is written twice exists once, constants fold, 0·x and 1·x vanish, and minus signs move outwards
-until an addition swallows them. No expression tree ever exists.
+Equal operations share one step, constants fold, 0·x and 1·x are simplified, and minus signs move
+outwards until an addition or subtraction absorbs them. No expression tree is ever built.
 """
 
 import math
@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 from eomgen.scalars.functions import BY_MATH
 
 TIME = "t"
-"""The input that stands for time; no name of a scene."""
+"""The name of the input that is time; a scene cannot use it."""
 
 
 class Stage(IntEnum):
-    """What a step depends on, and so how often it must be repeated."""
+    """What a step depends on; a step depends on nothing of a later stage."""
 
     CONSTANT = 0
     PARAMETERS = 1
@@ -29,7 +29,7 @@ class Stage(IntEnum):
 
 
 FUNCTIONS: dict[str, Callable[..., float]] = dict(BY_MATH)
-"""The functions of formulas, each an operation of its own."""
+"""The functions of formulas; each is one operation."""
 ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
     "add": operator.add,
     "sub": operator.sub,
@@ -37,11 +37,11 @@ ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
     "div": operator.truediv,
 }
 COUNTED = (*ARITHMETIC, "neg", *FUNCTIONS)
-"""Operations that cost something, each counted one."""
+"""Operations that count towards the cost, one each."""
 
 
 class Step(NamedTuple):
-    """One operation on earlier steps. A constant holds its value, an input its name."""
+    """One operation on earlier steps. `value` is a constant's number or an input's name."""
 
     operation: str
     operands: tuple[int, ...]
@@ -90,13 +90,13 @@ class Tape:
         self.steps: list[Step] = []
         self.names: dict[int, str] = {}
         self.values: list[float | None] = []
-        """The number that a step is, if it is a constant."""
+        """For each step its value if it is a constant, else None."""
         self.minus: list[int | None] = []
-        """The step that a step is minus of, if it is a negation."""
+        """For each step its operand if it is a negation, else None."""
         self._known: dict[tuple[Any, ...], int] = {}
 
     def _add(self, key: tuple[Any, ...], step: Step, number: float | None = None) -> int:
-        """A step that is not there yet."""
+        """Append a new step and return its index."""
         index = self._known[key] = len(self.steps)
         self.steps.append(step)
         self.values.append(number)
@@ -104,7 +104,7 @@ class Tape:
         return index
 
     def number(self, value: float) -> int:
-        """The step that is a number."""
+        """The step of a constant."""
         number = float(value) + 0.0
         index = self._known.get(("constant", number))
         if index is None:
@@ -113,11 +113,11 @@ class Tape:
         return index
 
     def constant(self, value: float) -> Node:
-        """A number."""
+        """The node of a constant."""
         return Node(self, self.number(value))
 
     def input(self, name: str, stage: Stage) -> Node:
-        """A named quantity that is given at run time."""
+        """The node of a quantity that is given by name at run time."""
         key = ("input", name)
         index = self._known.get(key)
         if index is None:
@@ -125,16 +125,16 @@ class Tape:
         return Node(self, index)
 
     def named(self, node: Node, name: str) -> Node:
-        """Suggest a name for the variable that will hold a node; the first suggestion stays."""
+        """Suggest a variable name for a node; a later suggestion does not replace the first."""
         self.names.setdefault(node.index, name)
         return node
 
     def apply(self, operation: str, *nodes: Node) -> Node:
-        """An operation on nodes, folded if it can be."""
+        """The node of an operation on nodes, simplified if a folding rule applies."""
         return Node(self, self.applied(operation, *[node.index for node in nodes]))
 
     def applied(self, operation: str, *operands: int) -> int:
-        """The step of an operation on steps, folded if it can be."""
+        """The step of an operation on steps, simplified if a folding rule applies."""
         fold = _FOLD.get(operation)
         if fold is not None:
             folded = fold(self, *operands)
@@ -156,8 +156,9 @@ class Tape:
         return index
 
     def folded(self, function: Callable[..., float], *values: float | None) -> float | None:
-        """A value of constants, or None where it is not finite: then that shows when it is
-        computed.
+        """The value of a function of constants; None if it is not finite.
+
+        Then the operation is recorded, and the error appears at run time.
         """
         try:
             value = function(*values)
@@ -167,12 +168,13 @@ class Tape:
 
 
 class ExactTape(Tape):
-    """A tape that folds numbers only where nothing is rounded: run in many digits, it computes
-    with exactly the numbers of the scene.
+    """A tape that folds constants only where the result needs no rounding.
+
+    A program recorded on it and run in extended precision uses exactly the numbers of the scene.
     """
 
     def folded(self, function: Callable[..., float], *values: float | None) -> float | None:
-        """A sum, difference, product or quotient that is a double itself; else None."""
+        """A sum, difference, product or quotient that is exactly a double; else None."""
         number = super().folded(function, *values)
         if number is None or function not in ARITHMETIC.values():
             return None
@@ -184,7 +186,7 @@ def _folded(tape: Tape, operation: str, a: float, b: float) -> int | None:
     return None if number is None else tape.number(number)
 
 
-# Each takes steps and returns the one that an operation on them folds to, or None.
+# Folding rules: each returns the step that an operation simplifies to, or None.
 
 
 def _fold_add(tape: Tape, a: int, b: int) -> int | None:
@@ -295,7 +297,7 @@ _FOLD: dict[str, Callable[..., int | None]] = {
 
 
 def power(node: Node, exponent: int) -> Node:
-    """A whole power >= 1 by repeated squaring."""
+    """A node to an integer power >= 1, by repeated squaring."""
     result: Node | None = None
     square = node
     while exponent:
@@ -309,7 +311,7 @@ def power(node: Node, exponent: int) -> Node:
 
 
 def total(nodes: Sequence[Node], tape: Tape) -> Node:
-    """The sum of nodes."""
+    """The sum of nodes, from left to right; 0 for none."""
     result = tape.constant(0.0)
     for node in nodes:
         result = result + node
