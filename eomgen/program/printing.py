@@ -1,8 +1,9 @@
 """Printing of programs as source code: variable names, inlining, parentheses."""
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import chain, count
 
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
@@ -126,35 +127,29 @@ def print_block(
     keep: Sequence[int] = (),
     known: Collection[int] = (),
 ) -> Block:
-    """Source that computes `nodes`.
+    """The source that computes `nodes`.
 
-    What depends on parameters alone is taken from constants by name, unless `fixed` asks for the
-    block that computes those. Nodes in `keep` get a name even if they are used once. Nodes that are
-    `known` from another block are taken from there by name.
+    fixed  whether to compute what depends on parameters alone, instead of reading it by name
+    keep   nodes that get a variable even if they are used once
+    known  nodes that another block computes and this one reads by name
     """
     steps = program.steps
 
-    def outside(i: int) -> bool:
-        if steps[i].operation == "constant":
+    def is_given(i: int) -> bool:
+        operation, _, stage, _ = steps[i]
+        if operation == "constant":
             return False
-        if i in known:
-            return True
-        return steps[i].operation == "input" or (not fixed and steps[i].stage <= Stage.PARAMETERS)
+        return i in known or operation == "input" or (not fixed and stage <= Stage.PARAMETERS)
 
-    live = live_steps(program, nodes, outside)
-    given = {i for i in live if outside(i)}
-    uses = dict.fromkeys(live, 0)
-    for i in live:
-        if i not in given:
-            for o in steps[i].operands:
-                uses[o] += 1
-    for n in nodes:
-        uses[n] += 1
+    live = live_steps(program, nodes, is_given)
+    given = {i for i in live if is_given(i)}
+    uses = Counter(nodes)
+    uses.update(chain.from_iterable(steps[i].operands for i in live if i not in given))
 
     results, kept = frozenset(nodes), frozenset(keep)
     text: dict[int, tuple[str, int]] = {}
     lines: list[tuple[str, str]] = []
-    named: list[int] = []
+    assigned: list[int] = []
     functions: dict[str, None] = {}
     for i in live:
         step = steps[i]
@@ -170,7 +165,7 @@ def print_block(
         long = len(source) > LONGEST_INLINE and i not in results
         if i in kept or uses[i] > 1 or long:
             lines.append((names[i], source))
-            named.append(i)
+            assigned.append(i)
             text[i] = (names[i], _ATOM)
         else:
             text[i] = (source, level)
@@ -184,7 +179,7 @@ def print_block(
             if steps[i].operation == "input" and steps[i].stage > Stage.PARAMETERS
         ),
         functions=tuple(functions),
-        nodes=tuple(named),
+        nodes=tuple(assigned),
         taken=tuple(i for i in live if i in known),
     )
 
