@@ -197,7 +197,8 @@ def test_quantities(kind: str) -> None:
         assert refusal(put("1e101")) == f"{place}: 1e+101 is larger than 1e+100; choose other units"
         if "motion" not in extra.get("sees", ()):
             assert refusal(put('"2*swing"')) == f"{place}: 'swing' " + (
-                "is found only as it moves, and a drive is fixed beforehand; use t and parameters"
+                "is part of the solution, which a prescribed motion cannot depend on; "
+                "use t and parameters"
                 if kind == "driven"
                 else "changes with the motion, which this value must not; use parameters"
             )

@@ -161,14 +161,13 @@ MISTAKES = [
     (
         'parent = "world"',
         'parent = "hand"',
-        "joints[0].parent: 'hand' hangs on its own child 'arm': "
-        "the joints make a cycle; let one tree start at the world",
+        "joints[0].parent: 'hand' is itself a descendant of the child 'arm': "
+        "the joints make a cycle; connect one of its bodies to the world",
     ),
     (
         None,
         BODY.format("hat"),
-        "bodies[2].name: 'hat' is attached to nothing; "
-        "give it a joint, of type 'free' if nothing holds it",
+        "bodies[2].name: 'hat' has no joint; give it one, of type 'free' if it moves freely",
     ),
     (
         'name = "hand"',

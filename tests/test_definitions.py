@@ -166,9 +166,11 @@ MISTAKES = [
      "effects[0].torque: its part '(1.0 / (a - 2.0))' is not a finite number; change it or its "
      "parameters"),
     (defined('x1 = "p"', *(f'x{i} = "x{i - 1}*x{i - 1}"' for i in range(2, 200))),
-     "definitions.x11: has more than 2000 parts with its own definitions put in; make it simpler"),
+     "definitions.x11: has more than 2000 parts once its own definitions are expanded; "
+     "make it simpler"),
     (defined('x1 = "p"', *(f'x{i} = "x{i - 1} + 1"' for i in range(2, 900))),
-     "definitions.x152: is nested too deep with its own definitions put in; make it simpler"),
+     "definitions.x152: is nested too deep once its own definitions are expanded; "
+     "make it simpler"),
 ]  # fmt: skip
 
 

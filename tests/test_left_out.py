@@ -429,12 +429,12 @@ w = 4.0
 MORE = '[[effects]]\ntype = "driven"\nname = "{}"\njoint = "{}"\ncoordinate = {}\n'
 AT = "effects[1].coordinate"
 BAD = [
-    ("A*sin", "first_angle*sin", f"{AT}: 'first_angle' is the motion that it gives, which is "
-     "circular; use t and parameters"),
-    ("A*sin", "first_angle_dot*sin", f"{AT}: 'first_angle_dot' is the motion that it gives, which "
-     "is circular; use t and parameters"),
-    ("A*sin", "second_angle*sin", f"{AT}: 'second_angle' is found only as it moves, and a drive is "
-     "fixed beforehand; use t and parameters"),
+    ("A*sin", "first_angle*sin", f"{AT}: 'first_angle' is the motion that the formula prescribes, "
+     "which is circular; use t and parameters"),
+    ("A*sin", "first_angle_dot*sin", f"{AT}: 'first_angle_dot' is the motion that the formula "
+     "prescribes, which is circular; use t and parameters"),
+    ("A*sin", "second_angle*sin", f"{AT}: 'second_angle' is part of the solution, which a "
+     "prescribed motion cannot depend on; use t and parameters"),
     ("A*sin", "B*sin", f"{AT}: unknown parameter 'B'; give it a value in [parameters]"),
     ("A*sin(w*t)", "sqrt(t)", f"{AT}: it, its rate or its acceleration is not finite at t = 0; "
      "change the formula"),
@@ -482,8 +482,8 @@ def test_bad_scenes(old: str, new: str, message: str) -> None:
 
 
 OTHERS = [
-    ("[locked]\nhip_qx = 0", "", "locked.hip_qx: is part of a quaternion, which is held whole or "
-     "not at all; give joint 'hip' type = 'weld'"),
+    ("[locked]\nhip_qx = 0", "", "locked.hip_qx: is part of a quaternion, which cannot be locked "
+     "in part; give joint 'hip' type = 'weld'"),
     ("[locked]\nknee_angle = 1", 'route = "closed"\n', "route: 'closed' needs the closed form, and "
      "it takes no locked coordinate ('knee_angle'); leave it out"),
     ("", 'leave_out = ["velocity_forces"]\nroute = "closed"\n', "route: 'closed' needs the closed "

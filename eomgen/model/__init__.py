@@ -1,1 +1,1 @@
-"""From scene to model: names bound, geometry normalised, bodies in a tree."""
+"""The mechanical model and its elaboration from a scene."""

@@ -1,4 +1,4 @@
-"""`[definitions]`: names for formulas, put in the place of their names before anything is built."""
+"""Expansion of `[definitions]`: each name in a scene's formulas is replaced by its formula."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -11,17 +11,21 @@ from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.schema import Scene
 
 LARGEST = 2000
-"""Most constants, names and operations of a definition once its own definitions are put in. What
-is there several times is computed once; but it is read as often as it is there.
+"""Largest number of constants, names and operations of an expanded definition.
+
+Repeated subexpressions count each time: the program computes them once, but every pass over the
+formula visits each of them.
 """
 TABLES = ("bodies", "joints", "chains", "points", "effects")
+"""The tables of a scene whose formulas may use definitions."""
 
 
 def with_definitions(scene: Scene, motion: Sequence[str]) -> Scene:
-    """A scene without definitions, each of their names replaced by its formula wherever it stands.
+    """The scene with all definitions expanded, and none left.
 
-    `motion` names what may change with the motion. Raises `SceneError` for a circle, an unknown
-    name, a name for two things, or a formula that grows beyond bounds.
+    `motion` names the variables that change with the motion. Raises `SceneError` for a definition
+    that depends on itself, an unknown name, a name with two meanings, or an expanded formula that
+    is too large.
     """
     if not scene.definitions:
         return scene
@@ -32,10 +36,10 @@ def with_definitions(scene: Scene, motion: Sequence[str]) -> Scene:
             what = "a number" if name in CONSTANTS else what
             raise SceneError(f"definitions.{name}: is the name of {what} too; rename one of them")
         _check_names(formula, (*known, *scene.definitions), f"definitions.{name}")
-    meanings = _meanings(scene.definitions)
+    expanded = _expanded_definitions(scene.definitions)
     tables = {
         key: tuple(
-            _replaced(table, meanings, known, f"{key}[{i}]")
+            _expanded_table(table, expanded, known, f"{key}[{i}]")
             for i, table in enumerate(getattr(scene, key))
         )
         for key in TABLES
@@ -50,36 +54,34 @@ def _check_names(formula: Formula, known: Collection[str], location: str) -> Non
             raise SceneError(f"{location}: unknown parameter '{name}'{hint}")
 
 
-def _meanings(definitions: Mapping[str, Formula]) -> dict[str, Formula]:
-    """Each definition with those that it needs put in."""
-    found: dict[str, Formula] = {}
+def _expanded_definitions(definitions: Mapping[str, Formula]) -> dict[str, Formula]:
+    """Each definition with the definitions that it uses expanded."""
+    expanded: dict[str, Formula] = {}
     for start in definitions:
         path = [start]
         while path:
             name = path[-1]
-            needed = dict.fromkeys(n for n in names_in(definitions[name]) if n in definitions)
-            missing = next((n for n in needed if n not in found), None)
+            used = dict.fromkeys(n for n in names_in(definitions[name]) if n in definitions)
+            missing = next((n for n in used if n not in expanded), None)
             if missing is None:
                 path.pop()
-                found[name] = _put_in(definitions[name], found)
-                _check_size(found[name], name)
+                expanded[name] = _substituted(definitions[name], expanded)
+                _check_size(expanded[name], name)
             elif missing in path:
-                circle = [*path[path.index(missing) :], missing]
-                reported = ", ".join(f"{a} needs {b}" for a, b in pairwise(circle))
-                raise SceneError(
-                    f"definitions.{missing}: is defined by itself: {reported}; break it"
-                )
+                cycle = [*path[path.index(missing) :], missing]
+                chain = ", ".join(f"{a} needs {b}" for a, b in pairwise(cycle))
+                raise SceneError(f"definitions.{missing}: is defined by itself: {chain}; break it")
             else:
                 path.append(missing)
-    return found
+    return expanded
 
 
-def _put_in(formula: Formula, meanings: Mapping[str, Formula]) -> Formula:
+def _substituted(formula: Formula, replacements: Mapping[str, Formula]) -> Formula:
     match formula:
         case Name(name):
-            return meanings.get(name, formula)
+            return replacements.get(name, formula)
         case Apply(operation, operands):
-            return Apply(operation, tuple(_put_in(part, meanings) for part in operands))
+            return Apply(operation, tuple(_substituted(part, replacements) for part in operands))
     return formula
 
 
@@ -88,46 +90,46 @@ def _check_size(formula: Formula, name: str) -> None:
         if size > LARGEST or depth > DEEPEST:
             what = f"has more than {LARGEST} parts" if size > LARGEST else "is nested too deep"
             raise SceneError(
-                f"definitions.{name}: {what} with its own definitions put in; make it simpler"
+                f"definitions.{name}: {what} once its own definitions are expanded; make it simpler"
             )
 
 
 def _depths(formula: Formula, depth: int) -> Iterator[int]:
-    """How deep each part of a formula lies, but for what is far too deep."""
+    """The depth of each part of a formula, down to one level below `DEEPEST`."""
     yield depth
     if isinstance(formula, Apply) and depth <= DEEPEST:
         for part in formula.operands:
             yield from _depths(part, depth + 1)
 
 
-def _replaced(
-    table: Table, meanings: Mapping[str, Formula], known: Sequence[str], location: str
+def _expanded_table(
+    table: Table, expanded: Mapping[str, Formula], known: Sequence[str], location: str
 ) -> Any:
-    """A table with its formulas put in."""
+    """A table with the definitions in its formulas expanded."""
     fields: dict[str, Any] = {}
     for field, info in type(table).model_fields.items():
         extra = info.json_schema_extra
         sees = extra.get("sees", ()) if isinstance(extra, dict) else ()
         local = [str(w) for w in sees if w != "motion"] if isinstance(sees, list | tuple) else []
 
-        def put_in(value: Any, spot: str, local: Sequence[str] = local) -> Any:
+        def expand(value: Any, at: str, local: Sequence[str] = local) -> Any:
             if isinstance(value, Table):
-                return _replaced(value, meanings, known, spot)
+                return _expanded_table(value, expanded, known, at)
             if isinstance(value, tuple):
-                return tuple(put_in(part, f"{spot}[{i}]") for i, part in enumerate(value))
+                return tuple(expand(part, f"{at}[{i}]") for i, part in enumerate(value))
             if isinstance(value, dict):
-                return {key: put_in(part, f"{spot}.{key}") for key, part in value.items()}
+                return {key: expand(part, f"{at}.{key}") for key, part in value.items()}
             if not isinstance(value, Formula):
                 return value
-            _check_names(value, (*known, *local, *meanings), spot)
+            _check_names(value, (*known, *local, *expanded), at)
             for name in names_in(value):
-                hidden = [n for n in (name, *names_in(meanings.get(name, value))) if n in local]
-                if name in meanings and hidden:
+                hidden = [n for n in (name, *names_in(expanded.get(name, value))) if n in local]
+                if name in expanded and hidden:
                     raise SceneError(
-                        f"{spot}: '{hidden[0]}' of definition '{name}' is predefined here; "
+                        f"{at}: '{hidden[0]}' of definition '{name}' is predefined here; "
                         "rename it where it comes from"
                     )
-            return _put_in(value, meanings)
+            return _substituted(value, expanded)
 
-        fields[field] = put_in(getattr(table, field), f"{location}.{info.alias or field}")
+        fields[field] = expand(getattr(table, field), f"{location}.{info.alias or field}")
     return table.replaced(**fields)

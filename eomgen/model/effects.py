@@ -1,4 +1,4 @@
-"""From what a scene says of effects to effects that act: what they name is there and fits them."""
+"""Elaboration of effects: checks the bodies, joints and points that they name, binds quantities."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ Given = TypeVar("Given", Input, ExtraState)
 
 
 def sliding_in(bodies: Sequence[Body], dimensions: int) -> frozenset[str]:
-    """Joints that do nothing but slide, and coordinates that slide."""
+    """The names of joints with prismatic primitives only, and of prismatic coordinates."""
     found: list[str] = []
     for body in bodies:
         kinds = [primitive.kind for primitive in body.joint.primitives(dimensions)]
@@ -34,7 +34,7 @@ def sliding_in(bodies: Sequence[Body], dimensions: int) -> frozenset[str]:
 def inputs_and_states(
     effects: Iterable[Effect], scope: Scope, dimensions: int
 ) -> tuple[tuple[Input, ...], tuple[ExtraState, ...]]:
-    """What effects take from outside and what they remember, in the units of their joints."""
+    """The inputs and extra states of effects, in the units of the joints at which they act."""
     inputs, states = [], []
     for effect in effects:
         inputs += [_at_joint(x, effect, scope.sliding) for x in effect.inputs(dimensions)]
@@ -43,26 +43,26 @@ def inputs_and_states(
 
 
 def _at_joint(given: Given, effect: Effect, sliding: Collection[str]) -> Given:
-    """An input or state of an effect, in the unit and words for its joint if it has one."""
-    here = about_slides(effect, sliding)
-    if here is None:
+    """An input or extra state with the unit and description for the effect's joint, if any."""
+    slides = about_slides(effect, sliding)
+    if slides is None:
         return given
-    unit, about = (of_joint(text, here) for text in (given.unit, given.about))
+    unit, about = (of_joint(text, slides) for text in (given.unit, given.about))
     return replace(given, unit=unit, about=about)
 
 
 def effects_in_force(
     scene: Scene, bodies: Sequence[Body], scope: Scope
 ) -> tuple[tuple[Effect, ...], Bindings]:
-    """Effects with bodies, points and joints that there are, and vectors of the right length; and
-    what their quantities bring.
+    """The effects of a scene, checked and with named quantities, and their bindings.
 
-    Raises `SceneError`, naming the place, for an effect that cannot act.
+    Vectors that the scene leaves out become zeros. Raises `SceneError`, naming the location, for an
+    effect that names something unknown or cannot act on what it names.
     """
     check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
     dofs = dofs_of(bodies, scene.dimensions)
     names_of_dofs = {b.joint.name: [c.name for c in b.positions] for b in bodies}
-    there = _there(scene, bodies, dofs)
+    known = _known_names(scene, bodies, dofs)
     types = {b.joint.name: b.joint.type for b in bodies}
     effects: list[Effect] = []
     found: list[Bindings] = []
@@ -70,7 +70,7 @@ def effects_in_force(
         location = f"effects[{i}]"
         if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
             raise SceneError(f"{location}.type: a second 'gravity'; give one")
-        _check_names_in(effect, location, there, types)
+        _check_names_in(effect, location, known, types)
         effect.check_dofs(dofs, names_of_dofs, location)
         vectors = {
             field: with_components(value, ZERO, scene.dimensions, f"{location}.{field}")
@@ -81,15 +81,15 @@ def effects_in_force(
         if isinstance(effect, Driven):
             check_drive(effect, location, bodies, effects, scope)
         effect, bindings = bind(effect, effect.name, location, scope)
-        together = tuple(effect.conditions(location))
-        require(together, bindings.values(scope))
-        found += [bindings, Bindings(conditions=together)]
+        conditions = tuple(effect.conditions(location))
+        require(conditions, bindings.values(scope))
+        found += [bindings, Bindings(conditions=conditions)]
         effects.append(effect)
     return tuple(effects), joined(found)
 
 
 def check_contacts(effects: Sequence[Effect], bodies: Sequence[str]) -> None:
-    """Raise `SceneError` if a name would stand for two contacts."""
+    """Raise `SceneError` if two contacts would have the same name."""
     taken: dict[str, str] = {}
     for effect in effects:
         for name in effect.contact_names(bodies):
@@ -101,17 +101,17 @@ def check_contacts(effects: Sequence[Effect], bodies: Sequence[str]) -> None:
             taken[name] = effect.name
 
 
-def _there(
+def _known_names(
     scene: Scene, bodies: Sequence[Body], dofs: Mapping[str, object]
 ) -> dict[str, tuple[str, Collection[str]]]:
-    """Of each kind of `EffectTable.…_fields`: what its fields name, and all that there are."""
-    own = [b.joint.name for b in bodies if isinstance(b.joint, Revolute | Prismatic)]
+    """For each kind of `EffectTable.…_fields` what its fields name, and the names that exist."""
+    single = [b.joint.name for b in bodies if isinstance(b.joint, Revolute | Prismatic)]
     names = [body.name for body in bodies]
     return {
         "body_fields": ("body", dict.fromkeys(names)),
         "anchor_fields": ("body", dict.fromkeys([WORLD, *names])),
         "point_fields": ("point", dict.fromkeys(point.name for point in scene.points)),
-        "joint_fields": ("revolute or prismatic joint", dict.fromkeys(own)),
+        "joint_fields": ("revolute or prismatic joint", dict.fromkeys(single)),
         "dof_fields": ("joint that moves", dofs),
     }
 
@@ -119,13 +119,14 @@ def _there(
 def _check_names_in(
     effect: Effect,
     location: str,
-    there: Mapping[str, tuple[str, Collection[str]]],
+    known: Mapping[str, tuple[str, Collection[str]]],
     types: Mapping[str, str],
 ) -> None:
-    """Raise `SceneError` for a name in an effect that is not `there`, or a joint of another type
-    than it acts on; `types` are those of the joints.
+    """Raise `SceneError` for an unknown name in an effect, or a joint of a type it cannot act on.
+
+    `types` maps the names of joints to their types.
     """
-    for fields, (what, names) in there.items():
+    for fields, (what, names) in known.items():
         for name, spot in _names_in(effect, getattr(effect, fields), location):
             if "joint" in what and name in types and name not in names:
                 one = what if fields == "joint_fields" else f"{what} and is not free"
@@ -137,7 +138,7 @@ def _check_names_in(
 
 
 def _names_in(effect: Effect, fields: Sequence[str], location: str) -> Iterator[tuple[str, str]]:
-    """Each name in some fields, of which some list names or hold tables by them, and its place."""
+    """Each name that some fields hold, with its location. A field is a name, a list or a table."""
     for field in fields:
         value = getattr(effect, field)
         if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""From a scene to a model: every name resolved, bodies in a tree, everything checked."""
+"""Elaboration of a scene to a model: names are resolved, values checked, bodies put in a tree."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model.definitions import with_definitions
 from eomgen.model.effects import check_contacts, effects_in_force, inputs_and_states, sliding_in
-from eomgen.model.geometry import entries_of_inertia, lengths_noticed, normalised_joint
+from eomgen.model.geometry import axis_notices, entries_of_inertia, normalised_joint
 from eomgen.model.initial import initial_state
 from eomgen.model.model import Body, Model, Point, prescribed_of, velocities_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
@@ -24,10 +24,10 @@ from eomgen.scene.schema import Scene
 
 
 def elaborate(scene: Scene) -> Model:
-    """Resolve a scene's names into a tree of bodies.
+    """The model of a scene.
 
-    Raises `SceneError`, naming place, value and remedy, if the scene makes no mechanism, or one
-    that cannot be drawn as it says.
+    Raises `SceneError`, naming location, value and remedy, if the scene does not describe a
+    mechanism, or if its `[view]` does not fit the mechanism.
     """
     own = _scene_parameters(scene)
     scope = Scope({p.name: p.default for p in own}, _moving(scene))
@@ -44,7 +44,7 @@ def elaborate(scene: Scene) -> Model:
     _check_symbols(n, found.parameters, links, bodies, effects)
     check_contacts(effects, [body.name for body in bodies])
     locked = locked_values(scene.locked, bodies, effects)
-    appearance_of(scene)  # raises for what cannot be drawn
+    appearance_of(scene)  # raises SceneError if the mechanism cannot be drawn
     prescribed = prescribed_of(bodies, effects, locked)
     if not velocities_of(bodies, prescribed):
         raise SceneError(
@@ -53,7 +53,7 @@ def elaborate(scene: Scene) -> Model:
         )
     start = initial_state(scene.initial, bodies, prescribed)
     driven = [c for c in prescribed if not c.locked]
-    noticed = (line for link in links for line in lengths_noticed(link.joint, link.joint_place))
+    lengths = (line for link in links for line in axis_notices(link.joint, link.joint_location))
     return Model(
         name=scene.name,
         title=scene.title or scene.name,
@@ -71,12 +71,12 @@ def elaborate(scene: Scene) -> Model:
         form=scene.form,
         route=scene.route,
         locked=tuple(locked.items()),
-        # What is not there by its own name is there in degrees.
+        # A locked coordinate is given by its own name, or else in degrees.
         locked_deg=tuple(
             (name, scene.locked[f"{name}_deg"]) for name in locked if name not in scene.locked
         ),
         leave_out=scene.leave_out,
-        notices=(*dict.fromkeys(noticed), *start.notices),
+        notices=(*dict.fromkeys(lengths), *start.notices),
     )
 
 
@@ -88,21 +88,23 @@ def outputs_for(
     parameters: Collection[object],
     driven: Collection[object],
 ) -> tuple[str, ...]:
-    """What is to be generated, in the order of `OUTPUTS`; "all" is all that there can be.
+    """The outputs to generate, in the order of `OUTPUTS`.
 
-    `wanted` holds names in `OUTPUTS`; `location` says where the one of number `{}` was asked for.
+    `wanted` is "all" or names in `OUTPUTS`. "all" leaves out outputs that need points, inputs,
+    parameters or driven joints that the model lacks; such an output asked for by name raises
+    `SceneError`. `location` is a format string for the location of a name, by its index.
     """
     needs = {name: spec.needs for name, spec in OUTPUTS.items() if spec.needs}
-    there = {
+    available = {
         "points": points,
         "inputs": inputs,
         "parameters": parameters,
         "driven joints": driven,
     }
     if wanted == "all":
-        return tuple(name for name in OUTPUTS if name not in needs or there[needs[name]])
+        return tuple(name for name in OUTPUTS if name not in needs or available[needs[name]])
     for i, name in enumerate(wanted):
-        if name in needs and not there[needs[name]]:
+        if name in needs and not available[needs[name]]:
             raise SceneError(
                 f"{location.format(i)}: '{name}' is about {needs[name]}, and there are none"
             )
@@ -110,7 +112,7 @@ def outputs_for(
 
 
 def in_order(outputs: Collection[str]) -> tuple[str, ...]:
-    """Outputs, each once, in the order of `OUTPUTS`."""
+    """The given outputs without duplicates, in the order of `OUTPUTS`."""
     return tuple(name for name in OUTPUTS if name in outputs)
 
 
@@ -128,7 +130,7 @@ def _scene_parameters(scene: Scene) -> tuple[Parameter, ...]:
 
 
 def _moving(scene: Scene) -> tuple[str, ...]:
-    """Names of what changes while a scene moves: time, coordinates, velocities, inputs, states."""
+    """The names of all variables: time, coordinates, velocities, inputs and extra states."""
     names = ["t"]
     for joint, _ in written_out(scene)[1]:
         both = (*joint.positions(scene.dimensions), *joint.velocities(scene.dimensions))
@@ -142,20 +144,20 @@ def _moving(scene: Scene) -> tuple[str, ...]:
 def _bodies(
     links: Sequence[Link], scope: Scope, dimensions: int
 ) -> tuple[tuple[Body, ...], Bindings]:
-    """The bodies of links, in their order, with their joints; and what their quantities bring."""
+    """The bodies of links, in their order, with their joints; and the bindings of both."""
     pairs = [_body(link, scope, dimensions) for link in links]
     return tuple(body for body, _ in pairs), joined(bindings for _, bindings in pairs)
 
 
 def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
-    joint = normalised_joint(link.joint, link.joint_place, dimensions)
+    joint = normalised_joint(link.joint, link.joint_location, dimensions)
     table, of_body = bind(link.body, link.body.name, link.location, scope)
     inertia_com = entries_of_inertia(table, link.location, dimensions)
     values = of_body.values(scope)
     at = f"{link.location}.inertia_com"
-    sound = tuple(of_inertia(at, table.name, table.mass, inertia_com, values))
-    require(sound, values)
-    joint, of_joint = bind(joint, joint.name, link.joint_place, scope)
+    conditions = tuple(of_inertia(at, table.name, table.mass, inertia_com, values))
+    require(conditions, values)
+    joint, of_joint = bind(joint, joint.name, link.joint_location, scope)
     body = Body(
         name=table.name,
         mass=table.mass,
@@ -165,13 +167,13 @@ def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
         positions=joint.positions(dimensions),
         velocities=joint.velocities(dimensions),
     )
-    return body, joined([of_body, Bindings(conditions=sound), of_joint])
+    return body, joined([of_body, Bindings(conditions=conditions), of_joint])
 
 
 def _points(
     scene: Scene, bodies: Sequence[Body], scope: Scope
 ) -> tuple[tuple[Point, ...], Bindings]:
-    """The named points, and what their quantities bring."""
+    """The named points and their bindings."""
     check_names([(point.name, f"points[{i}]") for i, point in enumerate(scene.points)])
     index = {body.name: k for k, body in enumerate(bodies)}
     points, found = [], []
@@ -192,17 +194,18 @@ def _check_symbols(
     bodies: Sequence[Body],
     effects: Sequence[Effect],
 ) -> None:
-    """No name may stand for two things in the equations of a mechanism in `n` dimensions; `bodies`
-    are those of the `links`. Raises `SceneError` with both places.
+    """Raise `SceneError`, with both locations, if a symbol of the equations would be ambiguous.
+
+    `n` is the number of dimensions, `bodies` are those of the `links`.
     """
-    moving = [(body, link.joint_place) for body, link in zip(bodies, links, strict=True)]
-    acting = [(effect, f"effects[{i}]") for i, effect in enumerate(effects)]
+    joints = [(body, link.joint_location) for body, link in zip(bodies, links, strict=True)]
+    located = [(effect, f"effects[{i}]") for i, effect in enumerate(effects)]
     uses = [(p.name, "a parameter", p.location) for p in parameters]
-    uses += [(c.name, "a coordinate", at) for body, at in moving for c in body.positions]
-    uses += [(c.name, "a velocity", at) for body, at in moving for c in body.velocities]
-    uses += [(c.acceleration, "an acceleration", at) for b, at in moving for c in b.velocities]
-    uses += [(i.name, "an input", at) for effect, at in acting for i in effect.inputs(n)]
-    uses += [(x.name, "a state", at) for effect, at in acting for x in effect.states(n)]
+    uses += [(c.name, "a coordinate", at) for body, at in joints for c in body.positions]
+    uses += [(c.name, "a velocity", at) for body, at in joints for c in body.velocities]
+    uses += [(c.acceleration, "an acceleration", at) for b, at in joints for c in b.velocities]
+    uses += [(i.name, "an input", at) for effect, at in located for i in effect.inputs(n)]
+    uses += [(x.name, "a state", at) for effect, at in located for x in effect.states(n)]
     taken = {"t": ("time", ""), "pi": ("the number π", "")}
     for name, use, location in uses:
         if name in taken:

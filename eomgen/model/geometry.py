@@ -1,4 +1,4 @@
-"""What a scene says of directions, orientations and inertias, made sound or refused."""
+"""Checks and normal forms of joint geometry and of inertias."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,14 +13,17 @@ from eomgen.scene.joints.base import Geared
 from eomgen.scene.schema import BodyTable
 
 PARALLEL = 1e-15
-"""Sine of the angle below which two axes are as good as parallel: their last digits say which."""
+"""Two axes count as parallel if the sine of the angle between them is less: it is then determined
+by rounding errors.
+"""
 
 
 def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
-    """A joint with vectors of the right length and axes that have a direction.
+    """A joint with vectors that have one component for each dimension.
 
-    Raises `SceneError` for a joint that there is not in this space, an axis of no length, parallel
-    axes, limits upside down.
+    Raises `SceneError` for a spatial joint in the plane, a vector or an orientation with the wrong
+    number of components, an axis of length zero, parallel axes, limits in the wrong order, or a
+    gear ratio that is zero or has no effect.
     """
     if dimensions not in joint.spaces:
         raise SceneError(
@@ -32,10 +35,10 @@ def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
         name: with_components(getattr(joint, name), ZERO, dimensions, f"{location}.{name}")
         for name in ("r_parent", "r_child")
     }
-    turned = isinstance(joint.orientation_deg, tuple)
-    if turned and dimensions == 2:
+    three_angles = isinstance(joint.orientation_deg, tuple)
+    if three_angles and dimensions == 2:
         raise SceneError(f"{location}.orientation_deg: has 3 components; the plane takes one angle")
-    if not turned and dimensions == 3 and joint.orientation_deg != 0.0:
+    if not three_angles and dimensions == 3 and joint.orientation_deg != 0.0:
         raise SceneError(
             f"{location}.orientation_deg: is one angle; space takes 3, about x, y and z"
         )
@@ -66,7 +69,7 @@ def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
 
 
 def _direction(axis: tuple[float, ...], location: str, dimensions: int) -> tuple[float, ...]:
-    """The axis itself: rounded to length 1 it would no longer be what the scene says."""
+    """An axis with its components checked. It is not normalised, which would round it."""
     axis = with_components(axis, 0.0, dimensions, location)
     if not any(axis):
         raise SceneError(
@@ -75,10 +78,10 @@ def _direction(axis: tuple[float, ...], location: str, dimensions: int) -> tuple
     return axis
 
 
-def lengths_noticed(joint: Joint, location: str) -> Iterator[str]:
-    """A line for every axis of a joint that is not of length 1."""
-    one = getattr(joint, "axis", None)
-    axes = {} if one is None else {"axis": one}
+def axis_notices(joint: Joint, location: str) -> Iterator[str]:
+    """A notice for each axis of a joint whose length is not 1."""
+    single = getattr(joint, "axis", None)
+    axes = {} if single is None else {"axis": single}
     axes |= {f"axes[{i}]": axis for i, axis in enumerate(getattr(joint, "axes", None) or ())}
     for key, axis in axes.items():
         length = math.hypot(*axis)
@@ -91,9 +94,10 @@ def _example(axis: Sequence[float]) -> str:
 
 
 def entries_of_inertia(body: BodyTable, location: str, dimensions: int) -> tuple[Formula, ...]:
-    """The entries of a body's inertia: one in the plane, six in space.
+    """The inertia of a body about its centre of mass: one moment in the plane, in space xx, yy, zz,
+    xy, xz, yz.
 
-    Raises `SceneError`, naming the body, if there are not as many as there should be.
+    Raises `SceneError`, naming the body, for a wrong number of entries.
     """
     given = body.inertia_com
     where = f"{location}.inertia_com: body '{body.name}'"

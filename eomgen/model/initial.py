@@ -1,4 +1,4 @@
-"""The state at the start: what a scene gives of it, and what stands for the rest."""
+"""The initial state: the values that a scene gives, and defaults for the others."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from eomgen.scene.schema import Initial
 
 @dataclass(frozen=True)
 class Start:
-    """The initial `q` (nq,) and `v` (nv,), and a line for each thing that was put right."""
+    """The initial `q` (nq,) and `v` (nv,), and a notice for each quaternion that was scaled."""
 
     q: tuple[float, ...]
     v: tuple[float, ...]
@@ -24,10 +24,10 @@ class Start:
 def initial_state(
     given: Initial, bodies: Sequence[Body], prescribed: Sequence[Prescribed]
 ) -> Start:
-    """The state at the start, its quaternions of length 1.
+    """The initial state, with quaternions scaled to length 1.
 
-    Raises `SceneError`, naming the place, for names that are not there or `prescribed`, lists that
-    are too long or too short, and a quaternion of no length.
+    Raises `SceneError`, naming the location, for an unknown or `prescribed` coordinate, a list of
+    the wrong length, or a quaternion of length zero.
     """
     coordinates = positions_of(bodies, prescribed)
     q = _values(given.q, coordinates, "initial.q", prescribed)
@@ -37,28 +37,28 @@ def initial_state(
     for body in bodies:
         if names := [c.name for c in body.positions[body.plain :]]:
             parts = [values[name] for name in names]
-            notices += _length_noticed(parts, names[0])
-            reported = not isinstance(given.q, dict) or any(name in given.q for name in names)
-            values |= zip(names, _unit(parts, names[0], reported), strict=True)
+            notices += _length_notice(parts, names[0])
+            is_given = not isinstance(given.q, dict) or any(name in given.q for name in names)
+            values |= zip(names, _unit(parts, names[0], is_given), strict=True)
     return Start(tuple(values.values()), v, tuple(notices))
 
 
-def _unit(parts: Sequence[float], first: str, reported: bool) -> list[float]:
-    """A quaternion scaled to length 1; 1, 0, 0, 0 where the scene has not `reported` it.
+def _unit(parts: Sequence[float], first: str, is_given: bool) -> list[float]:
+    """A quaternion scaled to length 1; the identity if the scene does not give it.
 
-    `first` is the name of its first part. Raises `SceneError` for one of no length.
+    `first` is the name of its first component. Raises `SceneError` if a given one has length zero.
     """
     length = math.hypot(*parts)
     if length != 0.0:
         return [part / length for part in parts]
-    if reported:
+    if is_given:
         raise SceneError(
             f"initial.q: the quaternion from {first} on has no length; give 1, 0, 0, 0 for no turn"
         )
     return [1.0, 0.0, 0.0, 0.0]
 
 
-def _length_noticed(parts: Sequence[float], first: str) -> list[str]:
+def _length_notice(parts: Sequence[float], first: str) -> list[str]:
     length = math.hypot(*parts)
     if length == 0.0 or abs(length - 1.0) <= ROUNDING:
         return []
@@ -71,7 +71,7 @@ def _values(
     location: str,
     prescribed: Sequence[Prescribed],
 ) -> tuple[float, ...]:
-    """The values of coordinates or velocities, in order: 0 for what a table does not name."""
+    """The values of coordinates or velocities, in order; 0 for those that a table leaves out."""
     names = [c.name for c in coordinates]
     if not isinstance(given, dict):
         if len(given) != len(names):
@@ -90,7 +90,7 @@ def _values(
 
 
 def _reasons(prescribed: Sequence[Prescribed]) -> dict[str, str]:
-    """Why each coordinate or velocity that is no state has no initial value."""
+    """For each prescribed coordinate and its velocity why it takes no initial value."""
     return {
         name: f"'{c.position.name}' is {'locked' if c.locked else f'driven by {c.by!r}'}"
         for c in prescribed

@@ -1,4 +1,4 @@
-"""The model: a scene whose every name is resolved; bodies in a tree, parents before children."""
+"""The model: a mechanism with all names resolved and its bodies in a tree, parents first."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,11 +21,13 @@ from eomgen.scene.schema import Form, LeftOut, Route
 
 @dataclass(frozen=True)
 class Body:
-    """A body and the joint that holds it. `parent` is an index into the bodies, -1 the world.
+    """A body and the joint that connects it to its parent.
 
-    `inertia_com` about the centre of mass in body axes: one moment in the plane; in space xx, yy,
-    zz, xy, xz, yz. `positions` and `velocities` are all the joint's, whether states or not; see
-    `Model.joint_indices`.
+    parent       index of the parent among the bodies, -1 for the world
+    inertia_com  about the centre of mass, in body axes, kg m²: one moment in the plane; in space
+                 xx, yy, zz, xy, xz, yz
+    positions    all coordinates of the joint, whether states or prescribed
+    velocities   all velocities of the joint, likewise
     """
 
     name: str
@@ -38,22 +40,26 @@ class Body:
 
     @property
     def plain(self) -> int:
-        """How many of its coordinates have a rate of their own: all but those of a quaternion,
-        which are four for three velocities.
+        """The number of coordinates whose time derivative is a velocity of the joint.
+
+        The coordinates after them are the four of a quaternion, whose velocities are the three
+        components of an angular velocity.
         """
-        turns = len(self.positions) != len(self.velocities)
-        return len(self.positions) - (4 if turns else 0)
+        has_quaternion = len(self.positions) != len(self.velocities)
+        return len(self.positions) - (4 if has_quaternion else 0)
 
     @property
     def moment(self) -> Formula:
-        """The moment of inertia of a planar body."""
+        """The moment of inertia of a planar body about its centre of mass, kg m²."""
         assert len(self.inertia_com) == 1, "in the plane only"
         return self.inertia_com[0]
 
 
 @dataclass(frozen=True)
 class Point:
-    """A named point: `body` is an index, `at` runs from its centre of mass in body axes."""
+    """A named point: the index of its body, and its position `at` from the body's centre of mass,
+    in body axes, m.
+    """
 
     name: str
     body: int
@@ -62,8 +68,10 @@ class Point:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A coordinate that is no state: `value` is a formula of t and parameters, or a number if it is
-    locked. `by` is the name of the effect that drives it.
+    """A coordinate whose motion is given, so that it is not a state.
+
+    value  a formula of t and parameters; of a locked coordinate a constant
+    by     the name of the effect that drives it, None if it is locked
     """
 
     position: Coordinate
@@ -73,26 +81,26 @@ class Prescribed:
 
     @property
     def locked(self) -> bool:
-        """Whether it stays as it is."""
+        """Whether the coordinate is constant."""
         return self.by is None
 
 
 def prescribed_of(
     bodies: Sequence[Body], effects: Iterable[Effect], locked: Mapping[str, float]
 ) -> tuple[Prescribed, ...]:
-    """The coordinates that are no states: driven ones in the order of the bodies, then locked ones.
+    """The prescribed coordinates: driven ones in the order of the bodies, then locked ones.
 
-    `locked` holds the values of those, by name.
+    `locked` maps the names of locked coordinates to their values.
     """
     drives = {e.joint: e for e in effects if isinstance(e, Driven)}
-    driven, fast = [], []
+    driven, constant = [], []
     for body in bodies if drives or locked else ():
         for x, v in zip(body.positions, body.velocities, strict=False):
             if drive := drives.get(body.joint.name):
                 driven.append(Prescribed(x, v, drive.coordinate, drive.name))
             elif x.name in locked:
-                fast.append(Prescribed(x, v, Constant(locked[x.name]), None))
-    return (*driven, *fast)
+                constant.append(Prescribed(x, v, Constant(locked[x.name]), None))
+    return (*driven, *constant)
 
 
 def positions_of(
@@ -112,7 +120,7 @@ def velocities_of(
 
 
 def dofs_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...]]:
-    """The joints that move but the free ones, each with the kinds of its primitives."""
+    """The joints that have coordinates, except free ones, with the kinds of their primitives."""
     return {
         body.joint.name: tuple(primitive.kind for primitive in body.joint.primitives(dimensions))
         for body in bodies
@@ -122,8 +130,10 @@ def dofs_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...
 
 @dataclass(frozen=True)
 class JointIndex:
-    """Where a body's joint stands among all coordinates and all velocities, which are those of the
-    state, then the driven ones, then the locked ones, each in the order of the bodies.
+    """The indices of a joint's coordinates `q` and velocities `v`.
+
+    They count all coordinates, or velocities: those of the state, then the driven ones, then the
+    locked ones, each in the order of the bodies.
     """
 
     body: Body
@@ -132,32 +142,30 @@ class JointIndex:
 
     @property
     def plain(self) -> tuple[tuple[int, int], ...]:
-        """Each coordinate that has a rate of its own, and that."""
+        """Pairs of a coordinate and the velocity that is its time derivative; see `Body.plain`."""
         end = self.body.plain
         return tuple(zip(self.q[:end], self.v[:end], strict=True))
 
     @property
     def quaternion(self) -> tuple[int, ...]:
-        """The other coordinates, w, x, y, z of a quaternion; or none."""
+        """The coordinates w, x, y, z of the joint's quaternion; () if it has none."""
         return self.q[self.body.plain :]
 
     @property
     def spin(self) -> tuple[int, ...]:
-        """The velocities of that."""
+        """The velocities that belong to the quaternion: an angular velocity; () if none."""
         return self.v[self.body.plain :]
 
 
 @dataclass(frozen=True)
 class Model:
-    """A mechanism with everything that acts on it, as `elaborate` makes it of a scene.
+    """A mechanism and the effects that act on it, without drawing and integration settings.
 
-    It knows nothing of pictures, nor of integrators.
-
-    `conditions` are what values of the parameters keep.
-    `states` are those that effects bring along, after coordinates and velocities.
-    `locked` holds each coordinate that is held fast, by name, with its value; `locked_deg` those
-    of them that the scene gives in degrees, in which a quarter turn is one.
-    `notices` say what was put right on the way, a line each.
+    conditions  conditions on the values of parameters
+    states      extra states of effects, which follow coordinates and velocities
+    locked      locked coordinates by name, with their values
+    locked_deg  locked angles by name, as the scene gives them in degrees: 90 is exact, π/2 is not
+    notices     what elaboration corrected, one line each
     """
 
     name: str
@@ -192,19 +200,19 @@ class Model:
 
     @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
-        """The coordinates that are no states: driven ones in the order of the bodies, then locked
+        """The coordinates that are not states: driven ones in the order of the bodies, then locked
         ones.
         """
         return prescribed_of(self.bodies, self.effects, dict(self.locked))
 
     @property
     def driven(self) -> tuple[Prescribed, ...]:
-        """Those of them that a drive moves."""
+        """The driven coordinates."""
         return tuple(c for c in self.prescribed if not c.locked)
 
     @cached_property
     def joint_indices(self) -> tuple[JointIndex, ...]:
-        """Where each body's joint stands among the coordinates and velocities."""
+        """The indices of each body's joint coordinates and velocities."""
         given = self.prescribed
         positions = (*self.coordinates, *(c.position for c in given))
         velocities = (*self.velocities, *(c.velocity for c in given))
@@ -219,18 +227,18 @@ class Model:
 
     @property
     def first_position(self) -> tuple[int, ...]:
-        """For each body its joint's first coordinate, where nothing is prescribed."""
+        """The index of each joint's first coordinate; valid if no coordinate is prescribed."""
         return tuple(accumulate((len(b.positions) for b in self.bodies), initial=0))[:-1]
 
     @property
     def first_velocity(self) -> tuple[int, ...]:
-        """For each body its joint's first velocity, where nothing is prescribed."""
+        """The index of each joint's first velocity; valid if no coordinate is prescribed."""
         return tuple(accumulate((len(b.velocities) for b in self.bodies), initial=0))[:-1]
 
     @property
     def angle_index(self) -> tuple[int, ...]:
-        """For each planar body the index of the coordinate that turns it: its joint's last; where
-        nothing is prescribed.
+        """For each planar body the index of its joint's angle, which is the joint's last
+        coordinate; valid if no coordinate is prescribed.
         """
         return tuple(accumulate((len(b.positions) for b in self.bodies), initial=-1))[1:]
 
@@ -246,21 +254,25 @@ class Model:
 
     @property
     def carriers(self) -> tuple[int, ...]:
-        """For each velocity of the state how many others carry it; pairs that M couples."""
+        """For each velocity of the state the number of velocities between its body and the world
+        that come before it: the off-diagonal entries of its row in a triangle of M.
+        """
         nv, depth = len(self.velocities), list[int]()
-        found = [0] * nv
+        carriers = [0] * nv
         for index in self.joint_indices:
             above = depth[index.body.parent] if index.body.parent >= 0 else 0
             for i in index.v:
                 if i < nv:
-                    found[i] = above
+                    carriers[i] = above
                     above += 1
             depth.append(above)
-        return tuple(found)
+        return tuple(carriers)
 
     @property
     def holding(self) -> tuple[Body, ...]:
-        """The bodies whose joint transmits forces: all but those that nothing holds."""
+        """The bodies whose joint transmits constraint forces: all except undriven, unlocked free
+        bodies.
+        """
         given = {c.position.name for c in self.prescribed}
         return tuple(
             body
@@ -270,7 +282,7 @@ class Model:
 
     @cached_property
     def defaults(self) -> Mapping[str, float]:
-        """Parameter values of the scene, by name."""
+        """The scene's parameter values, by name."""
         return {p.name: p.default for p in self.parameters}
 
     def quantities(self) -> Iterator[Formula]:
@@ -287,15 +299,16 @@ class Model:
             yield from point.at
 
     def locked_angle(self, name: str) -> Real:
-        """The value of a locked angle, rad, of more digits than a double has."""
+        """The value of a locked angle, rad, to more digits than a double has."""
         degrees = dict(self.locked_deg)
         return radians(degrees[name]) if name in degrees else dict(self.locked)[name]
 
     @cached_property
     def magnitude(self) -> float:
-        """The order of its lengths, a power of 2^40: 1 for all from a micrometre to a megametre.
+        """The magnitude of the mechanism's lengths, m, as a power of 2^40.
 
-        What has to be near nothing beside any of them counts in it: for ordinary scenes, in metres.
+        Tolerances that must be negligible beside any length are multiples of it. It is 1 for
+        lengths from a micrometre to a megametre.
         """
         lengths = [p.default for p in self.parameters if p.unit == "m"]
         pairs = zip(self.coordinates, self.initial_q, strict=False)
@@ -306,9 +319,9 @@ class Model:
         return float(2.0 ** (40 * round(math.log2(largest) / 40)))
 
     def with_parameters(self, values: Mapping[str, float]) -> "Model":
-        """The same model with other values for some parameters.
+        """The same model with other default values for some parameters.
 
-        Raises `SceneError` for values that a scene may not have.
+        Raises `SceneError` for values that do not meet the model's conditions.
         """
         parameters = (replace(p, default=values.get(p.name, p.default)) for p in self.parameters)
         model = replace(self, parameters=tuple(parameters))
@@ -316,15 +329,17 @@ class Model:
         return model
 
     def value(self, formula: Formula) -> float:
-        """A quantity's value at the scene's parameters."""
+        """A quantity's value at the scene's parameter values."""
         return float(evaluate(formula, self.defaults, FloatScalars()))
 
 
 def off_centre(joint: Joint) -> TypeGuard[Revolute]:
-    """Whether a pin holds its child away from the centre of mass, as its structure says."""
+    """Whether a revolute joint's axis passes beside its child's centre of mass: `r_child` is not
+    the bare number 0.
+    """
     return isinstance(joint, Revolute) and not all(is_zero(r) for r in joint.r_child)
 
 
 def is_zero(formula: Formula) -> bool:
-    """Whether a quantity is a bare 0: structure, no parameter."""
+    """Whether a quantity is the bare number 0, which is not a parameter."""
     return isinstance(formula, Constant) and formula.value == 0.0

@@ -1,4 +1,4 @@
-"""Names of a scene: each is given once and known where it is used; bare numbers get one."""
+"""Name resolution: names are unique and known, and each bare number becomes a parameter."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 
 @dataclass(frozen=True)
 class Scope:
-    """What the names in a scene's formulas stand for.
+    """The names that a scene's formulas may use.
 
-    values   of the scene's own parameters, by name
-    moving   what changes with the motion: t, coordinates, velocities, inputs and states of effects
-    sliding  joints and coordinates that slide, whose quantities have the units of that; none as
-             long as there are no joints yet
+    values   values of the scene's own parameters, by name
+    moving   variables: t, coordinates, velocities, inputs and extra states of effects
+    sliding  prismatic joints and coordinates, whose quantities have units of force and length;
+             empty until the joints are known
     """
 
     values: Mapping[str, float]
@@ -30,32 +30,31 @@ class Scope:
 
 @dataclass(frozen=True)
 class Bindings:
-    """What the quantities of tables bring along: parameters, of which each bare number makes one,
-    and the conditions that values keep.
-    """
+    """The parameters that bare numbers in tables became, and conditions on their values."""
 
     parameters: tuple[Parameter, ...] = ()
     conditions: tuple[Condition, ...] = ()
 
     def values(self, scope: Scope) -> dict[str, float]:
-        """The values of all parameters that these quantities may name."""
+        """The values of the scope's parameters and of these, by name."""
         return {**scope.values, **{p.name: p.default for p in self.parameters}}
 
 
 def joined(parts: Iterable[Bindings]) -> Bindings:
-    """All of them as one, in order."""
-    found = list(parts)
+    """Several bindings as one, in order."""
+    every = list(parts)
     return Bindings(
-        tuple(p for part in found for p in part.parameters),
-        tuple(c for part in found for c in part.conditions),
+        tuple(p for part in every for p in part.parameters),
+        tuple(c for part in every for c in part.conditions),
     )
 
 
 def bind(table: AnyTable, prefix: str, location: str, scope: Scope) -> tuple[AnyTable, Bindings]:
-    """A table with each bare number as a parameter, named after `prefix`, and what that brings.
+    """A table with each bare number replaced by a parameter, whose name starts with `prefix`; and
+    its bindings.
 
-    Raises `SceneError`, naming the `location`, for a name that is not in scope, and for a value
-    that does not keep its conditions.
+    Raises `SceneError`, naming the `location`, for a name that is not in scope, or a value that
+    does not meet its conditions.
     """
     fields, parameters, conditions = name_quantities(
         table, prefix, location, scope.values, scope.moving, scope.sliding
@@ -66,7 +65,10 @@ def bind(table: AnyTable, prefix: str, location: str, scope: Scope) -> tuple[Any
 
 
 def check_names(tables: Sequence[tuple[str, str]]) -> None:
-    """Raise `SceneError` unless names, each with its place, are given once; none is the world's."""
+    """Raise `SceneError` for a name given twice or a body named as the world.
+
+    `tables` are pairs of a name and its location.
+    """
     seen: dict[str, str] = {}
     for name, location in tables:
         if name in seen:

@@ -1,4 +1,4 @@
-"""Coordinates whose motion is given: driven by a formula, or locked."""
+"""Checks of prescribed coordinates, which are driven by a formula or locked."""
 
 import math
 from collections.abc import Sequence
@@ -16,10 +16,9 @@ from eomgen.scene.joints.base import Coordinate
 def values_by_name(
     given: dict[str, float], coordinates: Sequence[Coordinate], location: str
 ) -> dict[str, float]:
-    """The values of a table by the names of coordinates, some of them in degrees.
+    """The values of a table by coordinate name; keys that end in `_deg` are converted to radians.
 
-    Raises `SceneError`, naming the `location`, for a name that is not there, or that is given
-    twice.
+    Raises `SceneError`, naming the `location`, for an unknown name, or one that is given twice.
     """
     names = [c.name for c in coordinates]
     degrees = {f"{c.name}_deg": c.name for c in coordinates if c.unit in ("rad", "rad/s")}
@@ -40,9 +39,9 @@ def values_by_name(
 def locked_values(
     given: dict[str, float], bodies: Sequence[Body], effects: Sequence[Effect]
 ) -> dict[str, float]:
-    """The coordinates that are held fast, with their values, from a table by name.
+    """The locked coordinates with their values, from a table by name.
 
-    Raises `SceneError` for one that is not there, is part of a quaternion, or is driven.
+    Raises `SceneError` for one that is unknown, is part of a quaternion, or is driven.
     """
     values = values_by_name(given, [c for body in bodies for c in body.positions], "locked")
     driven = {effect.joint: effect.name for effect in effects if isinstance(effect, Driven)}
@@ -50,7 +49,7 @@ def locked_values(
         for i, c in enumerate(body.positions):
             if c.name in values and i >= body.plain:
                 raise SceneError(
-                    f"locked.{c.name}: is part of a quaternion, which is held whole or not at all; "
+                    f"locked.{c.name}: is part of a quaternion, which cannot be locked in part; "
                     f"give joint '{body.joint.name}' type = 'weld'"
                 )
             if c.name in values and body.joint.name in driven:
@@ -68,9 +67,10 @@ def check_drive(
     before: Sequence[Effect],
     scope: Scope,
 ) -> None:
-    """A coordinate follows one formula, of time and parameters, and is finite at the start.
+    """Raise `SceneError` unless a drive is the only one of its coordinate, its formula uses time
+    and parameters alone, and its value, rate and acceleration are finite at t = 0.
 
-    Raises `SceneError` for any other.
+    `before` are the effects that the scene lists before it.
     """
     for other in before:
         if isinstance(other, Driven) and other.joint == drive.joint:
@@ -82,16 +82,16 @@ def check_drive(
     for name in names_in(drive.coordinate):
         if name in (own, f"{own}_dot"):
             raise SceneError(
-                f"{location}.coordinate: '{name}' is the motion that it gives, which is circular; "
-                "use t and parameters"
+                f"{location}.coordinate: '{name}' is the motion that the formula prescribes, "
+                "which is circular; use t and parameters"
             )
         if name in scope.moving and name not in scope.values and name != "t":
             raise SceneError(
-                f"{location}.coordinate: '{name}' is found only as it moves, and a drive is fixed "
-                "beforehand; use t and parameters"
+                f"{location}.coordinate: '{name}' is part of the solution, which a prescribed "
+                "motion cannot depend on; use t and parameters"
             )
         if name not in scope.values and name != "t":
-            return  # unknown, which is said where all such names are
+            return  # an unknown name, which `bind` reports
     try:
         start = with_rates(drive.coordinate, scope.values, 0.0, FloatScalars())
     except (ArithmeticError, ValueError):

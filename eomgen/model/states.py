@@ -1,4 +1,4 @@
-"""What the numbers of a state vector are."""
+"""The entries of a state vector."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,8 @@ from eomgen.model.model import Model
 
 @dataclass(frozen=True)
 class State:
-    """One number of the state vector; `position` separates positions and angles from their
-    rates.
+    """One entry of the state vector; `position` is true for positions and angles, false for rates
+    and extra states.
     """
 
     name: str
@@ -18,10 +18,10 @@ class State:
 
 
 def velocity_states(model: Model) -> tuple[State, ...]:
-    """The form [q, v, x]: coordinates, velocities, and what effects bring along."""
-    moving = (
+    """The states of the form [q, v, x]: coordinates, velocities, extra states of effects."""
+    mechanical = (
         State(c.name, c.unit, c.about, position)
         for group, position in ((model.coordinates, True), (model.velocities, False))
         for c in group
     )
-    return (*moving, *(State(x.name, x.unit, x.about, False) for x in model.states))
+    return (*mechanical, *(State(x.name, x.unit, x.about, False) for x in model.states))

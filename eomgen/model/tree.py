@@ -1,4 +1,4 @@
-"""The tree that joints make of bodies: one joint holds each, parents come before children."""
+"""The kinematic tree: each body has one joint to its parent, and parents precede children."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,83 +13,86 @@ from eomgen.scene.schema import BodyTable, Scene
 
 @dataclass(frozen=True)
 class Link:
-    """A body and the joint that holds it, each with its place in the scene; `parent` is the number
-    of the link that it hangs on, -1 the world.
+    """A body and the joint to its parent, each with its location in the scene; `parent` is the
+    index of the parent's link, -1 for the world.
     """
 
     body: BodyTable
     location: str
     joint: Joint
-    joint_place: str
+    joint_location: str
     parent: int
 
 
 def links_of(scene: Scene) -> tuple[Link, ...]:
-    """The links of a scene and its chains: parents first, and otherwise in the scene's order.
+    """The links of a scene and its chains, sorted by depth in the tree and then as in the scene.
 
-    Raises `SceneError` for names that are given twice or not at all, and unless each body hangs on
-    the world by one joint after another.
+    Raises `SceneError` for duplicate or unknown names, and unless the joints form a tree whose root
+    is the world.
     """
     bodies, joints = written_out(scene)
     check_names([(body.name, location) for body, location in bodies])
     check_names([(joint.name, location) for joint, location in joints])
     locations = {body.name: location for body, location in bodies}
-    holding = _holding(locations, joints)
-    depth = _depths(holding)
+    parent_joint = _parent_joints(locations, joints)
+    depth = _depths(parent_joint)
     order = sorted(bodies, key=lambda body: depth[body[0].name])
     index = {WORLD: -1, **{body.name: k for k, (body, _) in enumerate(order)}}
     return tuple(
-        Link(body, location, *holding[body.name], index[holding[body.name][0].parent])
+        Link(body, location, *parent_joint[body.name], index[parent_joint[body.name][0].parent])
         for body, location in order
     )
 
 
-def _holding(
+def _parent_joints(
     bodies: Mapping[str, str], joints: Sequence[tuple[Joint, str]]
 ) -> dict[str, tuple[Joint, str]]:
-    """The joint that holds each body, with its place; `bodies` have theirs by name."""
-    holding: dict[str, tuple[Joint, str]] = {}
+    """For each body the joint to its parent and that joint's location.
+
+    `bodies` maps the names of bodies to their locations.
+    """
+    parent_joint: dict[str, tuple[Joint, str]] = {}
     anchors: Collection[str] = dict.fromkeys([WORLD, *bodies])
     for joint, location in joints:
         if joint.child == WORLD:
             raise SceneError(
-                f"{location}.child: '{WORLD}' is the ground, which hangs on nothing; name it as "
-                "the "
-                "parent, and give no body a second joint: loops are not closed"
+                f"{location}.child: '{WORLD}' is the ground, which has no parent; name it as the "
+                "parent, and give no body a second joint: closed loops are not supported"
             )
         check_known(joint.child, f"{location}.child", bodies, "body")
         if joint.parent != WORLD:
             check_known(joint.parent, f"{location}.parent", anchors, "body")
-        if joint.child in holding:
+        if joint.child in parent_joint:
+            other = parent_joint[joint.child][1]
             raise SceneError(
-                f"{location}.child: '{joint.child}' is the child of {holding[joint.child][1]} too; "
+                f"{location}.child: '{joint.child}' is the child of {other} too; "
                 "in a tree each body has one joint to its parent"
             )
-        holding[joint.child] = (joint, location)
+        parent_joint[joint.child] = (joint, location)
     for name, location in bodies.items():
-        if name not in holding:
+        if name not in parent_joint:
             raise SceneError(
-                f"{location}.name: '{name}' is attached to nothing; "
-                "give it a joint, of type 'free' if nothing holds it"
+                f"{location}.name: '{name}' has no joint; "
+                "give it one, of type 'free' if it moves freely"
             )
-    return holding
+    return parent_joint
 
 
-def _depths(holding: Mapping[str, tuple[Joint, str]]) -> dict[str, int]:
-    """How many joints lie between each body and the world. Raises `SceneError` for a cycle."""
+def _depths(parent_joint: Mapping[str, tuple[Joint, str]]) -> dict[str, int]:
+    """The number of joints between each body and the world. Raises `SceneError` for a cycle."""
     depth: dict[str, int] = {WORLD: 0}
-    for start in holding:
+    for start in parent_joint:
         path: dict[str, None] = {}
         name = start
         while name not in depth:
             if name in path:
-                joint, location = holding[name]
+                joint, location = parent_joint[name]
                 raise SceneError(
-                    f"{location}.parent: '{joint.parent}' hangs on its own child '{name}': "
-                    "the joints make a cycle; let one tree start at the world"
+                    f"{location}.parent: '{joint.parent}' is itself a descendant of the child "
+                    f"'{name}': the joints make a cycle; connect one of its bodies to the world"
                 )
             path[name] = None
-            name = holding[name][0].parent
+            name = parent_joint[name][0].parent
         for name in reversed(path):
-            depth[name] = depth[holding[name][0].parent] + 1
+            depth[name] = depth[parent_joint[name][0].parent] + 1
     return depth
