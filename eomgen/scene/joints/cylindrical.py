@@ -23,7 +23,7 @@ class Cylindrical(JointTable):
         """Slide and angle."""
         slide, angle = self.coordinates or (f"{self.name}_slide", f"{self.name}_angle")
         return (
-            Coordinate(slide, "m", f"way of {self.child} along {self.parent}"),
+            Coordinate(slide, "m", f"displacement of {self.child} relative to {self.parent}"),
             Coordinate(angle, "rad", f"angle of {self.child} from {self.parent}"),
         )
 

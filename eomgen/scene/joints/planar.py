@@ -25,8 +25,8 @@ class Planar(JointTable):
             f"{self.name}_angle",
         )
         return (
-            Coordinate(x, "m", f"way of {self.child} along x of {self.parent}"),
-            Coordinate(y, "m", f"way of {self.child} along y of {self.parent}"),
+            Coordinate(x, "m", f"displacement of {self.child} along x of {self.parent}"),
+            Coordinate(y, "m", f"displacement of {self.child} along y of {self.parent}"),
             Coordinate(angle, "rad", f"angle of {self.child} from {self.parent}"),
         )
 

@@ -18,7 +18,7 @@ class Prismatic(Geared):
         """The displacement of the joint's point on the child from that on the parent, m."""
         base = "the world" if self.parent == WORLD else self.parent
         name = self.coordinate or f"{self.name}_slide"
-        return (Coordinate(name, "m", f"way of {self.child} along {base}"),)
+        return (Coordinate(name, "m", f"displacement of {self.child} relative to {base}"),)
 
     def velocities(self, dimensions: int) -> tuple[Coordinate, ...]:
         """Its rate."""
