@@ -1,1 +1,1 @@
-"""From model to program and from program to files: routes, outputs, backends."""
+"""Recording of models as programs by a route, and writing of programs by a backend."""

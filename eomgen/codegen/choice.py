@@ -1,4 +1,4 @@
-"""Which route a model's equations take, and why."""
+"""Choice of the route by which a model's equations are derived."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,24 +18,26 @@ from eomgen.routes import ROUTES
 from eomgen.scalars.floats import ArrayScalars
 
 MOST_LOST = 4.0
-"""Decimal digits of v̇ that a route may lose at ordinary states and still be chosen by `auto`."""
-
+"""Largest number of decimal digits of v̇ that a route may lose at the sampled states and still be
+chosen by `auto`.
+"""
 SPARE = 1.0
-"""Digits that the last of all routes may lose at some state more than at those it was judged at."""
+"""Margin in digits for the route of last resort: it may lose more at states not sampled."""
 ENOUGH = 10
-"""Digits of v̇ of which nothing is said if so many are right."""
+"""Number of correct digits of v̇ from which on no notice is given."""
 FEWEST = 6
-"""Digits of v̇ that must be right, be it said; a scene of which fewer would be is refused."""
-
+"""Smallest number of correct digits of v̇; a scene that would have fewer is refused."""
 MOST_FACTORING = 20_000
-"""Operations of factoring alone beyond which `ldl` is not tried only to be compared."""
+"""Operations of factoring M from which on `ldl` is not derived for comparison only."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A route with the operations of its `derivative`, or None and why it was not tried.
+    """A route that `choose` considered.
 
-    It is `refused` if it loses too many digits.
+    operations  of its `derivative`, None if the route was not tried
+    words       what the operations are, or why it was not tried
+    refused     whether it loses too many digits
     """
 
     route: str
@@ -46,8 +48,9 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Choice:
-    """The equations of the route that was chosen, and the routes it was chosen from. So many
-    `digits` of accelerations are right, if fewer than `ENOUGH`; then the report must say so.
+    """The equations by the chosen route, and all candidates.
+
+    `digits` is the number of correct digits of accelerations, None if at least `ENOUGH`.
     """
 
     derived: Derived
@@ -55,48 +58,54 @@ class Choice:
     digits: int | None = None
 
     def notices(self) -> list[str]:
-        """What the report must say of it."""
+        """Notices for the user, one line each."""
         if self.digits is None:
             return []
         return [
-            "bodies and joints so uneven cost every route digits; by the best, "
-            f"'{self.derived.route}', {self.digits} of {ALL:.0f} digits of accelerations are right"
+            f"{_ILL_CONDITIONED}; by the best, '{self.derived.route}', "
+            f"{self.digits} of {ALL:.0f} digits of accelerations are right"
         ]
 
 
-def choose(model: Model, *, closed: bool = True) -> Choice:
-    """The equations of a model by the route it names, or by the one of the fewest operations that
-    keeps its digits. Without `closed`, symbolic routes are tried only if named; they take a second
-    or two.
+_ILL_CONDITIONED = "bodies and joints so uneven cost every route digits"
 
-    Raises `SceneError` if the route named is not for the model, or if all lose too many digits.
+
+def choose(model: Model, *, closed: bool = True) -> Choice:
+    """The equations of a model by the route it names; for `auto` by the route with the fewest
+    operations among those that lose at most `MOST_LOST` digits.
+
+    If all lose more, the route of last resort is taken. Without `closed`, symbolic routes, which
+    take a second or two, are tried only if named.
+
+    Raises `SceneError` if the named route does not apply to the model, or if every route loses too
+    many digits.
     """
     if model.route != "auto":
         return _only(model, model.route, "named")
     if model.form != "velocity":
         return _only(model, "closed", f"form '{model.form}' comes from it alone")
-    candidates, tried = _tried(model, closed)
-    routes = {name: _route(model, attempt) for name, attempt in tried.items()}
-    weighed, digits = _weighed(candidates, digits_lost(model, routes)), None
-    if not _kept(weighed):
+    candidates, attempts = _attempts(model, closed)
+    routes = {name: _route(model, attempt) for name, attempt in attempts.items()}
+    judged, digits = _judged(candidates, digits_lost(model, routes)), None
+    if not _accepted(judged):
         last = next(name for name, spec in ROUTES.items() if spec.last)
-        tried[last] = _recursive(derive(model, last))
-        routes[last] = _route(model, tried[last])
+        attempts[last] = _recursive(derive(model, last))
+        routes[last] = _route(model, attempts[last])
         lost = digits_lost(model, routes, closely=True)
-        weighed = _weighed(candidates, lost)
-        if not _kept(weighed):
+        judged = _judged(candidates, lost)
+        if not _accepted(judged):
             words = (
                 f"keeps digits that bodies and joints take from others, {lost['aba']:.0f} of aba"
             )
-            weighed.append(Candidate(last, _operations(tried[last].alone), words))
-            digits = _right(lost[last])
-    best = min(_kept(weighed), key=lambda c: c.operations or 0)
-    return Choice(tried[best.route].derived, tuple(weighed), digits)
+            judged.append(Candidate(last, _operations(attempts[last].alone), words))
+            digits = _correct_digits(lost[last])
+    best = min(_accepted(judged), key=lambda c: c.operations or 0)
+    return Choice(attempts[best.route].derived, tuple(judged), digits)
 
 
 @dataclass(frozen=True)
 class _Attempt:
-    """A route's equations, and the steps that its derivative takes, alone and after all passes."""
+    """A route's equations, and the optimised program of its derivative and nothing else."""
 
     derived: Derived
     alone: Program
@@ -106,14 +115,14 @@ def _only(model: Model, route: str, words: str) -> Choice:
     return Choice(derive(model, route), (Candidate(route, None, words),))
 
 
-def _tried(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _Attempt]]:
-    """The routes with the operations of their derivatives after all passes, and those of them that
-    were worth a try.
+def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _Attempt]]:
+    """All routes except that of last resort as candidates, and the equations of those tried.
 
-    Beside a symbolic route, which is counted among all outputs of its module, the others are, too:
-    that takes little time where one is tried.
+    Operations are those of `derivative` after all passes. A symbolic route shares steps among the
+    outputs of its module, so it is counted in the whole module; if one is tried, the other routes
+    are counted in the same way.
     """
-    candidates, tried = list[Candidate](), dict[str, _Attempt]()
+    candidates, attempts = list[Candidate](), dict[str, _Attempt]()
     for name, spec in ROUTES.items():
         if not spec.symbolic:
             continue
@@ -123,20 +132,20 @@ def _tried(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _Atte
             derived = derive(model, name)
             program = _in_module(derived)
             candidates.append(_candidate(name, _operations(program)))
-            tried[name] = _Attempt(derived, _alone(program))
-    among_all, least, fewest = bool(tried), least_factoring(model), math.inf
-    # Routes that factor M come last: what that takes at least is known beforehand.
+            attempts[name] = _Attempt(derived, _alone(program))
+    in_module, least, fewest = bool(attempts), least_factoring(model), math.inf
+    # Routes that factor M come last, because a lower bound of their operations is known.
     others = [name for name, spec in ROUTES.items() if not (spec.symbolic or spec.last)]
     for name in sorted(others, key=_factors):
         if _factors(name) and least > fewest:
             words = f"not tried: factoring alone takes {least} operations"
             candidates.append(Candidate(name, None, words))
             continue
-        tried[name] = _recursive(derive(model, name))
-        program = _in_module(derive(model, name)) if among_all else tried[name].alone
+        attempts[name] = _recursive(derive(model, name))
+        program = _in_module(derive(model, name)) if in_module else attempts[name].alone
         candidates.append(_candidate(name, _operations(program)))
         fewest = min(fewest, _operations(program))
-    return candidates, tried
+    return candidates, attempts
 
 
 def _factors(route: str) -> bool:
@@ -149,12 +158,12 @@ def _recursive(derived: Derived) -> _Attempt:
 
 
 def _in_module(derived: Derived) -> Program:
-    """All outputs but the Jacobian, after all passes."""
+    """The optimised program of all outputs except the Jacobian."""
     return optimised(record(derived, jacobian=False)).program
 
 
 def _alone(program: Program) -> Program:
-    """The steps that a derivative takes alone and after all passes."""
+    """The optimised program of the derivative and nothing else."""
     outputs = {"derivative": program.outputs["derivative"]}
     return optimise(replace(program, outputs=outputs, checks=()))
 
@@ -167,29 +176,31 @@ def _candidate(route: str, operations: int) -> Candidate:
     return Candidate(route, operations, "operations a call of derivative")
 
 
-def _right(lost: float) -> int | None:
-    """The digits that are right where the last of all routes loses so many; None if `ENOUGH`.
-    Raises `SceneError` if too few are left.
+def _correct_digits(lost: float) -> int | None:
+    """The number of correct digits by the route of last resort, which loses `lost`; None if
+    `ENOUGH`. Raises `SceneError` for fewer than `FEWEST`.
     """
-    right = max(0, math.floor(ALL - lost - SPARE))
-    if right < FEWEST:
+    correct = max(0, math.floor(ALL - lost - SPARE))
+    if correct < FEWEST:
         raise SceneError(
-            "route: bodies and joints so uneven cost every route digits; by the best, "
-            f"'orthogonal', only {right} of {ALL:.0f} digits of accelerations would be right; make "
+            f"route: {_ILL_CONDITIONED}; by the best, 'orthogonal', "
+            f"only {correct} of {ALL:.0f} digits of accelerations would be right; make "
             "them less uneven, or give route = 'orthogonal' to take it all the same"
         )
-    return right if right < ENOUGH else None
+    return correct if correct < ENOUGH else None
 
 
 def least_factoring(model: Model) -> int:
-    """Operations of LᵀDL at least: for each velocity a division and a product and a difference for
-    every pair of velocities that carry it.
+    """A lower bound of the operations of LᵀDL factorisation of M.
+
+    A velocity with n others on the path to the world takes n divisions, and a product and a
+    difference for each of n (n + 1) / 2 pairs of these.
     """
     return sum(above + above * (above + 1) for above in model.carriers)
 
 
 def why_not_compared(model: Model, route: str) -> str:
-    """What keeps a route from being made beside the one taken, in a few words; "" if nothing."""
+    """Why a route is not derived for comparison with the chosen one; "" if it is."""
     if model.form != "velocity":
         return f"the form '{model.form}' comes from the closed form alone"
     if ROUTES[route].symbolic:
@@ -200,31 +211,31 @@ def why_not_compared(model: Model, route: str) -> str:
     return ""
 
 
-def _weighed(candidates: Sequence[Candidate], lost: Mapping[str, float]) -> list[Candidate]:
-    """Those that were tried and lose too many digits are refused."""
-    weighed = []
+def _judged(candidates: Sequence[Candidate], lost: Mapping[str, float]) -> list[Candidate]:
+    """The candidates, those refused that were tried and lose more than `MOST_LOST` digits."""
+    judged = []
     for candidate in candidates:
         if candidate.operations is not None and (digits := lost[candidate.route]) > MOST_LOST:
             words = f"{candidate.words}; would lose {digits:.0f} digits"
             candidate = replace(candidate, words=words, refused=True)
-        weighed.append(candidate)
-    return weighed
+        judged.append(candidate)
+    return judged
 
 
-def _kept(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Those that may be taken."""
+def _accepted(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates that were tried and not refused."""
     return [c for c in candidates if c.operations is not None and not c.refused]
 
 
 def _route(model: Model, attempt: _Attempt) -> Route:
-    """How a route computes v̇, of one state or of several."""
+    """A route as `digits_lost` takes it: a function that computes v̇ at one state or several."""
     run = interpreter(attempt.alone, "derivative", ArrayScalars())
     names = [c.name for c in (*model.coordinates, *model.velocities)]
     first = len(model.coordinates)
 
-    def found(values: Values) -> Sequence[float]:
+    def accelerations(values: Values) -> Sequence[float]:
         given = {**values.parameters, **values.inputs, **values.states, TIME: 0.0}
         given |= dict(zip(names, (*values.q, *values.v), strict=True))
         return run(given)[first : first + len(model.velocities)]
 
-    return Route(found, attempt.derived.axes)
+    return Route(accelerations, attempt.derived.axes)
