@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eomgen.codegen import from_recursion as recording
+from eomgen.codegen import jacobians
 from eomgen.codegen.system import System
 from eomgen.language.formula import names_in
 from eomgen.model.elaborate import elaborate
@@ -131,7 +131,7 @@ def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) 
     model = replace(model, outputs=outputs, route=route or model.route)
     with pytest.MonkeyPatch.context() as patch:
         if tangents:
-            patch.setattr(recording, "LARGEST_JACOBIAN", -1)
+            patch.setattr(jacobians, "LARGEST_JACOBIAN", -1)
         system = compile_program(model, jacobian="jacobian" not in leave_out).system
     source = python_module(system)
     return Engine(model, system, source, load_module(source, f"tested_{model.name}"))

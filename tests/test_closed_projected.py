@@ -17,7 +17,8 @@ from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 import eomgen.derivation.projected
 from eomgen.cli import main
 from eomgen.codegen.from_projected import from_projected
-from eomgen.codegen.from_recursion import Recording, from_recursion
+from eomgen.codegen.from_recursion import from_recursion
+from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System
 from eomgen.derivation.projected.constraints import about, hat, of_quaternion, state_joints
 from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from eomgen.codegen.from_recursion import Recording
+from eomgen.codegen.recording import Recording
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene

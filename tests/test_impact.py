@@ -16,7 +16,7 @@ from striking import (
     touching_velocities,
 )
 
-from eomgen.codegen import from_recursion as recording
+from eomgen.codegen import jacobians
 from eomgen.errors import SceneError
 
 FREE = """\
@@ -607,7 +607,7 @@ def test_no_closed_form() -> None:
 
 def test_kernels_grow_with_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
     """A link with its contact costs no more where there are many."""
-    monkeypatch.setattr(recording, "LARGEST_JACOBIAN", -1)
+    monkeypatch.setattr(jacobians, "LARGEST_JACOBIAN", -1)
     counts = []
     for n in (4, 8, 12):
         scene = 'name = "row"\ndimensions = 3\n' + MATERIAL

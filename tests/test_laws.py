@@ -18,8 +18,8 @@ from campaign import some
 from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
-from eomgen.codegen.from_recursion import Recording
 from eomgen.codegen.kernels import MORE
+from eomgen.codegen.recording import Recording
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.elaborate import elaborate

@@ -1,10 +1,11 @@
-"""The equations of a model by a route, ready to be recorded."""
+"""Derivation of a model's equations by a route."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from eomgen.codegen.from_recursion import Recording, from_recursion
+from eomgen.codegen.from_recursion import from_recursion
+from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System
 from eomgen.derivation.supported import why_not_closed, why_not_pins
 from eomgen.dynamics.kinematics import Axes
@@ -17,10 +18,11 @@ from eomgen.routes import ROUTES
 
 @dataclass(frozen=True)
 class Derived:
-    """A route's equations: what `record` makes a system of, whole, with the Jacobian or without.
+    """A model's equations by a route.
 
-    Of a recursion they lie on a tape as far as v̇ already, `alone` being the optimised program of
-    the derivative and nothing else, and `axes` those that it works in. Of SymPy both are None.
+    recorder  makes the system of all outputs, with or without the Jacobian; see `record`
+    alone     the optimised program of the derivative and nothing else; None for a symbolic route
+    axes      the axes in which the recursion works; None for a symbolic route
     """
 
     route: str
@@ -32,11 +34,11 @@ class Derived:
 def derive(model: Model, route: str) -> Derived:
     """The equations of a model by a route.
 
-    By a recursion they are in the axes that take the fewest operations. In the plane those are the
-    world's, in which angles add up, unless bodies that turn carry slides; in space they are the
-    frames' own.
+    A recursion works in the axes that take the fewest operations: in space the body axes; in the
+    plane the world's, in which angles add up, or the body axes where rotating bodies carry
+    prismatic joints.
 
-    Raises `SceneError` if the route is not for the model.
+    Raises `SceneError` if the route does not apply to the model.
     """
     if why_not := why_not_derived(model, route):
         raise SceneError(why_not)
@@ -46,12 +48,12 @@ def derive(model: Model, route: str) -> Derived:
 
 
 def record(derived: Derived, *, jacobian: bool = True) -> System:
-    """All outputs on a tape, no pass run over it; with the derivative's Jacobian or without."""
+    """The system of all outputs, with or without the Jacobian of the derivative, not optimised."""
     return derived.recorder(jacobian=jacobian)
 
 
 def why_not_derived(model: Model, route: str) -> str:
-    """What keeps a model from a route, naming key and remedy; "" if nothing does."""
+    """Why a route does not apply to a model, with key and remedy; "" if it does."""
     velocity = model.form == "velocity"
     if not velocity and not ROUTES[route].symbolic:
         return (
@@ -66,7 +68,7 @@ def why_not_derived(model: Model, route: str) -> str:
 
 
 def _symbolic(model: Model) -> Derived:
-    # Imported here because SymPy takes longer to load than everything else together.
+    # Imported here because SymPy takes longer to load than all other modules together.
     if why_not_pins(model):
         from eomgen.codegen.from_projected import from_projected
         from eomgen.derivation.projected.derive import derive_projected

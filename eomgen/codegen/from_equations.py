@@ -1,11 +1,11 @@
-"""SymPy's equations lowered to the tape: the state's derivative and every output asked for."""
+"""Systems of planar pendulum trees by the symbolic route, in any form of the state."""
 
 from collections.abc import Iterable
 from typing import Any
 
 import sympy as sp
 
-from eomgen.codegen.system import Made, System, output_shape, recorded
+from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
 from eomgen.derivation.closed import Equations, written_out_forces
 from eomgen.derivation.forms import state_form
 from eomgen.derivation.free_bodies import SymbolicMechanism
@@ -22,7 +22,7 @@ from eomgen.scene.effects.base import JointLoad
 
 
 def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
-    """Lower the equations, and differentiate the derivative unless told not to."""
+    """The system of the equations, with or without the Jacobian of the derivative."""
     model, symbols, form = equations.model, equations.symbols, state_form(equations)
     tape = Tape()
     named = {name: tape.input(name, Stage.PARAMETERS) for name in symbols.parameters}
@@ -43,9 +43,9 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
     }
     given = parameters | states | inputs
     zero = tape.constant(0.0)
-    passive = Lowering(tape, given | dict.fromkeys(tau, zero), defined)
-    pushed = Lowering(tape, given | tau, defined)
-    demanded = Lowering(tape, given | vd, defined)
+    unforced = Lowering(tape, given | dict.fromkeys(tau, zero), defined)
+    forced = Lowering(tape, given | tau, defined)
+    inverse = Lowering(tape, given | vd, defined)
     start = {
         s: tape.constant(value)
         for s, value in zip(
@@ -57,46 +57,46 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
     def rows(lowering: Lowering, expressions: Iterable[Any]) -> list[Node]:
         return [lowering.lower(e.xreplace(form.replaced)) for e in expressions]
 
-    for pivot in equations.solution.pivots:  # so that they are named whoever meets them first
-        passive.lower(pivot)
-    rates = rows(passive, form.rates)
+    for pivot in equations.solution.pivots:  # first, so that each gets its own variable name
+        unforced.lower(pivot)
+    rates = rows(unforced, form.rates)
     by = {
         "jacobian": list(states.values()),
         "input_jacobian": list(inputs.values()),
         "parameter_jacobian": list(named.values()),
     }
-    made: Made = {
+    nodes: OutputNodes = {
         "initial_state": ((len(form.states),), [starting.lower(e) for e in form.initial]),
         "derivative": ((len(rates),), rates),
     }
     recipes = _recipes(equations)
-    lowerings = {"forward_dynamics": pushed, "inverse_dynamics": demanded}
+    lowerings = {"forward_dynamics": forced, "inverse_dynamics": inverse}
     for name in (*["jacobian"] * jacobian, *model.outputs):
         if name in by:
             slopes = slopes_of(rates, by[name])
-            made[name] = ((len(rates), len(by[name])), [node for row in slopes for node in row])
+            nodes[name] = ((len(rates), len(by[name])), [node for row in slopes for node in row])
         elif name == "point_jacobians" and model.form == "velocity":
             slopes = slopes_of(
-                rows(passive, recipes["point_velocities"]), [states[s] for s in symbols.v]
+                rows(unforced, recipes["point_velocities"]), [states[s] for s in symbols.v]
             )
-            made[name] = (output_shape(name, model), [node for row in slopes for node in row])
+            nodes[name] = (output_shape(name, model), [node for row in slopes for node in row])
         elif model.form == "velocity" or OUTPUTS[name].forms:
-            nodes = rows(lowerings.get(name, passive), recipes[name])
-            made[name] = (output_shape(name, model), nodes)
+            entries = rows(lowerings.get(name, unforced), recipes[name])
+            nodes[name] = (output_shape(name, model), entries)
     extra = {
-        "forward_dynamics": tuple(str(node.step.value) for node in tau.values()),
-        "inverse_dynamics": tuple(str(node.step.value) for node in vd.values()),
+        "forward_dynamics": names_of_inputs(tau.values()),
+        "inverse_dynamics": names_of_inputs(vd.values()),
     }
     checks = _checks(equations, starting)
-    return recorded(model, "closed", form.states, tape, made, checks, extra, frozenset())
+    return recorded(model, "closed", form.states, tape, nodes, checks, extra, frozenset())
 
 
 def _recipes(equations: Equations) -> dict[str, list[Any]]:
-    """Expressions of every output, over the symbols of bodies and coordinates."""
+    """The entries of each output as expressions in the symbols of bodies and coordinates."""
     s, symmetric, bodies = equations.symbols, equations.symmetric, equations.model.bodies
     balance = symmetric.M * sp.Matrix(s.a) + symmetric.V + symmetric.G - symmetric.F
-    held = [k for k, body in enumerate(bodies) if body.joint.type != "free"]
-    pins = [(*s.force[k], -equations.free_bodies.motor[k]) for k in held]
+    jointed = [k for k, body in enumerate(bodies) if body.joint.type != "free"]
+    wrenches = [(*s.force[k], -equations.free_bodies.motor[k]) for k in jointed]
     points = [_point(equations, point) for point in equations.model.points]
     each = range(len(bodies))
     return {
@@ -112,23 +112,23 @@ def _recipes(equations: Equations) -> dict[str, list[Any]]:
         "effect_powers": _powers(equations),
         "momentum": _momentum(equations),
         "centre_of_mass": _centre_of_mass(equations),
-        "joint_forces": [component for force in pins for component in force],
+        "joint_forces": [component for wrench in wrenches for component in wrench],
         "body_poses": [z for k in each for z in (s.x[k], s.y[k], s.angle[k])],
         "body_velocities": [z for k in each for z in (s.xd[k], s.yd[k], s.omega[k])],
-        "point_positions": [z for place, _ in points for z in place],
-        "point_velocities": [z for _, rate in points for z in rate],
+        "point_positions": [z for position, _ in points for z in position],
+        "point_velocities": [z for _, velocity in points for z in velocity],
     }
 
 
 def _point(equations: Equations, point: Point) -> tuple[Vec, Vec]:
-    """Place and velocity of a named point."""
+    """World position and velocity of a named point."""
     s, k = equations.symbols, point.body
     rx, ry = rotate((s.value(point.at[0]), s.value(point.at[1])), s.angle[k])
     return (s.x[k] + rx, s.y[k] + ry), (s.xd[k] - s.omega[k] * ry, s.yd[k] + s.omega[k] * rx)
 
 
 def _powers(equations: Equations) -> list[Any]:
-    """Of each effect Σ f · v of its loads, and τ times the rate of its joint."""
+    """The power of each effect: Σ f · v of its forces plus Σ τ ω of its torques at joints."""
     s, model = equations.symbols, equations.model
     mechanism = SymbolicMechanism(model, s)
     index = {body.name: k for k, body in enumerate(model.bodies)}
@@ -154,8 +154,8 @@ def _centre_of_mass(equations: Equations) -> list[Any]:
     """Σ m x / Σ m."""
     s = equations.symbols
     return [
-        sp.Add(*(m * z for m, z in zip(s.mass, places, strict=True))) / sp.Add(*s.mass)
-        for places in (s.x, s.y)
+        sp.Add(*(m * z for m, z in zip(s.mass, component, strict=True))) / sp.Add(*s.mass)
+        for component in (s.x, s.y)
     ]
 
 
@@ -180,15 +180,15 @@ def _momentum(equations: Equations) -> list[Any]:
 
 
 def _checks(equations: Equations, lowering: Lowering) -> list[Check]:
-    """What a user's own parameters must keep for the closed form to hold."""
+    """Conditions on a user's parameters under which the closed form holds."""
     model, symbols = equations.model, equations.symbols
     checks = []
     for k, body in enumerate(model.bodies):
         mass = lowering.lower(symbols.mass[k])
         checks.append(Check(f"mass of {body.name}", mass.index, may_vanish=False))
         if not is_zero(body.moment):
-            # A body held away from its centre of mass needs no inertia of its own to turn.
-            held = model.form == "velocity" and off_centre(body.joint)
+            # If the joint is not at the centre of mass, m r² alone makes the mass matrix regular.
+            may_vanish = model.form == "velocity" and off_centre(body.joint)
             inertia = lowering.lower(symbols.inertia[k])
-            checks.append(Check(f"inertia_com of {body.name}", inertia.index, may_vanish=held))
+            checks.append(Check(f"inertia_com of {body.name}", inertia.index, may_vanish))
     return checks

@@ -1,33 +1,27 @@
-"""SymPy's equations of any small tree lowered to the tape.
+"""Systems of small trees by the symbolic route: SymPy's equations lowered to a tape.
 
-v̇ and the terms of M v̇ + V + G = F are SymPy's; what only observes the motion, energies, positions,
-forces in the joints, comes from the recursions over the same tape.
+v̇ and the terms of M v̇ + V + G = F are SymPy's. Energies, positions, joint forces and other
+observables come from the recursions, recorded on the same tape.
 """
 
 from collections.abc import Sequence
 from typing import Any
 
-from eomgen.codegen.from_recursion import (
-    Recording,
-    along_directions,
-    checks,
-    derivatives,
-    output,
-    variables,
-)
-from eomgen.codegen.system import LARGEST_JACOBIAN, Made, System, output_shape, recorded
+from eomgen.codegen.from_recursion import checks, output
+from eomgen.codegen.jacobians import matrices
+from eomgen.codegen.recording import Recording
+from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.language.formula import evaluate
 from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES
-from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
 from eomgen.program.tape import Node
 
 
 class Lowered:
-    """The equations over the nodes of a recording."""
+    """The equations lowered to the tape of a recording."""
 
     def __init__(self, equations: ProjectedEquations, record: Recording) -> None:
         self.equations = equations
@@ -43,21 +37,23 @@ class Lowered:
         self._given |= {symbol: record.inputs[name] for name, symbol in s.inputs.items()}
 
     def forward(self, tau: Sequence[Node] | None = None) -> list[Node]:
-        """v̇ under the effects and forces `tau` beside them."""
+        """v̇ under the effects and further generalised forces `tau`."""
         zero = self._tape.constant(0.0)
         s = self.equations.symbols
         forces = [zero] * len(s.tau) if tau is None else tau
         return self.rows(s.a, dict(zip(s.tau, forces, strict=True)))
 
     def rows(self, expressions: Sequence[Any], given: dict[Any, Node] | None = None) -> list[Node]:
-        """Expressions over the equations' symbols; `given` are further ones."""
+        """The nodes of expressions over the equations' symbols and those in `given`."""
         definitions = self.equations.solution.definitions
         lowering = Lowering(self._tape, self._given | (given or {}), definitions)
-        for symbol in self._needed(expressions, given or {}):  # in order: no deep recursion
+        # In the order of the definitions, which bounds the depth of recursion.
+        for symbol in self._needed(expressions, given or {}):
             lowering.lower(symbol)
         return [lowering.lower(expression) for expression in expressions]
 
     def _needed(self, expressions: Sequence[Any], given: dict[Any, Node]) -> list[Any]:
+        """The defined symbols that expressions use, directly or not, in order of definition."""
         definitions = self.equations.solution.definitions
         needed: set[Any] = set()
         stack = [s for e in expressions for s in e.free_symbols]
@@ -70,25 +66,19 @@ class Lowered:
 
 
 def from_projected(equations: ProjectedEquations, *, jacobian: bool = True) -> System:
-    """The whole system of a model by route `closed`; with the derivative's Jacobian or without."""
+    """The system of a model by route `closed`, with or without the Jacobian of the derivative."""
     model = equations.model
     record = Recording(model, "closed", lambda record: Lowered(equations, record).forward)
     lowered, tape, ny = Lowered(equations, record), record.tape, len(record.q) + len(record.v)
     start = [tape.constant(x) for x in (*model.initial_q, *model.initial_v)]
-    made: Made = {"initial_state": ((ny,), start), "derivative": ((ny,), record.rates)}
-    extra: dict[str, tuple[str, ...]] = {}
-    tangents: set[str] = set()
-    for name in derivatives(model, jacobian):
-        by, before = variables(record, name), len(tape.steps)
-        rows = slopes_of(record.rates, by)
-        if len(tape.steps) - before > LARGEST_JACOBIAN:
-            rows, extra[name] = along_directions(record, by)
-            tangents.add(name)
-        made[name] = ((ny, len(by)), [node for row in rows for node in row])
+    nodes: OutputNodes = {"initial_state": ((ny,), start), "derivative": ((ny,), record.rates)}
+    derivatives = matrices(record, with_jacobian=jacobian)
+    nodes |= derivatives.nodes
+    extra = dict(derivatives.extra)
     for name in model.outputs:
         if name not in DERIVATIVES:
             found = _dynamics(lowered, record, name, extra)
-            made[name] = (
+            nodes[name] = (
                 output(record, name, extra) if found is None else (output_shape(name, model), found)
             )
     divisors = [
@@ -100,23 +90,23 @@ def from_projected(equations: ProjectedEquations, *, jacobian: bool = True) -> S
         "closed",
         velocity_states(model),
         tape,
-        made,
+        nodes,
         [*checks(record), *divisors],
         extra,
-        frozenset(tangents),
+        derivatives.tangents,
     )
 
 
 def _dynamics(
     lowered: Lowered, record: Recording, name: str, extra: dict[str, tuple[str, ...]]
 ) -> list[Node] | None:
-    """Nodes of an output that SymPy's equations give."""
+    """The nodes of an output that SymPy's equations give, None for any other."""
     terms, symbols = lowered.equations.balance, lowered.equations.symbols
     n = len(record.v)
     match name:
         case "inverse_dynamics":
-            vd = record.beside("vd")
-            extra[name] = tuple(str(node.step.value) for node in vd)
+            vd = record.velocity_inputs("vd")
+            extra[name] = names_of_inputs(vd)
             unknown = type(terms.V)(n, 1, symbols.a)
             needed = terms.M * unknown + terms.V + terms.G - terms.F
             return lowered.rows(list(needed), dict(zip(symbols.a, vd, strict=True)))

@@ -1,7 +1,7 @@
-"""A program with the meaning of its inputs: what a backend needs to write a module."""
+"""A model's program, with the names of its states and of the extra inputs of its outputs."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.model.model import Model
@@ -13,15 +13,18 @@ from eomgen.program.switching import with_switching_functions
 from eomgen.program.tape import Node, Tape
 
 LARGEST_JACOBIAN = 30_000
-"""Operations up to which a matrix of derivatives is written out entry by entry."""
+"""Most operations of a matrix of derivatives that is computed entry by entry.
 
-Made = dict[str, tuple[tuple[int, ...], list[Node]]]
-"""Shape and nodes of each output."""
+A larger one is computed column by column, as tangents along unit directions.
+"""
+
+OutputNodes = dict[str, tuple[tuple[int, ...], list[Node]]]
+"""Shape and nodes of each output, by name."""
 
 
 @dataclass(frozen=True)
 class ContactLabel:
-    """What a module says of a rigid contact; `unit` is that of its gap."""
+    """A rigid contact: its name, the name of its effect, and the unit of its gap."""
 
     name: str
     effect: str
@@ -32,10 +35,11 @@ class ContactLabel:
 class System:
     """A model's program.
 
-    `extra` names what some outputs take besides state, parameters and inputs: generalised forces or
-    accelerations, one a velocity; or directions, for those of `tangents`, which compute how
-    something changes along a direction in place of a matrix of derivatives. `contacts` are the
-    rigid ones, `reports` tell what each pass saved, once they have run.
+    extra     for some outputs the names of the inputs that they take besides time, state,
+              parameters and inputs: generalised forces or accelerations, or a direction
+    tangents  matrices of derivatives whose output is their product with the direction in `extra`
+    contacts  the rigid contacts
+    reports   the size of the program before all passes and after each; () if none has run
     """
 
     model: Model
@@ -49,7 +53,7 @@ class System:
 
 
 def output_shape(name: str, model: Model) -> tuple[int, ...]:
-    """The shape of an output of a model that is no matrix of derivatives."""
+    """The shape of an output of a model; for all outputs except matrices of derivatives."""
     sizes = {
         "nv": len(model.velocities),
         "bodies": len(model.bodies),
@@ -62,31 +66,36 @@ def output_shape(name: str, model: Model) -> tuple[int, ...]:
     return shape_of(name, model.dimensions, sizes)
 
 
+def names_of_inputs(nodes: Iterable[Node]) -> tuple[str, ...]:
+    """The names of nodes that are inputs."""
+    return tuple(str(node.step.value) for node in nodes)
+
+
 def recorded(
     model: Model,
     route: str,
     states: Sequence[State],
     tape: Tape,
-    made: Made,
+    nodes: OutputNodes,
     checks: Sequence[Check],
     extra: Mapping[str, tuple[str, ...]],
     tangents: frozenset[str],
     contacts: tuple[ContactLabel, ...] = (),
 ) -> System:
-    """A tape with its outputs as a system, no pass run over it yet."""
-    for name, (shape, nodes) in made.items():
-        entries = shape[0] if name in tangents else math.prod(shape)
-        assert entries == len(nodes), f"{name}: {len(nodes)} nodes for {shape}"
+    """The system of a tape and the nodes of its outputs, before optimisation."""
+    for name, (shape, entries) in nodes.items():
+        count = shape[0] if name in tangents else math.prod(shape)
+        assert count == len(entries), f"{name}: {len(entries)} nodes for {shape}"
     outputs = {
-        name: Output(shape, tuple(node.index for node in nodes))
-        for name, (shape, nodes) in made.items()
+        name: Output(shape, tuple(node.index for node in entries))
+        for name, (shape, entries) in nodes.items()
     }
     program = finish(tape, outputs, checks)
     return System(model, route, tuple(states), program, extra, tangents, contacts)
 
 
 def optimised(system: System) -> System:
-    """The same values in fewer operations, with switching functions and a report of the passes."""
+    """The system after all passes, with switching functions and a report of the passes."""
     program, reports = optimise_and_report(system.program)
     program = with_switching_functions(program, [state.name for state in system.states])
     return replace(system, program=program, reports=reports)

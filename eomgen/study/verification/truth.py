@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.codegen.from_recursion import Recording
+from eomgen.codegen.recording import Recording
 from eomgen.dynamics.diagnostics import values_at
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.model.model import Model

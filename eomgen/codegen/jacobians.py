@@ -1,0 +1,157 @@
+"""Matrices of derivatives of the state's derivative, by state, inputs or parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from eomgen.codegen.recording import Recording
+from eomgen.codegen.system import LARGEST_JACOBIAN, OutputNodes, names_of_inputs
+from eomgen.dynamics.composite import Entries, solved
+from eomgen.dynamics.sensitivity import sensitivity
+from eomgen.dynamics.vectors import sub, zeros
+from eomgen.outputs import DERIVATIVES
+from eomgen.program.differentiate import jacobian, substituted, tangent
+from eomgen.program.tape import Node, Stage
+from eomgen.routes import ROUTES
+
+
+@dataclass
+class Matrices:
+    """Nodes of matrices of derivatives, the directions that some take as extra inputs, and the
+    names of these, whose nodes are the product with the direction instead of all entries.
+    """
+
+    nodes: OutputNodes = field(default_factory=dict)
+    extra: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def tangents(self) -> frozenset[str]:
+        """Names of the matrices that are computed along directions."""
+        return frozenset(self.extra)
+
+
+def matrices(record: Recording, *, with_jacobian: bool) -> Matrices:
+    """The matrices of derivatives that the model asks for, and the Jacobian `with_jacobian`.
+
+    A matrix of more than `LARGEST_JACOBIAN` operations is computed along directions.
+    """
+    found = Matrices()
+    asked = [name for name in record.model.outputs if name in DERIVATIVES]
+    for name in (*["jacobian"] * with_jacobian, *asked):
+        by = _variables(record, name)
+        before = len(record.tape.steps)
+        rows = _matrix(record, name) if _is_small(record, name) else None
+        steps = len(record.tape.steps) - before
+        if rows is None or (ROUTES[record.route].differentiated and steps > LARGEST_JACOBIAN):
+            rows, found.extra[name] = _along_direction(record, by)
+        shape = (len(record.rates), len(by))
+        found.nodes[name] = (shape, [node for row in rows for node in row])
+    return found
+
+
+def _variables(record: Recording, name: str) -> list[Node]:
+    """The variables of a matrix of derivatives: state, inputs or parameters."""
+    return {
+        "jacobian": [*record.q, *record.v, *record.x],
+        "input_jacobian": list(record.inputs.values()),
+        "parameter_jacobian": list(record.parameters.values()),
+    }[name]
+
+
+def _is_small(record: Recording, name: str) -> bool:
+    """Whether a matrix takes at most `LARGEST_JACOBIAN` operations entry by entry, by an estimate:
+    the products of inverse dynamics, and the solution with the factors of M for each column.
+    """
+    pairs, columns = sum(record.model.carriers), len(_variables(record, name))
+    products = 100 if record.model.dimensions == 3 else 20
+    operations = 4 * pairs * columns + products * pairs
+    return max(operations, columns * len(record.rates)) <= LARGEST_JACOBIAN
+
+
+def _along_direction(
+    record: Recording, by: Sequence[Node]
+) -> tuple[list[list[Node]], tuple[str, ...]]:
+    """The directional derivative of the rates, and the names of the direction's components.
+
+    Unless the route's own steps are differentiated, v̇ = M⁻¹ (F - V - G) gives it: inverse dynamics
+    is differentiated at the accelerations found, which takes fewer operations than forward
+    dynamics, and M ∂v̇ = -∂τ solved.
+    """
+    directions = [record.input(f"d__{node.step.value}", Stage.INPUTS) for node in by]
+    names = names_of_inputs(directions)
+    seeds = {x.index: d for x, d in zip(by, directions, strict=True)}
+    if ROUTES[record.route].differentiated:
+        return [[node] for node in tangent(record.rates, seeds)], names
+    d, inputs = record.dynamics, record.velocity_inputs("vd")
+    accelerations = {x.index: vd for x, vd in zip(inputs, record.vd, strict=True)}
+    applied, needed = (tangent(f, seeds) for f in (d.applied_force, d.inverse(inputs)))
+    needed = substituted(needed, accelerations)
+    right = [a - b for a, b in zip(applied, needed, strict=True)]
+    above, below = (tangent(f, seeds) for f in (record.position_rates, d.state_rates))
+    return [[node] for node in (*above, *d.response(record.route)(right), *below)], names
+
+
+def _matrix(record: Recording, name: str) -> list[list[Node]]:
+    """A matrix of derivatives of the rates, row by row.
+
+    Unless the route's own steps are differentiated, inverse dynamics is, at the accelerations
+    found, and M ∂v̇ = -∂τ is solved with the factors of M.
+    """
+    d, tape = record.dynamics, record.tape
+    zero = tape.constant(0.0)
+    by = _variables(record, name)
+    if ROUTES[record.route].differentiated:
+        return jacobian(record.rates, by)
+    factors = d.factors
+    applied = jacobian(d.applied_force, by)
+    if name == "jacobian":
+        columns = _state_columns(record)
+    elif name == "parameter_jacobian":
+        # Accelerations as inputs, so that the steps that compute them are not differentiated.
+        inputs = record.velocity_inputs("vd")
+        accelerations = {x.index: vd for x, vd in zip(inputs, record.vd, strict=True)}
+        rows = [substituted(row, accelerations) for row in jacobian(d.inverse(inputs), by)]
+        columns = [list(column) for column in zip(*rows, strict=True)]
+    else:
+        columns = [[zero] * len(record.v) for _ in by]
+    solutions = [
+        solved(factors, [row[k] - part for row, part in zip(applied, column, strict=True)])
+        for k, column in enumerate(columns)
+    ]
+    middle = [list(row) for row in zip(*solutions, strict=True)] or [[] for _ in record.v]
+    above = jacobian(record.position_rates, by)
+    return [*above, *middle, *jacobian(d.state_rates, by)]
+
+
+def _state_columns(record: Recording) -> list[list[Node]]:
+    """The columns of ∂τ/∂y at fixed accelerations, for a state y = [q, v, x].
+
+    `sensitivity` differentiates by a small rotation δ in body axes; for a quaternion q the chain
+    rule takes δ = (2/|q|²) Im(q* dq).
+    """
+    d, model, tape = record.dynamics, record.model, record.tape
+    base = sub(zeros(record.scalars), d.down)
+    twists, accelerating = d.motion_in_world(record.vd)
+    slopes = sensitivity(d.in_world, twists, accelerating, base, record.scalars)
+    nv, zero, two = len(record.v), tape.constant(0.0), tape.constant(2.0)
+
+    def column(entries: Entries, j: int) -> list[Node]:
+        return [entries.get((i, j), zero) for i in range(nv)]
+
+    columns: list[list[Node]] = []
+    for index in model.joint_indices:
+        columns += [column(slopes.by_position, j) for _, j in index.plain if j < nv]
+        if not index.quaternion:
+            continue
+        w, x, y, z = (record.q[i] for i in index.quaternion)
+        k = two / (w * w + x * x + y * y + z * z)
+        rotations = [column(slopes.by_position, j) for j in index.spin]
+        for signs in ((-x, -y, -z), (w, -z, y), (z, w, -x), (-y, x, w)):
+            weights = [k * sign for sign in signs]
+            columns.append(
+                [
+                    weights[0] * a + weights[1] * b + weights[2] * c
+                    for a, b, c in zip(*rotations, strict=True)
+                ]
+            )
+    columns += [column(slopes.by_velocity, j) for j in range(nv)]
+    return columns + [[zero] * nv for _ in record.x]

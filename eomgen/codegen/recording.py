@@ -1,0 +1,85 @@
+"""Recording of a model's dynamics on a tape, up to the derivative of the state."""
+
+from collections.abc import Callable, Sequence
+
+from eomgen.dynamics.dynamics import Dynamics, Forward, Values
+from eomgen.dynamics.kinematics import Axes
+from eomgen.model.model import Model
+from eomgen.program.scalars import TapeScalars
+from eomgen.program.tape import TIME, Node, Stage, Tape
+from eomgen.routes import ROUTES
+
+
+class Recording:
+    """A model's dynamics recorded on a tape by a route.
+
+    model, route    as given
+    tape, scalars   the tape, and the operations on its nodes
+    parameters      parameters by name; `inputs` likewise
+    q, v, x         coordinates, velocities, and extra states of effects
+    dynamics        the recursions over these nodes
+    forward         forward dynamics: v̇ under generalised forces beside the effects
+    vd              v̇ under the effects alone
+    position_rates  q̇; `rates` is the derivative of the whole state, [q̇, v̇, ẋ]
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        route: str,
+        forward: Callable[["Recording"], Forward] | None = None,
+        axes: Axes | None = None,
+        tape: Tape | None = None,
+    ) -> None:
+        """Record a model.
+
+        forward  makes forward dynamics of a recording, instead of the route's recursion
+        axes     axes in which the recursion works, instead of its usual ones
+        tape     tape to record on, instead of a new one
+        """
+        self.model = model
+        self.route = route
+        self.tape = tape or Tape()
+        self.scalars = TapeScalars(self.tape)
+        self.parameters = {p.name: self.input(p.name, Stage.PARAMETERS) for p in model.parameters}
+        self.q = [self.input(c.name, Stage.POSITIONS) for c in model.coordinates]
+        self.v = [self.input(c.name, Stage.VELOCITIES) for c in model.velocities]
+        self.inputs = {i.name: self.input(i.name, Stage.INPUTS) for i in model.inputs}
+        self.x = [self.input(x.name, Stage.VELOCITIES) for x in model.states]
+        extra = {x.name: node for x, node in zip(model.states, self.x, strict=True)}
+        time = self.input(TIME, Stage.INPUTS)
+        values = Values(self.parameters, self.inputs, self.q, self.v, extra, time)
+        own: Axes | None = "own" if ROUTES[route].frame_axes else axes
+        self.dynamics = Dynamics(model, values, self.scalars, own)
+        self.forward: Forward
+        self.forward = self.dynamics.forward(route) if forward is None else forward(self)
+        self.vd = self.dynamics.vd = self.forward(None)
+        self.position_rates = _position_rates(model, self.q, self.v, self.tape)
+        self.rates = [*self.position_rates, *self.vd, *self.dynamics.state_rates]
+
+    def input(self, name: str, stage: Stage) -> Node:
+        """An input of the program."""
+        return self.tape.input(name, stage)
+
+    def velocity_inputs(self, prefix: str) -> list[Node]:
+        """One further input for each velocity, named after it with a prefix."""
+        names = (f"{prefix}__{c.name}" for c in self.model.velocities)
+        return [self.input(name, Stage.INPUTS) for name in names]
+
+
+def _position_rates(model: Model, q: Sequence[Node], v: Sequence[Node], tape: Tape) -> list[Node]:
+    """q̇: the velocity of each coordinate, or ½ q ∘ ω for a quaternion q, with ω in body axes."""
+    rates: list[Node] = []
+    half = tape.constant(0.5)
+    for index in model.joint_indices:
+        rates += [v[j] for _, j in index.plain if j < len(v)]
+        if index.quaternion:
+            w, x, y, z = (q[i] for i in index.quaternion)
+            a, b, c = (half * v[j] for j in index.spin)
+            rates += [
+                -(x * a + y * b + z * c),
+                w * a + y * c - z * b,
+                w * b + z * a - x * c,
+                w * c + x * b - y * a,
+            ]
+    return rates
