@@ -1,7 +1,7 @@
-"""A program's outputs as straight lines of a language: what all backends have in common."""
+"""Kernels: each output of a program as straight-line source code of a language."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from eomgen.codegen.interface import Function, Interface
 from eomgen.program.printing import Block, Dialect, Names, print_block
@@ -9,24 +9,24 @@ from eomgen.program.program import Check, Program, cost, live_steps
 from eomgen.program.tape import COUNTED, TIME, Stage
 
 LARGE = 500
-"""Operations shared with `derivative` from which on an output goes on from there."""
+"""Least number of operations that an output shares with `derivative` for it to call that kernel."""
 MORE = 0.05
-"""Part of an output's operations that it may do in vain for that."""
+"""Largest fraction of an output's operations that may be wasted by that call."""
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """One output as lines.
+    """The source of one output.
 
-    function   what it is to a user
-    block      its lines, one expression a result, and the functions that they call
-    state      of each state its variable, or "" where it is not used; `inputs` and `extra` likewise
-    constants  variables that depend on parameters alone, taken from what `Constants` computes
+    function   the interface of the output
+    block      its assignments, an expression for each result, and the functions called
+    state      the variable of each state, "" if it is not used; `inputs` and `extra` likewise
+    constants  variables that depend on parameters alone, computed by `Constants`
     time       whether it depends on time
     counts     operations by kind
-    passed     variables that it passes on to kernels that go on from it
-    base       the kernel that it goes on from, or None: it takes these of its variables, `taken`,
-               "_" for each that it does not use
+    passed     variables that it returns to kernels that continue from it
+    base       the kernel that it continues from, or None
+    taken      the variables `passed` by the base, "_" for each that it does not use
     """
 
     function: Function
@@ -44,12 +44,13 @@ class Kernel:
 
 @dataclass(frozen=True)
 class Constants:
-    """What depends on parameters alone, for all kernels together.
+    """The source of what depends on parameters alone, for all kernels together.
 
-    parameters  of each parameter its variable
-    checked     lines that come first, for `checks`: what each asks to be positive, and its source
-    lines       the other lines
-    functions   those that these lines call
+    parameters  the variable of each parameter
+    checked     assignments that `checks` need, which come first
+    checks      checks with the source of the value that each tests
+    lines       the other assignments
+    functions   functions that the assignments call
     """
 
     parameters: tuple[str, ...]
@@ -62,10 +63,10 @@ class Constants:
 def kernels_of(
     program: Program, interface: Interface, dialect: Dialect, *, sharing: bool = False
 ) -> tuple[list[Kernel], Constants]:
-    """The kernels of a program in a language, in order, and their constants.
+    """The kernels of a program in a language, in the order of its outputs, and their constants.
 
-    sharing  whether kernels go on from that of `derivative` where `shares` says so, instead of
-             repeating its lines
+    sharing  whether kernels may continue from that of `derivative`, where `shares` recommends it,
+             instead of repeating its lines
     """
     names = Names(program, dialect)
     blocks: dict[str, Block] = {}
@@ -79,43 +80,36 @@ def kernels_of(
 
     states = tuple(s.name for s in interface.states)
     inputs = tuple(i.name for i in interface.inputs)
-    kernels = [
-        Kernel(
+    taken = {i for block in blocks.values() for i in block.taken}
+    passed = [i for i in blocks["derivative"].nodes if i in taken] if taken else []
+    kernels: dict[str, Kernel] = {}
+    for function in interface.functions:
+        block = blocks[function.name]
+        kernels[function.name] = Kernel(
             function=function,
-            block=(block := blocks[function.name]),
+            block=block,
             state=used(states, block),
             inputs=used(inputs, block),
             extra=used(function.extra, block),
             constants=tuple(names[i] for i in block.constants),
             time=TIME in block.inputs,
             counts=cost(program, function.name),
+            passed=tuple(names[i] for i in passed) if function.name == "derivative" else (),
+            base=kernels["derivative"] if block.taken else None,
+            taken=tuple(names[i] if i in block.taken else "_" for i in passed)
+            if block.taken
+            else (),
         )
-        for function in interface.functions
-    ]
-    base = next((k for k in kernels if k.function.name == "derivative"), None)
-    if base and (wanted := {i for k in kernels for i in k.block.taken}):
-        given = [i for i in base.block.nodes if i in wanted]
-        passed = replace(base, passed=tuple(names[i] for i in given))
-        kernels = [
-            passed
-            if k is base
-            else replace(
-                k,
-                base=passed,
-                taken=tuple(names[i] if i in k.block.taken else "_" for i in given),
-            )
-            if k.block.taken
-            else k
-            for k in kernels
-        ]
     parameters = tuple(names.safe(p.name) for p in interface.parameters)
-    return kernels, _constants(program, blocks, names, parameters, dialect)
+    return list(kernels.values()), _constants(program, blocks, names, parameters, dialect)
 
 
 def shares(program: Program, name: str, base: Block) -> bool:
-    """Whether an output of a large program takes nearly all steps of `derivative`, so that it may
-    go on from there: at most `MORE` of its own operations would be done in vain, or twice, because
-    `derivative` has no variable for them.
+    """Whether an output should continue from the kernel of `derivative`, whose block is `base`.
+
+    It should if they share at least `LARGE` operations, and if those of `derivative` that it does
+    not need, and those that it must repeat because `derivative` has no variable for them, are at
+    most `MORE` of its own.
     """
     derivative = _operations(program, "derivative")
     if len(derivative) < LARGE:
@@ -128,14 +122,14 @@ def shares(program: Program, name: str, base: Block) -> bool:
 
 
 def _operations(program: Program, name: str, known: frozenset[int] = frozenset()) -> set[int]:
-    """The steps of an output that cost something at every call, if some are `known`."""
+    """The steps of an output that are operations at every call, if the nodes `known` are given."""
     steps = program.steps
 
-    def outside(i: int) -> bool:
+    def is_given(i: int) -> bool:
         return i in known or steps[i].stage <= Stage.PARAMETERS
 
-    live = live_steps(program, program.outputs[name].nodes, outside)
-    return {i for i in live if not outside(i) and steps[i].operation in COUNTED}
+    live = live_steps(program, program.outputs[name].nodes, is_given)
+    return {i for i in live if not is_given(i) and steps[i].operation in COUNTED}
 
 
 def _constants(
@@ -145,17 +139,17 @@ def _constants(
     parameters: tuple[str, ...],
     dialect: Dialect,
 ) -> Constants:
-    roots = sorted({i for block in blocks.values() for i in block.constants})
-    made = [i for i in roots if program.steps[i].operation != "input"]
-    # Checked before anything divides by it; the blocks share names, so they may share lines.
+    constants = sorted({i for block in blocks.values() for i in block.constants})
+    computed = [i for i in constants if program.steps[i].operation != "input"]
+    # Values are checked before anything divides by them.
     nodes = [check.node for check in program.checks]
     checked = print_block(program, nodes, names, dialect, fixed=True)
-    fixed = print_block(program, made, names, dialect, fixed=True, keep=made)
-    known = {name for name, _ in checked.lines}
+    fixed = print_block(program, computed, names, dialect, fixed=True, keep=computed)
+    assigned = {name for name, _ in checked.lines}
     return Constants(
         parameters,
         checked.lines,
         tuple(zip(program.checks, checked.results, strict=True)),
-        tuple(line for line in fixed.lines if line[0] not in known),
+        tuple(line for line in fixed.lines if line[0] not in assigned),
         (*checked.functions, *fixed.functions),
     )
