@@ -1,4 +1,4 @@
-"""What a program's numbers are called and what they mean: all that a backend knows beside it."""
+"""The interface of a program: names, units, shapes and defaults, which is all a backend needs."""
 
 import math
 from collections.abc import Iterator
@@ -19,13 +19,15 @@ ABOUT = {
     "switching_functions": "`derivative` has another branch where one of these passes 0.",
     "switching_functions_of_time": "As `switching_functions`; these depend on time alone.",
 }
-"""Outputs that every program has for which there is a need; the others are in the table."""
+"""Docstrings of the outputs that users do not ask for; those of the others are in `OUTPUTS`."""
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A state, an input or a parameter. `default` is its value unless given; `position` says of a
-    state that it is a position or an angle, no rate.
+    """A state, an input or a parameter.
+
+    `default` is the value of a parameter that is not given. `position` is true for states that are
+    positions or angles.
     """
 
     name: str
@@ -37,7 +39,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Given:
-    """A coordinate that is no state, with the text of its value."""
+    """A prescribed coordinate; `value` is the text of its formula or number."""
 
     name: str
     value: str
@@ -49,10 +51,10 @@ class Given:
 class Function:
     """An output of the program as a function.
 
-    shape    of its array, row by row; () for a number
-    extra    names of what it takes beside time, state, parameters and inputs
-    tangent  whether it computes how its first axis changes along a direction, `extra`, in place of
-             a matrix of derivatives
+    shape    of the array it returns, in C order; () for a number
+    extra    names of the inputs that it takes besides time, state, parameters and inputs
+    tangent  whether it computes the product of the matrix with a direction, given as `extra`,
+             instead of the matrix
     matrix   whether it is a matrix of derivatives of `derivative`
     """
 
@@ -66,19 +68,20 @@ class Function:
 
 @dataclass(frozen=True)
 class Interface:
-    """Names, units, shapes and defaults of a program, in order.
+    """The interface of a program.
 
-    name, title    of the scene
-    form           of the state: 'velocity', 'momentum', 'redundant'
-    coordinates    how many there are, and how many `velocities` and `others` after them
-    conditions     what values of the parameters must keep, but for sizes and what the program's
-                   own checks ask
-    functions      the program's outputs
-    quaternions    indices of each unit quaternion in the state
-    effects        name and type of each
-    driven, locked coordinates that are no states
-    contacts       the rigid ones
-    left_out       what the equations lack on purpose, a line each
+    name, title     of the scene
+    form            of the state: 'velocity', 'momentum', 'redundant'
+    coordinates     number of coordinates in the state; `velocities` and `others`, the extra states,
+                    are the numbers of those that follow
+    conditions      conditions on parameter values that the program's own checks do not cover
+    functions       the program's outputs
+    quaternions     indices of each unit quaternion in the state
+    effects         name and type of each effect
+    joints          names of the joints that transmit constraint forces
+    driven, locked  prescribed coordinates
+    contacts        rigid contacts
+    left_out        terms that the scene leaves out of the equations, one line each
     """
 
     name: str
@@ -140,9 +143,9 @@ def _function(system: System, name: str) -> Function:
     about = ABOUT.get(name, "")
     if name in OUTPUTS:
         about = OUTPUTS[name].of(system.model.dimensions)[1]
-    # With rigid contacts, whose forces only a run finds.
-    lacks = name == "derivative" or (name in OUTPUTS and OUTPUTS[name].contacts)
-    if lacks and system.contacts:
+    # Forces of rigid contacts are known only during a simulation.
+    incomplete = name == "derivative" or (name in OUTPUTS and OUTPUTS[name].contacts)
+    if incomplete and system.contacts:
         about += " Forces of held contacts are left out."
     return Function(
         name,
@@ -159,8 +162,8 @@ def _given(c: Prescribed) -> Given:
 
 
 def _conditions(model: Model) -> Iterator[Condition]:
-    """The conditions that depend on parameters, but for those that are asked in other ways: sizes
-    of single parameters, and masses and moments of which the equations ask more.
+    """The conditions that depend on parameters, except those checked elsewhere: the sizes of single
+    parameters, and masses and moments of inertia, for which the program has stricter checks.
     """
     moments = {entry for body in model.bodies for entry in (body.mass, *body.inertia_com[:3])}
     for c in model.conditions:

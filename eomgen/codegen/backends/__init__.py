@@ -1,6 +1,6 @@
-"""Languages that programs are written in: one module and one template folder each.
+"""Backends: the languages in which programs are written, each a module and a template folder.
 
-To add one, write its module, which is a `Backend`, and its templates, and name it in `BACKENDS`.
+To add a language, write a module that is a `Backend` and its templates, and enter it in `BACKENDS`.
 """
 
 from collections.abc import Mapping
@@ -13,13 +13,13 @@ from eomgen.program.program import Program
 
 
 class Backend(Protocol):
-    """What a module of a language provides.
+    """What the module of a language provides.
 
-    ABOUT      what its files are, in a few words
+    ABOUT      a few words on its files
     TEMPLATES  its folder of templates, in `templates/` or as a path
-    SUFFIXES   of its files, in order
-    files      the files of a program, in that order, by name: that of the scene and the suffix;
-               same program and interface, same bytes
+    SUFFIXES   the suffixes of its files, in order
+    files      the contents of the files in that order, by name: the name of the scene and a suffix;
+               equal programs and interfaces give equal bytes
     """
 
     ABOUT: str
@@ -27,14 +27,14 @@ class Backend(Protocol):
     SUFFIXES: tuple[str, ...]
 
     def files(self, program: Program, interface: Interface) -> Mapping[str, str]:
-        """The files of a program, by name."""
+        """The contents of a program's files, by name."""
 
 
 BACKENDS: dict[str, Backend] = {"numpy": python, "c": c, "javascript": javascript}
 
 
 def find_backend(name: str) -> Backend:
-    """The backend of a name. Raises `RunError` if there is none."""
+    """The backend of that name. Raises `RunError` if there is none."""
     if name not in BACKENDS:
         known = ", ".join(BACKENDS)
         raise RunError(f"backend: unknown name '{name}'{nearest(name, BACKENDS)}; known: {known}")

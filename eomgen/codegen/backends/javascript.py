@@ -1,4 +1,4 @@
-"""The JavaScript backend: an ES module of all outputs, and the poses that the page plays."""
+"""The JavaScript backend: an ES module of all outputs, and the function that the page animates."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,16 +25,16 @@ OWN = {
     "step": "(x) => (x > 0 ? 1 : 0)",
     "select": "(c, a, b) => (c > 0 ? a : b)",
 }
-"""Functions of formulas that JavaScript has not."""
+"""Functions of formulas that JavaScript lacks."""
 DIALECT = Dialect({name: name if name in OWN else f"Math.{name}" for name in FUNCTIONS}, RESERVED)
 
 
 def files(program: Program, interface: Interface) -> Mapping[str, str]:
-    """The module, in one file: `derivative(t, y, p, u)` and all other outputs.
+    """The module, one file, with `derivative(t, y, p, u)` and all other outputs.
 
     States, parameters and inputs are arrays in the order of `STATES`, `PARAMETERS`, `INPUTS`. An
-    output is an array of its entries, row by row. Arithmetic is that of doubles, in the program's
-    order; the functions of `Math` may differ from Python's in their last digit.
+    output is a flat array of its entries in C order. Arithmetic is in doubles, in the program's
+    order; functions of `Math` may differ from Python's in the last digit.
     """
     kernels, constants = kernels_of(program, interface, DIALECT)
     called = {f for kernel in kernels for f in kernel.block.functions} | {*constants.functions}
@@ -60,7 +60,7 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
 
 
 def _written(kernel: Kernel) -> dict[str, Any]:
-    """A kernel as the template writes it."""
+    """A kernel as values for the template."""
     function = kernel.function
     return {
         "name": function.name,
@@ -76,16 +76,16 @@ def _written(kernel: Kernel) -> dict[str, Any]:
 
 
 def _given(names: Sequence[str], array: str) -> list[tuple[str, str]]:
-    """The variables that are used, each with where it stands."""
+    """The variables that are used, each with the array element it reads."""
     return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
 
 
 def body_poses(program: Program, interface: Interface) -> str:
-    """`function bodyPoses(y, p)`: the poses of all bodies from state and parameters; with driven
-    joints `bodyPoses(y, p, t)`, from the time in s, too. "" for a program without poses.
+    """The source of `function bodyPoses(y, p)`, which computes the poses of all bodies from state
+    and parameters; if joints are driven, of `bodyPoses(y, p, t)`. "" for a program without poses.
 
-    For each body [x, y, angle] in the plane, m and rad; in space the three rows, four numbers each,
-    of [world_R_body | position], 1 and m.
+    It returns for each body [x, y, angle] in the plane, m and rad; in space the three rows, of four
+    numbers each, of [world_R_body | position], 1 and m.
     """
     if "body_poses" not in program.outputs:
         return ""
@@ -100,7 +100,7 @@ def body_poses(program: Program, interface: Interface) -> str:
         *((names.safe(n), f"y[{i}]") for i, n in enumerate(states) if n in block.inputs),
     ]
     rows = _bracketed(block.results, poses.shape[-1], ", ")
-    if len(poses.shape) == 3:  # rows of a matrix each body
+    if len(poses.shape) == 3:  # a matrix for each body
         rows = _bracketed(rows, poses.shape[-2], ",\n     ")
     context = {
         "timed": TIME in block.inputs,
@@ -113,6 +113,6 @@ def body_poses(program: Program, interface: Interface) -> str:
 
 
 def _bracketed(parts: Sequence[str], width: int, between: str) -> list[str]:
-    """Arrays of `width` parts each."""
+    """The sources of arrays of `width` parts each."""
     groups = (parts[i : i + width] for i in range(0, len(parts), width))
     return [f"[{between.join(group)}]" for group in groups]

@@ -30,9 +30,9 @@ RESERVED = frozenset(
     | {"float", "len", "list", "tuple", "ValueError", "zip"}
 )
 SHELL = ("hypot", "inf", "isfinite", "nan", "prod")
-"""What the shell needs of `math`."""
+"""Names of `math` that the shell uses."""
 SHOWING = ("sin", "cos", "tan", "asin", "acos", "log", "sqrt", "abs")
-"""Functions that have no finite value for an argument that is not finite."""
+"""Functions whose value is never finite for an argument that is not finite."""
 DIALECT = Dialect({name: name for name in FUNCTIONS}, RESERVED)
 COLUMNS = {
     **{name: f"np.{name}" for name in ("sin", "cos", "tan", "exp", "log", "tanh", "sqrt", "abs")},
@@ -42,17 +42,21 @@ COLUMNS = {
     "step": "lambda x: np.heaviside(x, 0.0)",
     "select": "lambda c, a, b: np.where(c > 0.0, a, b)",
 }
-"""What each function is on columns of states."""
+"""NumPy source of each function, for columns of states."""
 OWN = {
     "step": ("x", "1.0 if x > 0.0 else 0.0"),
     "select": ("c, a, b", "a if c > 0.0 else b"),
 }
-"""Functions that neither `math` nor Python has."""
+"""Parameters and value of functions that neither `math` nor Python has."""
 
 
 @dataclass(frozen=True)
 class Written:
-    """A kernel as the template writes it."""
+    """A kernel as values for the template.
+
+    held   constants of the kernel, after those of its base
+    known  number of the base's constants
+    """
 
     name: str
     about: str
@@ -74,7 +78,7 @@ class Written:
 
 
 def files(program: Program, interface: Interface) -> Mapping[str, str]:
-    """The module, in one file. Same program and interface, same bytes."""
+    """The module, one file. Equal programs and interfaces give equal bytes."""
     return {f"{interface.name}.py": module(program, interface)}
 
 
@@ -167,17 +171,17 @@ def _written(kernel: Kernel) -> Written:
 
 
 def _wrapped(names: Sequence[str]) -> tuple[str, ...]:
-    """Names on lines, each ending in a comma."""
+    """Names wrapped to lines, with a comma after each name."""
     return tuple(textwrap.wrap(" ".join(f"{name}," for name in names), WIDTH - 8))
 
 
 def watched(program: Program, states: Sequence[str]) -> str:
-    """What must hold, besides that the entries of `derivative` are less than `reach` in size, for
-    nothing to have gone wrong on the way to them that they do not show; a condition on `state`.
+    """The source of a condition on `state` under which no overflow remains undetected if the
+    entries of `derivative` are less than `reach` in size; "" if none is needed.
 
-    A quotient may be finite though its divisor is not, and so may the functions that are not
-    `SHOWING`. So a state must be less than `reach`, too, if it goes into one of these other than
-    by sine and cosine, and finite if nothing else would show that it is not.
+    A quotient may be finite though its divisor is not, and so may functions other than `SHOWING`.
+    Therefore a state that enters one of these, other than through sine or cosine, must be less than
+    `reach` too. A state that no entry depends on in a way that shows it must be finite.
     """
     nodes = program.outputs["derivative"].nodes
     steps, live = program.steps, live_steps(program, nodes)
@@ -222,15 +226,16 @@ def _words(test: Test) -> str:
 
 
 _BOUNDS = {False: (">", "not positive"), True: (">=", "negative")}
+"""Comparison of a check, and the message if it fails, by whether its value may vanish."""
 
 
 def _unpacking(names: Sequence[str]) -> str:
-    """`_, _, theta, phi`, for the names of those that are used, or nothing if none is used."""
+    """The names as unpacking targets, `_` for those not used; "" if none is used."""
     return _joined([name or "_" for name in names]) if any(names) else ""
 
 
 def _joined(words: Sequence[str]) -> str:
-    """A tuple to unpack into; one word keeps its comma."""
+    """The source of a tuple; a single word gets a trailing comma."""
     return f"{words[0]}," if len(words) == 1 else ", ".join(words)
 
 
@@ -243,7 +248,9 @@ _SUMS = ("total", "parameters")
 
 
 def _plain(text: str) -> str:
-    """Text of a scene as it may stand in a docstring: no quotes that end it, no escapes."""
+    """Text of a scene made safe for a docstring: no double quotes, backslashes or control
+    characters.
+    """
     kept = "".join(c if c.isprintable() else " " for c in text)
     return kept.replace("\\", "/").replace('"', "'")
 
@@ -251,7 +258,7 @@ def _plain(text: str) -> str:
 def _units(interface: Interface) -> list[tuple[str, str]]:
     entries = [(s.name, s.unit) for s in (*interface.states, *interface.inputs)]
     entries += [(p.name, _plain(p.unit)) for p in interface.parameters]
-    # A contact may be called what a parameter is; the parameter's entry is the one looked up.
+    # If a contact and a parameter have the same name, UNITS has the unit of the parameter.
     taken = {name for name, _ in entries}
     return entries + [(c.name, c.unit) for c in interface.contacts if c.name not in taken]
 
@@ -288,7 +295,7 @@ def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
 
 
 def _given(interface: Interface) -> list[str]:
-    """What there is to say of coordinates that are no states."""
+    """The docstring's tables of prescribed coordinates."""
     lines: list[str] = []
     if interface.driven:
         rows = [(f"{c.name} = {c.value}", c.unit, c.about) for c in interface.driven]
