@@ -1,10 +1,10 @@
-"""A folder of results under keys that this user alone can write.
+"""A folder of entries under keys, which only this user can write.
 
-What is found in it is run later, so it is taken only as this program wrote it: a plain file of this
-user that nobody else can write, of a sane size, in a folder of which the same is true, whose digest
-covers its key and its content. The digest shows damage, and entries under a wrong key. It is no
-signature: the key of one would have to lie where the entries lie, and who can write there as this
-user can read it, and can change this program as well.
+Entries are executed later, so one is read only if it is a regular file that this user owns and
+nobody else can write, of bounded size, in a folder with the same properties, and if its digest
+matches key and content. The digest detects damage and entries under a wrong key. It is not a
+signature: whoever can write entries as this user could read the signing key, and could change this
+program too.
 """
 
 import hashlib
@@ -19,13 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 LARGEST = 100_000_000
-"""Bytes of the largest entry that is kept: a thousand links with every output take 72 million."""
+"""Size in bytes of the largest entry; a thousand links with every output take 72 million."""
 MOST_BYTES = 500_000_000
-"""Bytes that all entries may have; those that were not used for longest go first."""
+"""Size in bytes of all entries; the least recently used are removed first."""
 LONGEST_UNUSED = 90 * 86400.0
-"""Seconds after which an entry that nobody has used goes."""
+"""Time in seconds after which an unused entry is removed."""
 LONGEST_WRITING = 3600.0
-"""Seconds after which a file that was begun and not finished is taken to be left behind."""
+"""Time in seconds after which an unfinished file is considered abandoned."""
 
 _MARK = b"eomgen entry 1 "
 _NAME = re.compile(r"([0-9a-f]{32})\.entry")
@@ -35,12 +35,12 @@ _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BI
 
 @dataclass(frozen=True)
 class Entries:
-    """The entries of a folder, each bytes under a key of 32 hexadecimal digits."""
+    """The entries of a folder: bytes under keys of 32 hexadecimal digits."""
 
     folder: Path
 
     def trouble(self) -> str:
-        """Why the folder cannot be trusted, and what to do; "" if it can, or is not there yet."""
+        """Why the folder cannot be trusted, and what to do; "" if it can, or does not exist."""
         try:
             about = self.folder.lstat()
         except FileNotFoundError:
@@ -58,7 +58,7 @@ class Entries:
         return ""
 
     def get(self, key: str) -> bytes | None:
-        """What is kept under a key; None if nothing is, or not as `put` wrote it."""
+        """The content under a key; None if there is none, or none that `put` wrote."""
         if self.trouble():
             return None
         with suppress(OSError, ValueError):
@@ -70,28 +70,28 @@ class Entries:
                 head, content = file.readline(len(_head(key, b""))), file.read(about.st_size)
                 if head != _head(key, content):
                     return None
-                with suppress(OSError):  # of a file system that cannot be written to
+                with suppress(OSError):  # on a read-only file system
                     os.utime(handle if os.utime in os.supports_fd else self._path(key))
             return content
         return None
 
     def put(self, key: str, content: bytes) -> str:
-        """Keep `content` under a key, whole or not at all, and let go of what is old.
+        """Write `content` under a key, atomically, and remove old entries.
 
-        What is too large is not kept. Returns why nothing could be kept, and what to do, or "".
+        Content that is too large is not written. Returns why writing failed, and what to do, or "".
         """
         entry = _head(key, content) + content
         if len(entry) > LARGEST:
             return ""
         begun = self.folder / f"{key}.{secrets.token_hex(8)}.begun"
         try:
-            if trouble := self.trouble() or self._made():
+            if trouble := self.trouble() or self._create():
                 return trouble
             handle = os.open(begun, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _FLAGS, 0o600)
             with os.fdopen(handle, "wb") as file:
                 file.write(entry)
             begun.replace(self._path(key))
-            self._let_go(time.time())
+            self._clean(time.time())
         except (OSError, ValueError) as error:
             return f"it cannot be written: {_why(error)}"
         finally:
@@ -99,8 +99,10 @@ class Entries:
                 begun.unlink(missing_ok=True)
         return ""
 
-    def _made(self) -> str:
-        """Make the folder where there is none; again what `trouble` says, if another came first."""
+    def _create(self) -> str:
+        """Create the folder if it does not exist. Returns `trouble` of it, since another process
+        may have created it meanwhile.
+        """
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         return self.trouble()
 
@@ -109,24 +111,25 @@ class Entries:
         assert _NAME.fullmatch(path.name), key
         return path
 
-    def _let_go(self, now: float) -> None:
-        """Remove entries that are too old or too many, and what was begun and left behind.
+    def _clean(self, now: float) -> None:
+        """Remove entries that are too old or too many, and abandoned files.
 
-        Another process may do the same, or use what goes: it then has it open, or derives anew.
+        Another process may do the same, or use an entry meanwhile: then it has the file open, or
+        does not find the entry.
         """
         size = 0
-        for about, path in sorted(self._ours(), key=lambda found: -found[0].st_mtime):
+        for about, path in sorted(self._ours(), key=lambda entry: -entry[0].st_mtime):
             size += about.st_size
             if size > MOST_BYTES or now - about.st_mtime > LONGEST_UNUSED:
                 with suppress(OSError):
                     path.unlink()
         for path in self.folder.iterdir():
             with suppress(OSError):
-                if _BEGUN.fullmatch(path.name) and _is_left_behind(path.lstat(), now):
+                if _BEGUN.fullmatch(path.name) and _is_abandoned(path.lstat(), now):
                     path.unlink()
 
     def _ours(self) -> Iterator[tuple[os.stat_result, Path]]:
-        """The files that `put` wrote, by name, owner and first line, with sizes and times."""
+        """The files that `put` wrote, judged by name, owner and first line, with their status."""
         for path in self.folder.iterdir():
             name = _NAME.fullmatch(path.name)
             if not name:
@@ -150,7 +153,7 @@ def _is_own(about: os.stat_result) -> bool:
 
 
 def _is_private(about: os.stat_result) -> bool:
-    """Whether nobody else may write; where there is no such mode the user's own folder is so."""
+    """Whether nobody else may write. Without POSIX modes, a folder in the user's profile is."""
     return os.name != "posix" or not about.st_mode & 0o022
 
 
@@ -158,7 +161,7 @@ def _is_trusted(about: os.stat_result) -> bool:
     return stat.S_ISREG(about.st_mode) and _is_own(about) and _is_private(about)
 
 
-def _is_left_behind(about: os.stat_result, now: float) -> bool:
+def _is_abandoned(about: os.stat_result, now: float) -> bool:
     return stat.S_ISREG(about.st_mode) and _is_own(about) and now - about.st_mtime > LONGEST_WRITING
 
 

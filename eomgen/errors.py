@@ -1,4 +1,4 @@
-"""Errors that are the user's to mend: one clear line each, with place, value and remedy."""
+"""Errors that a user can correct. Messages are one line, with location, value and remedy."""
 
 import difflib
 import sys
@@ -8,9 +8,9 @@ from eomgen.text import one_line
 
 
 class EomgenError(Exception):
-    """A fault in what the user gave, in one line or several fit for the terminal.
+    """An error in the user's input, with one or more lines of message.
 
-    Each argument is a line and stays one, whatever text of others is in it: see `text.one_line`.
+    Each argument is one line; `text.one_line` makes untrusted text in it safe.
     """
 
     def __init__(self, *lines: str) -> None:
@@ -22,19 +22,19 @@ class EomgenError(Exception):
 
 
 class SceneError(EomgenError):
-    """A scene that cannot be read or makes no mechanism."""
+    """A scene cannot be read, or does not describe a mechanism."""
 
 
 class RunError(EomgenError):
-    """A simulation, or a file it needs or writes, that cannot go on."""
+    """A simulation cannot continue, or a file cannot be read or written."""
 
 
 class InterruptedRunError(RunError):
-    """A run that an interrupt ended; what it had computed is kept."""
+    """An interrupt ended a run; the results up to then are kept."""
 
 
 def report_refusal(error: EomgenError) -> None:
-    """Say on standard error what is wrong, each line as one of this program."""
+    """Print the lines of an error to standard error, each with the name of this program."""
     for line in error.lines:
         print(f"eomgen: {line}", file=sys.stderr)
 
@@ -47,7 +47,7 @@ LONGER = 2 / ALIKE - 1
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return ``" (did you mean 'x'?)"`` for the known word nearest to `word`, or ``""``."""
-    # Small and capital letters are the least of differences: rk45 is RK45 rather than rk4.
+    # Words that differ in case alone come first: rk45 is RK45 rather than rk4.
     names = list(known)
     if len(word) > LONGER * max(map(len, names), default=0):
         return ""
@@ -57,13 +57,13 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names in a message, the first few of many."""
+    """Names for a message: the first twelve, and the number of others."""
     words = list(names)
     return ", ".join(words[:12]) + (f" and {len(words) - 12} more" if len(words) > 12 else "")
 
 
 def check_known(name: str, place: str, known: Collection[str], what: str) -> None:
-    """Raise `SceneError` unless a name is one of those `known`, of a `what`."""
+    """Raise `SceneError` unless a name is among the `known` ones, which are names of a `what`."""
     if name not in known:
         hint = nearest(name, known) or f"; known: {listed(known) or 'none'}"
         raise SceneError(f"{place}: no {what} is named '{name}'{hint}")

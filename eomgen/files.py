@@ -1,5 +1,7 @@
-"""Files are written whole or not at all, and never over something this program did not write; read
-are plain files alone, and no more of them than there may be.
+"""Reading and writing of files.
+
+Files are written atomically and replace only files that this program wrote. Only regular files of
+bounded size are read.
 """
 
 import os
@@ -27,9 +29,10 @@ SIGNATURES = (
     b"Software\0eomgen",  # PNG
     b"<dc:title>eomgen</dc:title>",  # SVG: who made it
 )
-"""Every file this program writes has one of these within its first `SIGNED_WITHIN` bytes."""
+"""Every file that this program writes has one of these in its first `SIGNED_WITHIN` bytes."""
 SIGNED_WITHIN = 2048
 PIECE = 2**20
+"""Bytes that are read in one call."""
 
 
 def is_ours(head: bytes) -> bool:
@@ -40,15 +43,15 @@ def is_ours(head: bytes) -> bool:
 def read_plain(
     path: Path, most: int, *, name: str = "", error: type[EomgenError] = RunError
 ) -> bytes:
-    """What a plain file of at most `most` bytes holds; `name` is what messages call it.
+    """The content of a regular file of at most `most` bytes; messages call it `name`.
 
-    Pipes and devices are refused before anything waits for them. Raises `error`, which says in one
-    line that the file cannot be read and why, that it is no plain file, or that it is too large.
+    Pipes and devices are refused without opening them, which could block. Raises `error` if the
+    file cannot be read, is not a regular file, or is too large.
     """
     shown = name or str(path)
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     try:
-        _check_plain(path.stat(), shown, error)  # to open a device may do something to it
+        _check_plain(path.stat(), shown, error)  # first, because opening a device may affect it
         handle = os.open(path, flags)
         with os.fdopen(handle, "rb") as file:
             about = os.fstat(handle)
@@ -63,9 +66,9 @@ def read_plain(
 
 
 def _read(file: BinaryIO, most: int) -> bytes:
-    """What a file holds, or a little more than `most` bytes of one that grows without end.
+    """The content of a file; of one that grows meanwhile, little more than `most` bytes.
 
-    In pieces, since one call takes memory for as much as it is asked for.
+    It is read in pieces, because a call allocates as many bytes as it may read.
     """
     data = bytearray()
     while len(data) <= most and (piece := file.read(PIECE)):
@@ -74,7 +77,7 @@ def _read(file: BinaryIO, most: int) -> bytes:
 
 
 def _check_plain(about: os.stat_result, shown: str, error: type[EomgenError]) -> None:
-    """Raise `error` unless this is about a plain file."""
+    """Raise `error` unless this is the status of a regular file."""
     kind = stat.S_IFMT(about.st_mode)
     if kind == stat.S_IFREG:
         return
@@ -86,7 +89,7 @@ def _check_plain(about: os.stat_result, shown: str, error: type[EomgenError]) ->
 
 
 def check_writable(path: Path, *, force: bool = False) -> None:
-    """Raise `RunError` if `path` may not be written: no plain file, or one that is not ours."""
+    """Raise `RunError` if `path` exists and is not a regular file, or not ours without `force`."""
     try:
         if path.is_dir():
             raise RunError(f"{path}: is a folder; give the name of a file")
@@ -108,7 +111,7 @@ def check_writable(path: Path, *, force: bool = False) -> None:
 
 
 def check_folder(path: Path) -> None:
-    """Make a folder for output. Raises `RunError` if it cannot be, or cannot be written to."""
+    """Create a folder for output. Raises `RunError` if it cannot be created or written to."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -118,14 +121,14 @@ def check_folder(path: Path) -> None:
 
 
 def write_whole(path: Path, data: bytes | str, *, force: bool = False) -> None:
-    """Write `data` to a temporary file beside `path`, then rename it into place.
+    """Write `data` to a temporary file beside `path`, then rename it to `path`.
 
-    Missing folders are made. Raises `RunError` if `path` exists and is not ours (see
-    `check_writable`) or cannot be written; then nothing is left behind.
+    Missing folders are created. Raises `RunError` if `path` exists and may not be replaced (see
+    `check_writable`), or cannot be written; then no file is left behind.
     """
     check_writable(path, force=force)
     content = data.encode("utf-8") if isinstance(data, str) else data
-    # Named before it is made: an interrupt at any moment, too, must leave nothing behind.
+    # The name is known before the file exists, so that an interrupt at any time leaves no file.
     temporary = path.parent / f".{path.name[:40]}.{secrets.token_hex(6)}"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:
@@ -141,7 +144,7 @@ def write_whole(path: Path, data: bytes | str, *, force: bool = False) -> None:
 
 
 def remove_ours(path: Path) -> None:
-    """Remove a file if this program wrote it; leave anything else, or nothing, as it is."""
+    """Remove a file if it exists and this program wrote it."""
     with suppress(OSError):
         with path.open("rb") as file:
             ours = is_ours(file.read(SIGNED_WITHIN))

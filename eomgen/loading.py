@@ -1,4 +1,4 @@
-"""Python source that this program wrote itself, loaded as a module."""
+"""Loading of Python source that this program generated, as a module."""
 
 import importlib.abc
 import importlib.util
@@ -6,7 +6,7 @@ from types import ModuleType
 
 
 class _FromSource(importlib.abc.InspectLoader):
-    """Loads a module from source that is at hand."""
+    """A loader for a module whose source is a string."""
 
     def __init__(self, source: str) -> None:
         self._source = source
@@ -16,7 +16,7 @@ class _FromSource(importlib.abc.InspectLoader):
 
 
 def load_source(source: str, name: str) -> ModuleType:
-    """A module of this name made from source. What the source raises is raised here."""
+    """A module with this name from source. Exceptions that the source raises are not caught."""
     spec = importlib.util.spec_from_loader(name, _FromSource(source))
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

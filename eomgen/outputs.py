@@ -1,27 +1,27 @@
-"""What a generated module can compute beside `derivative` and `jacobian`: one table.
+"""The outputs that a generated module can have besides `derivative` and `jacobian`.
 
-The schema takes the names from it, the check of a scene what an output is about, the stages that
-record equations its shape, and backends what to say of it. To add an output, add its entry here and
-what computes it in `codegen.from_recursion`.
+The table gives the schema the names, elaboration the conditions, recording the shapes and backends
+the docstrings. To add an output, add its entry here and its function in `codegen.from_recursion`.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 Size = str | int
-"""One length of an array: a number, or the name of one."""
+"""The length of one axis of an array: a number, or its name."""
 
 
 @dataclass(frozen=True)
 class OutputSpec:
     """One output.
 
-    shape     of the array, () for a number; in the plane, and in space where that is another
-    about     its docstring: what it is, units and frames; likewise
-    needs     what a scene must have for there to be anything to compute; "" for nothing
+    shape     shape of the array, () for a number
+    about     its docstring: what it is, with units and frames
+    space     shape and docstring in space, if they differ from those in the plane
+    needs     what a model must have for the output to exist; "" for nothing
     forms     whether all state forms have it, or the form [q, v] alone
-    contacts  whether rigid contacts that are held would add to it
-    by        what it is the derivative of `derivative` by; "" if it is none
+    contacts  whether forces of held rigid contacts, which it leaves out, would change it
+    by        the variables by which it is the Jacobian of `derivative`; "" if it is not one
     """
 
     shape: tuple[Size, ...]
@@ -33,14 +33,14 @@ class OutputSpec:
     by: str = ""
 
     def of(self, dimensions: int) -> tuple[tuple[Size, ...], str]:
-        """Shape and docstring, in the plane or in space."""
+        """Shape and docstring in the plane or in space."""
         if dimensions == 3 and self.space is not None:
             return self.space
         return self.shape, self.about
 
 
 def _force(about: str, *, contacts: bool = False) -> OutputSpec:
-    """Generalised forces or accelerations, one a velocity."""
+    """An output of generalised forces or accelerations, one for each velocity."""
     return OutputSpec(("nv",), about, forms=False, contacts=contacts)
 
 
@@ -126,15 +126,15 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         by="parameters",
     ),
 }
-"""In the order in which they stand in a module."""
+"""All outputs, in the order in which a module has them."""
 
 JACOBIAN = OutputSpec(("ny", "ny"), "Exact Jacobian of `derivative` by the state.", by="state")
-"""What every module has, as it has `derivative`."""
+"""The Jacobian, which every module has."""
 DERIVATIVES = ("jacobian", *(name for name, spec in OUTPUTS.items() if spec.by))
 """Names of the matrices of derivatives."""
 
 
 def shape_of(name: str, dimensions: int, sizes: Mapping[str, int]) -> tuple[int, ...]:
-    """The shape of an output, in the plane or in space; `sizes` are those it names."""
+    """The shape of an output in the plane or in space; `sizes` are the lengths by name."""
     shape, _ = OUTPUTS[name].of(dimensions)
     return tuple(sizes[size] if isinstance(size, str) else size for size in shape)

@@ -1,9 +1,9 @@
-"""The whole way from a model to generated code; each line is one stage.
+"""The pipeline from a model to generated code.
 
     Model ─choose▶ Choice ─record▶ System ─optimise▶ System ─render▶ Generated
 
-A scene is read by `scene.reader` and elaborated by `model.elaborate`; `store` keeps what is
-generated, `run` loads and integrates it.
+Before it, `scene.reader` reads a scene and `model.elaborate` makes a model of it. After it, `store`
+keeps the generated code, and `run` loads and integrates it.
 """
 
 from dataclasses import dataclass, replace
@@ -40,26 +40,26 @@ class Generated:
 
 @dataclass(frozen=True)
 class Compiled:
-    """A model's program, optimised, and the choice of its route."""
+    """A model's optimised program, and the choice of its route."""
 
     system: System
     choice: Choice
 
     @property
     def operations(self) -> int:
-        """Of one call of `derivative`."""
+        """The number of operations of one call of `derivative`."""
         return cost(self.system.program, "derivative")["total"]
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """The routes it was chosen from; the one taken with the operations of this program."""
+        """The candidate routes; the chosen one with the operations of this program."""
         return tuple(
             replace(c, operations=self.operations) if c.route == self.system.route else c
             for c in self.choice.candidates
         )
 
     def explanation(self) -> list[str]:
-        """Lines for a reader: each route, its operations, and why the one taken was taken."""
+        """A line for each candidate route: its operations, and why it was chosen or not."""
         lines = []
         for candidate in self.candidates:
             count = "-" if candidate.operations is None else str(candidate.operations)
@@ -69,40 +69,39 @@ class Compiled:
 
 
 def generate(model: Model, *, jacobian: bool = True) -> Generated:
-    """Derive a model's equations and write them as code. Same model, same bytes.
+    """Derive a model's equations and write them as code. Equal models give equal bytes.
 
-    Without its `jacobian`, which takes longer than all else, a module is no whole one, but enough
-    to count and to run by explicit methods.
+    Without `jacobian`, which takes longer than all other stages, a module is incomplete but can be
+    integrated by explicit methods.
 
-    Raises `SceneError` if the mass matrix is singular or the route is not for the model.
+    Raises `SceneError` if the mass matrix is singular or the route does not apply to the model.
     """
     check_nonsingular(model)
-    made = compile_program(model, jacobian=jacobian)
-    return render(made)
+    return render(compile_program(model, jacobian=jacobian))
 
 
 def compile_program(model: Model, *, jacobian: bool = True, closed: bool = True) -> Compiled:
-    """A model's program by the route it names, or by the one that `choose` takes for it.
+    """A model's program by the route it names, or for `auto` by the route that `choose` returns.
 
-    jacobian  whether the derivative's Jacobian is among the outputs
-    closed    whether symbolic routes are tried, if none is named
+    jacobian  whether the Jacobian of the derivative is an output
+    closed    whether `auto` tries symbolic routes
     """
     choice = choose(model, closed=closed)
     recorded = record(choice.derived, jacobian=jacobian)
     return Compiled(optimised(recorded), choice)
 
 
-def render(made: Compiled) -> Generated:
-    """The NumPy module of a program, and what belongs to it."""
-    program, interface = made.system.program, interface_of(made.system)
+def render(compiled: Compiled) -> Generated:
+    """The NumPy module of a program, with its page function and reports."""
+    program, interface = compiled.system.program, interface_of(compiled.system)
     return Generated(
         python.module(program, interface),
         body_poses(program, interface),
         program,
         interface,
-        made.system.reports,
-        tuple(made.explanation()),
-        tuple(made.choice.notices()),
+        compiled.system.reports,
+        tuple(compiled.explanation()),
+        tuple(compiled.choice.notices()),
     )
 
 
@@ -117,5 +116,5 @@ def compile_model(model: Model) -> str:
 
 
 def compile_scene(scene: Scene) -> str:
-    """The source of a scene's module. Raises `SceneError` if the scene makes no mechanism."""
+    """The source of a scene's module. Raises `SceneError` as `elaborate` and `generate` do."""
     return compile_model(elaborate(scene))

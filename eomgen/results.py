@@ -1,4 +1,4 @@
-"""What the public functions return: values that can be kept, pickled and shown in a notebook."""
+"""Results of the public functions, which can be pickled and displayed in a notebook."""
 
 import html
 from collections.abc import Mapping
@@ -28,9 +28,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Derivation:
-    """Equations of motion as SymPy has them, M v̇ + V + G = F, and how they were found.
+    """Equations of motion M v̇ + V + G = F as SymPy expressions, and the steps of their derivation.
 
-    `matrices` holds them with the symbols of coordinates `q`, velocities `v`, accelerations `a`.
+    `matrices` has the equations and the symbols of coordinates `q`, velocities `v` and
+    accelerations `a`.
     """
 
     name: str
@@ -44,22 +45,22 @@ class Derivation:
 
     @property
     def V(self) -> "Expr":
-        """Forces that velocities make, (nv, 1)."""
+        """Velocity-dependent forces (Coriolis and centrifugal), (nv, 1), on the left side."""
         return self.matrices.V
 
     @property
     def G(self) -> "Expr":
-        """Forces of gravity, (nv, 1), on the left side."""
+        """Gravity forces, (nv, 1), on the left side."""
         return self.matrices.G
 
     @property
     def F(self) -> "Expr":
-        """All other generalised forces, (nv, 1)."""
+        """All other generalised forces, (nv, 1), on the right side."""
         return self.matrices.F
 
     @property
     def solution(self) -> "dict[Expr, Expr]":
-        """Each acceleration as one expression of q, v, parameters and inputs."""
+        """Each acceleration as an expression in q, v, parameters and inputs."""
         from eomgen.derivation.matrices import written_out
 
         found = self.matrices
@@ -67,7 +68,7 @@ class Derivation:
 
     @property
     def steps(self) -> "tuple[Step, ...]":
-        """The derivation step by step: number, title, words, equations."""
+        """The steps of the derivation, with number, title, explanation and equations."""
         return self.matrices.steps
 
     def text(self) -> str:
@@ -83,7 +84,7 @@ class Derivation:
         return as_latex(self.name, self.title, self.steps)
 
     def html(self) -> str:
-        """All steps as one page."""
+        """All steps as one HTML page."""
         from eomgen.show.derivation import as_html
 
         return as_html(self.name, self.title, self.steps)
@@ -101,17 +102,17 @@ class Derivation:
 class Module:
     """A generated module.
 
-    name         of the scene
-    source       the file's text
-    poses        the page's `bodyPoses`, JavaScript; "" without `body_poses`
-    explanation  a line for each route, and which was taken
-    notices      what its user must know of it
-    reports      what each pass over the program left of it: steps and operations
-    derived      whether it was derived now; else it was in the store
-    backend      the language it is in
-    others       further files of that language, by name
-    library      the sources of its shared library, by name, if it is to be compiled and loaded
-    reference    the text of the Python module that a compiled one falls back on; "" without one
+    name         name of the scene
+    source       source code
+    poses        JavaScript source of `bodyPoses` for the page; "" without the output `body_poses`
+    explanation  a line for each route, with its operations and which was chosen
+    notices      notices for the user
+    reports      steps and operations of the program after each optimisation pass
+    derived      whether it was derived now; else it comes from the store
+    backend      name of the backend that wrote it
+    others       contents of further files of the backend, by name
+    library      sources of its shared library by name, if it is to be compiled and loaded
+    reference    source of the Python module that a compiled one falls back on; "" without one
     """
 
     name: str
@@ -127,8 +128,9 @@ class Module:
     reference: str = field(default="", compare=False)
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
-        """Write the file, whole or not at all, and further files beside it. Raises `RunError` where
-        another's is there.
+        """Write the file, and further files beside it, each atomically.
+
+        Raises `RunError` if a file exists that this program did not write, unless `force`.
         """
         write_whole(Path(path), self.source, force=force)
         for name, text in self.others.items():
@@ -141,18 +143,18 @@ class Module:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A motion computed.
+    """The result of a simulation.
 
-    model       the mechanism, at the parameters of the run
-    module      that computed it
+    model       the mechanism, with the parameters of the run
+    module      the module that was integrated
     trajectory  times, states, counts, events
-    motion      poses and energies along it
-    options     what on the command line makes the same run
-    error       estimated, of the last state, in parts of the motion's scale; nan if not asked for
-    warnings    what its user must know
-    choice      of its method and tolerances, where `accuracy` or `budget` made it
-    estimate    of its error by a second run, where that was asked for
-    begun       how it goes on from an earlier run; "" if it does not
+    motion      poses and energies along the trajectory
+    options     command-line options that give the same run
+    error       estimated error of the last state relative to the motion's scale; nan if none
+    warnings    warnings for the user
+    choice      the choice of method and tolerances, if `accuracy` or `budget` was given
+    estimate    the estimate of the error by a second run, if asked for
+    begun       how it continues an earlier run; "" if it does not
     """
 
     model: Model
@@ -183,39 +185,39 @@ class Run:
 
     @property
     def finished(self) -> bool:
-        """Whether it came to its end."""
+        """Whether the run reached its end time."""
         return self.trajectory.finished
 
     @property
     def outcome(self) -> Outcome:
-        """How it came to its end: its kind, the reason, and what to change."""
+        """How the run ended: kind, reason, and what to change."""
         return self.trajectory.outcome
 
     @property
     def message(self) -> str:
-        """Why it did not, and what to change; "" if there is nothing to say."""
+        """Why the run ended early, and what to change; "" if there is nothing to report."""
         return self.trajectory.message
 
     @property
     def energy(self) -> FloatArray:
-        """Kinetic and potential energy together, (n,), J."""
+        """Total mechanical energy, (n,), J."""
         return self.motion.kinetic_energy + self.motion.potential_energy
 
     @property
     def imbalance(self) -> "Imbalance | None":
-        """How far the energy is from what it must be; None where that is not known."""
+        """The error of the energy balance; None where it is not defined."""
         from eomgen.show.balance import imbalance
 
         return imbalance(self.motion)
 
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:
-        """Of joints, by coordinate, where no stop enforces them."""
+        """Joint limits that no joint stop enforces, by coordinate."""
         return joint_limits(self.model)
 
     @property
     def excursions(self) -> tuple[Excursion, ...]:
-        """Which coordinates left these limits, and when."""
+        """The coordinates that exceeded these limits, and when."""
         return tuple(excursions(self.trajectory, self.limits))
 
     @property
@@ -224,14 +226,14 @@ class Run:
         return tuple(locks(self.model, self.trajectory))
 
     def __getitem__(self, state: str) -> FloatArray:
-        """One state over time, (n,). Raises `KeyError` for a name that is none."""
+        """One state over time, (n,). Raises `KeyError` for an unknown name."""
         if state not in self.states:
             raise KeyError(f"no state '{state}'; known: {', '.join(self.states)}")
         return self.y[:, self.states.index(state)]
 
     @property
     def report(self) -> Mapping[str, object]:
-        """What it took and how it ended, by name."""
+        """Counts, outcome, energies and error of the run, by name."""
         return {
             "t_end": float(self.t[-1]),
             "finished": self.finished,
@@ -250,9 +252,9 @@ class Run:
         return draw_motion(self.motion)
 
     def save(self, folder: str | Path, *, force: bool = False) -> tuple[Path, ...]:
-        """Write module, archive, table and page into a folder; return their paths.
+        """Write module, table, archive and page into a folder; return their paths.
 
-        Raises `RunError` where others' files are there, or they cannot be written.
+        Raises `RunError` if a file cannot be written, or exists and this program did not write it.
         """
         from eomgen.show.page import save_page
 
@@ -260,7 +262,7 @@ class Run:
         paths = tuple(base.with_suffix(f".{kind}") for kind in ("py", "csv", "npz", "html"))
         module, table, archive, page = paths
         self.module.save(module, force=force)
-        save_csv(self.trajectory, table, force=force)  # the archive tells whose table it replaces
+        save_csv(self.trajectory, table, force=force)  # while the old archive exists
         save_npz(self.trajectory, archive, force=force)
         parameters = tuple(self.model.defaults.values())
         save_page(self.motion, self.module.poses, parameters, page, force=force)

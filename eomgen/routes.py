@@ -1,7 +1,7 @@
-"""The routes from a model to accelerations: one table.
+"""The routes: algorithms by which accelerations are derived.
 
-The schema and the command line take the names from it, the recursions what computes v̇, the stage
-that records equations how derivatives are taken. To add a route, add its entry here and to
+The table gives the schema and the command line the names, `Dynamics` the recursion, and recording
+the way derivatives are taken. To add a route, add its entry here and to
 `dynamics.dynamics.Dynamics` the methods that its `recursion` names.
 """
 
@@ -12,14 +12,15 @@ from dataclasses import dataclass
 class RouteSpec:
     """One route.
 
-    about           what it is
-    recursion       what solves for accelerations and for responses to impulses: `Dynamics` has
-                    methods of this name that end in `_forward` and `_response`
-    symbolic        whether v̇ is solved for by SymPy, and the recursion serves responses alone
-    frame_axes      whether the recursion works in the frames' own axes only
-    differentiated  whether derivatives of v̇ are those of its own steps; else M is factored, and
-                    inverse dynamics differentiated
-    last            whether `auto` tries it only where all others lose too many digits
+    about           a description
+    recursion       name of the algorithm that solves for accelerations and for responses to
+                    impulses: `Dynamics` has methods of this name that end in `_forward` and
+                    `_response`
+    symbolic        whether SymPy solves for v̇, and the recursion serves responses only
+    frame_axes      whether the recursion works in body axes only
+    differentiated  whether derivatives of v̇ are taken of the steps that compute it; else inverse
+                    dynamics is differentiated and solved with the factors of M
+    last            whether `auto` tries it only if all others lose too many digits
     """
 
     about: str

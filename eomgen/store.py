@@ -1,11 +1,11 @@
-"""Generated code kept, so that a scene whose module is fresh is not derived again.
+"""A cache of generated code, so that equations are not derived again for an unchanged scene.
 
-Beside the code lies the program that it was written from, in an entry of its own, which is read
-only where the program is run: in many digits, by studies.
+The program from which code was written is a separate entry. It is read only where the program
+itself is run, in extended precision or by studies.
 
-The key is a digest of what enters the code: the model without its notices, every file of this
-program that has a say, and the libraries it is made with. What is found under it is taken only as
-this program wrote it, see `eomgen.entries`.
+The key is a digest of all that determines the code: the model without its notices, the relevant
+files of this program, and the libraries that it uses. `eomgen.entries` ensures that an entry is
+used only if this program wrote it.
 """
 
 import hashlib
@@ -46,17 +46,17 @@ AFTER = (
     ),
     *("api", "commands", "cli.py", "__main__.py", "__init__.py"),
 )
-"""Files and folders of this program that have no say in the code; all others have."""
+"""Files and folders of this program that do not influence the generated code; all others do."""
 LIBRARIES = (
     *("gmpy2", "jinja2", "markupsafe", "mpmath", "numpy", "pydantic", "pydantic_core", "sympy"),
 )
-"""Whatever is loaded to generate code, but for what only states types."""
+"""Libraries that are loaded to generate code, except those for type annotations alone."""
 
 
 def folder(within: str = "") -> Path | None:
-    """Where code is kept, or what is kept `within`: `EOMGEN_CACHE`, or the user's cache folder.
+    """The cache folder, or its subfolder `within`: in `EOMGEN_CACHE`, or the user's cache folder.
 
-    None if the user has no home.
+    None if the user has no home folder.
     """
     chosen = os.environ.get("EOMGEN_CACHE") or platformdirs.user_cache_dir("eomgen")
     try:
@@ -67,9 +67,10 @@ def folder(within: str = "") -> Path | None:
 
 @dataclass(frozen=True)
 class Code:
-    """What a model is compiled to, as `eomgen.pipeline.Generated`, and whether only just now.
+    """Generated code, with the fields of `eomgen.pipeline.Generated`.
 
-    `notice` is what there is to say of the store: why it was not used; or "".
+    derived  whether it was derived now; else it comes from the store
+    notice   a problem with the store, or ""
     """
 
     module: str
@@ -82,25 +83,25 @@ class Code:
 
 
 def generated_code(model: Model, *, anew: bool = False) -> Code:
-    """A model's code, from the store or derived now.
+    """A model's code, from the store, or derived and stored; derived in any case if `anew`.
 
-    A store that cannot be trusted, read or written is done without, with a notice; what is damaged
-    in it is made again. With `anew` nothing that it holds is believed.
+    A store that cannot be trusted, read or written is not used, and the result has a notice. A
+    damaged entry is replaced.
     """
     directory, key = folder(), _key(model)
     kept = _code(Entries(directory).get(key)) if directory else None
     if kept and not anew:
         return kept
-    # Imported here because it brings what derives, which takes long to load.
+    # Imported here because the modules that derive equations take long to load.
     from eomgen.pipeline import generate
 
-    made = generate(model)
-    code = Code(made.module, made.poses, made.reports, made.explanation, made.notices, derived=True)
+    new = generate(model)
+    code = Code(new.module, new.poses, new.reports, new.explanation, new.notices, derived=True)
     if directory is None:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
     entries = Entries(directory)
     trouble = entries.put(key, _content(code))
-    trouble = trouble or _keep_program(entries, key, made.program, made.interface)
+    trouble = trouble or _keep_program(entries, key, new.program, new.interface)
     if trouble:
         return replace(code, notice=f"the store {directory} is not used: {trouble}")
     if kept and (kept.module, kept.poses) != (code.module, code.poses):
@@ -110,67 +111,68 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
 
 
 def program_of(model: Model) -> Program:
-    """The program of a model's code, from the store beside it or recorded now."""
+    """The program of a model's code, from the store, or recorded and stored."""
     return interfaced_program_of(model)[0]
 
 
 def interfaced_program_of(model: Model) -> tuple[Program, "Interface"]:
-    """The same with its interface: what a backend writes code of."""
+    """The program of a model's code and its interface, which is all that a backend needs."""
     directory, key = folder(), _key(model)
     if directory and (kept := _kept_program(Entries(directory), key)):
         return kept
-    # Imported here because it brings what derives, which takes long to load.
+    # Imported here because the modules that derive equations take long to load.
     from eomgen.codegen.interface import interface_of
     from eomgen.pipeline import compile_program
 
     system = compile_program(model).system
-    made = system.program, interface_of(system)
+    program, interface = system.program, interface_of(system)
     if directory:
-        _keep_program(Entries(directory), key, *made)
-    return made
+        _keep_program(Entries(directory), key, program, interface)
+    return program, interface
 
 
 def _keep_program(entries: Entries, key: str, program: Program, interface: "Interface") -> str:
-    """Keep a program and its interface beside code of this key; why not, or ""."""
-    return entries.put(_beside(key), pickle.dumps((saved(program), interface)))
+    """Store a program and its interface. Return why that failed, or ""."""
+    return entries.put(_program_key(key), pickle.dumps((saved(program), interface)))
 
 
 def _kept_program(entries: Entries, key: str) -> tuple[Program, "Interface"] | None:
-    content = entries.get(_beside(key))
+    """A stored program and its interface; None if there is none."""
+    content = entries.get(_program_key(key))
     if content is None:
         return None
     with suppress(ProgramError, pickle.UnpicklingError, ValueError, TypeError):
-        # To be trusted as the module is that lies beside it, and is executed: see `entries`.
+        # Unpickling can execute code, and so can the stored module: `entries` checks both.
         text, interface = pickle.loads(content)
         return restored(text), interface
     return None
 
 
-def _beside(key: str) -> str:
-    """The key of the program beside that of its code."""
+def _program_key(key: str) -> str:
+    """The key of the program whose code has this key."""
     return hashlib.sha256(f"program of {key}".encode()).hexdigest()[:32]
 
 
 def _content(code: Code) -> bytes:
-    """The bytes that are kept of code."""
+    """The bytes of an entry for code."""
     reports = [astuple(report) for report in code.reports]
     return json.dumps([code.module, code.poses, reports, code.explanation, code.notices]).encode()
 
 
 def _code(content: bytes | None) -> Code | None:
-    """The code of which these bytes were kept; None for anything else."""
+    """The code of an entry that `_content` wrote; None for any other bytes."""
     try:
         module, poses, reports, explanation, notices = json.loads(content or b"")
-        made = tuple(PassReport(*report) for report in reports)
-        texts = [module, poses, *explanation, *notices, *(report.name for report in made)]
-        "".join(texts).encode()  # which half of a surrogate pair cannot be
+        passes = tuple(PassReport(*report) for report in reports)
+        texts = [module, poses, *explanation, *notices, *(report.name for report in passes)]
+        "".join(texts).encode()  # fails for lone surrogates
     except (ValueError, TypeError, RecursionError):
         return None
-    counts = [getattr(r, f.name) for r in made for f in fields(r) if f.name != "name"]
+    counts = [getattr(r, f.name) for r in passes for f in fields(r) if f.name != "name"]
     lists = all(type(part) is list for part in (reports, explanation, notices))
     if not (lists and all(type(n) is int for n in counts)):
         return None
-    return Code(module, poses, made, tuple(explanation), tuple(notices), derived=False)
+    return Code(module, poses, passes, tuple(explanation), tuple(notices), derived=False)
 
 
 def _key(model: Model) -> str:
@@ -181,7 +183,7 @@ def _key(model: Model) -> str:
 
 @cache
 def _generator_digest() -> bytes:
-    """A digest of all that makes code of a model: Python, libraries, this program, templates."""
+    """A digest of all that generates code: Python, libraries, this program and its templates."""
     python = (platform.python_implementation(), platform.python_version(), platform.machine())
     digest = hashlib.sha256(repr((python, [_version(name) for name in LIBRARIES])).encode())
     for root, files in ((PACKAGE, _sources()), (templates_folder(), _templates())):

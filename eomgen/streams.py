@@ -1,7 +1,7 @@
-"""Standard output and standard error as they may be: closed, full, read by nobody, or of ASCII.
+"""Standard streams that do not fail, even if they are closed, full, unread or limited to ASCII.
 
-None of that ends a command before its files are written. What a stream could not take is known
-afterwards, and then it is said.
+A failing stream must not end a command before its files are written. The failure is recorded and
+reported at the end.
 """
 
 import io
@@ -15,11 +15,11 @@ from eomgen.text import escaped, spelled
 
 
 class Steady(io.TextIOBase):
-    """A stream that takes every text and never raises.
+    """A text stream whose methods never raise.
 
-    Characters that a terminal would obey are escaped, all but line breaks and a return to the
-    line's beginning at the very start; those that the encoding lacks are spelled. `failure` is what
-    the first write that failed raised, after which nothing more is written.
+    Control characters are escaped, except line breaks, and a carriage return at the start of a
+    text. Characters that the encoding lacks are spelled out. `failure` is the exception of the
+    first write that failed; nothing is written after it.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -37,11 +37,11 @@ class Steady(io.TextIOBase):
             shown.encode(self.encoding)
         except UnicodeEncodeError:
             shown = spelled(shown, self.encoding)
-        self._tried(lambda: self._stream.write(shown))
+        self._try(lambda: self._stream.write(shown))
         return len(text)
 
     def flush(self) -> None:
-        self._tried(self._stream.flush)
+        self._try(self._stream.flush)
 
     def isatty(self) -> bool:
         return self._stream.isatty()
@@ -50,39 +50,39 @@ class Steady(io.TextIOBase):
         return self._stream.fileno()
 
     def lost(self) -> str:
-        """Why something was not written; "" if all was, or if its reader went, who has enough."""
+        """Why output was lost; "" if none was, or if its reader closed the pipe."""
         self.flush()
         if self.failure is None or isinstance(self.failure, BrokenPipeError):
             return ""
         return self.failure.strerror or str(self.failure)
 
-    def _tried(self, action: Callable[[], object]) -> None:
+    def _try(self, action: Callable[[], object]) -> None:
         if self.failure is not None:
             return
         try:
             action()
         except OSError as error:
             self.failure = error
-            with suppress(OSError):  # what is still in buffers is to fail no more
-                nowhere = os.open(os.devnull, os.O_WRONLY)
-                os.dup2(nowhere, self.fileno())
-                os.close(nowhere)
+            with suppress(OSError):  # so that buffered output does not fail at exit
+                null = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(null, self.fileno())
+                os.close(null)
 
 
 @contextmanager
 def steady_streams() -> Iterator[Steady]:
-    """Put steady streams in the place of standard output, which is given, and standard error.
+    """Replace standard output and standard error by steady streams; yields the former.
 
-    A closed one is as good as one that leads nowhere.
+    A closed stream is replaced by the null device.
     """
-    for number in range(3):  # or a file opened later would get this number, and what C prints
+    for number in range(3):  # else a file opened later gets this number, and output of C libraries
         try:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
     before = sys.stdout, sys.stderr
-    with open(os.devnull, "w", encoding="utf-8") as nowhere:  # noqa: PTH123
-        output, errors = (Steady(stream or nowhere) for stream in before)
+    with open(os.devnull, "w", encoding="utf-8") as null:  # noqa: PTH123
+        output, errors = (Steady(stream or null) for stream in before)
         sys.stdout, sys.stderr = cast(TextIO, output), cast(TextIO, errors)
         try:
             yield output

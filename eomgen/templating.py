@@ -1,4 +1,4 @@
-"""Templates: where they are, and how one is filled with no name missing and none left over."""
+"""Rendering of templates, with a check that template and context have the same names."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -12,15 +12,15 @@ PACKAGE = Path(__file__).resolve().parent
 
 
 def templates_folder() -> Path:
-    """The folder of all templates: inside an installed package, beside it in a checkout."""
+    """The folder of all templates: inside the installed package, or beside it in a checkout."""
     inside = PACKAGE / "templates"
     return inside if inside.is_dir() else PACKAGE.parent / "templates"
 
 
 @cache
 def environment(folder: str, *, html: bool = False) -> "Environment":
-    """The Jinja2 environment of the templates in `folder`; `html` escapes every value put in."""
-    # Imported here: the folder is asked for where nothing is rendered.
+    """The Jinja2 environment of the templates in `folder`; with `html` it escapes all values."""
+    # Imported here because some callers need the folder only and render nothing.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(
@@ -34,11 +34,10 @@ def environment(folder: str, *, html: bool = False) -> "Environment":
 
 
 def render(folder: str, template: str, context: Mapping[str, object], *, html: bool = False) -> str:
-    """Render `template` of `folder` with exactly the values it asks for.
+    """Render `template` of `folder`.
 
-    Raises `AssertionError` if `context` lacks a name that the template or a file it includes reads,
-    or has one that none of them does: then the program and its template no longer fit, which is a
-    fault of this program and never of its user.
+    Raises `AssertionError`, for a fault of this program, unless `context` has exactly the names
+    that the template and the files it includes read.
     """
     surroundings = environment(folder, html=html)
     wanted = _names_read(surroundings, template)
@@ -53,7 +52,7 @@ def render(folder: str, template: str, context: Mapping[str, object], *, html: b
 
 @cache
 def _names_read(surroundings: "Environment", template: str) -> frozenset[str]:
-    """Names that `template` and whatever it includes read from the context."""
+    """The names that `template` and the files it includes read from the context."""
     from jinja2 import meta
 
     assert surroundings.loader is not None
@@ -61,6 +60,6 @@ def _names_read(surroundings: "Environment", template: str) -> frozenset[str]:
     tree = surroundings.parse(source)
     names = frozenset(meta.find_undeclared_variables(tree))
     for other in meta.find_referenced_templates(tree):
-        assert other is not None, f"{template} chooses what it includes only when it runs"
+        assert other is not None, f"{template} includes a file whose name is not constant"
         names |= _names_read(surroundings, other)
     return names

@@ -1,24 +1,26 @@
-"""Text of others made fit to be shown: it moves no cursor, forges no line, and has an end.
+"""Untrusted text made safe to show.
 
-A scene, a file's name or another library may hold anything: escape sequences that a terminal obeys,
-line breaks after which a message of this program seems to follow, marks that turn the order of
-letters around, a hundred thousand letters.
+A scene, a file's name or a library's message may contain escape sequences for the terminal, line
+breaks that forge a message of this program, marks that reverse the direction of writing, or very
+long text.
 """
 
 import re
 import unicodedata
 
 LONGEST_LINE = 1000
-"""Letters of a message's line; more are left out in its middle, since its end says what to do."""
+"""Longest line of a message, in characters. A longer one is cut in the middle, because its end says
+what to do.
+"""
 LONGEST_WORD = 200
 LONGEST_VALUE = 60
 _LONG_WORD = re.compile(rf"\S{{{LONGEST_WORD + 1},}}")
 
 
 def escaped(text: str) -> str:
-    r"""A text whose every character can be seen: those that cannot be as \n, \x1b, \u202e.
+    r"""A text with all characters that are not printable escaped, as \n, \x1b, \u202e.
 
-    Lone halves of surrogate pairs, which no encoding takes, are among them.
+    Lone surrogates, which cannot be encoded, are escaped too.
     """
     if text.isprintable():
         return text
@@ -26,14 +28,14 @@ def escaped(text: str) -> str:
 
 
 def brief(text: str, most: int = LONGEST_VALUE) -> str:
-    """A text of any length and characters as a name or a value in a message."""
-    if len(text) > 4 * most:  # what is left out need not be escaped first
+    """Any text, escaped and cut to `most` characters, as a name or a value in a message."""
+    if len(text) > 4 * most:  # so that text which is cut is not escaped first
         text = text[: 2 * most] + text[-2 * most :]
     return _without_middle(escaped(text), most)
 
 
 def one_line(text: str) -> str:
-    """A text of any length and characters as one line for a message."""
+    """Any text, escaped and cut, as one line of a message."""
     line = brief(text, 4 * LONGEST_LINE)
     line = _LONG_WORD.sub(lambda word: _without_middle(word[0], LONGEST_WORD), line)
     return _without_middle(line, LONGEST_LINE)
@@ -51,7 +53,7 @@ def _without_middle(text: str, most: int) -> str:
 
 
 def spelled(text: str, encoding: str) -> str:
-    """A text in characters that an encoding has: θ as theta, v̇ as v_dot, ² as ^2, … as ..."""
+    """A text with characters that an encoding lacks spelled out: θ as theta, v̇ as v_dot, ² as ^2."""
     return "".join(_spelled(c, encoding) for c in text)
 
 
