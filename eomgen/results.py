@@ -262,7 +262,8 @@ class Run:
         paths = tuple(base.with_suffix(f".{kind}") for kind in ("py", "csv", "npz", "html"))
         module, table, archive, page = paths
         self.module.save(module, force=force)
-        save_csv(self.trajectory, table, force=force)  # while the old archive exists
+        # Before the archive: a table is ours if the archive beside it has the same columns.
+        save_csv(self.trajectory, table, force=force)
         save_npz(self.trajectory, archive, force=force)
         parameters = tuple(self.model.defaults.values())
         save_page(self.motion, self.module.poses, parameters, page, force=force)
