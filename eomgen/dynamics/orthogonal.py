@@ -233,12 +233,12 @@ class Elimination:
         # Rows without an arm come first. They keep no arm, even if there are more than columns.
         loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
         along = self._aligned.along[k]
-        slides = translation_order(link, at, loose, self._planar, s)
+        translations = translation_order(link, at, loose, self._planar, s)
         order = rotation_order(link, self._planar, along)
         axes, rotations, taken = list(reversed(link.free)), Steps(), []
         if along is not None and along in angular:
             axes.sort(key=lambda axis: -order.index(column_of(axis[0])[1]))
-            kept = {(False, j): linear[j] for j in slides if j in linear}
+            kept = {(False, j): linear[j] for j in translations if j in linear}
             kept |= {(True, j): angular[j] for j in order if j in angular}
             one, kept, loose = self._early(link, axes.pop(0), kept, loose, at)
             taken.append(one)
@@ -246,20 +246,10 @@ class Elimination:
             angular = {j: row for (spins, j), row in kept.items() if spins}
             about = about - {(True, along)}
         orders = (
-            [j for j in slides if (False, j) in about],
+            [j for j in translations if (False, j) in about],
             [j for j in order if (True, j) in about],
         )
-        loose += [linear.pop(j) for j in [*linear] if j not in orders[0]]
-        loose += [angular.pop(j) for j in [*angular] if j not in orders[1]]
-        room = len(orders[0]) + len(orders[1])
-        folded = bool(linear) or len(loose) + len(angular) > room
-        if folded:
-            linear, loose = self._rows.folded(linear, loose, orders[0], rotations, angular=False)
-            holding = sum(not self._rows.is_empty(row) for row in loose)
-            if angular or holding > len(orders[1]):
-                angular, loose = self._rows.folded(
-                    angular, loose, orders[1], rotations, angular=True
-                )
+        linear, angular, loose = self._triangular(linear, angular, loose, orders, rotations)
         kept = {(False, j): shifted(linear[j], at) for j in orders[0] if j in linear}
         kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
         kept = {column: self._rows.of(columns, row) for column, row in kept.items()}
@@ -278,6 +268,36 @@ class Elimination:
         holding_rows = [row for row in rest if not self._rows.is_empty(row)]
         empty += [row for row in rest if self._rows.is_empty(row)]
         return Eliminated(tuple(taken), tuple(rotations), tuple(holding_rows), tuple(empty)), term
+
+    def _triangular(
+        self,
+        linear: dict[int, Row],
+        angular: dict[int, Row],
+        loose: list[Row],
+        orders: tuple[list[int], list[int]],
+        rotations: Steps,
+    ) -> tuple[dict[int, Row], dict[int, Row], list[Row]]:
+        """Rotate rows about one point to triangular form, unless there are few of them.
+
+        linear, angular  rows of the triangle, by coordinate axis; returned with those added
+        loose            the other rows; returned with what is left of them
+        orders           axes of the columns of a and of α, in the order of elimination; rows of the
+                         triangle on other axes become loose
+        """
+        loose = [
+            *loose,
+            *(row for j, row in linear.items() if j not in orders[0]),
+            *(row for j, row in angular.items() if j not in orders[1]),
+        ]
+        linear = {j: row for j, row in linear.items() if j in orders[0]}
+        angular = {j: row for j, row in angular.items() if j in orders[1]}
+        if not linear and len(loose) + len(angular) <= len(orders[0]) + len(orders[1]):
+            return linear, angular, loose
+        linear, loose = self._rows.folded(linear, loose, orders[0], rotations, angular=False)
+        count = sum(not self._rows.is_empty(row) for row in loose)
+        if angular or count > len(orders[1]):
+            angular, loose = self._rows.folded(angular, loose, orders[1], rotations, angular=True)
+        return linear, angular, loose
 
     def _early(
         self,
