@@ -111,8 +111,8 @@ class Module:
     derived      whether it was derived now; else it comes from the store
     backend      name of the backend that wrote it
     others       contents of further files of the backend, by name
-    library      C sources of its shared library, by name, if it can be compiled and loaded
-    reference    source of the Python module that a compiled module falls back on; "" without one
+    library      sources of its shared library by name, if it is to be compiled and loaded
+    reference    source of the Python module that a compiled one falls back on; "" without one
     """
 
     name: str
@@ -264,7 +264,8 @@ class Run:
         paths = tuple(base.with_suffix(f".{kind}") for kind in ("py", "csv", "npz", "html"))
         module, table, archive, page = paths
         self.module.save(module, force=force)
-        save_csv(self.trajectory, table, force=force)  # while the old archive exists
+        # Before the archive: a table is ours if the archive beside it has the same columns.
+        save_csv(self.trajectory, table, force=force)
         save_npz(self.trajectory, archive, force=force)
         parameters = tuple(self.model.defaults.values())
         save_page(self.motion, self.module.poses, parameters, page, force=force)

@@ -116,7 +116,7 @@ def program_of(model: Model) -> Program:
 
 
 def interfaced_program_of(model: Model) -> tuple[Program, "Interface"]:
-    """The program of a model's code and its interface: what a backend needs."""
+    """The program of a model's code and its interface, which is all that a backend needs."""
     directory, key = folder(), _key(model)
     if directory and (kept := _kept_program(Entries(directory), key)):
         return kept
@@ -125,23 +125,24 @@ def interfaced_program_of(model: Model) -> tuple[Program, "Interface"]:
     from eomgen.pipeline import compile_program
 
     system = compile_program(model).system
-    made = system.program, interface_of(system)
+    program, interface = system.program, interface_of(system)
     if directory:
-        _keep_program(Entries(directory), key, *made)
-    return made
+        _keep_program(Entries(directory), key, program, interface)
+    return program, interface
 
 
 def _keep_program(entries: Entries, key: str, program: Program, interface: "Interface") -> str:
-    """Store a program and its interface; return why that failed, or ""."""
+    """Store a program and its interface. Return why that failed, or ""."""
     return entries.put(_program_key(key), pickle.dumps((saved(program), interface)))
 
 
 def _kept_program(entries: Entries, key: str) -> tuple[Program, "Interface"] | None:
+    """A stored program and its interface; None if there is none."""
     content = entries.get(_program_key(key))
     if content is None:
         return None
     with suppress(ProgramError, pickle.UnpicklingError, ValueError, TypeError):
-        # Pickle is as safe here as the stored module, which is executed: see `entries`.
+        # Unpickling can execute code, and so can the stored module: `entries` checks both.
         text, interface = pickle.loads(content)
         return restored(text), interface
     return None

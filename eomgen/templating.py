@@ -20,7 +20,7 @@ def templates_folder() -> Path:
 @cache
 def environment(folder: str, *, html: bool = False) -> "Environment":
     """The Jinja2 environment of the templates in `folder`; with `html` it escapes all values."""
-    # Imported here: the folder is used also where nothing is rendered.
+    # Imported here because some callers need the folder only and render nothing.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(

@@ -53,7 +53,7 @@ def _without_middle(text: str, most: int) -> str:
 
 
 def spelled(text: str, encoding: str) -> str:
-    """A text with what an encoding lacks spelled out: θ as theta, v̇ as v_dot, ² as ^2."""
+    """A text with characters that an encoding lacks spelled out: θ as theta, ² as ^2."""
     return "".join(_spelled(c, encoding) for c in text)
 
 

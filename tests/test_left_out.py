@@ -389,7 +389,7 @@ def test_the_page_of_a_driven_scene_moves() -> None:
     energy = [e.module.kinetic_energy(t, y) for t, y in zip(run.t, run.y, strict=True)]
     np.testing.assert_allclose(motion.kinetic_energy, energy, rtol=1e-14)
     data, scripts = page_parts(render_page(motion, code.poses, tuple(model.defaults.values())))
-    script = scripts[0] + scripts[1][: scripts[1].index("// The picture's frame")]
+    script = scripts[0] + scripts[1][: scripts[1].index("// View, traces and scale bar")]
     picture = scripts[1]
     paths = picture[picture.index("const paths") : picture.index("const canvas")]
     draw = picture[picture.index("function draw()") :]

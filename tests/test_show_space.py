@@ -580,7 +580,7 @@ def test_the_page_draws_what_the_figure_draws() -> None:
     motion = sliding()
     source = render_page(motion, POSES, (HEIGHT,))
     run, scripts = page_parts(source)
-    script = scripts[0] + scripts[1][: scripts[1].index("// The picture's frame")]
+    script = scripts[0] + scripts[1][: scripts[1].index("// View, traces and scale bar")]
     eye = eye_axes(-60.0, 20.0)
     sight = look(cast_of(solids(motion.shapes, 3.0, 4000)), motion.poses[-1], eye)
     frame = frame_around(sight.faces.reshape(-1, 3)[:, :2], 300)

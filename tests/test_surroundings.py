@@ -200,7 +200,7 @@ def drawn_by_page(motion: Motion, poses: str, p: tuple[float, ...], frame: Any) 
     """What the page asks of its pen: the paths that it fills and strokes, with their colours."""
     source = render_page(motion, poses, p)
     data, *scripts = re.findall(r"<script[^>]*>(.*?)</script>", source, re.DOTALL)
-    script = scripts[0] + scripts[1][: scripts[1].index("// Shows the numbers")]
+    script = scripts[0] + scripts[1][: scripts[1].index("// Shows values")]
     given = "\0".join([data, script.replace('"use strict";', ""), json.dumps(frame)])
     answer = subprocess.run(
         ["node", "-e", DOM], input=given, capture_output=True, text=True, check=True

@@ -47,11 +47,8 @@ class Collected:
 
 def trees(model: Model) -> tuple[Tree, ...]:
     """The trees of a model, in the order of their roots."""
-    roots: list[int] = []
     members: dict[int, list[int]] = {}
-    for k, body in enumerate(model.bodies):
-        root = k if body.parent < 0 else roots[body.parent]
-        roots.append(root)
+    for k, root in enumerate(model.roots):
         members.setdefault(root, []).append(k)
     return tuple(
         Tree(root, isinstance(model.bodies[root].joint, Free), tuple(bodies))

@@ -1,5 +1,7 @@
 """Which models have a closed form, and by which of the two derivations."""
 
+from collections import Counter
+
 from eomgen.language.formula import ZERO
 from eomgen.model.model import Model, off_centre
 from eomgen.scene.joints import Free, Revolute
@@ -78,14 +80,7 @@ def why_not_pins(model: Model) -> str:
             not off_centre(joint) or all(model.value(r) == 0.0 for r in joint.r_child)
         ):
             return f"nothing in it resists the rotation of '{body.name}', whose inertia_com is 0"
-    size = max(_tree_sizes(model))
+    size = max(Counter(model.roots).values())
     if size > MOST_BODIES:
         return f"it is for trees of up to {MOST_BODIES} bodies, and one has {size}"
     return ""
-
-
-def _tree_sizes(model: Model) -> list[int]:
-    roots: list[int] = []
-    for k, body in enumerate(model.bodies):
-        roots.append(k if body.parent < 0 else roots[body.parent])
-    return [roots.count(root) for root in dict.fromkeys(roots)]

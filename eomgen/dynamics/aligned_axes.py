@@ -67,7 +67,7 @@ def align_axes(
     """
     rotations: list[Rotation] = [IdentityRotation() for _ in links]
     heaviest, between = ranks.heaviest, dict[int, Vec]()
-    ways: list[int | None] = [None] * len(links)
+    aligned: list[int | None] = [None] * len(links)
     arms = {k: link.arm for k, link in enumerate(links)}
     for k, link in enumerate(links):
         child, spins = heaviest[k], [axis.angular for axis, _ in link.free] == [True] * 3
@@ -80,7 +80,7 @@ def align_axes(
             arms[other] = add(arms[child], between[other])
         elif child >= 0 and spins and not loose:
             rotations[k], arms[child] = _along(links[child].arm, scalars)
-            ways[k] = next((j for j in AXES if not scalars.is_zero(arms[child][j])), None)
+            aligned[k] = next((j for j in AXES if not scalars.is_zero(arms[child][j])), None)
     found, bodies = [], []
     for k, link in enumerate(links):
         base = rotations[link.parent] if link.parent >= 0 else IdentityRotation()
@@ -97,21 +97,21 @@ def align_axes(
                 body = replace(body, centre=rotations[k].into(body.centre), inertia=inertia)
         found.append(replace(link, rotation=rotation, arm=arms[k]))
         bodies.append(body)
-    return AlignedTree(tuple(found), tuple(bodies), tuple(rotations), between, tuple(ways))
+    return AlignedTree(tuple(found), tuple(bodies), tuple(rotations), between, tuple(aligned))
 
 
 def _along(arm: Vec, scalars: Scalars) -> tuple[Rotation, Vec]:
     """A rotation that brings a coordinate axis to an arm, and the arm on that axis."""
-    ways = [j for j in AXES if not scalars.is_zero(arm[j])]
-    if len(ways) < 2:
+    nonzero = [j for j in AXES if not scalars.is_zero(arm[j])]
+    if len(nonzero) < 2:
         return IdentityRotation(), arm
     zero = scalars.number(0.0)
-    if len(ways) == 3:
+    if len(nonzero) == 3:
         first, flat = _along((arm[0], arm[1], zero), scalars)
         second, left = _along((flat[0], zero, arm[2]), scalars)
         return ComposedRotation(first, second), left
     # A rotation about the third axis brings axis i, the next after it, to the arm.
-    (k,) = (j for j in AXES if j not in ways)
+    (k,) = (j for j in AXES if j not in nonzero)
     i, j = (k + 1) % 3, (k + 2) % 3
     length = scalars.call("sqrt", arm[i] * arm[i] + arm[j] * arm[j])
     # If a parameter makes the arm 0, the axes stay.

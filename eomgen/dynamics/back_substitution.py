@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 
 from eomgen.dynamics.articulated import along, with_component
 from eomgen.dynamics.kinematics import Link
-from eomgen.dynamics.rows import Eliminated, Taken, undo_rotations
+from eomgen.dynamics.rows import EliminatedAxis, EliminatedLink, undo_rotations
 from eomgen.dynamics.vectors import Vec, add, cross, dot, named, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 
 
 def outwards(
-    links: Sequence[Link], found: Sequence[Eliminated], nv: int, scalars: Scalars
+    links: Sequence[Link], found: Sequence[EliminatedLink], nv: int, scalars: Scalars
 ) -> list[Scalar]:
     """v̇ (nv,), root to leaf: rotate the residuals back, then solve (2) for each axis."""
     zero = scalars.number(0.0)
@@ -29,38 +29,38 @@ def outwards(
         for row in (*eliminated.empty, *(eliminated.rows if link.parent < 0 else ())):
             residuals[row.index] = -row.right
         undo_rotations(eliminated.rotations, residuals)
-        for taken in reversed(eliminated.axes):
-            motion = taken.axis
-            residuals[taken.pivot] = taken.left
-            undo_rotations((*taken.gathered, *taken.rotations), residuals)
+        for axis in reversed(eliminated.axes):
+            motion = axis.axis
+            residuals[axis.pivot] = axis.residual
+            undo_rotations((*axis.gathered, *axis.rotations), residuals)
             before = along(motion, angular, linear)
-            if taken.rotor >= 0:
-                result[taken.velocity] = residuals[taken.rotor]
-                value = before + residuals[taken.rotor]
+            if axis.rotor >= 0:
+                result[axis.velocity] = residuals[axis.rotor]
+                value = before + residuals[axis.rotor]
             else:
-                value = _value(taken, residuals, angular, linear, zero)
-                result[taken.velocity] = value - before
+                value = _value(axis, residuals, angular, linear, zero)
+                result[axis.velocity] = value - before
             angular, linear = with_component(motion, angular, linear, value)
-            undo_rotations(taken.before, residuals)
+            undo_rotations(axis.before, residuals)
         angular = named(angular, f"alpha_{link.name}", scalars)
         reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
     return result
 
 
 def _value(
-    taken: Taken, residuals: Mapping[int, Scalar], angular: Vec, linear: Vec, zero: Scalar
+    axis: EliminatedAxis, residuals: Mapping[int, Scalar], angular: Vec, linear: Vec, zero: Scalar
 ) -> Scalar:
     """Equation (2): the acceleration along an axis from rows that contain it, if the others are
     known. Several rows are averaged with weights x² / noise: a row counts by how much of the
     axis it contains beside its rounding error, not by its mass.
     """
     above, below = zero, zero
-    for row in taken.rows:
-        x = along(taken.axis, row.angular, row.linear)
-        clear = with_component(taken.axis, row.angular, row.linear, zero)
+    for row in axis.rows:
+        x = along(axis.axis, row.angular, row.linear)
+        clear = with_component(axis.axis, row.angular, row.linear, zero)
         known = dot(clear[0], angular) + dot(clear[1], linear)
         held = row.right + residuals[row.index] - known
-        if len(taken.rows) == 1:
+        if len(axis.rows) == 1:
             return held / x
         share = x / row.noise
         above, below = above + share * held, below + share * x

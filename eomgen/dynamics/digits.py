@@ -56,8 +56,8 @@ Accelerations = Callable[[Values], Sequence[Any]]
 
 @dataclass(frozen=True)
 class Route:
-    """How a route computes v̇, by the steps that will be written; and the axes that its recursion
-    works in, None if it is no recursion.
+    """A route's v̇, by the steps of its program, and the axes in which its recursion works, None
+    for a symbolic route.
     """
 
     accelerations: Accelerations
@@ -116,7 +116,7 @@ def _recursion(name: str, model: Model, axes: Axes) -> Accelerations:
     """v̇ by a recursion over arrays."""
 
     def found(values: Values) -> Sequence[Any]:
-        # All states at once: what is 0 at some of them only, is none of a program's zeros.
+        # All states at once, so that a value counts as structurally 0 only if it is 0 at all.
         d = Dynamics(model, values, ArrayScalars(), axes)
         return d.forward(name)(None)
 
@@ -153,8 +153,8 @@ def _slight(rng: random.Random) -> float:
 def _off(
     model: Model, at: Sequence[Values], solvers: Mapping[str, Accelerations], closely: bool
 ) -> dict[str, float]:
-    """What the v̇ of each route is off, in parts of its size and of what must be allowed, at the
-    worst of some states; infinite where it gives no number.
+    """For each route the largest error of v̇ at some states, relative to the size of v̇ and to the
+    error that is allowed; infinite if it gives no number.
     """
     together, shape = _together(at), (len(model.velocities), len(at))
     sure = _recursion("orthogonal", model, "own")
@@ -174,9 +174,9 @@ def _off(
         try:
             long, change_here = exactly(at[n])
         except (ArithmeticError, ValueError):
-            continue  # no v̇ there to lose digits of
+            continue  # v̇ does not exist at this state
         if not all(math.isfinite(x) for x in map(float, long)):
-            continue  # nor one that doubles could hold
+            continue  # v̇ overflows doubles
         known_somewhere = True
         size = max([float(least[n]), *(float(abs(x)) for x in long)])
         for route, rates in found.items():
@@ -189,14 +189,14 @@ def _off(
     if closely and worst["orthogonal"] > TRUSTED:
         return worst
     known = np.isfinite(true).all(axis=0)
-    if not closely:  # what one route has no number for, others may
+    if not closely:  # states where any route gives a number
         known = np.any([np.isfinite(rates).all(axis=0) for rates in found.values()], axis=0)
     beside = _worst(found, true, least, change, np.asarray(known))
     return {route: max(off, beside[route]) for route, off in worst.items()}
 
 
 def _doubtful(doubts: Sequence[Array], count: int) -> list[int]:
-    """Of each kind so many states of the greatest doubt of one sort (n,), so many of the other."""
+    """The indices of the `count` states of each kind with the largest value of each doubt (n,)."""
     found = set()
     for doubt in doubts:
         kinds = np.where(np.isnan(doubt), np.inf, doubt).reshape(len(KINDS), EACH)
@@ -218,13 +218,13 @@ def _together(at: Sequence[Values]) -> Values:
 
 
 def _nudged(values: Values, count: int) -> Values:
-    """Values at so many states, all of them changed by up to a unit in the last place."""
+    """Values at `count` states with each number changed by up to a unit in the last place."""
     rng = np.random.default_rng(7)
 
     def near(x: Any, count: int | None = count) -> Any:
         return x * (1.0 + rng.uniform(-EPSILON, EPSILON, count))
 
-    # One number of each for all: some are the names of places.
+    # Parameters and extra states are the same at all states.
     given = (values.parameters, values.states)
     fixed, states = ({name: near(x, None) for name, x in own.items()} for own in given)
     inputs = {name: near(x) for name, x in values.inputs.items()}
@@ -232,7 +232,7 @@ def _nudged(values: Values, count: int) -> Values:
 
 
 def _numbers(solver: Accelerations, values: Values, shape: tuple[int, ...]) -> Array:
-    """v̇ at several states (nv, count); nan where there is no number."""
+    """v̇ at several states, (nv, count); nan where it cannot be computed."""
     try:
         with np.errstate(all="ignore"):
             rows = [np.broadcast_to(np.asarray(x, dtype=float), shape[1:]) for x in solver(values)]
@@ -248,8 +248,8 @@ def _worst(
     change: Array,
     known: NDArray[np.bool_],
 ) -> dict[str, float]:
-    """What v̇ is off (nv, n), in parts of its size and of what is allowed, at the worst of those
-    states where it is `known` (n,); infinite where it is no number.
+    """For each route the largest error of v̇ (nv, n) among the states where the true one is `known`
+    (n,), relative to its size and to the allowed error; infinite if it is nan.
     """
     worst = {}
     for route, rates in found.items():
@@ -259,16 +259,16 @@ def _worst(
 
 
 def _in_parts(off: Array, change: Array) -> Array:
-    """Errors in parts of what is allowed: the rounding of a number, or a part of the `change` of v̇
-    by that of all numbers. All but the result in parts of the size of v̇.
+    """Errors relative to the allowed error: the rounding of one number, or `change` / `SURE`, where
+    `change` is that of v̇ when all numbers change in the last place. Both are relative to v̇.
     """
     allowed = np.fmax(change / SURE, EPSILON)
     return np.asarray(off / np.where(off > UNEXPLAINED * change, EPSILON, allowed))
 
 
 def _least(model: Model, rates: Array, at: Sequence[Values]) -> Array:
-    """What sizes of v̇ (nv, n) count as at least, (n,): at the middle of all states at rest, or of
-    those in motion, and at most 1; 1 if there v̇ is 0 or none. Or ω v, if that is more.
+    """The least scale (n,) for errors of v̇ (nv, n): its median size among states at rest, or among
+    those in motion, at most 1, and 1 if that is 0 or nan; or ω v, if that is larger.
     """
     sizes, least = np.abs(rates).max(axis=0, initial=0.0), np.ones(len(at))
     for first in (0, 1):
@@ -282,15 +282,15 @@ def _least(model: Model, rates: Array, at: Sequence[Values]) -> Array:
 
 
 def _shares(rates: Array, true: Array, least: Array) -> Array:
-    """The greatest difference at each of n states, in parts of the size of v̇ there."""
+    """The largest difference at each of n states, relative to the size of v̇ there."""
     with np.errstate(all="ignore"):
         off = np.abs(rates - true).max(axis=0, initial=0.0)
         return np.asarray(off / np.maximum(np.abs(true).max(axis=0, initial=0.0), least))
 
 
 def _in_many_digits(model: Model, *, nudge: bool) -> Callable[[Values], tuple[list[Any], float]]:
-    """A function of values with the model's own parameters: v̇ in 60 digits, and what that is off
-    where all numbers are by half a unit in the last place, if it is asked for.
+    """A function of values at the model's own parameters: v̇ in 60 digits, and with `nudge` its
+    change when all numbers change by half a unit in the last place, else 0.
     """
     scalars = Bits()
     own = {0.0: model, EPSILON / 2: perturbed(model)}

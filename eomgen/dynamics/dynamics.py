@@ -47,11 +47,11 @@ from eomgen.scene.joints.base import WORLD
 __all__ = ["Dynamics", "Forward", "Values"]
 
 Forward = Callable[[Sequence[Scalar] | None], list[Scalar]]
-"""v̇ under the effects and, if given, forces beside them, one a velocity."""
+"""v̇ (nv,) under the effects and further generalised forces (nv,), or None for none."""
 
 
 class Dynamics(MechanismState):
-    """A model at given values. What is asked for is computed, once."""
+    """A model at given values. Each property is computed once, when it is first used."""
 
     def accelerating(
         self, vd: Sequence[Scalar] | None, *, still: bool = False, weightless: bool = False
@@ -203,38 +203,44 @@ class Dynamics(MechanismState):
         return articulate(self.kinematics, self.scalars)
 
     def forward(self, route: str) -> Forward:
-        """What gives v̇ under the effects and forces beside them by the recursion of a route."""
+        """Forward dynamics by the recursion of a route."""
         found: Forward = getattr(self, f"{ROUTES[route].recursion}_forward")
         return found
 
     def response(self, route: str) -> Callable[[Sequence[Scalar]], list[Scalar]]:
-        """What gives M⁻¹ of impulses, or forces, on the velocities by the recursion of a route."""
+        """A function that computes M⁻¹ f of generalised impulses or forces f by the recursion of a
+        route.
+        """
         found: Callable[[Sequence[Scalar]], list[Scalar]]
         found = getattr(self, f"{ROUTES[route].recursion}_response")
         return found
 
     def articulated_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """v̇ (nv,) under the effects and generalised forces `tau`, by articulated bodies."""
-        pushed = self._pushed(tau)
-        found = respond(self.kinematics, self.articulated, self._at_rest, pushed, self.scalars)
-        return self._fallen(found)
+        forces = self._generalised_forces(tau)
+        found = respond(
+            self.kinematics, self.articulated, self._bias_wrenches, forces, self.scalars
+        )
+        return self._with_gravity(found)
 
     def factored_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by the LᵀDL factors of the mass matrix."""
-        carried = fc.carried(self.kinematics, self._at_rest)
+        carried = fc.carried(self.kinematics, self._bias_wrenches)
         bias = fc.generalised(self.kinematics, carried, self.moved)[: self.nv]
-        right = [a - b for a, b in zip(self._pushed(tau), bias, strict=True)]
-        return self._fallen(solved(self.factors, right))
+        right = [a - b for a, b in zip(self._generalised_forces(tau), bias, strict=True)]
+        return self._with_gravity(solved(self.factors, right))
 
     def orthogonal_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by orthogonal elimination, in the frames' own axes."""
         about = centres(self._solids, self.scalars)
         wrenches = fc.wrenches(self.linkage, self.kinematics, self.loads[0], self.scalars, about)
-        found = self._eliminated.respond(self._falling, wrenches, self._pushed(tau))
-        return self._fallen(found)
+        found = self._elimination.respond(
+            self._reference_accelerations, wrenches, self._generalised_forces(tau)
+        )
+        return self._with_gravity(found)
 
     def articulated_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
-        """M⁻¹ of impulses on the velocities by articulated bodies."""
+        """M⁻¹ times generalised impulses, by articulated bodies."""
         still = [fc.no_wrench(self.scalars)] * len(self.kinematics.links)
         return respond(self.kinematics, self.articulated, still, impulse, self.scalars)
 
@@ -248,14 +254,14 @@ class Dynamics(MechanismState):
         frame = Acceleration(nothing, nothing, matrix, nothing, nothing)
         still = [frame] * len(self.kinematics.links)
         wrenches = [fc.no_wrench(self.scalars)] * len(still)
-        return self._eliminated.respond(still, wrenches, impulse)
+        return self._elimination.respond(still, wrenches, impulse)
 
     @cached_property
     def _solids(self) -> tuple[Solid | None, ...]:
         return solids(self.linkage, self.scalars)
 
     @cached_property
-    def _eliminated(self) -> Elimination:
+    def _elimination(self) -> Elimination:
         ranks = ranked(make_linkage(self.model, self.model.defaults, FloatScalars()))
         return Elimination(self.kinematics, self._solids, ranks, self.scalars)
 
@@ -269,9 +275,9 @@ class Dynamics(MechanismState):
         ]
 
     @cached_property
-    def _falling(self) -> tuple[Acceleration, ...]:
+    def _reference_accelerations(self) -> tuple[Acceleration, ...]:
         """Accelerations of the frames at v̇ = 0, without gravity in trees on a free joint. Gravity
-        accelerates such a tree as a whole; `_fallen` adds that.
+        accelerates such a tree as a whole; `_with_gravity` adds that.
         """
         falling = [
             k for k, link in enumerate(self.kinematics.links) if link.v[0] in self._free_roots
@@ -282,12 +288,12 @@ class Dynamics(MechanismState):
         return accelerations(self.kinematics, twists, v, vd, base, self.scalars, falling)
 
     @cached_property
-    def _at_rest(self) -> list[fc.Wrench]:
+    def _bias_wrenches(self) -> list[fc.Wrench]:
         """The wrenches that would make v̇ = 0."""
-        inertial = fc.inertial(self.kinematics, self._falling, self.scalars)
+        inertial = fc.inertial(self.kinematics, self._reference_accelerations, self.scalars)
         return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
 
-    def _fallen(self, vd: Sequence[Scalar]) -> list[Scalar]:
+    def _with_gravity(self, vd: Sequence[Scalar]) -> list[Scalar]:
         """v̇ plus the gravity of trees on a free joint, with the names of its components."""
         found = list(vd)
         for i in self._free_roots:
@@ -296,7 +302,8 @@ class Dynamics(MechanismState):
         rates = zip(found, self.model.velocities, strict=True)
         return [self.scalars.named(x, c.acceleration) for x, c in rates]
 
-    def _pushed(self, tau: Sequence[Scalar] | None) -> list[Scalar]:
+    def _generalised_forces(self, tau: Sequence[Scalar] | None) -> list[Scalar]:
+        """The joint loads of the effects plus `tau`."""
         motors = self.motors[: self.nv]
         return motors if tau is None else [a + b for a, b in zip(motors, tau, strict=True)]
 

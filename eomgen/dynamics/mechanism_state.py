@@ -43,8 +43,9 @@ class Values:
 class MechanismState:
     """The kinematics of a model at given values, for effects and recursions.
 
-    What is asked for is computed, once. `nv` is the number of velocities of the state, `moved` that
-    of those and the driven ones. A `linkage` over the same parameters may be passed to be reused.
+    Each property is computed once, when it is first used. `nv` is the number of velocities of the
+    state, `moved` the number of these and the driven ones. A `linkage` over the same parameters may
+    be passed for reuse.
     """
 
     def __init__(
@@ -206,7 +207,7 @@ class MechanismState:
     def _cut(self, vector: Vector) -> Vector:
         return tuple(vector[: self.dimensions])
 
-    # Where everything is and how it moves.
+    # Kinematics.
 
     @cached_property
     def linkage(self) -> Linkage:

@@ -22,7 +22,7 @@ Leaf to root, for each link:
 2. Rotate them to triangular form about one point (`Rows.folded`): first the columns of a, then
    those of α. The point is the joint of the heaviest child. An arm that is zero there stays zero.
 3. For each free motion axis, rotate the rows against each other until only one contains the
-   acceleration along that axis (`_taken`): the pivot row (ρ, u | s). Keep it.
+   acceleration along that axis (`_eliminate_axis`): the pivot row (ρ, u | s). Keep it.
 4. Pass the other rows on to the parent: at most five for one degree of freedom in space, two in
    the plane.
 
@@ -71,13 +71,13 @@ from eomgen.dynamics.kinematics import Link, MotionAxis, TreeKinematics
 from eomgen.dynamics.motion import Acceleration, moment_about_centre
 from eomgen.dynamics.rows import (
     Column,
-    Eliminated,
+    EliminatedAxis,
+    EliminatedLink,
     GivensRotation,
     Row,
     Rows,
     Steps,
     Sum,
-    Taken,
     in_parent_axes,
     shifted,
 )
@@ -131,11 +131,11 @@ class Elimination:
         """
         wrenches, tau = on_frames(self._links, *self._aligned.into(wrenches, tau), self._scalars)
         rows: list[list[tuple[Row, int]]] = [[] for _ in self._links]
-        found: list[Eliminated] = []
+        found: list[EliminatedLink] = []
         for k in reversed(range(len(self._links))):
             link = self._links[k]
             own, left = self._own_rows(k, frame_accelerations[k], wrenches[k])
-            eliminated, passed = self._eliminated(k, own, rows[k], left, tau)
+            eliminated, passed = self._eliminate_link(k, own, rows[k], left, tau)
             found.append(eliminated)
             if link.parent >= 0:
                 rows[link.parent] += [(in_parent_axes(link, row), k) for row in eliminated.rows]
@@ -183,7 +183,7 @@ class Elimination:
             for n, i in enumerate(order):
                 if s.is_zero(solid.inertia[i][i]):
                     continue
-                d = self._pivot_of(work[i][i], solid.inertia[i][i])
+                d = self._bounded_pivot(work[i][i], solid.inertia[i][i])
                 entries = unit(i, s)
                 for j in order[n + 1 :]:
                     part = work[i][j] / d
@@ -200,18 +200,18 @@ class Elimination:
         left = replace(wrench, moment=(moment[0], moment[1], moment[2]))
         return (linear, angular), moved_to(sub(zero, self._centre(k)), left)
 
-    def _pivot_of(self, pivot: Scalar, entry: Scalar) -> Scalar:
+    def _bounded_pivot(self, pivot: Scalar, entry: Scalar) -> Scalar:
         floor = self._rows.tiny if pivot is entry else self._scalars.number(SLIGHT) * entry
         return self._scalars.call("max", pivot, floor)
 
-    def _eliminated(
+    def _eliminate_link(
         self,
         k: int,
         own: tuple[dict[int, Row], dict[int, Row]],
         rows: Sequence[tuple[Row, int]],
         term: Wrench,
         tau: Sequence[Scalar],
-    ) -> tuple[Eliminated, Wrench]:
+    ) -> tuple[EliminatedLink, Wrench]:
         """Eliminate a link's free motion axes from its own rows and those of its children.
 
         own   linear and angular rows of the link, by coordinate axis
@@ -233,33 +233,23 @@ class Elimination:
         # Rows without an arm come first. They keep no arm, even if there are more than columns.
         loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
         along = self._aligned.along[k]
-        slides = translation_order(link, at, loose, self._planar, s)
+        translations = translation_order(link, at, loose, self._planar, s)
         order = rotation_order(link, self._planar, along)
         axes, rotations, taken = list(reversed(link.free)), Steps(), []
         if along is not None and along in angular:
             axes.sort(key=lambda axis: -order.index(column_of(axis[0])[1]))
-            kept = {(False, j): linear[j] for j in slides if j in linear}
+            kept = {(False, j): linear[j] for j in translations if j in linear}
             kept |= {(True, j): angular[j] for j in order if j in angular}
-            one, kept, loose = self._early(link, axes.pop(0), kept, loose, at)
+            one, kept, loose = self._eliminate_aligned_rotation(link, axes.pop(0), kept, loose, at)
             taken.append(one)
             linear = {j: row for (spins, j), row in kept.items() if not spins}
             angular = {j: row for (spins, j), row in kept.items() if spins}
             about = about - {(True, along)}
         orders = (
-            [j for j in slides if (False, j) in about],
+            [j for j in translations if (False, j) in about],
             [j for j in order if (True, j) in about],
         )
-        loose += [linear.pop(j) for j in [*linear] if j not in orders[0]]
-        loose += [angular.pop(j) for j in [*angular] if j not in orders[1]]
-        room = len(orders[0]) + len(orders[1])
-        folded = bool(linear) or len(loose) + len(angular) > room
-        if folded:
-            linear, loose = self._rows.folded(linear, loose, orders[0], rotations, angular=False)
-            holding = sum(not self._rows.is_empty(row) for row in loose)
-            if angular or holding > len(orders[1]):
-                angular, loose = self._rows.folded(
-                    angular, loose, orders[1], rotations, angular=True
-                )
+        linear, angular, loose = self._triangular(linear, angular, loose, orders, rotations)
         kept = {(False, j): shifted(linear[j], at) for j in orders[0] if j in linear}
         kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
         kept = {column: self._rows.of(columns, row) for column, row in kept.items()}
@@ -270,23 +260,57 @@ class Elimination:
         empty = [row for row in loose if self._rows.is_empty(row)]
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
-            first, sources, kept, free, gathered = self._first(axis[0], held, kept, free)
-            one, kept, free, term = self._taken(link, axis, first, kept, free, term, tau[axis[1]])
+            first, sources, kept, free, gathered = self._pivot_row(axis[0], held, kept, free)
+            one, kept, free, term = self._eliminate_axis(
+                link, axis, first, kept, free, term, tau[axis[1]]
+            )
             taken.append(replace(one, rows=sources, gathered=gathered, before=tuple(rotations)))
             rotations.clear()
         rest = [*kept.values(), *free]
         holding_rows = [row for row in rest if not self._rows.is_empty(row)]
         empty += [row for row in rest if self._rows.is_empty(row)]
-        return Eliminated(tuple(taken), tuple(rotations), tuple(holding_rows), tuple(empty)), term
+        return EliminatedLink(
+            tuple(taken), tuple(rotations), tuple(holding_rows), tuple(empty)
+        ), term
 
-    def _early(
+    def _triangular(
+        self,
+        linear: dict[int, Row],
+        angular: dict[int, Row],
+        loose: list[Row],
+        orders: tuple[list[int], list[int]],
+        rotations: Steps,
+    ) -> tuple[dict[int, Row], dict[int, Row], list[Row]]:
+        """Rotate rows about one point to triangular form, unless there are few of them.
+
+        linear, angular  rows of the triangle, by coordinate axis; returned with those added
+        loose            the other rows; returned with what is left of them
+        orders           axes of the columns of a and of α, in the order of elimination; rows of the
+                         triangle on other axes become loose
+        """
+        loose = [
+            *loose,
+            *(row for j, row in linear.items() if j not in orders[0]),
+            *(row for j, row in angular.items() if j not in orders[1]),
+        ]
+        linear = {j: row for j, row in linear.items() if j in orders[0]}
+        angular = {j: row for j, row in angular.items() if j in orders[1]}
+        if not linear and len(loose) + len(angular) <= len(orders[0]) + len(orders[1]):
+            return linear, angular, loose
+        linear, loose = self._rows.folded(linear, loose, orders[0], rotations, angular=False)
+        count = sum(not self._rows.is_empty(row) for row in loose)
+        if angular or count > len(orders[1]):
+            angular, loose = self._rows.folded(angular, loose, orders[1], rotations, angular=True)
+        return linear, angular, loose
+
+    def _eliminate_aligned_rotation(
         self,
         link: Link,
         axis: tuple[MotionAxis, int],
         kept: dict[Column, Row],
         loose: list[Row],
         at: Vec,
-    ) -> tuple[Taken, dict[Column, Row], list[Row]]:
+    ) -> tuple[EliminatedAxis, dict[Column, Row], list[Row]]:
         """Eliminate the rotation about the arm from the rows about the arm's end `at`.
 
         The heaviest rows do not contain it. Rows with other arms, rotated against them first, would
@@ -294,7 +318,7 @@ class Elimination:
         """
         first, nothing = kept.pop(column_of(axis[0])), no_wrench(self._scalars)
         # The forces along this axis are all on its own row.
-        one, kept, loose, _ = self._taken(
+        one, kept, loose, _ = self._eliminate_axis(
             link, axis, first, kept, loose, nothing, self._rows.zero, early=True
         )
         return replace(one, rows=(shifted(first, at),)), kept, loose
@@ -304,7 +328,7 @@ class Elimination:
         between = self._aligned.between.get(k)
         return sub(self._links[k].arm, at) if between is None else between
 
-    def _first(
+    def _pivot_row(
         self, motion: MotionAxis, held: bool, kept: dict[Column, Row], free: list[Row]
     ) -> tuple[
         Row, tuple[Row, ...], dict[Column, Row], list[Row], tuple[GivensRotation | Sum, ...]
@@ -336,7 +360,7 @@ class Elimination:
             single, kept[key] = self._rows.rotated(single, kept[key], column, rotations)
         return single, sources or (single,), kept, free, tuple(rotations)
 
-    def _taken(
+    def _eliminate_axis(
         self,
         link: Link,
         axis: tuple[MotionAxis, int],
@@ -347,7 +371,7 @@ class Elimination:
         tau: Scalar,
         *,
         early: bool = False,
-    ) -> tuple[Taken, dict[Column, Row], list[Row], Wrench]:
+    ) -> tuple[EliminatedAxis, dict[Column, Row], list[Row], Wrench]:
         """Rotate the pivot row `first` against all others until it alone contains a motion axis.
 
         It is rotated against the free rows first, or if `early` against the kept ones, which then
@@ -383,5 +407,5 @@ class Elimination:
         pivot = replace(pivot, weight=s.named(pivot.weight, f"pivot_{link.name}"))
         share = pivot.force / pivot.weight
         left = Wrench(*with_component(motion, moment, push, back))
-        one = Taken(motion, i, (first,), first.index, share, tuple(rotations), rotor)
+        one = EliminatedAxis(motion, i, (first,), first.index, share, tuple(rotations), rotor)
         return one, kept, free, left

@@ -75,23 +75,23 @@ Steps = list[GivensRotation | Sum]
 
 
 @dataclass(frozen=True)
-class Taken:
-    """A motion axis that was eliminated.
+class EliminatedAxis:
+    """The elimination of a motion axis.
 
-    velocity   its index in v
-    rows       the rows from which its acceleration is found: the one that contained it, or all that
-               were gathered
-    pivot      index of the pivot row, and its final residual φ / ρ², `left`
+    velocity   index of its velocity in v
+    rows       the rows that determine its acceleration: the one that contained it, or all that were
+               gathered
+    pivot      index of the pivot row; `residual` is its final residual φ / ρ²
     rotor      index of the row of the motor's rotor, -1 if there is none
-    rotations  those that cleared the axis from the other rows. Before them came those that
-               `gathered` the pivot row, and `before` those the ones since the last axis
+    rotations  rotations that cleared the axis from the other rows; before them those that
+               `gathered` the pivot row, and `before` these the ones since the previous axis
     """
 
     axis: MotionAxis
     velocity: int
     rows: tuple[Row, ...]
     pivot: int
-    left: Scalar
+    residual: Scalar
     rotations: tuple[GivensRotation | Sum, ...]
     rotor: int
     gathered: tuple[GivensRotation | Sum, ...] = ()
@@ -99,12 +99,12 @@ class Taken:
 
 
 @dataclass(frozen=True)
-class Eliminated:
-    """A link after its elimination: its axes in order, the rotations after the last, the rows that
-    are passed to the parent, and the rows that are empty now.
+class EliminatedLink:
+    """The elimination of a link: its axes in order, the rotations after the last axis, the rows
+    that are passed to the parent, and the rows that are empty now.
     """
 
-    axes: tuple[Taken, ...]
+    axes: tuple[EliminatedAxis, ...]
     rotations: tuple[GivensRotation | Sum, ...]
     rows: tuple[Row, ...]
     empty: tuple[Row, ...]
@@ -168,7 +168,7 @@ class Rows:
     def _summed(
         self, pivot: Row, rows: Sequence[Row], j: int, rotations: Steps
     ) -> tuple[Row, list[Row]]:
-        """Add all rows of one angular acceleration to the pivot row of it; and the other rows."""
+        """Add the rows with angular acceleration j to its pivot row; return the others too."""
         is_zero = self._scalars.is_zero
         weight, right, force = pivot.weight, pivot.weight * pivot.right, pivot.force
         found, others = [], []

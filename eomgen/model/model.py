@@ -226,6 +226,14 @@ class Model:
         )
 
     @property
+    def roots(self) -> tuple[int, ...]:
+        """For each body the index of the root of its tree: a body whose parent is the world."""
+        roots: list[int] = []
+        for k, body in enumerate(self.bodies):
+            roots.append(k if body.parent < 0 else roots[body.parent])
+        return tuple(roots)
+
+    @property
     def first_position(self) -> tuple[int, ...]:
         """The index of each joint's first coordinate; valid if no coordinate is prescribed."""
         return tuple(accumulate((len(b.positions) for b in self.bodies), initial=0))[:-1]

@@ -1,11 +1,10 @@
-// What the page knows: the run, and its state and poses at any time. `bodyPoses(y, p, t)`, written
-// by the generator, gives the poses of all bodies for any state and time, so that what moves here is
-// the state itself and not a recorded film.
+// The data of the run, and the state and poses at any time. The generated `bodyPoses(y, p, t)`
+// computes the poses of all bodies from state and time, so that no poses are stored.
 
 const byId = (id) => document.getElementById(id);
 const run = JSON.parse(byId("run").textContent);
 
-// Arrays lie in the page as base64 of little-endian float64, which is what browsers compute with.
+// Arrays are stored as base64 of little-endian float64.
 const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 const unpack = (text) => new Float64Array(bytesOf(text));
 const t = unpack(run.t);
@@ -15,7 +14,7 @@ const potential = unpack(run.potential);
 const ny = run.states.length;
 const last = t.length - 1;
 
-// ---- What holds at a time: linear between the two samples around it ----
+// ---- Values at a time, by linear interpolation between the two samples around it ----
 
 function place(time) {
   let low = 0;
@@ -38,13 +37,13 @@ function stateAt(where) {
   const state = run.states.map((_, k) => between(y, where, ny, k));
   for (const four of run.quaternions ?? []) {
     const length = Math.hypot(...four.map((k) => state[k])) || 1;
-    for (const k of four) state[k] /= length; // what lies between two unit quaternions is none
+    for (const k of four) state[k] /= length; // interpolation changes the length of a quaternion
   }
   return state;
 }
 const posesOf = (state, time) => bodyPoses(state, run.parameters, time);
 
-// What is read well on the background.
+// Ink that contrasts with the background.
 function luminance(color) {
   const [r, g, b] = [1, 3, 5].map((i) => parseInt(color.slice(i, i + 2), 16) / 255);
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;

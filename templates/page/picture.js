@@ -1,5 +1,5 @@
-// The picture's frame: view, traces, scale bar. `plane.js` or `space.js` has what is different there:
-// `HOME`, where the view starts, `positionOf` a pose, `turn`, and `drawScene`.
+// View, traces and scale bar. `plane.js` or `space.js` defines `HOME`, the initial view,
+// `positionOf` a pose, `turn`, and `drawScene`.
 
 // Centres of mass of the traced bodies at every sample.
 const paths = Array.from(t, (_, i) => {
@@ -49,7 +49,7 @@ function draw() {
   showValues(state, where);
 }
 
-// Where the traced bodies have come along; `seen` gives the place of a position in the picture.
+// Draw the paths of the traced bodies; `seen` maps a position to the picture.
 function drawTraces(upTo, poses, pixel, seen) {
   pen.lineWidth = 1.3 * pixel;
   pen.lineJoin = "round";
@@ -64,8 +64,8 @@ function drawTraces(upTo, poses, pixel, seen) {
   pen.globalAlpha = 1;
 }
 
-// Balls that stand still, and, as outlines, the obstacles of fields with their reach dotted; `size` is
-// how many units of the pen a metre has, `pixel` how many a CSS pixel.
+// Draw fixed balls, and obstacles of fields as outlines with their reach dotted; `size` is a metre in
+// units of the pen, `pixel` a CSS pixel in units of the pen.
 function drawBalls(size, pixel, seen) {
   pen.lineWidth = pixel;
   for (const { center, radius, reach } of run.balls ?? []) {

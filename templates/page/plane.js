@@ -11,7 +11,7 @@ function centerOfView(poses) {
 
 function drawScene(poses, upTo, { scale, ratio, width, height }) {
   const [x, y] = centerOfView(poses);
-  // In metres, y up; `pixel` is the size of one.
+  // In metres, y up; `pixel` is the size of a pixel.
   const pixel = 1 / scale;
   pen.setTransform(ratio * scale, 0, 0, -ratio * scale,
     ratio * (width / 2 - x * scale), ratio * (height / 2 + y * scale));
@@ -38,7 +38,7 @@ function drawGrid(x, y, halfWidth, halfHeight, pixel) {
   for (let i = Math.ceil(low / step); i * step <= high; i++) line(i, [left, i * step], [right, i * step]);
 }
 
-// What lies behind planes of contact, grey, as `far` as the view goes around x, y.
+// Shade the half-planes behind contact planes, up to the distance `far` from the view's centre x, y.
 function drawPlanes(x, y, far, pixel) {
   const ends = (run.planes ?? []).map(({ normal: [nx, ny], offset }) => {
     const gap = nx * x + ny * y - offset;
@@ -87,7 +87,7 @@ function drawShape(shape, pixel) {
     pen.lineCap = "round";
     pen.moveTo(...shape.start);
     pen.lineTo(...shape.end);
-    // Its edge is a wider line below it.
+    // The edge is a wider line drawn below it.
     for (const [width, color] of [[pixel, `rgba(${ink}, 0.35)`], [-pixel, shape.color]]) {
       pen.lineWidth = Math.max(shape.width + width, pixel);
       pen.strokeStyle = color;
@@ -112,7 +112,7 @@ function drawShape(shape, pixel) {
   pen.strokeStyle = `rgba(${ink}, 0.35)`;
   pen.stroke();
   if (shape.type === "disc") {
-    // A spoke, for a disc without one would not be seen turning.
+    // A spoke makes the rotation of a disc visible.
     pen.beginPath();
     pen.moveTo(...shape.center);
     pen.lineTo(shape.center[0] + shape.radius, shape.center[1]);

@@ -1,4 +1,4 @@
-// Shows the numbers, keeps the time, and does what keys and pointers ask for.
+// Shows values, plays the run, and handles keys and pointers.
 
 // ---- Numbers ----
 
@@ -30,8 +30,8 @@ const stateCells = run.states.map((name, k) => row("values", name, run.units[k])
 const energyCells = ["kinetic", "potential", "total"].map((name) =>
   row("energies", name, "J", `var(--${name})`));
 
-// So many numbers are not read while they run: a few times a second will do, and leaves the picture
-// its time.
+// Tables with more values than this are updated only a few times a second while the run plays, to
+// save time for drawing.
 const RUNNING = 40;
 const PAUSE = 150; // ms
 
@@ -105,7 +105,7 @@ function setPlaying(playing) {
 
 function tick(now) {
   if (!clock.playing) return;
-  // A page that was hidden for a while goes on where it was instead of leaping ahead.
+  // A page that was hidden continues where it was.
   const passed = Math.min(Math.max((now - clock.stamp) / 1000, 0), 0.1);
   clock.stamp = now;
   clock.time += passed * Number(byId("speed").value);
@@ -121,18 +121,18 @@ function tick(now) {
 }
 
 function step(direction) {
-  // Several samples may share one time, as around an impact; each step must leave it.
+  // Several samples may have the same time, as at an impact; each step goes to another time.
   if (direction > 0) goTo(t.find((time) => time > clock.time) ?? t[last]);
   else goTo(t.findLast((time) => time < clock.time) ?? t[0]);
 }
 
-// ---- Hands ----
+// ---- Keys and pointers ----
 
 function zoom(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2) {
   const before = 1 / scaleOfView();
   view.zoom = Math.min(Math.max(view.zoom * factor, 0.01), 1000);
   const gained = before - 1 / scaleOfView();
-  // What lies under the pointer stays under it.
+  // The point under the pointer stays under it.
   view.x += (x - canvas.clientWidth / 2) * gained;
   view.y -= (y - canvas.clientHeight / 2) * gained;
   requestAnimationFrame(draw);
@@ -210,7 +210,7 @@ const shiftKeys = {
 };
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select")) return;
-  // Space on a button, a box to tick or a summary does what that one is for.
+  // On a button, a check box or a summary, space has its usual meaning.
   if (event.key === " " && event.target.closest("button, summary, input[type=checkbox]")) return;
   const action = (event.shiftKey && shiftKeys[event.key]) || keys[event.key];
   if (!action) return;

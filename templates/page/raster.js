@@ -1,5 +1,5 @@
-// Hidden surfaces by a nearness for each pixel, so that solids may touch and pierce one another. Drawn
-// on a sheet of its own, which is then laid on the picture.
+// Rasteriser with a depth buffer, so that solids may touch and intersect. It draws on a canvas of its
+// own, the sheet, which is then copied to the picture.
 
 const SAMPLES = 2; // pixels of the sheet for each CSS pixel, along and across, to smooth what is drawn
 const MOST_PIXELS = 4e6;
@@ -7,7 +7,7 @@ const MOST_PIXELS = 4e6;
 const raster = { sheet: document.createElement("canvas"), width: 0, height: 0, ratio: 1 };
 raster.pen = raster.sheet.getContext("2d");
 
-// Clear the sheet for a picture of so many CSS pixels; `ratio` is the pixels for each of them.
+// Clear the sheet for a picture of a size in CSS pixels; `ratio` is device pixels per CSS pixel.
 function startRaster(width, height) {
   const wanted = Math.max(SAMPLES, window.devicePixelRatio || 1);
   raster.ratio = Math.max(1, Math.min(wanted, Math.sqrt(MOST_PIXELS / (width * height))));
@@ -32,9 +32,9 @@ function layRaster(width, height) {
 // A colour as the sheet stores it, red in the lowest byte.
 const packed = (red, green, blue) => ((255 << 24) | (blue << 16) | (green << 8) | red) >>> 0;
 
-// Fill the convex flat face with corners x, y, in pixels of the sheet, where it is nearest. `near` is
-// how near its first corner is, `right` and `down` how this grows with a pixel, and `nearest` the most
-// that it grows to: of a face seen nearly from its side the middle of a pixel may lie far beyond it.
+// Fill a convex planar face with corners x, y, in pixels of the sheet, where it is the nearest. `near`
+// is the depth value of its first corner, larger is nearer, `right` and `down` are its increments per
+// pixel. `nearest` bounds it: for a face seen edge-on, a pixel's centre may lie far outside the face.
 function fillFace(x, y, near, right, down, nearest, color) {
   const { width, height, pixels, nearness } = raster;
   const count = x.length;
@@ -78,7 +78,7 @@ function fillLine(x0, y0, near0, x1, y1, near1, thick, color) {
   if (length < 1e-6) return;
   const alongX = ((x1 - x0) / length) * (thick / 2);
   const alongY = ((y1 - y0) / length) * (thick / 2);
-  // A little longer at both ends, so that lines that meet leave no notch.
+  // Extend both ends slightly, so that lines that meet leave no gap.
   lineX[0] = x0 - alongX / 2 + alongY;
   lineY[0] = y0 - alongY / 2 - alongX;
   lineX[1] = x1 + alongX / 2 + alongY;

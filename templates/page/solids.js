@@ -1,4 +1,4 @@
-// The bodies' faces: each mesh unpacked once, turned, lit, and drawn on the raster.
+// Bodies as meshes: unpacked once, rotated, shaded, and drawn by the rasteriser.
 
 const LEVELS = 48; // shades of a colour
 const EDGE = 0.6; // how dark edges are, between the body's colour and ink
@@ -13,13 +13,13 @@ const meshes = run.meshes.map((mesh) => ({
 const solids = run.solids.flatMap((parts, body) =>
   parts.map(([mesh, color]) => ({ body, mesh: meshes[mesh], ...coloursOf(color) })));
 
-// Of one mesh at a time: places of its corners, which faces look at the eye, how much light they get.
+// Buffers for one mesh: positions of its corners, which faces are visible, and their brightness.
 const most = Math.max(0, ...meshes.map((mesh) => mesh.faces.length / 4));
 const spots = new Float64Array(Math.max(0, ...meshes.map((mesh) => mesh.vertices.length)));
 const front = new Uint8Array(most);
 const light = new Float64Array(most);
 
-// The colour under each strength of light, from none to all, and that of edges.
+// The colour for each brightness, from dark to light, and that of edges.
 function coloursOf(color) {
   const rgb = [1, 3, 5].map((i) => parseInt(color.slice(i, i + 2), 16));
   const shades = Array.from({ length: LEVELS + 1 }, (_, level) => {
@@ -35,7 +35,7 @@ function coloursOf(color) {
   };
 }
 
-// Places of a mesh's corners along three axes.
+// Coordinates of a mesh's corners along three axes.
 function placeCorners({ vertices }, axes, pose) {
   const turned = axes.map((axis) =>
     [0, 1, 2, 3].map((k) => axis[0] * pose[0][k] + axis[1] * pose[1][k] + axis[2] * pose[2][k]));
@@ -47,8 +47,8 @@ function placeCorners({ vertices }, axes, pose) {
   }
 }
 
-// Which faces look along the third axis, and how much light they get. No arrays are made here, for
-// this runs for every face of every picture.
+// Which faces are turned towards the third axis, and their brightness. It allocates no arrays, because
+// it runs for every face of every picture.
 function findFront({ faces }) {
   const [lx, ly, lz] = run.light.toward;
   for (let face = 0; 4 * face < faces.length; face++) {
@@ -76,7 +76,7 @@ const slopes = new Float64Array(2 * most); // of the nearness, with a step to th
 const cornerX = new Float64Array(4);
 const cornerY = new Float64Array(4);
 
-// Draw all solids; `scale`, `left` and `top` bring the eye's metres to the picture's pixels.
+// Draw all solids; `scale`, `left` and `top` map metres in view axes to pixels of the picture.
 function drawSolids(poses, axes, scale, left, top) {
   const { ratio } = raster;
   const size = scale * ratio; // all in pixels of the sheet from here on, nearness too
@@ -98,7 +98,7 @@ function drawSolids(poses, axes, scale, left, top) {
         cornerX[k] = spots[from];
         cornerY[k] = spots[from + 1];
         nearest = Math.max(nearest, spots[from + 2]);
-        // An edge is where the surface bends sharply, or where it turns away from the eye.
+        // Edges are sharp bends of the surface, and the outline.
         const beyond = across[4 * face + k];
         if (beyond >= 0 && front[beyond]) continue;
         const to = 3 * faces[4 * face + ((k + 1) % 4)];

@@ -50,7 +50,7 @@ function drawScene(poses, upTo, { scale, width, height }) {
   drawCross(axes, width, height);
 }
 
-// Where the bodies are over the floor: their faces that look up, laid flat.
+// Shadows of the bodies on the floor: their upward faces, projected vertically.
 function drawShadow(poses, toPicture) {
   const { z } = run.floor;
   const [left, top] = toPicture([0, 0, z]);
@@ -86,7 +86,7 @@ function drawFloor(toPicture) {
   });
 }
 
-// Squares of planes of contact other than the floor; they hide nothing.
+// Draw squares for contact planes other than the floor; they are drawn without hiding anything.
 function drawPatches(toPicture) {
   pen.fillStyle = `rgba(${ink}, ${FILL / 2})`;
   pen.strokeStyle = `rgba(${ink}, ${SURFACE})`;
@@ -110,7 +110,7 @@ function drawDot([x, y], radius, fill, line) {
   pen.stroke();
 }
 
-// In a corner, how x, y and z lie in the picture; the one that points at the eye comes last.
+// Draw the axes x, y and z in a corner; the one that points at the viewer is drawn last.
 function drawCross(axes, width, height) {
   const [x, y, size] = [width - 52, height - 50, 30];
   pen.lineWidth = 2;

@@ -22,7 +22,7 @@ from eomgen.scene.joints.base import Primitive
 
 
 @dataclass(frozen=True)
-class Moving:
+class MotionSymbols:
     """Symbols of one body's motion in its own axes.
 
     `omega`, `velocity`: angular velocity and velocity of the centre of mass; `alpha`,
@@ -52,8 +52,8 @@ class Constraint:
     arm: Expr
     relative_omega: Expr
     axis_angle: tuple[Expr, Expr] | None
-    parent: Moving
-    own: Moving
+    parent: MotionSymbols
+    own: MotionSymbols
     omega: Expr
     velocity: Expr
     alpha: Expr
@@ -63,15 +63,15 @@ class Constraint:
 def state_joints(model: Model, symbols: Symbols, ledger: Ledger) -> tuple[Constraint, ...]:
     """State every joint's constraint and differentiate it; long rotations get definitions."""
     found: list[Constraint] = []
-    nothing = Moving(*(sp.zeros(3, 1) for _ in range(4)))
+    at_rest = MotionSymbols(*(sp.zeros(3, 1) for _ in range(4)))
     starts = zip(model.bodies, model.first_position, model.first_velocity, strict=True)
     for body, i, j in starts:
         q = symbols.q[i : i + len(body.positions)]
         v = symbols.v[j : j + len(body.velocities)]
         a = symbols.a[j : j + len(body.velocities)]
-        parent = found[body.parent].own if body.parent >= 0 else nothing
+        parent = found[body.parent].own if body.parent >= 0 else at_rest
         words = ("omega", "u", "alpha", "a")
-        own = Moving(*(triple(word, body.name) for word in words))
+        own = MotionSymbols(*(triple(word, body.name) for word in words))
         ledger.rates.update(zip(v, a, strict=True))
         ledger.rates.update(zip(own.omega, own.alpha, strict=True))
         found.append(_differentiated(body, model, symbols, q, v, parent, own, ledger))
@@ -84,8 +84,8 @@ def _differentiated(
     symbols: Symbols,
     q: Sequence[Expr],
     v: Sequence[Expr],
-    parent: Moving,
-    own: Moving,
+    parent: MotionSymbols,
+    own: MotionSymbols,
     ledger: Ledger,
 ) -> Constraint:
     joint = body.joint
@@ -95,7 +95,7 @@ def _differentiated(
         axes = sp.Matrix([[symbols.number(entry) for entry in row] for row in fixed])
         r_parent, arm = symbols.vector(joint.r_parent), symbols.vector(joint.r_child)
     primitives = joint.primitives(model.dimensions)
-    rotation, relative_omega, slide = _moved(body.name, primitives, q, v, symbols, ledger)
+    rotation, relative_omega, slide = _relative_motion(body.name, primitives, q, v, symbols, ledger)
     if primitives and not all(_simple(primitive) for primitive in primitives):
         rotation = _entries(body.name, rotation, relative_omega, ledger)
     inward, back = axes.T, rotation.T
@@ -127,7 +127,7 @@ def _differentiated(
     )
 
 
-def _moved(
+def _relative_motion(
     name: str,
     primitives: Sequence[Primitive],
     q: Sequence[Expr],
@@ -149,7 +149,7 @@ def _moved(
             ledger.rates[x] = half * (w * a + y * c - z * b)
             ledger.rates[y] = half * (w * b + z * a - x * c)
             ledger.rates[z] = half * (w * c + x * b - y * a)
-            # |q|² stays as it is, so that this needs no rate.
+            # |q|² is constant, so k has no rate.
             k = ledger.define(real(f"k__{name}"), 2 / (w**2 + x**2 + y**2 + z**2))
             rotated_by, spin = of_quaternion(q[:4], k), sp.Matrix(v[:3])
             rotation, relative_omega = rotation * rotated_by, rotated_by.T * relative_omega + spin
@@ -193,14 +193,14 @@ def _axis_angle_of(
         along = sp.Matrix([int(part != 0) for part in primitive.axis])
         if not _simple(primitive) or (any(axis) and along != axis):
             return None
-        way = sum(symbols.number(part) for part in direction(primitive.axis))
-        axis, angle = along, angle + way * coordinate
+        sign = sum(symbols.number(part) for part in direction(primitive.axis))
+        axis, angle = along, angle + sign * coordinate
     return axis, angle
 
 
 def _simple(primitive: Primitive) -> bool:
-    """Whether a primitive's rotation has one sine or cosine in an entry: slides, and coordinate
-    axes.
+    """Whether each entry of a primitive's rotation has at most one sine or cosine, as for prismatic
+    primitives and rotations about coordinate axes.
     """
     along = sum(part != 0.0 for part in primitive.axis) == 1
     return primitive.kind == "prismatic" or (primitive.kind == "revolute" and along)

@@ -12,9 +12,9 @@ from eomgen.derivation.projected.equations import (
     Motion,
     World,
     balance,
+    body_motions,
     inertias,
     loads,
-    set_in_motion,
 )
 from eomgen.derivation.projected.solution import Solution, solve
 from eomgen.derivation.projected.symbols import Ledger, Symbols, make_symbols
@@ -56,12 +56,12 @@ def derive_projected(model: Model) -> ProjectedEquations:
     ledger = Ledger(symbols.fixed, *(WRITTEN if few else NAMED))
     bodies = inertias(model, symbols)
     constraints = state_joints(model, symbols, ledger)
-    acting = loads(model, symbols, bodies)
+    applied_loads = loads(model, symbols, bodies)
     world = World(model, constraints, ledger)
-    motions = set_in_motion(model, constraints, acting.uniform, world, ledger, symbols)
-    equations = balance(model, symbols, bodies, motions, acting, world, ledger)
+    motions = body_motions(model, constraints, applied_loads.uniform, world, ledger, symbols)
+    equations = balance(model, symbols, bodies, motions, applied_loads, world, ledger)
     before = len(ledger.definitions)
-    solution = solve(model, symbols, bodies, motions, acting, world, ledger)
+    solution = solve(model, symbols, bodies, motions, applied_loads, world, ledger)
     return ProjectedEquations(
-        model, symbols, bodies, constraints, motions, acting, equations, before, solution
+        model, symbols, bodies, constraints, motions, applied_loads, equations, before, solution
     )

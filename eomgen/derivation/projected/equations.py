@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.projected.constraints import Constraint, Moving, about
+from eomgen.derivation.projected.constraints import Constraint, MotionSymbols, about
 from eomgen.derivation.projected.simplify import gathered
 from eomgen.derivation.projected.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
@@ -20,9 +20,9 @@ from eomgen.scene.effects.base import JointLoad, Load, Unmoved
 from eomgen.scene.joints.base import Geared
 
 ROTATIONS = ("R__", "k__", "W__")
-"""How names of entries of rotations begin: these stay."""
+"""Prefixes of names of rotation entries, which are not substituted."""
 SLACK = 1.5
-"""How much longer than the shortest form one may be that says which terms there are."""
+"""How many times as long as the shortest form the entries of M, V, G, F may be."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ def _uniform(forces: tuple[tuple[int, Expr, Expr], ...], bodies: tuple[Inertia, 
     return shared if same else none
 
 
-def set_in_motion(
+def body_motions(
     model: Model,
     constraints: tuple[Constraint, ...],
     uniform: Expr,
@@ -218,7 +218,7 @@ def set_in_motion(
     return tuple(found)
 
 
-def _by(moving: Moving, partial_omega: Expr, partial_velocity: Expr) -> dict[Expr, Expr]:
+def _by(moving: MotionSymbols, partial_omega: Expr, partial_velocity: Expr) -> dict[Expr, Expr]:
     pairs = (
         *zip(moving.omega, partial_omega, strict=True),
         *zip(moving.velocity, partial_velocity, strict=True),
@@ -278,14 +278,14 @@ def balance(
     symbols: Symbols,
     bodies: tuple[Inertia, ...],
     motions: tuple[Motion, ...],
-    acting: Loads,
+    applied_loads: Loads,
     world: World,
     ledger: Ledger,
 ) -> Balance:
     """Collect M, V, G and F."""
     n = len(symbols.v)
     M, V, G, F = sp.zeros(n, n), sp.zeros(n, 1), sp.zeros(n, 1), sp.zeros(n, 1)
-    floating = carried_along(model)
+    floating = translational_velocities(model)
     for body, motion in zip(bodies, motions, strict=True):
         inertial = body.mass * motion.acceleration
         torque = body.moments * motion.alpha
@@ -293,29 +293,28 @@ def balance(
         weight = body.mass * motion.gravity
         for i, partial_velocity in motion.partial_velocities.items():
             V[i] += partial_velocity.dot(inertial)
-            # Right angles and length 1: directions of the world, that carry a floating tree.
-            fall = (
-                body.mass * acting.uniform[floating[i]]
+            # The partial velocities of a floating tree's translation are the world's unit vectors.
+            G[i] -= (
+                body.mass * applied_loads.uniform[floating[i]]
                 if i in floating
                 else partial_velocity.dot(weight)
             )
-            G[i] -= fall
             for j, other in motion.partial_velocities.items():
-                straight = i in floating and j in floating
-                M[i, j] += body.mass * (int(i == j) if straight else partial_velocity.dot(other))
+                both = i in floating and j in floating
+                M[i, j] += body.mass * (int(i == j) if both else partial_velocity.dot(other))
         for i, partial_omega in motion.partial_omegas.items():
             V[i] += partial_omega.dot(torque)
             for j, other in motion.partial_omegas.items():
                 M[i, j] += partial_omega.dot(body.moments * other)
     for j, armature in armatures(model, symbols).items():
         M[j, j] += armature
-    for load in acting.gravity:
+    for load in applied_loads.gravity:
         for i, part in generalised(model, motions, world, load).items():
             G[i] -= part
-    for load in acting.applied:
+    for load in applied_loads.applied:
         for i, part in generalised(model, motions, world, load).items():
             F[i] += part
-    for j, force in acting.motors.items():
+    for j, force in applied_loads.motors.items():
         F[j] += force
 
     def short(matrix: Expr) -> Expr:
@@ -328,7 +327,7 @@ def balance(
 
 
 def _written_out(entry: Expr, ledger: Ledger) -> Expr:
-    """An entry of the balance without names for parts of motions, where that stays short."""
+    """An entry of the balance with definitions substituted, unless that makes it too long."""
     whole = entry
     while True:
         motions = {
@@ -349,7 +348,7 @@ def generalised(
 ) -> dict[int, Expr]:
     """The generalised forces of a force (world axes) at a point of a body, by index in v."""
     k, at, outside = load
-    motion, floating = motions[k], carried_along(model)
+    motion, floating = motions[k], translational_velocities(model)
     force = world.rotation(k).T * outside
     torque = at.cross(force)
     found: dict[int, Expr] = {}
@@ -374,7 +373,7 @@ def armatures(model: Model, symbols: Symbols) -> dict[int, Expr]:
     return found
 
 
-def carried_along(model: Model) -> dict[int, int]:
+def translational_velocities(model: Model) -> dict[int, int]:
     """The translational velocities of floating trees, with the world axis of each."""
     return {
         first + i: i

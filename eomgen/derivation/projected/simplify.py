@@ -1,4 +1,4 @@
-"""Shorter forms of expressions, where they are cheap to find."""
+"""Simplification of expressions by inexpensive rewriting."""
 
 from collections.abc import Collection, Mapping
 
@@ -8,13 +8,13 @@ from eomgen.derivation.solution import is_sum_of_positive_terms
 from eomgen.derivation.symbols import Expr, tidy
 
 MOST_TERMS = 400
-"""Terms of an expanded expression beyond which it is left as it was."""
+"""Largest number of terms of an expanded expression that is rewritten."""
 MOST_FACTORED = 24
-"""Terms of a numerator beyond which factoring it would cost more than it saves."""
+"""Largest number of terms of a numerator that is factored."""
 
 
 def canonical(expression: Expr) -> Expr:
-    """Expanded, with cos² written as 1 - sin²: terms that cancel by Pythagoras do cancel."""
+    """The expanded form with cos² written as 1 - sin², so that terms which are equal cancel."""
     expanded = sp.expand(expression)
     if not any(p.base.func is sp.cos and p.exp.is_Integer for p in expanded.atoms(sp.Pow)):
         return expanded
@@ -40,17 +40,17 @@ def gathered(
     *,
     slack: float = 1.0,
 ) -> Expr:
-    """One term for each product of moving quantities, its coefficient in parameters factored.
+    """A sum with one term for each product of variables, its coefficient in parameters factored.
 
-    `sums` are symbols that stand for sums of parameters; they are written out before coefficients
-    are factored, and written as symbols again after it. An expression that this makes more than
-    `slack` times as long stays as it is.
+    fixed  symbols that depend on parameters alone
+    sums   symbols for sums of parameters, substituted before factoring and restored after it
+    slack  the result may be this many times as long as the shortest form found
     """
     if expression.is_Atom:
         return expression
     flats = [canonical(expression)]
     if any(wave.args[0].is_Add for wave in expression.atoms(sp.sin, sp.cos)):
-        flats.append(tidy(expression))  # θ + φ, and a product of waves that θ is left of
+        flats.append(tidy(expression))  # products of sines and cosines of sums such as θ + φ
     flat = min(flats, key=sp.count_ops)
     terms = sp.Add.make_args(flat)
     if flat == 0 or len(terms) > MOST_TERMS:
@@ -89,7 +89,7 @@ def _with_cosines(coefficients: dict[Expr, Expr]) -> dict[Expr, Expr]:
 
 
 def nested(expression: Expr) -> Expr:
-    """A sum with the sine or cosine that most of its terms share taken out, if that is shorter."""
+    """A sum with the sine or cosine that most terms share factored out, if that is shorter."""
     return min((expression, _nested(expression)), key=sp.count_ops)
 
 
@@ -112,7 +112,7 @@ def _nested(expression: Expr) -> Expr:
 
 
 def _factored(coefficient: Expr) -> Expr:
-    """A coefficient over one denominator, its numerator factored where that is quick."""
+    """A coefficient over one denominator, with its numerator factored if it is short."""
     if coefficient.is_Atom:
         return coefficient
     top, bottom = sp.fraction(sp.together(coefficient))
@@ -128,10 +128,10 @@ def _factored(coefficient: Expr) -> Expr:
 def sum_of_squares(
     total: Expr, fixed: Collection[Expr], sums: Mapping[Expr, Expr], longest: int
 ) -> Expr:
-    """A pivot, a sum of weighted squares, in its shortest form that is positive at sight.
+    """A pivot, given as a sum of weighted squares, in a short form that is manifestly positive.
 
-    A + B sin² + C cos² of one angle may be written with fewer terms; which of them is chosen by
-    what is plainly positive, and if nothing is, or it is long, the sum of squares stays.
+    A + B sin² + C cos² of one angle has several shorter forms; the first that is a sum of positive
+    terms is chosen. If there is none, or the pivot is long, the sum of squares is returned.
     """
     if sp.count_ops(total) > longest:
         return total

@@ -46,9 +46,13 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Drift:
-    """A floating tree's translation, eliminated: root, whole mass, and in axes of the root the mean
-    of the centres' partial velocities and of their accelerations at v̇ = 0; the force in the world.
+class Translation:
+    """The eliminated translation of a floating tree.
+
+    root, mass  index of its root, and the mass of the tree
+    mean        mass-weighted mean of the centres' partial velocities by velocity, in root axes
+    bias        mass-weighted mean of their accelerations at v̇ = 0, in root axes
+    force       the force on the translation, in world axes
     """
 
     root: int
@@ -62,7 +66,7 @@ class Drift:
 class Solution:
     """Definitions in order, the last of them v̇.
 
-    They divide by `pivots`, and by `divisors`, moments of inertia by the name of their body.
+    They divide by `pivots`, and by `divisors`: pairs of a body's name and a moment of inertia.
     """
 
     definitions: dict[Expr, Expr]
@@ -84,15 +88,15 @@ class Elimination:
     divisors: list[tuple[str, Expr]] = field(default_factory=list)
 
     def short(self, expression: Expr) -> Expr:
-        """Gathered, with constant pivots written out where that lets something cancel."""
+        """The expression simplified, with constant pivots substituted where terms then cancel."""
         return self.ledger.short(expression, self.sums)
 
     def named(self, name: str, expression: Expr) -> Expr:
-        """The short form, by a name if it is still long."""
+        """The short form; a new symbol for it if it is long."""
         return self.ledger.named(name, self.short(expression))
 
     def pivot(self, name: str, total: Expr) -> Expr:
-        """A pivot's symbol; constant ones are remembered by what they are."""
+        """The symbol of a pivot; the value of a constant pivot is kept for `short`."""
         fixed, longest = self.ledger.fixed, self.ledger.longest
         form = sum_of_squares(total, fixed, self.sums, longest)
         if form.is_Atom:
@@ -110,41 +114,45 @@ def solve(
     symbols: Symbols,
     bodies: Sequence[Inertia],
     motions: Sequence[Motion],
-    acting: Loads,
+    applied_loads: Loads,
     world: World,
     ledger: Ledger,
 ) -> Solution:
-    """Solve for v̇, under the effects and forces `tau` beside them."""
+    """Solve for v̇ under the effects and further generalised forces `tau`."""
     work = Elimination(symbols, ledger, [], {})
-    _set_forces(model, symbols, bodies, motions, acting, world, work)
-    roots = _roots(model)
-    drifts = []
+    _set_forces(model, symbols, bodies, motions, applied_loads, world, work)
+    roots = model.roots
+    translations = []
     for k, (body, motion) in enumerate(zip(bodies, motions, strict=True)):
         floats = isinstance(model.bodies[roots[k]].joint, Free)
         work.rows += _angular_rows(model, k, body, motion, work)
         if not floats:
-            work.rows += _moving_rows(body, motion, work)
+            work.rows += _linear_rows(body, motion, work)
         elif roots[k] == k:
             tree = [i for i, root in enumerate(roots) if root == k]
-            drifts.append(_drift(model, tree, bodies, motions, world, work))
+            translations.append(_eliminate_translation(model, tree, bodies, motions, world, work))
     for j, inertia in armatures(model, symbols).items():
         work.rows.append(Row(inertia, {j: sp.Integer(1)}, sp.Integer(0)))
     carried = {
-        model.first_velocity[drift.root] + i for drift in drifts for i in range(model.dimensions)
+        model.first_velocity[translation.root] + i
+        for translation in translations
+        for i in range(model.dimensions)
     }
     answers = {}
     for j in _inwards(model):
         if j not in carried:
             answers[j] = _eliminate(j, work)
-    for j in reversed(answers):  # the innermost was eliminated last and is known first
+    for j in reversed(answers):  # the last one eliminated is known first
         ledger.define(symbols.a[j], answers[j])
-    for drift in drifts:
-        _fall(model, symbols, drift, acting.uniform, world, ledger)
+    for translation in translations:
+        _define_translation(model, symbols, translation, applied_loads.uniform, world, ledger)
     return Solution(ledger.definitions, tuple(work.pivots), tuple(work.divisors))
 
 
 def _inwards(model: Model) -> list[int]:
-    """The velocities from the leaves to the root; prismatic ones of a joint first, as cheaper."""
+    """The velocities from the leaves to the root; of a joint the prismatic ones first, which are
+    cheaper to eliminate.
+    """
     order: list[int] = []
     for body, first in reversed([*zip(model.bodies, model.first_velocity, strict=True)]):
         units = [c.unit for c in body.velocities]
@@ -153,27 +161,20 @@ def _inwards(model: Model) -> list[int]:
     return order
 
 
-def _roots(model: Model) -> list[int]:
-    roots: list[int] = []
-    for k, body in enumerate(model.bodies):
-        roots.append(k if body.parent < 0 else roots[body.parent])
-    return roots
-
-
 def _set_forces(
     model: Model,
     symbols: Symbols,
     bodies: Sequence[Inertia],
     motions: Sequence[Motion],
-    acting: Loads,
+    applied_loads: Loads,
     world: World,
     work: Elimination,
 ) -> None:
-    """All forces but uniform gravity, minus the gyroscopic torques ω x I ω."""
+    """Set the generalised forces: all except uniform gravity, minus gyroscopic torques ω x I ω."""
     forces = dict(enumerate(symbols.tau))
-    for j, force in acting.motors.items():
+    for j, force in applied_loads.motors.items():
         forces[j] += force
-    for load in (*acting.gravity, *acting.applied):
+    for load in (*applied_loads.gravity, *applied_loads.applied):
         for j, part in generalised(model, motions, world, load).items():
             forces[j] += part
     for body, motion in zip(bodies, motions, strict=True):
@@ -220,7 +221,7 @@ def _angular_rows(
     return [row for row in rows if row.entries]
 
 
-def _moving_rows(body: Inertia, motion: Motion, work: Elimination) -> list[Row]:
+def _linear_rows(body: Inertia, motion: Motion, work: Elimination) -> list[Row]:
     """Three squares of a body's centre of mass, in its axes."""
     if body.mass == 0:
         return []
@@ -237,15 +238,15 @@ def _moving_rows(body: Inertia, motion: Motion, work: Elimination) -> list[Row]:
     return rows
 
 
-def _drift(
+def _eliminate_translation(
     model: Model,
     tree: Sequence[int],
     bodies: Sequence[Inertia],
     motions: Sequence[Motion],
     world: World,
     work: Elimination,
-) -> Drift:
-    """Eliminate a floating tree's translation, which all its bodies share; adds their rows."""
+) -> Translation:
+    """Eliminate a floating tree's translation, and add the rows of its bodies that are left."""
     root, ledger, name = tree[0], work.ledger, model.bodies[tree[0]].name
     first = model.first_velocity[root]
     carried = range(first, first + model.dimensions)
@@ -294,24 +295,31 @@ def _drift(
             entries = {j: vector[i] for j, vector in apart.items() if vector[i] != 0}
             if entries:
                 work.rows.append(Row(bodies[k].mass, entries, rest[i]))
-    return Drift(root, mass, {j: m for j, m in means.items() if any(m)}, bias, force)
+    return Translation(root, mass, {j: m for j, m in means.items() if any(m)}, bias, force)
 
 
-def _fall(
-    model: Model, symbols: Symbols, drift: Drift, uniform: Expr, world: World, ledger: Ledger
+def _define_translation(
+    model: Model,
+    symbols: Symbols,
+    translation: Translation,
+    uniform: Expr,
+    world: World,
+    ledger: Ledger,
 ) -> None:
     """The acceleration of a floating tree's root: the whole tree's, minus that from other v̇."""
-    inside = -drift.bias
-    for j, part in drift.mean.items():
+    inside = -translation.bias
+    for j, part in translation.mean.items():
         inside -= part * symbols.a[j]
-    first = model.first_velocity[drift.root]
-    outside = uniform + drift.force / drift.mass + world.rotation(drift.root) * inside
+    first = model.first_velocity[translation.root]
+    outside = (
+        uniform + translation.force / translation.mass + world.rotation(translation.root) * inside
+    )
     for i in range(model.dimensions):
         ledger.define(symbols.a[first + i], outside[i])
 
 
 def _eliminate(k: int, work: Elimination) -> Expr:
-    """Eliminate v̇_k; returns it over the v̇ that are left."""
+    """Eliminate v̇_k; return it as an expression in the v̇ that are left."""
     name = work.symbols.v[k].name
     here = [row for row in work.rows if k in row.entries]
     pivot = work.pivot(f"pivot__{name}", sum(row.weight * row.entries[k] ** 2 for row in here))
@@ -331,7 +339,7 @@ def _eliminate(k: int, work: Elimination) -> Expr:
         for row in here:
             row.entries.pop(k)
         work.rows = [row for row in work.rows if row.entries]
-        return _driven(name, force - held, pivot, work)
+        return _acceleration(name, force - held, pivot, work)
     force = work.forces[k] = work.named(f"load__{name}", force)
     bias = work.named(f"bias__{name}", held / pivot)
     for n, row in enumerate(here):
@@ -347,12 +355,12 @@ def _eliminate(k: int, work: Elimination) -> Expr:
         work.forces[j] -= c * force
     if bias in work.ledger.definitions:
         return force / pivot - bias - known
-    return _driven(name, force - held, pivot, work) - known
+    return _acceleration(name, force - held, pivot, work) - known
 
 
-def _driven(name: str, force: Expr, pivot: Expr, work: Elimination) -> Expr:
-    """What the force that is left for a velocity makes of it; a long force gets a name."""
+def _acceleration(name: str, force: Expr, pivot: Expr, work: Elimination) -> Expr:
+    """f / d for a force and a pivot; a long force gets a name."""
     force = nested(work.short(force))
-    if pivot in work.sums:  # f / d is a constant times what moves
+    if pivot in work.sums:  # the pivot is constant, so that terms of f / d may simplify
         return sp.Add(*(work.short(term / pivot) for term in sp.Add.make_args(force)))
     return work.ledger.named(f"drive__{name}", force) / pivot

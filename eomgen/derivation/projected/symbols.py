@@ -35,26 +35,26 @@ class Symbols:
 
     @property
     def fixed(self) -> frozenset[Expr]:
-        """What does not change with time."""
+        """Symbols that are constant in time."""
         named = (self.parameters, self.formulas, self.numbers)
         return frozenset(symbol for symbols in named for symbol in symbols.values())
 
     def number(self, value: Real) -> Expr:
-        """A number of the scene's geometry: 0 and 1 themselves, so that what they make zero
-        vanishes, any other a symbol, so that SymPy rounds nothing.
+        """A number of the scene's geometry: 0, 1 and -1 as integers, which simplify; any other as a
+        symbol, so that SymPy does not round it.
         """
         if value in (0, 1, -1):
             return sp.Integer(int(value))
         return self.numbers[value] if value > 0 else -self.numbers[opposite(value)]
 
     def value(self, formula: Formula) -> Expr:
-        """A quantity over the parameters' symbols."""
+        """A quantity in the parameters' symbols."""
         if formula in self.formulas:
             return self.formulas[formula]
         return evaluate(formula, self.parameters, SympyScalars())
 
     def vector(self, parts: tuple[Formula, ...]) -> Expr:
-        """A vector of the plane or of space as one of space."""
+        """A vector with two or three components as one with three."""
         x, y, *z = (self.value(part) for part in parts)
         return sp.Matrix([x, y, *(z or [0])])
 
@@ -113,9 +113,10 @@ def _sizes(model: Model) -> dict[Real, None]:
 class Ledger:
     """The definitions of a derivation, in order: its only mutable object.
 
-    `fixed` are symbols of parameters. `inline` is the number of operations up to which an
-    expression stands where it is used and gets no name of its own, `longest` that up to which it is
-    worth making shorter. `rates` are time derivatives of symbols that have one.
+    fixed    symbols that depend on parameters alone
+    inline   largest number of operations of an expression that is not given a name
+    longest  largest number of operations of an expression that is simplified
+    rates    time derivatives of symbols; a symbol without an entry is constant
     """
 
     fixed: frozenset[Expr]
@@ -138,7 +139,7 @@ class Ledger:
         return self.define(real(name), expression)
 
     def short(self, expression: Expr, sums: Mapping[Expr, Expr] | None = None) -> Expr:
-        """Gathered (see there), if it is not too long; of a vector each component."""
+        """An expression, or each component of a vector, simplified by `gathered` unless long."""
         if isinstance(expression, sp.MatrixBase):
             return expression.applyfunc(self.short)
         if expression.is_Atom or sp.count_ops(expression) > self.longest:

@@ -1,6 +1,6 @@
 """The bases of effects on degrees of freedom of one joint, of several, or of all."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from eomgen.errors import SceneError, nearest
 from eomgen.language.base import Identifier
+from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Mechanism, Scalar, Vector
 from eomgen.scene.effects.bodies import wrong
 from eomgen.scene.effects.vectors import dot, length, scale
@@ -62,6 +63,15 @@ def joint_dof(mechanism: Mechanism, joint: str, kind: str, index: int) -> Dof:
     per_sine = mechanism.call("select", -w, -per_sine, per_sine)
     direction = scale(per_sine, vector)
     return Dof(joint, index, half + half, direction, rates)
+
+
+def spring_energy(mechanism: Mechanism, stiffness: Formula, stretches: Iterable[Scalar]) -> Scalar:
+    """Σ ½ k s², J."""
+    total = mechanism.number(0.0)
+    for stretch in stretches:
+        half = mechanism.number(0.5) * mechanism.value(stiffness)
+        total = total + half * (stretch * stretch)
+    return total
 
 
 class OnJoints(EffectTable):

@@ -10,7 +10,7 @@ from eomgen.language.conditions import are_zero
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import JointLoad, Mechanism, Scalar
-from eomgen.scene.effects.dofs import Dof, OnJoints
+from eomgen.scene.effects.dofs import Dof, OnJoints, spring_energy
 from eomgen.scene.effects.spring import check_law
 
 
@@ -80,15 +80,11 @@ class JointSpring(OnJoints):
         return self.law is None and are_zero(values, self.damping)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """½ k s², summed over degrees of freedom, J."""
-        total = mechanism.number(0.0)
+        """½ k s², J; 0 with a law."""
         if self.law is not None:
-            return total
-        for dof in self.dofs(mechanism):
-            stretch = self._stretch(mechanism, dof)
-            half = mechanism.number(0.5) * mechanism.value(self.stiffness)
-            total = total + half * (stretch * stretch)
-        return total
+            return mechanism.number(0.0)
+        stretches = (self._stretch(mechanism, dof) for dof in self.dofs(mechanism))
+        return spring_energy(mechanism, self.stiffness, stretches)
 
     def _stretch(self, mechanism: Mechanism, dof: Dof) -> Scalar:
         return dof.value - mechanism.value(self.rest)

@@ -10,7 +10,7 @@ from eomgen.language.conditions import Condition, a_part, are_zero, in_order
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import Contact, JointLoad, Mechanism, Scalar
-from eomgen.scene.effects.dofs import Dof, OnJoints
+from eomgen.scene.effects.dofs import Dof, OnJoints, spring_energy
 from eomgen.scene.effects.vectors import negative
 
 
@@ -108,15 +108,11 @@ class JointStop(OnJoints):
         return mechanism.call("select", beyond, above, or_below)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
-        """½ k x², J; of a rigid stop 0."""
-        total = mechanism.number(0.0)
+        """½ k x², J; 0 for a rigid stop."""
         if self.restitution is not None:
-            return total
-        for dof in self.dofs(mechanism):
-            beyond = self._beyond(mechanism, dof)
-            half = mechanism.number(0.5) * mechanism.value(self.stiffness)
-            total = total + half * (beyond * beyond)
-        return total
+            return mechanism.number(0.0)
+        excesses = (self._beyond(mechanism, dof) for dof in self.dofs(mechanism))
+        return spring_energy(mechanism, self.stiffness, excesses)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
