@@ -1,4 +1,4 @@
-"""The C backend: C99 and a header that stand alone, fit for firmware."""
+"""The C backend: a C99 source and header without dependencies, suitable for firmware."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,28 +24,28 @@ KEYWORDS = (
     "union unsigned void volatile while _Bool _Complex _Imaginary asm typeof bool true false "
     "nullptr constexpr alignas alignof thread_local static_assert"
 )
-"""Of C99 and of later standards."""
+"""Keywords of C99 and later standards."""
 MACROS = (
     "NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL FP_NAN FP_INFINITE FP_ZERO FP_SUBNORMAL FP_NORMAL "
     "FP_ILOGB0 FP_ILOGBNAN MATH_ERRNO MATH_ERREXCEPT math_errhandling linux unix i386 "
     "DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE MAXFLOAT"
 )
-"""Macros that <math.h> or a compiler may define."""
+"""Macros of <math.h> or of compilers."""
 OURS = "y p u k out extra real R failed"
 C_NAMES = {"abs": "fabs", "min": "fmin", "max": "fmax"}
-"""C names of the functions of formulas, where they differ."""
+"""Names of functions of formulas that differ in C."""
 OWN = {
     "min": ("real a, real b", "b < a ? b : a"),
     "max": ("real a, real b", "b > a ? b : a"),
     "step": ("real x", "x > 0 ? R(1.0) : R(0.0)"),
     "select": ("real c, real a, real b", "c > 0 ? a : b"),
 }
-"""Functions that C lacks or defines otherwise: `fmin` ignores a nan and may return -0.0."""
+"""Functions that C lacks or defines otherwise: `fmin` ignores nan, and may return -0.0."""
 CONSTANTS = (
     "M_E M_LOG2E M_LOG10E M_LN2 M_LN10 M_PI M_PI_2 M_PI_4 M_1_PI M_2_PI M_2_SQRTPI M_SQRT2 "
     "M_SQRT1_2"
 )
-"""Macros of <math.h> on many systems."""
+"""Further macros of <math.h> on many systems."""
 RESERVED = frozenset(
     [*f"{KEYWORDS} {MACROS} {OURS} {CONSTANTS}".split(), *FUNCTIONS, *(f"{f}_" for f in FUNCTIONS)]
 )
@@ -86,8 +86,8 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
 def library(program: Program, interface: Interface) -> Mapping[str, str]:
     """The sources of a shared library: those of `files`, and `MAIN`, which includes them.
 
-    `MAIN` defines `checked_NAME` and `columns_NAME` for each output. They also report whether the
-    result is valid.
+    `MAIN` defines `checked_NAME` and `columns_NAME` for each output, which report whether a result
+    is valid.
     """
     kernels, _ = kernels_of(program, interface, DIALECT)
     place = _places_of(kernels)
@@ -106,7 +106,7 @@ _SHARED = ("scene", "prefix", "kernels")
 
 
 def _places_of(kernels: Sequence[Kernel]) -> dict[str, int]:
-    """The constants that kernels use, each with its index in `k`."""
+    """The constants that kernels take, each with its index in `k`."""
     names = dict.fromkeys(name for kernel in kernels for name in kernel.constants)
     return {name: i for i, name in enumerate(names)}
 
@@ -143,7 +143,7 @@ def _context(
 
 
 def _written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
-    """A kernel as the templates write it."""
+    """A kernel as values for the templates."""
     function, block = kernel.function, kernel.block
     size = math.prod(function.shape)
     along = len(function.extra) if function.tangent else 0
@@ -183,7 +183,7 @@ def _written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
 
 
 def _places(names: Sequence[str], array: str) -> list[tuple[str, str]]:
-    """The variables that are used, each with its element of an array."""
+    """The variables that are used, each with the array element it reads."""
     return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
 
 
@@ -195,7 +195,7 @@ def _table(variables: Sequence[Variable]) -> list[tuple[int, str, str, str, str]
 
 
 def _test(test: Test) -> str:
-    """A comparison that is false for nan."""
+    """The source of a condition that is false for nan."""
     over = "<" if test.condition.strict else "<="
     parts = [f"R({test.condition.low!r}) {over} {test.value}"]
     if test.condition.high != math.inf:
@@ -213,11 +213,11 @@ def _check_words(check: Any) -> str:
 
 
 def _plain(text: str) -> str:
-    """Text of a scene made fit for a C comment: ASCII, one line, without comment marks."""
+    """Text of a scene made safe for a comment: ASCII, on one line, without comment delimiters."""
     kept = "".join(c if c.isprintable() and c.isascii() else " " for c in text)
     return " ".join(kept.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").split())
 
 
 def _quoted(text: str) -> str:
-    """A C string literal; `??` would begin a trigraph."""
+    """Text as a C string literal, without `??`, which would begin a trigraph."""
     return '"' + _plain(text).replace('"', "'").replace("??", "? ?") + '"'

@@ -1,4 +1,4 @@
-"""What a module asks of its parameters, as lines of source."""
+"""Conditions on a module's parameters as lines of source."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from eomgen.program.tape import Stage, Tape
 
 @dataclass(frozen=True)
 class Test:
-    """A condition with the source of its value, and of the numbers `shown` where it is not met."""
+    """A condition with the source of its value, and of the numbers `shown` in its message."""
 
     condition: Condition
     value: str
@@ -22,8 +22,8 @@ class Test:
 
 @dataclass(frozen=True)
 class Refusals:
-    """`lines` are assignments, in order; `tests` what must hold after them; `functions` those that
-    the lines call.
+    """The source of all conditions: assignments, the tests that follow them, and the functions that
+    the assignments call.
     """
 
     lines: tuple[tuple[str, str], ...]
@@ -32,7 +32,7 @@ class Refusals:
 
 
 def refusals(interface: Interface, dialect: Dialect) -> Refusals:
-    """The conditions on a program's parameters, each once."""
+    """The conditions on a program's parameters."""
     conditions = interface.conditions
     tape = Tape()
     scalars = TapeScalars(tape)

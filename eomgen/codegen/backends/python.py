@@ -207,7 +207,7 @@ def watched(program: Program, states: Sequence[str]) -> str:
 
 
 def _test(test: Test) -> str:
-    """A comparison that no nan passes."""
+    """The source of a condition that is false for nan."""
     condition, value = test.condition, test.value
     low, high = f"{condition.low + 0.0!r}", f"{condition.high!r}"
     if condition.high == math.inf:
@@ -216,7 +216,7 @@ def _test(test: Test) -> str:
 
 
 def _words(test: Test) -> str:
-    """The source of what is said where a condition is not met."""
+    """The source of the message for a condition that is not met."""
     condition = test.condition
     names = listed(dict.fromkeys(names_in(condition.value)))
     text = f"parameters {names}: {condition.location}: {condition.words}"
