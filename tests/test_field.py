@@ -243,7 +243,7 @@ def test_the_particles_pass_every_obstacle() -> None:
         ),
         (
             'force = ["x.real", 0]',
-            "effects[0].force[0]: 'x.real' has '.real' at column 2, which no formula may hold",
+            "effects[0].force[0]: 'x.real' has '.real' at column 2, which is not allowed",
         ),
         ('force = ["motion", 0]', "effects[0].force[0]: unknown parameter 'motion'"),
     ],
