@@ -26,7 +26,7 @@ from eomgen.entries import Entries
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
 from eomgen.program.program import Program
-from eomgen.program.saving import ProgramError, restored, saved
+from eomgen.program.saving import restored, saved
 from eomgen.templating import PACKAGE, templates_folder
 
 if TYPE_CHECKING:
@@ -141,10 +141,13 @@ def _kept_program(entries: Entries, key: str) -> tuple[Program, "Interface"] | N
     content = entries.get(_program_key(key))
     if content is None:
         return None
-    with suppress(ProgramError, pickle.UnpicklingError, ValueError, TypeError):
-        # Unpickling can execute code, and so can the stored module: `entries` checks both.
+    from eomgen.codegen.interface import Interface
+
+    # A malformed pickle may raise any error. Unpickling can execute code, and so can the stored
+    # module: `entries` checks that this user wrote both.
+    with suppress(Exception):
         text, interface = pickle.loads(content)
-        return restored(text), interface
+        return (restored(text), interface) if isinstance(interface, Interface) else None
     return None
 
 

@@ -4,6 +4,7 @@ import errno
 import hashlib
 import json
 import os
+import pickle
 import random
 import subprocess
 import sys
@@ -316,6 +317,28 @@ def test_malformed_entries_are_none() -> None:
             assert isinstance(line.name, str)
             assert {type(n) for n in (line.steps, line.derivative, line.jacobian)} == {int}
     assert taken > 50
+
+
+def test_a_malformed_program_is_recorded_again(folder: Path) -> None:
+    """Whatever its entry holds, with the right digest."""
+    model = model_of("pendulum")
+    right = store.program_of(model)
+    path = folder / f"{store._program_key(store._key(model))}.entry"
+    whole = path.read_bytes().partition(b"\n")[2]
+    odd = (b"", b"x", b"cnowhere\nclass\n.", pickle.dumps(3), pickle.dumps(("{}", None)))
+    r = random.Random(3)
+    cut = [whole[: r.randrange(len(whole))] for _ in range(some(3, 100))]
+    flips = [
+        bytes(b ^ (i == at) for i, b in enumerate(whole))
+        for at in r.sample(range(900), some(4, 200))
+    ]
+    for content in flips:  # some are programs, if other ones; none is an error
+        signed(path, content)
+        assert store.program_of(model).outputs
+    for content in (*odd, *cut):
+        signed(path, content)
+        assert store.program_of(model).steps == right.steps
+    assert path.read_bytes().partition(b"\n")[2] == whole
 
 
 def test_writers_at_once(tmp_path: Path) -> None:
