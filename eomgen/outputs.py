@@ -64,18 +64,18 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     ),
     "kinetic_energy": OutputSpec((), "Kinetic energy, J."),
     "potential_energy": OutputSpec((), "Potential energy, J."),
-    "effect_powers": OutputSpec(("effects",), "What each of `EFFECT_NAMES` does to the motion, W."),
+    "effect_powers": OutputSpec(("effects",), "Power of each of `EFFECT_NAMES` on the motion, W."),
     "momentum": OutputSpec(
         (3,),
         "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
         ((6,), "Momentum x, y, z (kg m/s), angular about the world's origin (kg m^2/s)."),
     ),
     "centre_of_mass": OutputSpec(
-        ("dimensions",), "World place of the centre of mass of all bodies, m."
+        ("dimensions",), "World position of the centre of mass of all bodies, m."
     ),
     "joint_forces": OutputSpec(
         ("joints", 3),
-        "What each of `JOINTS` puts on its parent: world x, y (N), moment (N m).",
+        "Force (world x, y; N) and moment (N m) of each of `JOINTS` on its parent.",
         (
             ("joints", 6),
             "Force (N) and moment (N m) of each of `JOINTS` on its parent, world axes.",
@@ -84,25 +84,25 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     ),
     "driving_forces": OutputSpec(
         ("driven",),
-        "What each of `DRIVEN` takes, N m or N, on the child and back on the parent.",
+        "Driving force or torque of each of `DRIVEN` on the child, N or N m.",
         needs="driven joints",
         contacts=True,
     ),
     "body_poses": OutputSpec(
         ("bodies", 3),
-        "World x, y (m) of each centre of mass and angle (rad), a row a body.",
+        "World x, y (m) of each centre of mass and angle (rad), one row a body.",
         (("bodies", 3, 4), "[world_R_body | centre of mass (m)] of each body, 3 x 4."),
     ),
     "body_velocities": OutputSpec(
         ("bodies", 3),
-        "World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s).",
+        "World velocity x, y (m/s) of each centre of mass, angular velocity (rad/s).",
         (
             ("bodies", 6),
             "Velocity of each centre of mass (m/s) and angular velocity (rad/s), world.",
         ),
     ),
     "point_positions": OutputSpec(
-        ("points", "dimensions"), "World place of each of `POINTS`, m.", needs="points"
+        ("points", "dimensions"), "World position of each of `POINTS`, m.", needs="points"
     ),
     "point_velocities": OutputSpec(
         ("points", "dimensions"), "World velocity of each of `POINTS`, m/s.", needs="points"

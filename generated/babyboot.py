@@ -27,9 +27,9 @@ parameters alone are done once.
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (4, k); then every result has a last axis of length k.
 
-All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
-where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
-results of such a state are nan, and those of the others are as they would be alone.
+Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
+ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
+state are nan, and the others are not affected.
 """
 
 from functools import lru_cache
@@ -105,7 +105,7 @@ COST = {
 
 
 def _refused(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
-    """What the scene would refuse in these parameters, in words; or nothing."""
+    """The reason why the scene does not allow these parameters; None if it does."""
     k1 = I_A + I_A
     k2 = 5e-10 * k1
     k3 = I_A + k2 - I_A
@@ -122,7 +122,7 @@ def _refused(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
 
 
 def _fixed(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
-    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
+    """The constants of each kernel, which depend on parameters only; or what is wrong, as text."""
     if not m_A > 0.0:
         return "mass of A is not positive"
     if not I_A >= 0.0:
@@ -659,7 +659,7 @@ _LARGEST = 1e+100
 
 
 def _numbers(values, what):
-    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    """`values` converted exactly to an array of floats; else an error is raised."""
     if values.__class__ is _ARRAY and values.dtype is _FLOAT:
         return values
     if np.ma.is_masked(values):
@@ -677,7 +677,7 @@ def _numbers(values, what):
 
 
 def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
     names = tuple(defaults)
     if hasattr(values, "keys"):
         for name in values.keys():
@@ -700,7 +700,7 @@ def _parameters(p):
 
 
 def _inputs(u, columns):
-    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
     if columns and not hasattr(u, "keys"):
         u = _numbers(u, "inputs")
         if u.ndim == 2:
@@ -757,7 +757,7 @@ def _states(y):
 
 
 def _strict(reach):
-    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    """A context in which NumPy raises an error for overflow, and for underflow without `reach`."""
     under = "ignore" if reach else "raise"
     return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
 
@@ -926,7 +926,7 @@ def potential_energy(t, y, p=None, u=None):
 
 
 def effect_powers(t, y, p=None, u=None):
-    """What each of `EFFECT_NAMES` does to the motion, W."""
+    """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), ('cos', 'sin'), y, p, u)
 
 
@@ -936,7 +936,7 @@ def momentum(t, y, p=None, u=None):
 
 
 def centre_of_mass(t, y, p=None, u=None):
-    """World place of the centre of mass of all bodies, m."""
+    """World position of the centre of mass of all bodies, m."""
     return _evaluate(_centre_of_mass, "centre_of_mass", (3,), ('sin', 'cos'), y, p, u)
 
 

@@ -39,9 +39,9 @@ more on parameters alone are done once.
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (8, k); then every result has a last axis of length k.
 
-All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
-where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
-results of such a state are nan, and those of the others are as they would be alone.
+Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
+ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
+state are nan, and the others are not affected.
 """
 
 from functools import lru_cache
@@ -129,7 +129,7 @@ def select(c, a, b):
 
 
 def _refused(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, ground_friction, ground_slip_speed):
-    """What the scene would refuse in these parameters, in words; or nothing."""
+    """The reason why the scene does not allow these parameters; None if it does."""
     if not ground_radius >= 0.0:
         return 'parameters ground_radius: effects[1].radius: {:g} is negative; give a number >= 0 in m'.format(ground_radius)
     if not ground_friction >= 0.0:
@@ -142,7 +142,7 @@ def _refused(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution,
 
 
 def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, ground_friction, ground_slip_speed):
-    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
+    """The constants of each kernel, which depend on parameters only; or what is wrong, as text."""
     if not m_A > 0.0:
         return "mass of A is not positive"
     if not I_A >= 0.0:
@@ -633,7 +633,7 @@ _LARGEST = 1e+100
 
 
 def _numbers(values, what):
-    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    """`values` converted exactly to an array of floats; else an error is raised."""
     if values.__class__ is _ARRAY and values.dtype is _FLOAT:
         return values
     if np.ma.is_masked(values):
@@ -651,7 +651,7 @@ def _numbers(values, what):
 
 
 def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
     names = tuple(defaults)
     if hasattr(values, "keys"):
         for name in values.keys():
@@ -674,7 +674,7 @@ def _parameters(p):
 
 
 def _inputs(u, columns):
-    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
     if columns and not hasattr(u, "keys"):
         u = _numbers(u, "inputs")
         if u.ndim == 2:
@@ -733,7 +733,7 @@ def _states(y):
 
 
 def _strict(reach):
-    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    """A context in which NumPy raises an error for overflow, and for underflow without `reach`."""
     under = "ignore" if reach else "raise"
     return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
 
@@ -841,12 +841,12 @@ def jacobian(t, y, p=None, u=None):
 
 
 def gaps(t, y, p=None, u=None):
-    """How far apart each of `CONTACTS` is, m or rad; negative where they overlap."""
+    """Gap of each of `CONTACTS`, m or rad; negative if they overlap."""
     return _evaluate(_gaps, "gaps", (3,), ('sin',), y, p, u)
 
 
 def gap_rates(t, y, p=None, u=None):
-    """How fast each of `gaps` grows, m/s or rad/s."""
+    """Time derivative of each of `gaps`, m/s or rad/s."""
     return _evaluate(_gap_rates, "gap_rates", (3,), ('cos',), y, p, u)
 
 

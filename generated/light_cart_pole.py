@@ -22,9 +22,9 @@ parameters alone are done once.
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (4, k); then every result has a last axis of length k.
 
-All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
-where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
-results of such a state are nan, and those of the others are as they would be alone.
+Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
+ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
+state are nan, and the others are not affected.
 """
 
 from functools import lru_cache
@@ -90,7 +90,7 @@ COST = {
 
 
 def _fixed(M, m, l, g):
-    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
+    """The constants of each kernel, which depend on parameters only; or what is wrong, as text."""
     if not M > 0.0:
         return "mass of cart is not positive"
     if not m > 0.0:
@@ -442,7 +442,7 @@ _LARGEST = 1e+100
 
 
 def _numbers(values, what):
-    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    """`values` converted exactly to an array of floats; else an error is raised."""
     if values.__class__ is _ARRAY and values.dtype is _FLOAT:
         return values
     if np.ma.is_masked(values):
@@ -460,7 +460,7 @@ def _numbers(values, what):
 
 
 def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
     names = tuple(defaults)
     if hasattr(values, "keys"):
         for name in values.keys():
@@ -483,7 +483,7 @@ def _parameters(p):
 
 
 def _inputs(u, columns):
-    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
     if columns and not hasattr(u, "keys"):
         u = _numbers(u, "inputs")
         if u.ndim == 2:
@@ -540,7 +540,7 @@ def _states(y):
 
 
 def _strict(reach):
-    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    """A context in which NumPy raises an error for overflow, and for underflow without `reach`."""
     under = "ignore" if reach else "raise"
     return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
 
@@ -710,7 +710,7 @@ def potential_energy(t, y, p=None, u=None):
 
 
 def effect_powers(t, y, p=None, u=None):
-    """What each of `EFFECT_NAMES` does to the motion, W."""
+    """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), ('sin',), y, p, u)
 
 
@@ -720,20 +720,20 @@ def momentum(t, y, p=None, u=None):
 
 
 def centre_of_mass(t, y, p=None, u=None):
-    """World place of the centre of mass of all bodies, m."""
+    """World position of the centre of mass of all bodies, m."""
     return _evaluate(_centre_of_mass, "centre_of_mass", (2,), ('sin', 'cos'), y, p, u)
 
 
 def joint_forces(t, y, p=None, u=None):
-    """What each of `JOINTS` puts on its parent: world x, y (N), moment (N m)."""
+    """Force (world x, y; N) and moment (N m) of each of `JOINTS` on its parent."""
     return _evaluate(_joint_forces, "joint_forces", (2, 3), ('sin', 'cos'), y, p, u)
 
 
 def body_poses(t, y, p=None, u=None):
-    """World x, y (m) of each centre of mass and angle (rad), a row a body."""
+    """World x, y (m) of each centre of mass and angle (rad), one row a body."""
     return _evaluate(_body_poses, "body_poses", (2, 3), ('sin', 'cos'), y, p, u)
 
 
 def body_velocities(t, y, p=None, u=None):
-    """World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s)."""
+    """World velocity x, y (m/s) of each centre of mass, angular velocity (rad/s)."""
     return _evaluate(_body_velocities, "body_velocities", (2, 3), ('sin', 'cos'), y, p, u)

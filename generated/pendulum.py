@@ -18,9 +18,9 @@ One call of `derivative` takes 3 operations: 2 mul, 1 cos; 5 more on parameters 
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (2, k); then every result has a last axis of length k.
 
-All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
-where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
-results of such a state are nan, and those of the others are as they would be alone.
+Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
+ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
+state are nan, and the others are not affected.
 """
 
 from functools import lru_cache
@@ -80,7 +80,7 @@ COST = {
 
 
 def _fixed(bob_mass, pivot_r_child_x, gravity_g):
-    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
+    """The constants of each kernel, which depend on parameters only; or what is wrong, as text."""
     if not bob_mass > 0.0:
         return "mass of bob is not positive"
     pivot_r_child_x_squared = pivot_r_child_x * pivot_r_child_x
@@ -351,7 +351,7 @@ _LARGEST = 1e+100
 
 
 def _numbers(values, what):
-    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    """`values` converted exactly to an array of floats; else an error is raised."""
     if values.__class__ is _ARRAY and values.dtype is _FLOAT:
         return values
     if np.ma.is_masked(values):
@@ -369,7 +369,7 @@ def _numbers(values, what):
 
 
 def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
     names = tuple(defaults)
     if hasattr(values, "keys"):
         for name in values.keys():
@@ -392,7 +392,7 @@ def _parameters(p):
 
 
 def _inputs(u, columns):
-    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
     if columns and not hasattr(u, "keys"):
         u = _numbers(u, "inputs")
         if u.ndim == 2:
@@ -449,7 +449,7 @@ def _states(y):
 
 
 def _strict(reach):
-    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    """A context in which NumPy raises an error for overflow, and for underflow without `reach`."""
     under = "ignore" if reach else "raise"
     return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
 
@@ -618,7 +618,7 @@ def potential_energy(t, y, p=None, u=None):
 
 
 def effect_powers(t, y, p=None, u=None):
-    """What each of `EFFECT_NAMES` does to the motion, W."""
+    """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (1,), ('cos',), y, p, u)
 
 
@@ -628,20 +628,20 @@ def momentum(t, y, p=None, u=None):
 
 
 def centre_of_mass(t, y, p=None, u=None):
-    """World place of the centre of mass of all bodies, m."""
+    """World position of the centre of mass of all bodies, m."""
     return _evaluate(_centre_of_mass, "centre_of_mass", (2,), ('cos', 'sin'), y, p, u)
 
 
 def joint_forces(t, y, p=None, u=None):
-    """What each of `JOINTS` puts on its parent: world x, y (N), moment (N m)."""
+    """Force (world x, y; N) and moment (N m) of each of `JOINTS` on its parent."""
     return _evaluate(_joint_forces, "joint_forces", (1, 3), ('cos', 'sin'), y, p, u)
 
 
 def body_poses(t, y, p=None, u=None):
-    """World x, y (m) of each centre of mass and angle (rad), a row a body."""
+    """World x, y (m) of each centre of mass and angle (rad), one row a body."""
     return _evaluate(_body_poses, "body_poses", (1, 3), ('cos', 'sin'), y, p, u)
 
 
 def body_velocities(t, y, p=None, u=None):
-    """World velocity x, y (m/s) of each centre of mass and rate of turn (rad/s)."""
+    """World velocity x, y (m/s) of each centre of mass, angular velocity (rad/s)."""
     return _evaluate(_body_velocities, "body_velocities", (1, 3), ('cos', 'sin'), y, p, u)

@@ -32,9 +32,9 @@ alone are done once.
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
 columns of an array (13, k); then every result has a last axis of length k.
 
-All that is given must be 64-bit floats, or convert to them exactly. A state that is not finite, or
-where a result is not, is refused: a ValueError or ArithmeticError says why. Among columns, the
-results of such a state are nan, and those of the others are as they would be alone.
+Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
+ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
+state are nan, and the others are not affected.
 """
 
 from functools import lru_cache
@@ -123,7 +123,7 @@ COST = {
 
 
 def _refused(m, I_1, I_2, I_3, stem_at_y):
-    """What the scene would refuse in these parameters, in words; or nothing."""
+    """The reason why the scene does not allow these parameters; None if it does."""
     k1 = I_1 + I_2
     k2 = 5e-10 * (I_3 + k1)
     if not min(min(I_2 + I_3 + k2 - I_1, k2 + (I_1 + I_3) - I_2), k1 + k2 - I_3) >= 0.0:
@@ -132,7 +132,7 @@ def _refused(m, I_1, I_2, I_3, stem_at_y):
 
 
 def _fixed(m, I_1, I_2, I_3, stem_at_y):
-    """All that depends on parameters alone, for each kernel; or what is wrong with them, in words."""
+    """The constants of each kernel, which depend on parameters only; or what is wrong, as text."""
     if not m > 0.0:
         return "mass of nut is not positive"
     if not I_1 >= 0.0:
@@ -939,7 +939,7 @@ _LARGEST = 1e+100
 
 
 def _numbers(values, what):
-    """`values` as an array of floats, exactly as they are; what cannot be is an error."""
+    """`values` converted exactly to an array of floats; else an error is raised."""
     if values.__class__ is _ARRAY and values.dtype is _FLOAT:
         return values
     if np.ma.is_masked(values):
@@ -957,7 +957,7 @@ def _numbers(values, what):
 
 
 def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; a wrong name, shape or value is an error."""
+    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
     names = tuple(defaults)
     if hasattr(values, "keys"):
         for name in values.keys():
@@ -980,7 +980,7 @@ def _parameters(p):
 
 
 def _inputs(u, columns):
-    """Inputs of one state, `columns` being (); or of columns, (k,), for each its own or the same."""
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
     if columns and not hasattr(u, "keys"):
         u = _numbers(u, "inputs")
         if u.ndim == 2:
@@ -1040,7 +1040,7 @@ def _states(y):
 
 
 def _strict(reach):
-    """NumPy's numbers raise an error where they overflow; or vanish, if that is to be expected."""
+    """A context in which NumPy raises an error for overflow, and for underflow without `reach`."""
     under = "ignore" if reach else "raise"
     return np.errstate(divide="raise", over="raise", under=under, invalid="raise")
 
@@ -1210,7 +1210,7 @@ def potential_energy(t, y, p=None, u=None):
 
 
 def effect_powers(t, y, p=None, u=None):
-    """What each of `EFFECT_NAMES` does to the motion, W."""
+    """Power of each of `EFFECT_NAMES` on the motion, W."""
     return _evaluate(_effect_powers, "effect_powers", (0,), (), y, p, u)
 
 
@@ -1220,7 +1220,7 @@ def momentum(t, y, p=None, u=None):
 
 
 def centre_of_mass(t, y, p=None, u=None):
-    """World place of the centre of mass of all bodies, m."""
+    """World position of the centre of mass of all bodies, m."""
     return _evaluate(_centre_of_mass, "centre_of_mass", (3,), (), y, p, u)
 
 
@@ -1240,7 +1240,7 @@ def body_velocities(t, y, p=None, u=None):
 
 
 def point_positions(t, y, p=None, u=None):
-    """World place of each of `POINTS`, m."""
+    """World position of each of `POINTS`, m."""
     return _evaluate(_point_positions, "point_positions", (1, 3), (), y, p, u)
 
 

@@ -14,10 +14,10 @@ ABOUT = {
     "initial_state": "The scene's initial state; momenta follow the parameters.",
     "derivative": "Time derivative of the state.",
     "jacobian": JACOBIAN.about,
-    "gaps": "How far apart each of `CONTACTS` is, m or rad; negative where they overlap.",
-    "gap_rates": "How fast each of `gaps` grows, m/s or rad/s.",
-    "switching_functions": "`derivative` has another branch where one of these passes 0.",
-    "switching_functions_of_time": "As `switching_functions`; these depend on time alone.",
+    "gaps": "Gap of each of `CONTACTS`, m or rad; negative if they overlap.",
+    "gap_rates": "Time derivative of each of `gaps`, m/s or rad/s.",
+    "switching_functions": "`derivative` changes its branch where one of these passes 0.",
+    "switching_functions_of_time": "As `switching_functions`; these depend on time only.",
 }
 """Docstrings of the outputs that users do not ask for; those of the others are in `OUTPUTS`."""
 
