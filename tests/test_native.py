@@ -33,6 +33,10 @@ CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 pytestmark = pytest.mark.skipif(CC is None, reason="there is no C compiler")
 FEW = ("tumbling_body", "bouncing_two_body", "cart_pole")
 LARGE = "hanging_figure human_figure puma560 quadruped ragdoll stiff_beam walker_motors".split()
+NOT_IN_FLOAT = ("babyboot", "ragdoll")
+"""Of the first a condition that holds with equality is missed by rounding; the second has weights
+of 1e-200, which are 0 in float.
+"""
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off")
 OUTPUTS = (
     *("derivative", "jacobian", "mass_matrix", "velocity_force", "kinetic_energy", "body_poses"),
@@ -187,7 +191,11 @@ def test_it_stands_alone(scene: str, real: str, tmp_path: Path) -> None:
     for command in (kernels, program):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
-    done = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True)
+    done = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=False)
+    if real == "float" and scene in NOT_IN_FLOAT:
+        assert done.returncode == 1 or "nan" in done.stdout, "it works now: see docs/c.md"
+        return
+    assert done.returncode == 0
     *numbers, refusal = done.stdout.split("\n")[:-1]
     _, python = pair(scene)
     wanted = python.derivative(0.0, python.initial_state())
