@@ -24,6 +24,8 @@ USUAL_CONSTANT = 1e100
 """… and constants from its inverse up to it, apart from weights of about 1e-200. Products of
 these do not underflow by accident.
 """
+EXACT = 2**53
+"""Largest time that kernels take: a whole number up to it is a float; nan and inf are beyond."""
 OTHERS = ("initial_state", "forward_dynamics", "inverse_dynamics", "impact", "held")
 """Outputs with other arguments, which the Python module computes."""
 _FLOAT, _POINTER, _LONG, _REAL = np.dtype(float), ctypes.c_void_p, ctypes.c_long, ctypes.c_double
@@ -101,7 +103,8 @@ class _Kernels:
         columns = self._columns(name, shape)
 
         def function(t: float, y: Any, p: Any = None, u: Any = None) -> Any:
-            if y.__class__ is np.ndarray and y.dtype is _FLOAT and len(y) == states:
+            usual = y.__class__ is np.ndarray and y.dtype is _FLOAT and y.shape[:1] == (states,)
+            if usual and isinstance(t, (float, int)) and abs(t) <= EXACT:
                 if y.ndim == 2 and y.shape[1]:
                     return columns(t, y, p, u)
                 k = own if p is None else self.held(p)
