@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -83,14 +84,11 @@ def _found(chosen: str, path: str) -> Compiler:
             return _asked(tuple(shlex.split(chosen)))
         except (OSError, ValueError, subprocess.SubprocessError):
             raise RunError(f"CC: '{chosen}' does not run; name a C compiler or unset it") from None
-    for name in KNOWN:
-        if found := shutil.which(name, path=path):
-            try:
-                return _asked((found,))
-            except (OSError, subprocess.SubprocessError):
-                continue
-    if importlib.util.find_spec("ziglang"):
-        return _asked((sys.executable, "-m", "ziglang", "cc"))
+    commands = [(found,) for name in KNOWN if (found := shutil.which(name, path=path))]
+    zig = (sys.executable, "-m", "ziglang", "cc")
+    for command in (*commands, *([zig] if importlib.util.find_spec("ziglang") else [])):
+        with suppress(OSError, subprocess.SubprocessError):
+            return _asked(command)
     raise RunError(ABSENT)
 
 
