@@ -106,11 +106,14 @@ def translated(module: Module, model: Model, backend: str) -> Module:
     from eomgen.codegen.backends import c, find_backend
 
     program, interface = interfaced_program_of(model)
-    (_, source), *others = find_backend(backend).files(program, interface).items()
-    made = replace(module, source=source, backend=backend, others=dict(others))
     if backend == "c":
-        return replace(made, library=c.library(program, interface), reference=module.source)
-    return made
+        library = c.library(program, interface)
+        written = {name: text for name, text in library.items() if name != c.MAIN}
+        module = replace(module, library=library, reference=module.source)
+    else:
+        written = dict(find_backend(backend).files(program, interface))
+    (_, source), *others = written.items()
+    return replace(module, source=source, backend=backend, others=dict(others))
 
 
 def compiled(

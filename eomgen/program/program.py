@@ -27,6 +27,16 @@ class Check:
     node: int
     may_vanish: bool
 
+    @property
+    def relation(self) -> str:
+        """The comparison with 0 that the value must pass."""
+        return ">=" if self.may_vanish else ">"
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with a value that does not pass it."""
+        return "negative" if self.may_vanish else "not positive"
+
 
 @dataclass(frozen=True)
 class Program:

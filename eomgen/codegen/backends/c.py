@@ -6,7 +6,7 @@ from typing import Any
 
 from eomgen.codegen.backends.conditions import Test, refusals
 from eomgen.codegen.interface import Interface, Variable
-from eomgen.codegen.kernels import Constants, Kernel, kernels_of
+from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.language.formula import names_in
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
@@ -32,7 +32,7 @@ MACROS = (
 )
 """Macros of <math.h> or of compilers."""
 OURS = "y p u k out extra real R failed"
-C_NAMES = {"abs": "fabs", "min": "fmin", "max": "fmax"}
+C_NAMES = {"abs": "fabs"}
 """Names of functions of formulas that differ in C."""
 OWN = {
     "min": ("real a, real b", "b < a ? b : a"),
@@ -59,9 +59,11 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
     `-std=c99` in GCC) and with the same mathematical library, each function returns the same bits
     as that of the Python module.
     """
-    kernels, constants = kernels_of(program, interface, DIALECT)
+    return _files(_context(program, interface), interface)
+
+
+def _files(context: Mapping[str, Any], interface: Interface) -> dict[str, str]:
     name = interface.name
-    context = _context(kernels, constants, interface)
     shared = {key: context[key] for key in _SHARED}
     return {
         f"{name}.c": render(TEMPLATES, "module.c.jinja", context),
@@ -89,37 +91,31 @@ def library(program: Program, interface: Interface) -> Mapping[str, str]:
     `MAIN` defines `checked_NAME` and `columns_NAME` for each output, which report whether a result
     is valid.
     """
-    kernels, _ = kernels_of(program, interface, DIALECT)
-    place = _places_of(kernels)
-    context = {
+    context = _context(program, interface)
+    checked = {
         "prefix": interface.name,
         "states": len(interface.states),
         "inputs": len(interface.inputs),
         "parameters": len(interface.parameters),
-        "held": len(place),
-        "kernels": [_written(kernel, place) for kernel in kernels],
+        "held": len(context["held"]),
+        "kernels": context["kernels"],
     }
-    return {**files(program, interface), MAIN: render(TEMPLATES, "checked.c.jinja", context)}
+    return {**_files(context, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
 
 
 _SHARED = ("scene", "prefix", "kernels")
 
 
-def _places_of(kernels: Sequence[Kernel]) -> dict[str, int]:
-    """The constants that kernels take, each with its index in `k`."""
-    names = dict.fromkeys(name for kernel in kernels for name in kernel.constants)
-    return {name: i for i, name in enumerate(names)}
-
-
-def _context(
-    kernels: Sequence[Kernel], constants: Constants, interface: Interface
-) -> dict[str, Any]:
+def _context(program: Program, interface: Interface) -> dict[str, Any]:
+    """Values for the template of the source."""
+    kernels, constants = kernels_of(program, interface, DIALECT)
     refused = refusals(interface, DIALECT)
     called = {f for kernel in kernels for f in kernel.block.functions}
     called |= {*constants.functions, *refused.functions}
-    place = _places_of(kernels)
+    held = dict.fromkeys(name for kernel in kernels for name in kernel.constants)
+    place = {name: i for i, name in enumerate(held)}
     checks = [
-        (f"{source} {'>=' if check.may_vanish else '>'} 0", _quoted(_check_words(check)))
+        (f"{source} {check.relation} 0", _quoted(f"{check.about} is {check.problem}"))
         for check, source in constants.checks
     ]
     tests = [(_test(test), _quoted(_test_words(test))) for test in refused.tests]
@@ -206,10 +202,6 @@ def _test(test: Test) -> str:
 def _test_words(test: Test) -> str:
     names = ", ".join(dict.fromkeys(names_in(test.condition.value)))
     return f"parameters {names}: {test.condition.location} is out of bounds"
-
-
-def _check_words(check: Any) -> str:
-    return f"{check.about} is {'negative' if check.may_vanish else 'not positive'}"
 
 
 def _plain(text: str) -> str:

@@ -50,7 +50,7 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
         "parameter_names": ", ".join(constants.parameters),
         "checked": constants.checked,
         "checks": [
-            (check.about.replace('"', "'"), source, ">=" if check.may_vanish else ">")
+            (check.about.replace('"', "'"), source, check.relation)
             for check, source in constants.checks
         ],
         "fixed": constants.lines,

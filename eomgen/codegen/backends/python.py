@@ -138,7 +138,7 @@ def module(program: Program, interface: Interface) -> str:
         "dynamics": [(written[name], *rest) for name, *rest in dynamics if name in written],
         "checked": constants.checked,
         "checks": [
-            (_plain(check.about), source, *_BOUNDS[check.may_vanish])
+            (_plain(check.about), source, check.relation, check.problem)
             for check, source in constants.checks
         ],
         "fixed": constants.lines,
@@ -223,10 +223,6 @@ def _words(test: Test) -> str:
     if test.shown:
         return f"{text!r}.format({', '.join(test.shown)})"
     return repr(text.replace("{{", "{").replace("}}", "}"))
-
-
-_BOUNDS = {False: (">", "not positive"), True: (">=", "negative")}
-"""Comparison of a check, and the message if it fails, by whether its value may vanish."""
 
 
 def _unpacking(names: Sequence[str]) -> str:
