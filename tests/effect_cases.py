@@ -379,14 +379,14 @@ def _cases() -> list[Case]:
 
 
 def _part() -> list[Case]:
-    """The first case of each effect in the plane and in space; of the others a third in each."""
+    """The first case of each effect in the plane and in space; of the others a fifth in each."""
     met: dict[tuple[str, str], int] = {}
     found = []
     for case in CASES:
         label, base = case.name.rsplit(", ", 1)
         kind = label.split()[0]
         turn = met[kind, base] = met.get((kind, base), -1) + 1
-        if base == "pins" or turn == 0 or turn % 3 == (1 if base == "plane" else 2):
+        if base == "pins" or turn == 0 or turn % 5 == (1 if base == "plane" else 3):
             found.append(case)
     return found
 

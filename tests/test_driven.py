@@ -28,7 +28,7 @@ from eomgen.scene.reader import parse_scene
 
 ROUNDING = 1e-11
 """What the recursions keep to in floats; of the trees here the worst is off by 2e-13."""
-TREES = [*product((PLANE, SPACE), range(some(24, 120)))]
+TREES = [*product((PLANE, SPACE), range(some(16, 120)))]
 FEW = [(PLANE, 3), (PLANE, 38), (SPACE, 11), (SPACE, 14), (SPACE, 47)]
 ROUTES = ("aba", "ldl")
 
@@ -135,8 +135,8 @@ def test_as_the_judge_has_it(dimensions: int, seed: int) -> None:
 def test_the_trees_are_given_much() -> None:
     """Driven and locked coordinates of all kinds occur often."""
     cases = [given(dimensions, seed, (6, 14, 30)[seed % 3]) for dimensions, seed in TREES]
-    assert sum(len(case.driven) for case in cases) > some(60, 200)
-    assert sum(len(case.locked) for case in cases) > some(60, 200)
+    assert sum(len(case.driven) for case in cases) > some(40, 200)
+    assert sum(len(case.locked) for case in cases) > some(40, 200)
 
 
 # In 60 digits, as modules.

@@ -16,7 +16,7 @@ from eomgen.pipeline import compile_scene
 from eomgen.scene.reader import parse_scene
 
 TOLERANCE = 1e-12
-MANY = some(300, 1000)
+MANY = some(150, 1000)
 TREES = [random_tree(seed) for seed in SEEDS]
 
 

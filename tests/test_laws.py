@@ -44,7 +44,7 @@ TREES = {  # of up to 5 bodies; together they have everything
     "space_293": (293, 3),
     "space_377": (377, 3),
 }
-LIKE_OTHERS = some(("hanging_figure", "ragdoll"), ())
+LIKE_OTHERS = some(("hanging_figure", "quadruped", "ragdoll"), ())
 CASES = [(name, "") for name in built_in_names() if name not in LIKE_OTHERS]
 CASES += [(name, ("aba", "ldl")[i % 2]) for i, name in enumerate(TREES)]
 SMALL = [name for name in built_in_names() if name not in LARGE]

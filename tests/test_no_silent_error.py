@@ -98,7 +98,7 @@ ONCE_SILENT = {
 }
 
 
-@pytest.mark.parametrize("number", ONCE_SILENT)
+@pytest.mark.parametrize("number", some([*ONCE_SILENT][::2], [*ONCE_SILENT]))
 def test_not_silent_again(number: int) -> None:
     """What the campaign found. No route keeps its digits for those that are refused, or told."""
     outcome = "refused" if number in REFUSED else "told" if number in REPORTED else "right"
@@ -118,7 +118,7 @@ ONCE_REFUSED = {
 }
 
 
-@pytest.mark.parametrize("number", ONCE_REFUSED)
+@pytest.mark.parametrize("number", some([*ONCE_REFUSED][::2], [*ONCE_REFUSED]))
 def test_not_refused(number: int) -> None:
     """Pushed about as if it were alone, a body that is slight beside others costs digits."""
     assert tried(*case(number)) == "right", ONCE_REFUSED[number]
