@@ -242,6 +242,12 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
         type=_path,
         help="continue an earlier run as if it had not ended",
     )
+    parser.add_argument(
+        "--backend",
+        metavar="NAME",
+        default="auto",
+        help="auto (default): steps in compiled C code if that pays; numpy: never; c: always",
+    )
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="compute the work of each effect")
     _values(parser)

@@ -40,7 +40,7 @@ INTEGRATORS: Mapping[str, IntegratorSpec] = {
     "gauss_4": IntegratorSpec("Gauss collocation, order 4", "symplectic", "gauss_4:INTEGRATOR"),
     "gauss_6": IntegratorSpec("Gauss collocation, order 6", "symplectic", "gauss_6:INTEGRATOR"),
     "RK45": IntegratorSpec("Dormand-Prince 5(4), by SciPy", "explicit", "from_scipy:RK45"),
-    "DOP853": IntegratorSpec("Dormand-Prince 8(5,3), by SciPy", "explicit", "from_scipy:DOP853"),
+    "DOP853": IntegratorSpec("Dormand-Prince 8(5,3)", "explicit", "dormand_prince_8:INTEGRATOR"),
     "gragg_bulirsch_stoer": IntegratorSpec(
         "extrapolated modified midpoint rule, variable order",
         "explicit",

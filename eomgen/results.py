@@ -157,6 +157,7 @@ class Run:
     choice      the choice of method and tolerances, if `accuracy` or `budget` was given
     estimate    the estimate of the error by a second run, if asked for
     begun       how it continues an earlier run; "" if it does not
+    compiled    whether steps were made in compiled code
     """
 
     model: Model
@@ -169,6 +170,7 @@ class Run:
     choice: "Choice | None" = None
     estimate: "Estimate | None" = None
     begun: str = ""
+    compiled: bool = False
 
     @property
     def t(self) -> FloatArray:

@@ -88,7 +88,7 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     A store that cannot be trusted, read or written is not used, and the result has a notice. A
     damaged entry is replaced.
     """
-    directory, key = folder(), _key(model)
+    directory, key = folder(), key_of(model)
     kept = _code(Entries(directory).get(key)) if directory else None
     if kept and not anew:
         return kept
@@ -117,7 +117,7 @@ def program_of(model: Model) -> Program:
 
 def interfaced_program_of(model: Model) -> tuple[Program, "Interface"]:
     """The program of a model's code and its interface, which is all that a backend needs."""
-    directory, key = folder(), _key(model)
+    directory, key = folder(), key_of(model)
     if directory and (kept := _kept_program(Entries(directory), key)):
         return kept
     # Imported here because the modules that derive equations take long to load.
@@ -178,7 +178,8 @@ def _code(content: bytes | None) -> Code | None:
     return Code(module, poses, passes, tuple(explanation), tuple(notices), derived=False)
 
 
-def _key(model: Model) -> str:
+def key_of(model: Model) -> str:
+    """The key of a model's code: a digest of all that determines it."""
     digest = hashlib.sha256(_generator_digest())
     digest.update(repr(replace(model, notices=())).encode())
     return digest.hexdigest()[:32]

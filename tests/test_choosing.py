@@ -12,7 +12,7 @@ from campaign import some
 
 from eomgen.cli import main
 from eomgen.model.elaborate import elaborate
-from eomgen.run.checks import SMALLEST_RTOL
+from eomgen.run.integrators.interface import SMALLEST_RTOL
 from eomgen.run.module import load_module
 from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import COUNTS, Trajectory
@@ -274,7 +274,7 @@ def test_what_was_put_aside(monkeypatch: pytest.MonkeyPatch) -> None:
         name: min(one.rtol or 0 for one in made if one.integrator == name)
         for name in {one.integrator for one in made}
     }
-    assert tightest == {"LSODA": 1e-12, "DOP853": 1e-13, "gauss_6": 0}
+    assert tightest == {"LSODA": 1e-12, "DOP853": 1e-16}
 
 
 def test_impacts_have_a_floor_of_their_own() -> None:
@@ -317,9 +317,9 @@ def test_a_second_run_reports_the_error() -> None:
         assert found.most >= found.last
         assert found.last > 0.9 * off or setting.dt is None
         assert found.second.tolerance < first.tolerance
-    tightest = case.run(Setting("DOP853", SMALLEST_RTOL, 1e-16))
+    tightest = case.run(Setting("DOP853", 1e-16, 1e-16))
     found = by_second_run(case, tightest)
-    assert found.second.tolerance > SMALLEST_RTOL and 1e-16 < found.last < 1e-11
+    assert found.second.tolerance > 1e-16 and 1e-16 < found.last < 1e-11
 
 
 def rows(folder: Path) -> FloatArray:

@@ -144,9 +144,9 @@ def test_a_universal_joint_crosses_gimbal_lock(method: str) -> None:
 
 
 def test_a_start_in_gimbal_lock_stops_with_the_reason() -> None:
-    """There a turn about the first axis has no acceleration."""
+    """There a turn about the first axis has no acceleration, and its rate falls at 1e11/s."""
     model = cardan("q = { j_angle_2_deg = 90.0 }, v = { j_angle_1_dot = 1.0 }")
     module = load_module(python_module(compile_program(model, jacobian=False).system), "locked")
-    run = integrate(problem_of(module, model=model), "DOP853", 1.0)
+    run = integrate(problem_of(module, model=model), "RK45", 1.0)
     assert not run.finished and math.isfinite(run.y[-1].sum())
     assert LOCK in run.message and "take a joint of type 'ball'" in run.message

@@ -26,6 +26,8 @@ from eomgen.run.integrators import (
     gauss_6,
     implicit_midpoint,
 )
+from eomgen.run.integrators import dop853_coefficients as coefficients
+from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.integrators.runge_kutta_4 import TABLEAU
@@ -734,10 +736,21 @@ def collocation(method):
     return {"a": tuple(map(tuple, a.tolist())), "b": method.b, "c": method.c, "order": method.order}
 
 
+def dormand_prince(weights, order):
+    """The stages of DOP853 with the weights of one of its sums."""
+    rows = coefficients.STAGES
+    return {
+        "a": tuple(tuple(row.get(j, 0.0) for j in range(len(rows))) for row in rows),
+        "b": tuple(weights.get(j, 0.0) for j in range(len(rows))),
+        "c": coefficients.NODES[: len(rows)],
+        "order": order,
+    }
+
+
 PROVED = {
     "rk4": {"a": TABLEAU.a, "b": TABLEAU.b, "c": TABLEAU.c, "order": 4},
     "RK45": scipys(RK45, 5),
-    "DOP853": scipys(DOP853, 8),
+    "DOP853": dormand_prince(coefficients.END, 8),
     **{name: collocation(module.METHOD) for name, module in GAUSS.items()},
 }
 
@@ -758,6 +771,51 @@ def test_tableaus_prove_their_order(name):
             given = tuple(map(tuple, rows)) if part == "a" else tuple(rows)
             with pytest.raises(ValueError, match="tableau: "):
                 ButcherTableau(**{**whole, part: given})
+
+
+def test_the_error_estimates_of_dop853_have_their_orders():
+    """They are differences from methods of orders 5 and 3, and of no higher ones."""
+    fifth = {i: coefficients.END[i] - x for i, x in coefficients.ERROR_5.items()}
+    for weights, order in ((fifth, 5), (coefficients.ORDER_3, 3)):
+        ButcherTableau(**dormand_prince(weights, order))
+        with pytest.raises(ValueError, match=f"not of order {order + 1}"):
+            ButcherTableau(**dormand_prince(weights, order + 1))
+
+
+def test_dop853_makes_the_steps_of_scipys():
+    """But for rounding: states, lengths of steps, and dense output, whose order is 7."""
+    errors, same = [], 0
+    for rtol in (1e-6, 1e-10):
+        ours, theirs = (
+            solver(PENDULUM.derivative, 0.0, PENDULUM.initial, 9.0, rtol=rtol, atol=1e-3 * rtol)
+            for solver in (DormandPrince8, DOP853)
+        )
+        while theirs.status == "running":
+            ours.t, ours.y, ours.f, ours.h_abs = theirs.t, theirs.y, theirs.f, theirs.h_abs
+            ours.step(), theirs.step()
+            # The estimate of the error is a difference with few digits: the length of the next
+            # step, or of this one if it was repeated, is not the same.
+            assert ours.t == pytest.approx(theirs.t, rel=1e-3)
+            assert ours.h_abs == pytest.approx(theirs.h_abs, rel=0.1)
+            if ours.t == theirs.t:
+                same += 1
+                assert ours.y == pytest.approx(theirs.y, abs=1e-14)
+                times = np.linspace(theirs.t_old, theirs.t, 5)[1:-1]
+                dense = [solver.dense_output()(times) for solver in (ours, theirs)]
+                assert dense[0] == pytest.approx(dense[1], abs=1e-14)
+        assert ours.status == "finished"
+    assert same > 30
+    for h in (0.4, 0.2):  # one step of each length, against a very accurate run
+        step = DormandPrince8(
+            PENDULUM.derivative, 0.0, PENDULUM.initial, 9.0, rtol=1.0, atol=1.0, max_step=h
+        )
+        step.h_abs = h
+        step.step()
+        true = solve_ivp(
+            PENDULUM.derivative, (0, h / 3), PENDULUM.initial, "DOP853", rtol=1e-13, atol=1e-15
+        )
+        errors.append(np.abs(step.dense_output()(h / 3) - true.y[:, -1]).max())
+    assert 7.5 < math.log2(errors[0] / errors[1]) < 8.7  # the local error is of order 8
 
 
 def test_a_method_of_shares_is_checked_too():

@@ -43,7 +43,7 @@ def model_of(name: str) -> Model:
 
 
 def entry_of(folder: Path, name: str) -> Path:
-    return folder / f"{store._key(model_of(name))}.entry"
+    return folder / f"{store.key_of(model_of(name))}.entry"
 
 
 def signed(path: Path, content: bytes) -> None:
@@ -323,7 +323,7 @@ def test_a_malformed_program_is_recorded_again(folder: Path) -> None:
     """Whatever its entry holds, with the right digest."""
     model = model_of("pendulum")
     right = store.program_of(model)
-    path = folder / f"{store._program_key(store._key(model))}.entry"
+    path = folder / f"{store._program_key(store.key_of(model))}.entry"
     whole = path.read_bytes().partition(b"\n")[2]
     odd = (b"", b"x", b"cnowhere\nclass\n.", pickle.dumps(3), pickle.dumps(("{}", None)))
     r = random.Random(3)
@@ -511,12 +511,12 @@ def test_the_key_names_all_that_shapes_the_code(monkeypatch: pytest.MonkeyPatch)
 def test_every_number_of_a_model_is_in_its_key() -> None:
     """Change any value of a scene by its last digit: the key is another."""
     text = (BUILT_IN / "spinning_top.toml").read_text("utf-8")
-    key = store._key(elaborate(parse_scene(text)))
+    key = store.key_of(elaborate(parse_scene(text)))
     changed = text.replace("9.81", "9.8100000000000005")
     assert text != changed and 9.81 == 9.8100000000000005
-    assert store._key(elaborate(parse_scene(changed))) == key
+    assert store.key_of(elaborate(parse_scene(changed))) == key
     changed = text.replace("9.81", "9.810000000000002")
-    assert store._key(elaborate(parse_scene(changed))) != key
+    assert store.key_of(elaborate(parse_scene(changed))) != key
     assert generate(model_of("pendulum")).module.encode() == RIGHT
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from eomgen.study.accuracy.trial import Case, Setting, Tried
 
 GuardMode = Literal["stop", "repair"]
+Backend = Literal["auto", "numpy", "c"]
 EarlierRun = str | PathLike[str] | Run
 
 
@@ -61,6 +62,7 @@ class Plan:
     unstable: bool = False
     estimate: bool = False
     resume: EarlierRun | None = None
+    backend: Backend = "auto"
 
 
 def simulate(
@@ -84,6 +86,7 @@ def simulate(
     unstable: bool = False,
     estimate: bool = False,
     resume: EarlierRun | None = None,
+    backend: Backend = "auto",
     follow: "Follow | None" = None,
 ) -> Run:
     """Simulate a scene from its initial state.
@@ -106,6 +109,9 @@ def simulate(
     unstable    allow steps of an explicit fixed-step method that are too long for stability
     estimate    estimate the error by a second run
     resume      continue an earlier run: a `Run`, or its archive `.npz`
+    backend     "numpy": make all steps in Python; "c": make those of DOP853 in compiled C code,
+                with the same bits; "auto": do so if a library is in the store, or if the run is
+                longer than compiling takes and there is a compiler
     follow      called with time and state after each step; a true result stops the run
 
     A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
@@ -131,6 +137,7 @@ def simulate(
         unstable=unstable,
         estimate=estimate,
         resume=resume,
+        backend=backend,
     )
     return run_plan(plan, follow=follow)
 
@@ -156,6 +163,7 @@ def plan_run(
     unstable: bool = False,
     estimate: bool = False,
     resume: EarlierRun | None = None,
+    backend: Backend = "auto",
     reporter: Reporter = SILENT,
 ) -> Plan:
     """Check the arguments of `simulate`, which describes them, for a scene's model.
@@ -168,6 +176,8 @@ def plan_run(
     parameters, inputs = values_of(model, parameters, inputs, reporter)
     if guard not in (None, "stop", "repair"):
         raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
+    if backend not in ("auto", "numpy", "c"):
+        raise RunError(f"{reporter.argument('backend')}: '{backend}' is none of auto, numpy, c")
     setting = None
     if not aims:
         setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
@@ -192,6 +202,7 @@ def plan_run(
         unstable=unstable,
         estimate=estimate,
         resume=resume,
+        backend=backend,
     )
 
 
@@ -212,6 +223,15 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         "unstable": plan.unstable,
     }
     problem = problem_of(functions, *values, model)
+    accelerator = None
+    if plan.backend != "numpy":
+        from eomgen.native.accelerator import Accelerator
+
+        accelerator = Accelerator(model, functions, *values)
+        problem = accelerator.of(problem)
+        if plan.backend == "c":
+            with reporter.waiting(f"compiling {model.name} …"):
+                accelerator.compile()
     start = _start(plan, problem)
     if start is not None:
         problem = start.problem
@@ -220,7 +240,9 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     if plan.setting is None or plan.estimate:
         from eomgen.study.accuracy.moved import moved_problem
 
-        moved = moved_problem(functions, model, *values)
+        moved = moved_problem(
+            functions, model, *values, compiled=accelerator.of if accelerator else None
+        )
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     warnings, error = [*model.notices, *module.notices], math.nan
@@ -238,6 +260,8 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
         estimate = by_second_run(case, trial)
         error = estimate.last
+    if accelerator and accelerator.notice:
+        warnings.append(f"the run was not compiled: {accelerator.notice}")
     model = model.with_parameters(plan.parameters)
     return Run(
         model,
@@ -250,6 +274,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         choice=choice,
         estimate=estimate,
         begun=start.reported(trajectory) if start else "",
+        compiled=accelerator is not None and accelerator.used,
     )
 
 

@@ -49,6 +49,7 @@ def simulate(given: Arguments) -> int:
         unstable=given.unstable,
         estimate=given.estimate,
         resume=given.resume,
+        backend=given.backend,
         reporter=reporter,
     )
     paths = output_paths(given.output, name, figure=given.plot, force=given.force)
@@ -74,7 +75,8 @@ def _report(given: Arguments, run: Run) -> str:
     trajectory = run.trajectory
     print(
         f"{run.model.name}: {trajectory.t[-1]:g} s by {trajectory.integrator}, "
-        f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives "
+        f"{trajectory.counts['steps']} steps, {trajectory.counts['derivatives']} derivatives"
+        f"{' in C' if run.compiled else ''} "
         f"({'derived now' if run.module.derived else 'module fresh, not derived again'})"
     )
     if run.begun:

@@ -3,7 +3,7 @@
 import ctypes
 import hashlib
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from eomgen.codegen.backends.c import MAIN
@@ -21,22 +21,42 @@ higher one gains little.
 
 
 def built(sources: Mapping[str, str]) -> ctypes.CDLL:
-    """Compile and load the library of C sources (name to text).
+    """The library of C sources, name to text, from the store or compiled now.
 
-    The library is stored under a digest of the sources, the compiler's version and the flags.
     Raises `RunError` if there is no compiler, or if it fails.
     """
-    compiler = find_compiler()
-    level = LEVELS[sum(map(len, sources.values())) > LARGE]
-    known = repr((sorted(sources.items()), compiler, FLAGS, level))
-    key = hashlib.sha256(known.encode()).hexdigest()[:32]
-    place = folder("native")
-    content = Entries(place).get(key) if place else None
-    if content is None:
-        content = compiler.shared_library(sources, MAIN, level)
-        if place:
-            Entries(place).put(key, content)
+    return compiled_library(repr(sorted(sources.items())), lambda: sources, MAIN)
+
+
+def compiled_library(
+    about: str, sources: Callable[[], Mapping[str, str]], main: str
+) -> ctypes.CDLL:
+    """The library of C sources, of which `main` includes the others.
+
+    It is stored under a digest of `about`, which must determine the sources, of the compiler's
+    version and of the flags. Raises `RunError` if there is no compiler, or if it fails.
+    """
+    kept = kept_library(about)
+    if kept is not None:
+        return kept
+    texts = sources()
+    level = LEVELS[sum(map(len, texts.values())) > LARGE]
+    content = find_compiler().shared_library(texts, main, level)
+    if place := folder("native"):
+        Entries(place).put(_key(about), content)
     return _loaded(content)
+
+
+def kept_library(about: str) -> ctypes.CDLL | None:
+    """The same if it is in the store, or None. Raises `RunError` if there is no compiler."""
+    place = folder("native")
+    content = Entries(place).get(_key(about)) if place else None
+    return None if content is None else _loaded(content)
+
+
+def _key(about: str) -> str:
+    known = repr((about, find_compiler(), FLAGS, LEVELS))
+    return hashlib.sha256(known.encode()).hexdigest()[:32]
 
 
 def _loaded(content: bytes) -> ctypes.CDLL:

@@ -8,7 +8,7 @@ new, and computes the outputs that take further arguments.
 
 import ctypes
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import ModuleType
 from typing import Any
 
@@ -38,7 +38,7 @@ def compiled_module(module: Any, library: ctypes.CDLL) -> Any:
     """
     made = ModuleType(f"{module.NAME}_compiled", module.__doc__)
     made.__dict__.update({k: v for k, v in vars(module).items() if not k.startswith("__")})
-    kernels = _Kernels(module, library)
+    kernels = Kernels(module, library)
     for name, shape in _outputs(library).items():
         if name not in OTHERS:
             setattr(made, name, kernels.output(name, shape))
@@ -52,7 +52,7 @@ def _outputs(library: ctypes.CDLL) -> dict[str, tuple[int, ...]]:
     return {name: tuple(map(int, shape)) for name, *shape in lines}
 
 
-class _Kernels:
+class Kernels:
     """The kernels of a library, and the constants of the parameter sets used so far."""
 
     def __init__(self, module: Any, library: ctypes.CDLL) -> None:
@@ -79,10 +79,7 @@ class _Kernels:
         call = self.library.constants_of
         call.argtypes = [_POINTER, _POINTER]
         wrong = call(values.tobytes(), k)
-        sizes = [abs(x) for x in k if x and not 1e-240 < abs(x) < 1e-160]
-        usual = all(1 / USUAL < abs(x) < USUAL for x in values.tolist() if x)
-        usual = usual and all(1 / USUAL_CONSTANT < size < USUAL_CONSTANT for size in sizes)
-        return k if usual and not wrong else None
+        return k if are_usual(values.tolist(), k) and not wrong else None
 
     def given(self, u: Any, *columns: int) -> FloatArray | None:
         """Inputs as an array; None if the Python module must be used."""
@@ -146,6 +143,13 @@ class _Kernels:
             return result.reshape(*shape, count)
 
         return columns
+
+
+def are_usual(parameters: Iterable[float], constants: Iterable[float]) -> bool:
+    """Whether kernels can compute with such numbers: products of these do not underflow."""
+    sizes = [abs(x) for x in constants if x and not 1e-240 < abs(x) < 1e-160]
+    usual = all(1 / USUAL < abs(x) < USUAL for x in parameters if x)
+    return usual and all(1 / USUAL_CONSTANT < size < USUAL_CONSTANT for size in sizes)
 
 
 def _ordered(values: Any, defaults: dict[str, float]) -> FloatArray | None:

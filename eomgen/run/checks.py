@@ -5,12 +5,10 @@ import math
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.run.integrators import INTEGRATORS, FixedStep, fixed_step
+from eomgen.run.integrators import INTEGRATORS, Adaptive, FixedStep, fixed_step
 from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import FloatArray, Problem
 
-SMALLEST_RTOL = 2.3e-14
-"""SciPy silently raises an rtol below 100 times the machine epsilon; here it is an error."""
 LEAST_STEPS = 1000
 """Least number of steps of an adaptive method if longer ones cannot be checked for branches."""
 MOST_SAMPLES = 1_000_000
@@ -61,15 +59,16 @@ def allowed_errors(
     return np.asarray(relative * sizes)
 
 
-def check_tolerances(rtol: float, atol: float | None) -> None:
-    """Raise `RunError` for tolerances that are not positive, or that doubles cannot meet."""
+def check_tolerances(method: FixedStep | Adaptive, rtol: float, atol: float | None) -> None:
+    """Raise `RunError` for tolerances that are not positive, or that the method cannot meet."""
+    least = method.smallest_rtol if isinstance(method, Adaptive) else 0.0
     for name, tolerance in (("rtol", rtol), ("atol", atol)):
         if tolerance is None:
             continue
         if not (math.isfinite(tolerance) and tolerance > 0):
             raise RunError(f"{name}: {tolerance:g} is not a positive number")
-    if rtol < SMALLEST_RTOL:
-        raise RunError(f"rtol: {rtol:g} is too small; the smallest allowed is {SMALLEST_RTOL:g}")
+    if rtol < least:
+        raise RunError(f"rtol: {rtol:g} is too small; the smallest allowed is {least:g}")
 
 
 def check_samples(samples: int | None) -> None:

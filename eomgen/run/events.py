@@ -205,7 +205,7 @@ def _strike(
 
     def instant(struck: int | None = None) -> Advance:
         y = now.y
-        return Advance(t, y, [], problem, lambda _: y, is_step=False, struck=struck)
+        return Advance(t, y, [], problem, lambda _: y, steps=0, struck=struck)
 
     sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
     free = accelerations(contacts, t, now.y)
@@ -243,7 +243,7 @@ def _open(contacts: Contacts, problem: Problem, now: _Status, opened: Sequence[i
         now.slack[k] = _slack(contacts, now.t, now.y, k)
     events = tuple(Event(now.t, contacts.names[k], "lift", 0.0) for k in opened)
     y = now.y
-    return Advance(now.t, y, [], problem, lambda _: y, is_step=False, events=events)
+    return Advance(now.t, y, [], problem, lambda _: y, steps=0, events=events)
 
 
 def _slack(contacts: Contacts, t: float, y: FloatArray, contact: int) -> float:

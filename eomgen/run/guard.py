@@ -166,7 +166,7 @@ def repaired(
                     monitor.stretches[-1] = since, advance.t, max(worst, loss)
                     monitor.repairing = loss > REGAINED * monitor.bound
             t, y = advance.t, advance.y
-            made += advance.is_step
+            made += advance.steps
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             yield advance

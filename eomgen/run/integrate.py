@@ -115,7 +115,15 @@ def integrate(
         checked = None if unstable or not method.explicit or repairs else problem
         begin, settings = equal_steps(asked, method, counted, checked)
     else:
-        begin, settings = adaptive_steps(asked, method, problem, remarks.append)
+        # Compiled steps are not checked for what needs the state within a step.
+        plain = not (monitor or powers or problem.contacts or problem.corners)
+        compiled = problem.compiled if plain else None
+        if compiled and compiled.derivative is not problem.derivative:
+            compiled = None
+        steps = compiled.steps if compiled else None
+        begin, settings = adaptive_steps(
+            asked, method, problem, remarks.append, steps=steps, each=tally is not None
+        )
 
     gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else GAP_CHECKS
     stepper = events.Stepper(begin, gap_checks, calls.derivatives.of)
@@ -259,7 +267,7 @@ class _Run:
             self.works.extend(self.account.book(self.t, self.y, advance))
         self.t, self.y = advance.t, advance.y
         self.rows.extend(advance.samples)
-        self.steps += advance.is_step
+        self.steps += advance.steps
         self.capped += advance.capped
         self.cut += advance.cut
         self.events.extend(advance.events)
@@ -321,6 +329,7 @@ def _follow(
                 if not _is_finite(advance):
                     raise StepFailure("the state overflows or is not a number", method.remedy)
                 run.take(advance)
+                calls.derivatives.calls += advance.derivatives
                 if tally:
                     tally.take(advance, calls.derivatives.calls, calls.jacobians.calls)
                 report((run.t - t_start) / (t_end - t_start))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.errors import RunError
+from eomgen.run.compiled import Compiled
 from eomgen.run.intervals import Interval
 from eomgen.run.origin import Origin
 
@@ -35,6 +36,8 @@ def unexplained(t: float, y: FloatArray, initial: FloatArray) -> None:
     """An `Explain` without a model: it knows no reason."""
 
 
+USUAL_LENGTH = (1e-100, 1e100)
+"""Bounds of lengths whose squares neither overflow nor underflow."""
 SHORTEST = 1e-150
 """A quaternion shorter than this gives no orientation: its square underflows."""
 
@@ -108,6 +111,7 @@ class Problem:
                 might pass over what begins and ends within it
     switching   the switching functions of these corners; None if not known
     origin      what the motion depends on, to check runs that continue; None if not known
+    compiled    steps of `derivative` in compiled code; None if there are none
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
     quaternion in it is 0.
@@ -129,6 +133,7 @@ class Problem:
     noise: Callable[[float], FloatArray] | None = None
     operations: Mapping[str, int] = field(default_factory=dict)
     columns: bool = False
+    compiled: Compiled | None = None
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)
@@ -162,7 +167,11 @@ class Problem:
             return y
         values = y.tolist()
         for indices in self.quaternions:
-            length = math.hypot(*(values[i] for i in indices))
+            a, b, c, d = (values[i] for i in indices)
+            # Like this also in compiled steps, for the same bits.
+            length = math.sqrt(a * a + b * b + c * c + d * d)
+            if not USUAL_LENGTH[0] < length < USUAL_LENGTH[1]:
+                length = math.hypot(a, b, c, d)
             if math.isfinite(length):
                 for i in indices:
                     values[i] /= length

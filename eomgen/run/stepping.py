@@ -1,6 +1,6 @@
 """The steps of a run, from its arguments."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +16,9 @@ from eomgen.run.checks import (
     longest_steps,
     numbers,
 )
-from eomgen.run.integrators import FixedStep, adaptive, fixed_step
-from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Resume
-from eomgen.run.integrators.unwarned import Remark
+from eomgen.run.compiled import Steps
+from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
+from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume
 from eomgen.run.problem import Problem
 
 ADAPTIVE_SAMPLES = 1001
@@ -49,7 +49,7 @@ class Asked:
 
     def __post_init__(self) -> None:
         check_times(self.t_start, self.t_end)
-        check_tolerances(self.rtol, self.atol)
+        check_tolerances(find_integrator(self.integrator), self.rtol, self.atol)
         check_samples(self.samples)
 
     @property
@@ -92,11 +92,19 @@ def equal_steps(
 
 
 def adaptive_steps(
-    asked: Asked, method: Adaptive, problem: Problem, remark: Remark
+    asked: Asked,
+    method: Adaptive,
+    problem: Problem,
+    remark: Remark,
+    *,
+    steps: Callable[[str], Steps | None] | None = None,
+    each: bool = True,
 ) -> tuple[Begin, Resume]:
     """A function that begins adaptive steps, and the settings that a later run compares.
 
     remark  called with the method's remarks
+    steps   see `run.compiled.Compiled`
+    each    whether each compiled step becomes an `Advance`
 
     Raises `RunError` if `dt` is given, or `max_step` is invalid.
     """
@@ -121,6 +129,8 @@ def adaptive_steps(
             made=made,
             remark=remark,
             resume=resume,
+            steps=steps,
+            each=each,
         )
 
     return begin, {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}

@@ -57,7 +57,7 @@ class Tally:
         Raises `EndedRunError` if `check` or `follow` ends the run.
         """
         assert self.low is not None and self.high is not None
-        self.steps += advance.is_step
+        self.steps += advance.steps
         self.factorisations += advance.factorisations
         self.rows += len(advance.samples)
         self.derivatives, self.jacobians = derivatives, jacobians

@@ -84,7 +84,7 @@ class Account:
             self.total = self.total.copy()
             self.total[slot] += energy(advance.t, advance.y) - energy(t, y)
         length = advance.t - t
-        if not advance.is_step or length <= 0:
+        if not advance.steps or length <= 0:
             return [self.total for _ in advance.samples]
         state = advance.within if self._dense else self._cubic(t, y, advance)
         times = [time for time, _ in advance.samples]

@@ -1,8 +1,7 @@
 """The methods of the integrators in `eomgen.integrators`, by name."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pkgutil import resolve_name
-from types import MappingProxyType
 
 from eomgen import integrators
 from eomgen.errors import RunError, nearest
@@ -17,12 +16,23 @@ __all__ = [
     "find_integrator",
 ]
 
-INTEGRATORS: Mapping[str, FixedStep | Adaptive] = MappingProxyType(
-    {
-        name: resolve_name(f"{__name__}.{spec.method}")
-        for name, spec in integrators.INTEGRATORS.items()
-    }
-)
+
+class _Methods(Mapping[str, FixedStep | Adaptive]):
+    """The methods by name. Each is imported when it is first used: some load much of SciPy."""
+
+    def __getitem__(self, name: str) -> FixedStep | Adaptive:
+        method = resolve_name(f"{__name__}.{integrators.INTEGRATORS[name].method}")
+        assert isinstance(method, FixedStep | Adaptive)
+        return method
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(integrators.INTEGRATORS)
+
+    def __len__(self) -> int:
+        return len(integrators.INTEGRATORS)
+
+
+INTEGRATORS = _Methods()
 
 
 def find_integrator(name: str) -> FixedStep | Adaptive:

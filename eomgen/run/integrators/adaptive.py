@@ -1,6 +1,6 @@
-"""The steps of SciPy's adaptive methods, and of methods with the same interface.
+"""The steps of SciPy's adaptive methods, and of our own with the same interface.
 
-RK45 and DOP853 are explicit (Dormand, Prince), Radau is Radau IIA of order 5, BDF and LSODA are
+RK45 and our DOP853 are explicit (Dormand, Prince), Radau is Radau IIA of order 5, BDF and LSODA are
 multistep methods; LSODA switches between stiff and nonstiff methods by itself (Hindmarsh, Petzold).
 The implicit ones are given the problem's exact Jacobian, except `Radau_differences` and
 `BDF_differences`, which approximate it by differences of derivatives that count as derivatives.
@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from eomgen.run.branches import BranchMonitor, Retry, Step
-from eomgen.run.integrators.interface import Adaptive, Advance, Resume, StepFailure
+from eomgen.run.compiled import Steps
+from eomgen.run.integrators.interface import Adaptive, Advance, Remark, Resume, StepFailure
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
-from eomgen.run.integrators.unwarned import BDF, Radau, Remark
+from eomgen.run.integrators.strides import Strides, continuation
 from eomgen.run.problem import FloatArray, Problem
 
 _STALLED = 100
@@ -61,6 +62,8 @@ def advances(
     made: int,
     remark: Remark,
     resume: Resume | None = None,
+    steps: Callable[[str], Steps | None] | None = None,
+    each: bool = True,
 ) -> Iterator[Advance]:
     """Yield the steps of `method`, each with samples at those of `times` (ascending) within it.
 
@@ -71,15 +74,27 @@ def advances(
 
     made    number of earlier steps, which count towards `bounds.most`
     remark  called with what SciPy would warn of
+    steps   see `run.compiled.Compiled`; used where steps need no check of their own
+    each    whether each compiled step is yielded, or many at once
 
     Raises `StepFailure` if the method fails, or after `bounds.most` steps.
     """
     stepper = _Stepper(method, problem, t_end, bounds, remark)
     stepper.begin(t_start, resume)
     sampled, stalled, cut = int(np.searchsorted(times, t_start, side="right")), 0, 0
-    left, factored = bounds.most - made, 0
-    for here in range(left):
+    left, factored, here = bounds.most - made, 0, 0
+    compiled = Strides(method, problem, t_end, bounds, times) if steps and method.compiled else None
+    while here < left:
         _check_pace(problem, stepper, t_start, here, left)
+        found = steps(method.compiled) if steps and compiled else None
+        if compiled and found:
+            until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
+            stride = compiled.made(found, stepper.solver, sampled, until - here)
+            if stride:
+                yield from compiled.advances(stride, sampled, stepper.is_whole, each)
+                here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
+                continue
+        here += 1
         step = stepper.step()
         t, y = step.end, step.last
         # LSODA continues with steps so short that t + h rounds to t; the others stop by themselves.
@@ -151,7 +166,7 @@ class _Stepper:
         self.solver: Any = self.method.solver(
             self._problem.derivative, t, y.copy(), bound, max_step=self._longest, **options
         )
-        if isinstance(self.solver, Radau | BDF):
+        if hasattr(self.solver, "remark"):
             self.solver.remark = self._remark
         self.solver.t_bound = until
         self._until = until
@@ -205,6 +220,11 @@ class _Stepper:
             self.solver.y = step.last.copy()
 
     @property
+    def is_whole(self) -> bool:
+        """Whether no step so far depends on the end of this run."""
+        return self._whole and bool(self.method.memory)
+
+    @property
     def ended(self) -> bool:
         """Whether the run has reached its end."""
         return bool(self.solver.status == "finished" and self._until == self.t_end)
@@ -219,7 +239,7 @@ class _Stepper:
 
         It can if no step so far depends on the end of this run.
         """
-        if not self.method.memory or self.ended or not self._whole:
+        if self.ended or not self.is_whole:
             return None
         memory = self._memory()
         if self._branches:
@@ -227,7 +247,7 @@ class _Stepper:
             memory["until"] = np.inf if reached or self._until == self.t_end else self._until
             memory |= self._branches.memory
         t, y = float(self.solver.t), self._problem.unit(self.solver.y.copy())
-        return partial(_continuation, t, y, memory)
+        return partial(continuation, t, y, memory)
 
     def _memory(self) -> dict[str, Any]:
         return {name: getattr(self.solver, name) for name in self.method.memory}
@@ -255,11 +275,6 @@ def _check_stiff(problem: Problem, solver: Any, span: tuple[float, float], made:
         if why:
             reason = f"{made} steps reached only {solver.t:g} s: {why}"
             raise UnstableStepError(reason, "take --integrator Radau, or BDF")
-
-
-def _continuation(t: float, y: FloatArray, memory: dict[str, Any]) -> Resume:
-    arrays = {name: np.array(value, dtype=np.float64) for name, value in memory.items()}
-    return {"t": np.array(t), "y": y, **arrays}
 
 
 def _restored(value: Any, kind: type) -> Any:

@@ -5,10 +5,7 @@ from scipy import integrate
 from eomgen.run.integrators import unwarned
 from eomgen.run.integrators.interface import Adaptive
 
-_EXPLICIT_MEMORY = ("h_abs", "f")
-
-RK45 = Adaptive(integrate.RK45, memory=_EXPLICIT_MEMORY)
-DOP853 = Adaptive(integrate.DOP853, memory=_EXPLICIT_MEMORY)
+RK45 = Adaptive(integrate.RK45, memory=("h_abs", "f"))
 RADAU = Adaptive(unwarned.Radau, uses_jacobian=True)
 RADAU_DIFFERENCES = Adaptive(unwarned.Radau)
 BDF = Adaptive(unwarned.BDF, uses_jacobian=True, one_step=False)

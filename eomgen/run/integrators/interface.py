@@ -6,7 +6,6 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolver
 
 from eomgen.errors import RunError
 from eomgen.run.problem import FloatArray, Problem
@@ -24,6 +23,8 @@ Resume = Mapping[str, FloatArray]
 """
 
 
+SMALLEST_RTOL = 2.3e-14
+"""SciPy silently raises an rtol below 100 times the machine epsilon; here it is an error."""
 SHORTER = "take a smaller --dt, or an implicit or adaptive method (--integrator Radau)"
 LOOSER = "try another --integrator, or a looser --rtol and --atol"
 """Remedies for runs that fail."""
@@ -42,6 +43,10 @@ class StepFailure(RunError):
 
 class EndedRunError(StepFailure):
     """Raised by a callback of a run to end it; the text says why."""
+
+
+Remark = Callable[[str], None]
+"""Called with a method's remark on a step, as text."""
 
 
 @dataclass(frozen=True)
@@ -65,36 +70,42 @@ class FixedStep:
 
 @dataclass(frozen=True)
 class Adaptive:
-    """A method, SciPy's or one with the same interface, that chooses its steps to meet rtol and
-    atol.
+    """A method that chooses its steps to meet rtol and atol.
 
+    solver         SciPy's `OdeSolver` of the method, or a class with the same interface
     uses_jacobian  whether it is given the problem's Jacobian
     one_step       whether a step depends on the state alone, not on earlier steps; then the state
                    may be corrected between steps
     remedy         what to change when a run fails
+    smallest_rtol  the smallest relative tolerance that it takes
+    compiled       name of its compiled steps, "" if there are none
     memory         attributes of the solver, numbers or arrays, that together with time and state
                    determine the next step; the first is its length. Empty if these do not suffice
     vectors        those of `memory` that have a number for each state
     sees_end       whether its error estimate depends on the derivative at the end of a step
     """
 
-    solver: "Callable[..., OdeSolver[Any]]"
+    solver: Callable[..., Any]
     uses_jacobian: bool = False
     one_step: bool = True
     remedy: str = LOOSER
     memory: tuple[str, ...] = ()
-    vectors: tuple[str, ...] = ("f", "slope")
+    vectors: tuple[str, ...] = ("f", "slope", "lost")
     sees_end: bool = True
+    compiled: str = ""
+    smallest_rtol: float = SMALLEST_RTOL
 
 
 @dataclass(frozen=True)
 class Advance:
-    """A step from the end of the one before: the state `y` (ny,) at its end, time `t`.
+    """A step, or several, from the end of the one before: the state `y` (ny,) at the end, time `t`.
 
     samples  the rows to keep: times and states in the step
     problem  whose derivative was integrated
     within   gives the state at any time in the step; valid until the next step is made
-    is_step  False if no time passes: an impact, or `events` only
+    steps    number of steps; 0 if no time passes: an impact, or `events` only
+    derivatives
+             calls of the derivative that compiled code made, which are not counted otherwise
     struck   number of the contact of an impact
     events   changes of contacts at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts and of the drives during the step,
@@ -102,7 +113,7 @@ class Advance:
     factorisations  LU factorisations in the step, as far as the method counts them
     resume   returns what a later run needs to continue from here exactly as this one does; None if
              this run would not have ended a step here, or if the method cannot continue so
-    capped   whether the step has the greatest length allowed
+    capped   number of steps that have the greatest length allowed
     cut      number of longer attempts that passed over a branch of the derivative
     """
 
@@ -111,13 +122,14 @@ class Advance:
     samples: Sequence[tuple[float, FloatArray]]
     problem: Problem
     within: Callable[[float], FloatArray]
-    is_step: bool = True
+    steps: int = 1
+    derivatives: int = 0
     struck: int | None = None
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, FloatArray], FloatArray] | None = None
     factorisations: int = 0
     resume: Callable[[], Resume] | None = None
-    capped: bool = False
+    capped: int = 0
     cut: int = 0
 
 

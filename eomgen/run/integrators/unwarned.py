@@ -16,8 +16,7 @@ from scipy.integrate import Radau as ScipyRadau
 from scipy.integrate._ode import IntegratorConcurrencyError
 from scipy.linalg import get_lapack_funcs
 
-Remark = Callable[[str], None]
-"""Called with a method's remark on a step, as text."""
+from eomgen.run.integrators.interface import Remark
 
 Matrix = NDArray[np.float64] | NDArray[np.complex128]
 Factors = tuple[Matrix, NDArray[np.int32]]

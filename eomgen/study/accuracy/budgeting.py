@@ -21,6 +21,8 @@ WORTH = 0.5
 """The search ends when no method is expected to reduce the best error to this part of it."""
 FIRST = 1e-4
 """Tolerance of the first runs."""
+LEAST = 1e-14
+"""Smallest error that is aimed at: rounding keeps most runs in doubles from a smaller one."""
 RUNG = 100.0
 """Factor by which a next run is to reduce the error while its convergence is not known."""
 
@@ -81,8 +83,11 @@ def _tightest(search: Search, method: Method, judged: dict[int, float], left: fl
         return None
     last, tightest = own[-1].tolerance, search.tightest(method)
     law, known = error_law(search, method, judged)
-    work = growth(method, own)
+    # Loose runs grow less: a plan that trusts them takes more than the time that is left.
+    work = growth(method, own if _steep(method, own) else own[-1:])
     whole = max(work.tolerance(left / (1 + SECOND)), tightest)
+    if known:
+        whole = max(whole, law.tolerance(LEAST))
     sure = known and _falls(own, judged)
     tolerance = whole if sure else max(whole, last / rung(method, RUNG))
     if tolerance > last / rung(method, TIGHTER) and not last > tolerance == tightest:
@@ -92,6 +97,11 @@ def _tightest(search: Search, method: Method, judged: dict[int, float], left: fl
     cost = work.at(tolerance)
     reach = law.at(whole) if known else 0.0
     return _Aim(Plan(method, tolerance, law.at(tolerance), sure, cost, cost), reach)
+
+
+def _steep(method: Method, own: list[Tried]) -> bool:
+    """Whether a method's work grows at least as its order says."""
+    return -growth(method, own).exponent >= method.growth
 
 
 def _falls(own: list[Tried], judged: dict[int, float]) -> bool:

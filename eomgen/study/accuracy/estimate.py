@@ -19,7 +19,7 @@ from eomgen.run.checks import longest_steps
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.study.accuracy.measure import WRONG
-from eomgen.study.accuracy.trial import TIGHTEST_OF_ALL, Case, Setting, Tried, method_of
+from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
 
 LAST = 0.1
 """Part of a run's time, at its end, over which differences are taken."""
@@ -275,12 +275,12 @@ def by_second_run(case: Case, first: Tried) -> Estimate:
     The second run has a tenth of the tolerances, or half the step; near the tightest tolerance it
     has ten times the tolerances.
     """
-    given, tightest = first.setting, TIGHTEST_OF_ALL
+    given = first.setting
     if given.dt is not None:
         other = replace(given, dt=given.dt / 2)
     else:
         assert given.rtol is not None
-        factor = 0.1 if given.rtol >= 10 * tightest else 10.0
+        factor = 0.1 if given.rtol >= 10 * method_of(given.integrator).tightest else 10.0
         atol = None if given.atol is None else _plain(given.atol * factor)
         other = replace(given, rtol=_plain(given.rtol * factor), atol=atol)
     second = case.run(other, moved=0)

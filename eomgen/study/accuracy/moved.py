@@ -32,13 +32,21 @@ UNIT = float(np.finfo(float).eps)
 
 
 def moved_problem(
-    module: GeneratedModule, model: Model, parameters: Any = None, inputs: Any = None
+    module: GeneratedModule,
+    model: Model,
+    parameters: Any = None,
+    inputs: Any = None,
+    *,
+    compiled: Callable[[Problem, GeneratedModule], Problem] | None = None,
 ) -> Callable[[int], Problem]:
     """A function that gives, by number, the problem of a model's module with constants perturbed in
     one of several patterns of signs, from the same initial state. Each problem is made once.
+
+    compiled  adds compiled steps to a problem and its perturbed module
     """
     program = cache(partial(program_of, model))
-    return cache(partial(_made, module, program, model, parameters, inputs))
+    made = partial(_made, module, program, model, parameters, inputs, compiled)
+    return cache(made)
 
 
 def _made(
@@ -47,11 +55,13 @@ def _made(
     model: Model,
     parameters: Any,
     inputs: Any,
+    compiled: Callable[[Problem, GeneratedModule], Problem] | None,
     seed: int,
 ) -> Problem:
     true = problem_of(module, parameters, inputs, model)
     twin = moved(module, program(), parameters, seed)
-    return replace(problem_of(twin, parameters, inputs, model), initial=true.initial)
+    problem = replace(problem_of(twin, parameters, inputs, model), initial=true.initial)
+    return compiled(problem, twin) if compiled else problem
 
 
 def moved(

@@ -23,9 +23,9 @@ from eomgen.files import write_whole
 from eomgen.model.model import Model
 from eomgen.precision.precise import BITS, digits, precise
 from eomgen.program.program import Program
-from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS
+from eomgen.run.integrators.interface import SMALLEST_RTOL
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress, throttled

@@ -8,8 +8,8 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.precision.precise import BITS
-from eomgen.run.checks import SMALLEST_RTOL
 from eomgen.run.integrate import integrate
+from eomgen.run.integrators.interface import SMALLEST_RTOL
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Problem
 from eomgen.run.progress import Progress

@@ -1,0 +1,148 @@
+"""Whole steps of a method in compiled code, with the bits of the same steps made in Python."""
+
+import ctypes
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from eomgen.codegen.backends import c
+from eomgen.codegen.interface import Interface
+from eomgen.native.module import Kernels, are_usual
+from eomgen.program.program import Program
+from eomgen.run.compiled import Array, Steps, Stride
+from eomgen.run.integrators import dormand_prince_8 as dop853
+from eomgen.run.integrators.dop853_coefficients import NODES, Row
+from eomgen.run.module import given_values
+from eomgen.run.problem import USUAL_LENGTH
+from eomgen.templating import render
+
+MAIN = "runs.c"
+_POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+_UNUSUAL = 2
+"""What C returns before a step that Python must make."""
+
+
+def sources(program: Program, interface: Interface) -> Mapping[str, str]:
+    """The C sources of the derivative and of the methods that step with it."""
+    program = replace(program, outputs={"derivative": program.outputs["derivative"]})
+    functions = tuple(f for f in interface.functions if f.name == "derivative")
+    interface = replace(interface, functions=functions)
+    low, high = USUAL_LENGTH
+    context = {
+        "prefix": interface.name,
+        "main": c.MAIN,
+        "states": len(interface.states),
+        "quaternions": interface.quaternions,
+        "shortest": repr(low),
+        "longest": repr(high),
+        "slopes": dop853.SLOPES,
+        "nodes": [repr(node) for node in NODES],
+        "stages": [(i, _sum(dop853.SUMS[i])) for i in range(1, 12)],
+        "end_sum": _sum(dop853.SUMS[dop853.AT_END]),
+        "long_error": _sum(dop853.SUMS[dop853.LONG_ERROR]),
+        "short_error": _sum(dop853.SUMS[dop853.SHORT_ERROR]),
+        "dense_stages": [
+            (i, _sum(dop853.SUMS[dop853.AT_DENSE + i - 13])) for i in range(13, dop853.SLOPES)
+        ],
+        "dense": [_sum(row) for row in dop853.SUMS[dop853.IN_DENSE :]],
+        "safety": repr(dop853.SAFETY),
+        "power": repr(dop853.POWER),
+        "smallest": repr(dop853.SMALLEST),
+        "greatest": repr(dop853.GREATEST),
+        "short_weight": repr(dop853.SHORT_WEIGHT),
+    }
+    return {**c.library(program, interface), MAIN: render(c.TEMPLATES, "runs.c.jinja", context)}
+
+
+def _sum(row: Row) -> str:
+    """A sum over slopes. It begins with 0 and so is never -0, as where all factors are added."""
+    return " + ".join(["0.0", *(f"{row[j]!r} * k[{j}][j]" for j in sorted(row))])
+
+
+class _Settings(ctypes.Structure):
+    _fields_ = (
+        *((name, _POINTER) for name in ("k", "u", "atol")),
+        *((name, _REAL) for name in ("rtol", "longest", "t_end")),
+    )
+
+
+class _Records(ctypes.Structure):
+    _fields_ = (
+        *((name, _POINTER) for name in ("ends", "lengths", "states", "slopes", "losses")),
+        *((name, _POINTER) for name in ("derivatives", "sampled", "times", "rows")),
+        ("count", _WHOLE),
+    )
+
+
+class CompiledSteps:
+    """The compiled steps of a module at given parameters and inputs.
+
+    The constants are those that the module computes, also where it is a perturbed one.
+    """
+
+    def __init__(self, module: Any, library: ctypes.CDLL, p: Any, u: Any) -> None:
+        kernels = Kernels(module, library)
+        constants = (module._DEFAULT if p is None else module._parameters(p))["derivative"]
+        assert len(constants) == kernels.constants
+        values = {**module.PARAMETERS, **given_values(module, p)[0]}
+        usual = are_usual(values.values(), constants)
+        self._constants = (_REAL * max(1, len(constants)))(*constants) if usual else None
+        self._inputs = kernels.given(u)
+        self._states = kernels.states
+        self._call = library.dop853
+        self._call.restype = ctypes.c_int
+        self._call.argtypes = [_POINTER, _WHOLE, _REAL, _REAL, *[_POINTER] * 5]
+
+    def named(self, name: str) -> Steps | None:
+        """The steps of a method; None if there are none for it, these parameters or inputs."""
+        if self._constants is None or self._inputs is None or name != "dop853":
+            return None
+        held = ctypes.cast(self._constants, _POINTER), self._inputs.ctypes.data
+        return partial(self._dop853, held)
+
+    def _dop853(
+        self,
+        held: tuple[Any, int],
+        t: float,
+        y: Array,
+        memory: Mapping[str, float | Array],
+        *,
+        t_end: float,
+        rtol: float,
+        atol: Array,
+        longest: float,
+        times: Array,
+        most: int,
+    ) -> Stride:
+        """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
+        ny = self._states
+        ends, lengths = np.empty((2, most))
+        states, slopes, losses = np.empty((3, most, ny))
+        derivatives, sampled = np.empty((2, most), np.int64)
+        rows, made = np.empty((len(times), ny)), ctypes.c_int64()
+        arrays = (ends, lengths, states, slopes, losses, derivatives, sampled, times, rows)
+        records = _Records(*(array.ctypes.data for array in arrays), len(times))
+        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end)
+        start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
+        why = self._call(
+            ctypes.byref(settings),
+            most,
+            t,
+            float(memory["h_abs"]),
+            *(array.ctypes.data for array in start),
+            ctypes.byref(records),
+            ctypes.byref(made),
+        )
+        n = made.value
+        return Stride(
+            ends[:n],
+            states[:n],
+            {"h_abs": lengths[:n], "f": slopes[:n], "lost": losses[:n]},
+            derivatives[:n],
+            sampled[:n],
+            rows,
+            usual=why != _UNUSUAL,
+        )

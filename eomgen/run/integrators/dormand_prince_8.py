@@ -1,0 +1,202 @@
+"""The method of Dormand and Prince of order 8 with dense output of order 7, known as DOP853.
+
+Hairer, Norsett, Wanner, Solving ODEs I, sections II.5 and II.6; steps are chosen as in SciPy's
+DOP853. The sums over slopes are taken term by term in a fixed order. So a run has the same bits on
+every machine on which its derivative has them, and also when C makes its steps: see
+`eomgen.native.runs` and `templates/c/runs.c.jinja`, which repeats this arithmetic line by line.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from eomgen.run.integrators.dop853_coefficients import (
+    DENSE,
+    DENSE_STAGES,
+    END,
+    ERROR_5,
+    NODES,
+    ORDER_3,
+    STAGES,
+    Row,
+)
+from eomgen.run.integrators.interface import Adaptive
+from eomgen.run.problem import FloatArray
+
+SUMS: tuple[Row, ...] = (
+    *STAGES,
+    END,
+    ERROR_5,
+    {i: END.get(i, 0.0) - ORDER_3.get(i, 0.0) for i in {**END, **ORDER_3}},
+    *DENSE_STAGES,
+    *DENSE,
+)
+"""All sums over the slopes of a step, by their factors."""
+AT_END, LONG_ERROR, SHORT_ERROR, AT_DENSE, IN_DENSE = 12, 13, 14, 15, 18
+"""The numbers of these sums from `END` on, and of the first of `DENSE_STAGES` and of `DENSE`."""
+SLOPES = len(NODES)
+MATRIX = np.array([[row.get(j, 0.0) for j in range(SLOPES)] for row in SUMS])
+"""The factors, (22, 16): one row a sum, one column a slope."""
+SAFETY, SMALLEST, GREATEST = 0.9, 0.2, 10.0
+"""Factor for the next step's length, and its bounds."""
+POWER = -1 / 8
+SHORT_WEIGHT = 0.01
+"""Weight of the square of the error of order 3."""
+TOO_SHORT = "Required step size is less than spacing between numbers."
+
+# The parts of sums to which slope j adds: stage j + 1 and all sums behind it.
+_ADDED = tuple(
+    np.ascontiguousarray(MATRIX[(j + 1 if j < 12 else j + 3) :, j, None]) for j in range(SLOPES)
+)
+
+
+class DormandPrince8:
+    """A solver of y' = fun(t, y) from `t0` on, with the interface of SciPy's.
+
+    Its state consists of `t`, `y`, the length `h_abs` of the next step in s, the slope `f` at t, y,
+    and what rounding took from y, `lost`. That is added to the next change, or else the errors of
+    these sums would limit the accuracy (Hairer, Lubich, Wanner, Geometric Numerical Integration,
+    section VIII.5).
+    """
+
+    nlu = 0
+
+    def __init__(
+        self,
+        fun: Callable[[float, FloatArray], FloatArray],
+        t0: float,
+        y0: FloatArray,
+        t_bound: float,
+        *,
+        rtol: float,
+        atol: float | FloatArray,
+        max_step: float = math.inf,
+    ) -> None:
+        self.fun, self.rtol, self.atol, self.max_step = fun, rtol, atol, max_step
+        self.t, self.y, self.t_bound = float(t0), y0, t_bound
+        self.t_old = self.t
+        self.status: Literal["running", "finished", "failed"] = "running"
+        self.f, self.lost = fun(self.t, y0), np.zeros(len(y0))
+        self.h_abs = self._first_length(min(t_bound - self.t, max_step))
+        self._slopes = np.empty((SLOPES, len(y0)))
+        self._sums = np.empty((len(SUMS), len(y0)))
+        products = np.empty_like(self._sums)
+        self._parts = [
+            (slope, factors, products[-len(factors) :], self._sums[-len(factors) :])
+            for slope, factors in zip(self._slopes, _ADDED, strict=True)
+        ]
+        self._step = (0.0, y0)
+        self._dense: Callable[[FloatArray | float], FloatArray] | None = None
+
+    def _first_length(self, longest: float) -> float:
+        """The length of the first step. Hairer, Norsett, Wanner I, section II.4."""
+        t, y, f = self.t, self.y, self.f
+        if not len(y):
+            return longest
+        scale = self.atol + np.abs(y) * self.rtol
+        size, speed = _norm(y / scale), _norm(f / scale)
+        trial = 0.01 * size / speed if size >= 1e-5 and 1e-5 <= speed < math.inf else 1e-6
+        trial = min(trial, longest)
+        bend = _norm((self.fun(t + trial, y + trial * f) - f) / scale) / trial
+        if speed <= 1e-15 and bend <= 1e-15:
+            length = max(1e-6, trial * 1e-3)
+        else:
+            length = (0.01 / max(speed, bend)) ** (1 / 8)
+        return min(100 * trial, length, longest)
+
+    def step(self) -> str | None:
+        """Make a step; returns why it failed, or None."""
+        t, y = self.t, self.y
+        shortest = 10 * abs(math.nextafter(t, math.inf) - t)
+        length = max(min(self.h_abs, self.max_step), shortest)
+        rejected = False
+        while True:
+            if length < shortest or math.isnan(length):
+                self.status = "failed"
+                return TOO_SHORT
+            end = min(t + length, self.t_bound)
+            h = length = end - t
+            change = self._attempt(t, y, h) + self.lost
+            last = y + change
+            error = self._error(y, last, h)
+            if error < 1:
+                break
+            length *= max(SMALLEST, SAFETY * error**POWER)
+            rejected = True
+        factor = GREATEST if error == 0 else min(GREATEST, SAFETY * error**POWER)
+        self.h_abs = length * (min(1.0, factor) if rejected else factor)
+        self._step, self._dense = (h, y), None
+        self.t_old, self.t, self.y = t, end, last
+        self.f, rest = self.fun(end, last), last - y
+        self.lost = (y - (last - rest)) + (change - rest)
+        if end >= self.t_bound:
+            self.status = "finished"
+        return None
+
+    def _attempt(self, t: float, y: FloatArray, h: float) -> FloatArray:
+        """Compute slopes 0 to 11 of a step and the sums over them; returns the change of y."""
+        sums = self._sums
+        sums.fill(0.0)
+        self._add(0, self.f)
+        for i in range(1, 12):
+            self._add(i, self.fun(t + NODES[i] * h, y + h * sums[i]))
+        return np.asarray(h * sums[AT_END])
+
+    def _add(self, j: int, slope: FloatArray) -> None:
+        """Take slope j, and add its part to all sums that have one."""
+        kept, factors, products, sums = self._parts[j]
+        kept[:] = slope
+        np.multiply(factors, kept, products)
+        np.add(sums, products, sums)
+
+    def _error(self, y: FloatArray, last: FloatArray, h: float) -> float:
+        """The error estimate of a step, relative to the tolerance."""
+        if not len(y):
+            return 0.0
+        scale = self.atol + np.maximum(np.abs(y), np.abs(last)) * self.rtol
+        both = self._sums[LONG_ERROR : SHORT_ERROR + 1] / scale
+        long, short = np.add.accumulate(both * both, axis=1)[:, -1].tolist()
+        size = math.sqrt((long + SHORT_WEIGHT * short) * len(y))
+        return float(h * long / size) if size else 0.0
+
+    def dense_output(self) -> Callable[[FloatArray | float], FloatArray]:
+        """The states within the last step, as a function of times: (m,) -> (ny, m), or one."""
+        if self._dense is None:
+            self._dense = self._interpolant()
+        return self._dense
+
+    def _interpolant(self) -> Callable[[FloatArray | float], FloatArray]:
+        h, y = self._step
+        start, sums = self.t_old, self._sums
+        self._add(12, self.f)
+        for i in range(13, SLOPES):
+            row = AT_DENSE + i - 13
+            self._add(i, self.fun(start + NODES[i] * h, y + h * sums[row]))
+        change, first = self.y - y, self._slopes[0]
+        terms = np.empty((7, len(y)))
+        terms[0] = change
+        terms[1] = h * first - change
+        terms[2] = 2 * change - h * (self.f + first)
+        terms[3:] = h * sums[IN_DENSE:]
+
+        def states(times: FloatArray | float) -> FloatArray:
+            x = (np.asarray(times)[..., None] - start) / h
+            found = np.zeros((*np.shape(times), len(y)))
+            for i in range(6, -1, -1):
+                found += terms[i]
+                found *= x if i % 2 == 0 else 1 - x
+            return (found + y).T
+
+        return states
+
+
+def _norm(values: FloatArray) -> float:
+    """The root of the mean square, summed in order."""
+    return math.sqrt(float(np.add.accumulate(values * values)[-1]) / len(values))
+
+
+INTEGRATOR = Adaptive(
+    DormandPrince8, memory=("h_abs", "f", "lost"), compiled="dop853", smallest_rtol=1e-16
+)

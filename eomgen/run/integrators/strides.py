@@ -1,0 +1,112 @@
+"""Steps of an adaptive method that compiled code makes, many at once."""
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+
+from eomgen.run.compiled import Steps, Stride
+from eomgen.run.integrators.interface import Adaptive, Advance, Resume
+from eomgen.run.problem import FloatArray, Problem
+
+MOST = 256
+"""Greatest number of steps at once: between them progress is shown, and Ctrl-C is heard."""
+
+
+class Tolerances(Protocol):
+    """What `adaptive.Bounds` says of the error and the length of steps."""
+
+    @property
+    def rtol(self) -> float: ...
+    @property
+    def atol(self) -> float | FloatArray: ...
+    @property
+    def longest(self) -> float: ...
+
+
+class Strides:
+    """The compiled steps of a run, with rows at `times`."""
+
+    def __init__(
+        self,
+        method: Adaptive,
+        problem: Problem,
+        t_end: float,
+        bounds: Tolerances,
+        times: FloatArray,
+    ) -> None:
+        self._method, self._problem, self._t_end, self._bounds = method, problem, t_end, bounds
+        self._times = times
+        self._atol = np.array(np.broadcast_to(bounds.atol, problem.initial.shape), dtype=float)
+        self._unusual = False
+
+    def made(self, steps: Steps, solver: Any, sampled: int, most: int) -> Stride | None:
+        """Make at most so many steps and put the solver at their end; None if Python must make the
+        next. `sampled` is the number of rows so far.
+        """
+        if self._unusual:  # the last stride ended before a step that Python must make
+            self._unusual = False
+            return None
+        memory = {name: getattr(solver, name) for name in self._method.memory}
+        stride = steps(
+            solver.t,
+            solver.y,
+            memory,
+            t_end=self._t_end,
+            rtol=self._bounds.rtol,
+            atol=self._atol,
+            longest=self._bounds.longest,
+            times=self._times[sampled:],
+            most=min(most, MOST),
+        )
+        count = len(stride.ends)
+        if not count:
+            return None
+        self._unusual = not stride.usual
+        self._start = solver.t
+        solver.t_old = float(stride.ends[-2]) if count > 1 else solver.t
+        solver.t, solver.y = float(stride.ends[-1]), stride.states[-1].copy()
+        for name, values in stride.memory.items():
+            last = values[-1]
+            setattr(solver, name, last.copy() if last.ndim else float(last))
+        return stride
+
+    def advances(
+        self, stride: Stride, sampled: int, resumes: bool, each: bool
+    ) -> Iterator[Advance]:
+        """The steps as one `Advance`, or as one for each; with `resumes` a run can continue from
+        their ends.
+        """
+        count = len(stride.ends)
+        lengths = np.diff(stride.ends, prepend=self._start)
+        capped = lengths >= self._bounds.longest * (1 - 1e-9)
+        times, before, called = self._times.tolist(), 0, 0
+        for first in range(count) if each else (0,):
+            last = first if each else count - 1
+            passed = int(stride.sampled[last])
+            at = slice(sampled + before, sampled + passed)
+            t, y = float(stride.ends[last]), stride.states[last]
+            memory = {name: values[last] for name, values in stride.memory.items()}
+            yield Advance(
+                t,
+                y,
+                list(zip(times[at], stride.rows[before:passed], strict=True)),
+                self._problem,
+                _unknown,
+                steps=last + 1 - first,
+                derivatives=int(stride.derivatives[last]) - called,
+                resume=partial(continuation, t, y, memory) if resumes else None,
+                capped=int(capped[first : last + 1].sum()),
+            )
+            before, called = passed, int(stride.derivatives[last])
+
+
+def continuation(t: float, y: FloatArray, memory: Mapping[str, Any]) -> Resume:
+    """What a later run needs to continue from the state `y` at t."""
+    arrays = {name: np.array(value, dtype=np.float64) for name, value in memory.items()}
+    return {"t": np.array(t), "y": y, **arrays}
+
+
+def _unknown(t: float) -> FloatArray:
+    raise AssertionError("compiled steps are not made where states within them are needed")
