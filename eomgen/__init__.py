@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from eomgen.api.given import check, read
     from eomgen.api.linearising import linearise
     from eomgen.api.simulating import simulate
+    from eomgen.api.sweeping import Ensemble, ensemble, grid, sampled
     from eomgen.api.verifying import horizon, verify
     from eomgen.errors import EomgenError, RunError, SceneError
     from eomgen.results import Derivation, Module, Run
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Derivation",
+    "Ensemble",
     "EomgenError",
     "Module",
     "Run",
@@ -35,11 +37,14 @@ __all__ = [
     "check",
     "derive",
     "effects",
+    "ensemble",
     "generate",
+    "grid",
     "horizon",
     "linearise",
     "load",
     "read",
+    "sampled",
     "simulate",
     "verify",
 ]
@@ -50,6 +55,7 @@ _PLACES = {
     "derive": "api.deriving",
     "linearise": "api.linearising",
     "simulate": "api.simulating",
+    **dict.fromkeys(("Ensemble", "ensemble", "grid", "sampled"), "api.sweeping"),
     **dict.fromkeys(("horizon", "verify"), "api.verifying"),
     **dict.fromkeys(("accuracy", "arithmetic"), "api.accuracy"),
     "effects": "api.effects",

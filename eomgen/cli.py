@@ -137,6 +137,8 @@ def _parser() -> argparse.ArgumentParser:
         ("view", commands.view, "integrate, and open the animated page"),
     ):
         _simulation(_code(_form(command(name, run, about))))
+    about = "run a scene many times, with other parameters, initial states or inputs"
+    _sweep(_route(_form(command("sweep", commands.sweep, about))))
     about = "compare the module with an independent solver and 60 digits"
     _verification(_route(command("verify", commands.verify, about)))
     about = "measure time against error of all methods, and rounding errors of all routes"
@@ -254,6 +256,43 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     parser.add_argument("--plot", metavar="FILE", type=_path, help="figure (DIR/NAME.png)")
     parser.add_argument("--view", action="store_true", help="open the page when done")
+    _force(parser)
+
+
+def _sweep(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--vary",
+        metavar="NAME=…",
+        action="append",
+        default=[],
+        help="a parameter, state or input: LOW:HIGH:COUNT, LOW:HIGH:COUNT:log or A,B,…; with "
+        "--sample uniform:LOW:HIGH, loguniform:LOW:HIGH or normal:MEAN:DEVIATION",
+    )
+    parser.add_argument("--sample", metavar="N", type=int, help="draw N members, instead of a grid")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of the sample")
+    parser.add_argument("--of", metavar="NAME", help="state or output in the figure (the first)")
+    parser.add_argument("--outputs", metavar="A,B,…", help="functions of the module to compute")
+    parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
+    parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
+    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
+    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
+    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
+    parser.add_argument("--t-end", metavar="S", type=float, help="end time")
+    parser.add_argument(
+        "--samples", metavar="N", type=int, default=2, help="rows to keep (2, the ends)"
+    )
+    parser.add_argument(
+        "--backend",
+        metavar="NAME",
+        default="auto",
+        help="auto (default): steps in compiled C code if that pays; numpy: never; c: always",
+    )
+    parser.add_argument("--workers", metavar="N", type=int, help="processes (one a core)")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", default="", help="run on the workers of a Dask scheduler"
+    )
+    _values(parser)
+    parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     _force(parser)
 
 

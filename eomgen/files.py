@@ -23,6 +23,7 @@ SIGNATURES = (
     b"eomgen linearisation of ",  # tables
     b"method,kind,order,dt_s,rtol,atol,status,error,error_is,",
     b"state_kind,t,condition,",
+    b"member,status,t,",
     b"# eomgen verification of ",
     b'"eomgen": "verification of ',
     b"eomgen.npy",  # archives: their first member

@@ -41,6 +41,7 @@ AFTER = (
         "precision",
         "linear",
         "study",
+        "sweep",
         "show",
         "results.py",
     ),

@@ -43,6 +43,7 @@ FLOORS = (
     "study.verification",
     "study.cost",
     "study",
+    "sweep",
     "show",
     "results",
     "api",

@@ -14,6 +14,7 @@ from eomgen.cli import main
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
 API = (ROOT / "docs" / "api.md").read_text("utf-8")
+SWEEPS = (ROOT / "docs" / "sweeps.md").read_text("utf-8")
 
 
 def blocks(language: str, text: str = README) -> list[str]:
@@ -21,7 +22,7 @@ def blocks(language: str, text: str = README) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.parametrize("text", [README, API], ids=["README", "api"])
+@pytest.mark.parametrize("text", [README, API + SWEEPS], ids=["README", "docs"])
 def test_python_examples_run_and_print_what_they_say(text: str) -> None:
     """The Python blocks run from the checkout, one after another; a `# prints` comment holds what
     each prints. One process runs them all: to load what they import takes longer than most of them.

@@ -1,11 +1,16 @@
-"""The files that `eomgen simulate` writes into a folder."""
+"""The files that `eomgen simulate` and `eomgen sweep` write into a folder."""
 
+import csv
+import io
 from pathlib import Path
 
+import numpy as np
+
 from eomgen.errors import RunError
-from eomgen.files import check_folder, check_writable, remove_ours
+from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.results import Run
 from eomgen.run.trajectory import is_own_table, save_csv, save_npz
+from eomgen.sweep.ensemble import Ensemble
 
 KINDS = ("py", "npz", "csv", "png", "html")
 
@@ -58,3 +63,25 @@ def _save_pictures(run: Run, paths: dict[str, Path], force: bool) -> str:
             raise
         return str(error)
     return ""
+
+
+def save_sweep(found: Ensemble, of: str, table: Path, figure: Path, *, force: bool = False) -> None:
+    """Write the table and the figure of a sweep. Raises `RunError` if a file cannot be written.
+
+    The table has a line for each member: its number, how and when it ended, its varied values, its
+    last state, and the outputs there that are one number.
+    """
+    from eomgen.show.sweep import save_sweep_figure
+
+    single = [name for name in found.outputs if found.of(name).ndim == 1]
+    names = [*found.design.names, *(f"{name} (end)" for name in (*found.states, *single))]
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["member", "status", "t", *names, "message"])
+    ends = [found.final, *(found.of(name)[:, None] for name in single)]
+    numbers = np.concatenate([found.design.values, *ends], axis=1).tolist()
+    rows = zip(found.status, found.t.tolist(), numbers, found.messages.tolist(), strict=True)
+    for i, (status, t, values, message) in enumerate(rows):
+        writer.writerow([i, status, repr(t), *map(repr, values), message])
+    write_whole(table, stream.getvalue(), force=force)
+    save_sweep_figure(found, of, figure, force=force)

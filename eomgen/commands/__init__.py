@@ -61,6 +61,13 @@ def view(given: Arguments) -> int:
     return running.view(given)
 
 
+def sweep(given: Arguments) -> int:
+    """Run a scene many times."""
+    from eomgen.commands import sweeping
+
+    return sweeping.sweep(given)
+
+
 def verify(given: Arguments) -> int:
     """Compare the module with an independent solver and 60 digits."""
     from eomgen.commands import verifying

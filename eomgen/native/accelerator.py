@@ -67,7 +67,7 @@ class Accelerator:
         """
         self._due = False
         self._library = compiled_library(
-            self._key(), lambda: sources(*interfaced_program_of(self._model)), MAIN
+            library_key(self._model), lambda: sources(*interfaced_program_of(self._model)), MAIN
         )
 
     def _look(self) -> None:
@@ -75,7 +75,7 @@ class Accelerator:
         if self._begun is None:
             self._begun = time.perf_counter()
             with suppress(RunError):  # no compiler: said only if the run is a long one
-                self._library = kept_library(self._key())
+                self._library = kept_library(library_key(self._model))
                 self._due = self._library is None
         elif time.perf_counter() - self._begun > self._price:
             try:
@@ -83,8 +83,10 @@ class Accelerator:
             except RunError as error:
                 self.notice = str(error)
 
-    def _key(self) -> str:
-        return f"runs {key_of(self._model)} {_digest()}"
+
+def library_key(model: Model) -> str:
+    """What determines the sources of a model's compiled steps."""
+    return f"runs {key_of(model)} {_digest()}"
 
 
 @cache

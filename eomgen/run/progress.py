@@ -29,19 +29,35 @@ def throttled(progress: Progress, interval: float = 0.1) -> Progress:
 
 
 @contextmanager
-def terminal_progress(label: str) -> Iterator[Progress]:
+def terminal_progress(label: str, *, countdown: bool = False) -> Iterator[Progress]:
     """Yield a function that draws a bar on one line of standard error, erased when the block ends.
 
-    If standard error is no terminal, the function does nothing.
+    With `countdown`, for work of equal parts, it also shows about how long the rest will take: as
+    long as what was done since the first call. If standard error is no terminal, the function does
+    nothing.
     """
     with terminal_line() as write:
+        first: tuple[float, float] | None = None
 
         def draw(fraction: float) -> None:
+            nonlocal first
             done = min(max(fraction, 0.0), 1.0)
             bar = "#" * round(done * _BAR)
-            write(f"{label} [{bar:<{_BAR}}] {done:4.0%}")
+            now = time.monotonic()
+            first = first or (now, done)
+            left = ""
+            if countdown and done > first[1]:
+                left = rough_time((now - first[0]) * (1 - done) / (done - first[1]))
+            write(f"{label} [{bar:<{_BAR}}] {done:4.0%}{left and f', about {left} left'}")
 
         yield draw
+
+
+def rough_time(seconds: float) -> str:
+    """A time in words: "8 s", "5 min", "3.2 h"."""
+    if seconds < 99.5:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5970 else f"{seconds / 3600:.1f} h"
 
 
 @contextmanager

@@ -30,7 +30,7 @@ def test_run(benchmark: BenchmarkFixture, scene: str, rtol: float, backend: str)
         accelerator.compile()
         problem = accelerator.of(problem)
     benchmark.group = f"{scene}, rtol {rtol:g}"
-    rounds = {"rounds": 3, "iterations": 1} if backend == "numpy" else {"rounds": 20}
+    rounds = {"rounds": 20 if backend == "c" else 1 if scene == "human_figure" else 5}
     run = benchmark.pedantic(
         integrate, (problem, "DOP853", 10.0), {"rtol": rtol, "samples": 2}, **rounds
     )

@@ -1,0 +1,263 @@
+"""Many runs of one scene: `ensemble`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from eomgen.api.generating import compiled
+from eomgen.api.given import Source, Values, check, check_name, check_time, read, values_of
+from eomgen.api.reporter import SILENT, Reporter
+from eomgen.api.simulating import Backend, setting_of
+from eomgen.errors import RunError
+from eomgen.model.elaborate import in_order
+from eomgen.model.model import Model
+from eomgen.outputs import OUTPUTS
+from eomgen.run.checks import check_samples, check_steps
+from eomgen.run.integrators import FixedStep, find_integrator
+from eomgen.run.integrators.fixed_step import count_steps
+from eomgen.run.problem import FloatArray
+from eomgen.scene.schema import Scene
+from eomgen.study.accuracy.trial import Setting
+from eomgen.sweep.design import Design, Law, grid, listed, sampled
+from eomgen.sweep.ensemble import Ensemble
+from eomgen.sweep.execute import chunk_size, execute
+from eomgen.sweep.members import Task
+from eomgen.sweep.storage import opened
+
+__all__ = ["Design", "Ensemble", "Law", "ensemble", "grid", "plan_sweep", "run_sweep", "sampled"]
+
+MANY = 20
+"""Least number of members for which C steps are compiled that are not in the store."""
+DYNAMICS = ("forward_dynamics", "inverse_dynamics")
+"""Outputs that take more than a time and a state."""
+MOST_STEPS = 10_000_000
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """Checked arguments of a sweep."""
+
+    scene: Scene
+    model: Model
+    design: Design
+    setting: Setting
+    t_end: float
+    parameters: Mapping[str, float]
+    inputs: Mapping[str, float]
+    outputs: tuple[str, ...]
+    samples: int
+    max_step: float | None
+    backend: Backend
+
+
+def ensemble(
+    source: Source,
+    vary: Design | Mapping[str, Sequence[float] | FloatArray],
+    *,
+    t_end: float | None = None,
+    integrator: str | None = None,
+    dt: float | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    parameters: Values | None = None,
+    inputs: Values | None = None,
+    outputs: Sequence[str] = (),
+    samples: int = 2,
+    max_step: float | None = None,
+    backend: Backend = "auto",
+    workers: int = 1,
+    scheduler: str = "",
+    folder: str | PathLike[str] | None = None,
+) -> Ensemble:
+    """Run a scene many times, with other parameters, initial states or inputs.
+
+    vary        lists of values by name of a parameter, a state or an input, one for each member;
+                or `grid(...)` or `sampled(...)`
+    t_end, integrator, dt, rtol, atol, max_step  as for `simulate`
+    parameters, inputs  values that all members have
+    outputs     functions of the module to compute: "kinetic_energy" for example
+    samples     number of rows that are kept, about; 2 keeps the ends alone
+    backend     "numpy": make all steps in Python; "c": those of DOP853 in C; "auto": if that pays
+    workers     number of processes. With more than one, a script needs `if __name__ == "__main__":`
+    scheduler   address of a Dask scheduler whose workers run the members
+    folder      keeps what has run, so that the same call goes on after it was stopped
+
+    A member that stops or is refused is a row that says so. The results do not depend on backend,
+    workers or scheduler. Raises `SceneError`, or `RunError` for an invalid argument.
+    """
+    scene = read(source)
+    design = vary if isinstance(vary, Design) else listed(vary)
+    plan = plan_sweep(
+        scene,
+        check(scene),
+        design,
+        t_end=t_end,
+        integrator=integrator,
+        dt=dt,
+        rtol=rtol,
+        atol=atol,
+        parameters=parameters,
+        inputs=inputs,
+        outputs=outputs,
+        samples=samples,
+        max_step=max_step,
+        backend=backend,
+    )
+    kept = None if folder is None else Path(folder)
+    return run_sweep(plan, workers=workers, scheduler=scheduler, folder=kept)
+
+
+def plan_sweep(
+    scene: Scene,
+    model: Model,
+    design: Design,
+    *,
+    t_end: float | None = None,
+    integrator: str | None = None,
+    dt: float | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    parameters: Values | None = None,
+    inputs: Values | None = None,
+    outputs: Sequence[str] = (),
+    samples: int = 2,
+    max_step: float | None = None,
+    backend: Backend = "auto",
+    reporter: Reporter = SILENT,
+) -> SweepPlan:
+    """Check the arguments of `ensemble`, which describes them. Raises `RunError`."""
+    argument = reporter.argument
+    check_samples(samples)
+    t_end = scene.simulation.t_end if t_end is None else t_end
+    check_time(t_end, argument("t_end"))
+    if backend not in ("auto", "numpy", "c"):
+        raise RunError(f"{argument('backend')}: '{backend}' is none of auto, numpy, c")
+    for name in outputs:
+        check_name(name, [n for n in OUTPUTS if n not in DYNAMICS], argument("outputs"), "output")
+    setting = setting_of(
+        scene.simulation, integrator, dt=dt, rtol=rtol, atol=atol, reporter=reporter
+    )
+    fixed = values_of(model, parameters, inputs, reporter)
+    for name in design.names:
+        if any(name in values for values in fixed):
+            raise RunError(f"{argument('vary')}: {name} is also given a fixed value; leave one out")
+    return SweepPlan(
+        scene,
+        replace(model, outputs=in_order((*model.outputs, *outputs))),
+        design,
+        setting,
+        t_end,
+        *fixed,
+        tuple(outputs),
+        samples,
+        max_step,
+        backend,
+    )
+
+
+def run_sweep(
+    plan: SweepPlan,
+    *,
+    workers: int = 1,
+    scheduler: str = "",
+    folder: Path | None = None,
+    reporter: Reporter = SILENT,
+) -> Ensemble:
+    """Run a plan. Raises `RunError` if it cannot begin, or if workers fail."""
+    if workers < 1:
+        raise RunError(f"{reporter.argument('workers')}: {workers} is no number of processes")
+    model = plan.model
+    module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
+    state_names: tuple[str, ...] = functions.STATES
+    key, kernels = _kernels(plan, reporter)
+    times = _times(plan)
+    task = Task(
+        model=model,
+        source=module.source,
+        key=key,
+        kernels=kernels,
+        names=plan.design.names,
+        kinds=tuple(_kind(name, model, state_names, reporter) for name in plan.design.names),
+        parameters=plan.parameters,
+        inputs=plan.inputs,
+        outputs=plan.outputs,
+        t_end=plan.t_end,
+        times=times,
+        settings={
+            "integrator": plan.setting.integrator,
+            "dt": plan.setting.dt,
+            **plan.setting.tolerances,
+            "max_step": plan.max_step,
+            "rest_speed": plan.scene.simulation.rest_speed,
+        },
+    )
+    storage = None
+    if folder is not None:
+        storage = opened(folder, task, plan.design, chunk_size(len(plan.design.values)))
+    with reporter.progress(f"sweeping {model.name}") as progress:
+        found = execute(
+            task, plan.design, storage, workers=workers, scheduler=scheduler, progress=progress
+        )
+    return Ensemble(
+        model.name,
+        plan.design,
+        state_names,
+        found["final"],
+        found["t"],
+        found["status"],
+        found["message"],
+        np.array(times),
+        found.get("rows"),
+        {name: found[name] for name in plan.outputs},
+    )
+
+
+def _times(plan: SweepPlan) -> tuple[float, ...]:
+    """The times of the rows that are kept, s."""
+    method = find_integrator(plan.setting.integrator)
+    if not isinstance(method, FixedStep):
+        return tuple(np.linspace(0.0, plan.t_end, plan.samples).tolist())
+    given = (plan.setting.integrator, plan.t_end, plan.setting.dt, plan.samples, MOST_STEPS)
+    dt, every = check_steps(*given)
+    steps = int(count_steps(plan.t_end, dt))
+    return (*(i * dt for i in range(0, steps, every)), plan.t_end)
+
+
+def _kind(name: str, model: Model, states: Sequence[str], reporter: Reporter) -> str:
+    """Whether a name is that of a parameter, a state or an input."""
+    inputs = [i.name for i in model.inputs]
+    for kind, names in (("parameter", model.defaults), ("state", states), ("input", inputs)):
+        if name in names:
+            return kind
+    known = (*model.defaults, *states, *inputs)
+    check_name(name, known, reporter.argument("vary"), "parameter, state or input")
+    raise AssertionError(name)
+
+
+def _kernels(plan: SweepPlan, reporter: Reporter) -> tuple[str, Mapping[str, str]]:
+    """The key and the C sources of compiled steps; no sources if they would not pay."""
+    from eomgen.native.accelerator import library_key
+    from eomgen.native.compiler import find_compiler
+    from eomgen.native.library import kept_library
+    from eomgen.native.runs import sources
+    from eomgen.store import interfaced_program_of
+
+    key = library_key(plan.model)
+    usable: Any = getattr(find_integrator(plan.setting.integrator), "compiled", "")
+    if plan.backend == "numpy" or not usable:
+        return key, {}
+    if plan.backend == "auto":
+        try:
+            find_compiler()
+        except RunError as error:
+            reporter.note(f"the sweep is not compiled: {error}")
+            return key, {}
+        if len(plan.design.values) < MANY and kept_library(key) is None:
+            return key, {}
+    else:
+        find_compiler()
+    return key, sources(*interfaced_program_of(plan.model))

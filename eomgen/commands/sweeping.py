@@ -1,0 +1,166 @@
+"""The command `sweep`."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from eomgen.api.saving import save_sweep
+from eomgen.api.sweeping import Design, Ensemble, Law, grid, plan_sweep, run_sweep, sampled
+from eomgen.commands.shared import (
+    Arguments,
+    given_values,
+    named_outputs,
+    read_whole,
+    reporter_of,
+    shortened,
+)
+from eomgen.errors import InterruptedRunError, RunError
+from eomgen.files import check_folder, check_writable
+from eomgen.run.problem import FloatArray
+from eomgen.run.progress import terminal_progress
+from eomgen.sweep.design import MOST
+
+FEW = 5
+"""Number of members that did not finish of which the reason is printed."""
+
+
+def sweep(given: Arguments) -> int:
+    """Run the members; write a table and a figure; keep what has run in a folder."""
+    outputs = named_outputs(given)
+    if outputs == "all":
+        raise RunError("--outputs: name the functions to compute, kinetic_energy for example")
+    given.outputs = None
+    scene, model, name = read_whole(given.scene, given)
+    reporter = reporter_of(given, given.scene)
+    parameters, inputs = given_values(given, model)
+    plan = plan_sweep(
+        scene,
+        model,
+        _design(given),
+        t_end=given.t_end,
+        integrator=given.integrator,
+        dt=given.dt,
+        rtol=given.rtol,
+        atol=given.atol,
+        parameters=parameters,
+        inputs=inputs,
+        outputs=outputs or (),
+        samples=given.samples,
+        max_step=given.max_step,
+        backend=given.backend,
+        reporter=reporter,
+    )
+    table, figure = (given.output / f"{name}_sweep.{kind}" for kind in ("csv", "png"))
+    check_folder(given.output)
+    for path in (table, figure):
+        check_writable(path, force=given.force)
+    folder = given.output / f"{name}_sweep"
+    counting = replace(reporter, progress=partial(terminal_progress, countdown=True))
+    workers = os.cpu_count() or 1 if given.workers is None else given.workers
+    try:
+        found = run_sweep(
+            plan, workers=workers, scheduler=given.scheduler, folder=folder, reporter=counting
+        )
+    except KeyboardInterrupt:
+        raise InterruptedRunError(
+            f"{model.name}: interrupted; the same command goes on with what is in {folder}"
+        ) from None
+    of = given.of or found.states[0]
+    try:
+        found.of(of)
+    except RunError as error:
+        raise RunError(f"--{error}") from None
+    save_sweep(found, of, table, figure, force=given.force)
+    _report(found, of)
+    for path in (folder, table, figure):
+        print(f"    wrote {path}")
+    return 0
+
+
+def _design(given: Arguments) -> Design:
+    """The members that --vary and --sample describe. Raises `RunError`."""
+    if not given.vary:
+        raise RunError("--vary: name what is varied, --vary NAME=LOW:HIGH:COUNT for example")
+    parts = dict(_part(text) for text in given.vary)
+    if len(parts) < len(given.vary):
+        raise RunError("--vary: a name is given twice")
+    if given.sample is None:
+        return grid({name: _axis(name, text) for name, text in parts.items()})
+    if not 0 < given.sample <= MOST:
+        raise RunError(f"--sample: {given.sample} is not a number from 1 to {MOST}")
+    if given.seed < 0:
+        raise RunError(f"--seed: {given.seed} is negative; give 0, 1, 2, …")
+    return sampled({n: _law(n, text) for n, text in parts.items()}, given.sample, given.seed)
+
+
+def _part(text: str) -> tuple[str, str]:
+    name, sign, rest = text.partition("=")
+    if not (name and sign and rest):
+        raise RunError(f"--vary {text}: write NAME=LOW:HIGH:COUNT, m_A=0.5:2:50 for example")
+    return name, rest
+
+
+def _axis(name: str, text: str) -> FloatArray:
+    """The values of an axis of a grid. Raises `RunError`."""
+    *ends, last = text.split(":")
+    if logarithmic := last == "log" and len(ends) == 3:
+        *ends, last = ends
+    elif not ends:
+        return np.array(_numbers(name, text, text.split(",")))
+    if len(ends) != 2:
+        raise RunError(f"--vary {name}={text}: write LOW:HIGH:COUNT, or A,B,… for single values")
+    low, high, count = _numbers(name, text, (*ends, last))
+    if not (count == int(count) and 1 <= count <= MOST):
+        raise RunError(f"--vary {name}={text}: {last} is not a number of values from 1 to {MOST}")
+    if not logarithmic:
+        return np.linspace(low, high, int(count))
+    if not (low > 0 and high > 0):
+        raise RunError(f"--vary {name}={text}: a logarithmic axis needs positive ends")
+    return np.geomspace(low, high, int(count))
+
+
+def _law(name: str, text: str) -> Law:
+    """The distribution of a name. Raises `RunError`."""
+    parts = text.split(":")
+    if len(parts) == 2:
+        parts = ["uniform", *parts]
+    if len(parts) != 3:
+        raise RunError(
+            f"--vary {name}={text}: write uniform:LOW:HIGH, loguniform:LOW:HIGH or "
+            "normal:MEAN:DEVIATION with --sample"
+        )
+    try:
+        return Law(parts[0], *_numbers(name, text, parts[1:]))
+    except RunError as error:
+        raise RunError(f"--vary {name}: {error}") from None
+
+
+def _numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
+    try:
+        values = [float(part) for part in parts]
+    except ValueError:
+        values = [np.nan]
+    if not np.isfinite(values).all():
+        raise RunError(f"--vary {name}={text}: has something that is not a finite number")
+    return values
+
+
+def _report(found: Ensemble, of: str) -> None:
+    """Print how many members finished, why others did not, and the spread of a quantity."""
+    ended = int(found.finished.sum())
+    varied = ", ".join(found.design.names)
+    print(f"{found.scene}: {len(found)} members, {varied} varied; {ended} finished")
+    lines = [
+        f"member {i} {found.status[i]}: {found.messages[i]}"
+        for i in np.flatnonzero(~found.finished).tolist()[:FEW]
+    ]
+    left = len(found) - ended - len(lines)
+    for line in shortened([*lines, *([f"{left} more, see the table"] if left else [])]):
+        print(f"    {line}")
+    values = found.of(of)[found.finished]
+    if values.size and values.ndim == 1:
+        low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)).tolist()
+        print(f"    {of} at the end: median {middle:.6g}, 5 to 95 % {low:.6g} to {high:.6g}")

@@ -1,0 +1,1 @@
+"""Many runs of one scene, whose parameters, initial states and inputs differ."""

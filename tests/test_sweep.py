@@ -1,0 +1,246 @@
+"""Sweeps: members are single runs, whatever runs them, and what was stopped goes on."""
+
+import csv
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import eomgen
+from eomgen.cli import main
+from eomgen.errors import RunError
+from eomgen.show.sweep import draw_sweep
+from eomgen.sweep import execute, members
+from eomgen.sweep.design import Law
+from eomgen.sweep.ensemble import Ensemble
+
+MASSES = (0.5, 1.0, 1.7)
+QUICK: dict[str, Any] = {"t_end": 1.0, "integrator": "DOP853", "rtol": 1e-8}
+
+
+def same(one: Ensemble, other: Ensemble) -> bool:
+    """Whether two sweeps have the same bytes."""
+    names = ("final", "t", "codes", "times")
+    alike = all(getattr(one, n).tobytes() == getattr(other, n).tobytes() for n in names)
+    alike = alike and one.messages.tolist() == other.messages.tolist()
+    rows = [b"" if e.rows is None else e.rows.tobytes() for e in (one, other)]
+    outputs = [{n: v.tobytes() for n, v in e.outputs.items()} for e in (one, other)]
+    return alike and rows[0] == rows[1] and outputs[0] == outputs[1]
+
+
+@pytest.mark.parametrize("integrator", ["DOP853", "rk4"])
+def test_members_are_single_runs(integrator: str) -> None:
+    """To the bit, with rows and outputs."""
+    options = {**QUICK, "integrator": integrator, "samples": 11}
+    if integrator == "rk4":
+        options = {"t_end": 1.0, "integrator": "rk4", "dt": 0.01, "samples": 11}
+    found = eomgen.ensemble(
+        "two_body_forced",
+        {"m_A": MASSES, "tau": (0.0, 0.2, -0.3)},
+        outputs=("kinetic_energy", "body_poses"),
+        **options,
+    )
+    assert found.finished.all() and found.rows is not None and len(found) == 3
+    for i, (mass, torque) in enumerate(found.design.values.tolist()):
+        run = eomgen.simulate(
+            "two_body_forced", parameters={"m_A": mass}, inputs={"tau": torque}, **options
+        )
+        assert found.rows[i].tobytes() == run.y.tobytes()
+        assert found.times.tolist() == run.t.tolist()
+        assert found.of("kinetic_energy")[i] == run.motion.kinetic_energy[-1]
+    assert found.outputs["body_poses"].shape[:2] == (3, 11)
+    assert found.of("theta").tolist() == found.rows[:, -1, found.states.index("theta")].tolist()
+
+
+def test_states_are_varied() -> None:
+    """An initial state is that of the scene with the value put in; quaternions are normalised."""
+    found = eomgen.ensemble("pendulum", {"theta": (0.1, 0.2)}, samples=3, **QUICK)
+    assert found.rows is not None and found.rows[:, 0, 0].tolist() == [0.1, 0.2]
+    turned = eomgen.ensemble("tumbling_body", {"nut_qw": (0.5,)}, samples=3, **QUICK)
+    assert turned.rows is not None
+    parts = turned.rows[0, 0, [name.startswith("nut_q") for name in turned.states]]
+    assert np.linalg.norm(parts) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_nothing_depends_on_who_runs_it(tmp_path: Path) -> None:
+    """Python or C, one process or two, kept in a folder or not: the same bytes."""
+    design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, 10), "theta": np.linspace(-1.0, 1.0, 10)})
+    runs = [
+        eomgen.ensemble("two_body", design, outputs=("momentum",), **QUICK, **options)
+        for options in (
+            {"backend": "numpy"},
+            {"backend": "auto", "workers": 2},
+            {"backend": "auto", "folder": tmp_path / "kept"},
+        )
+    ]
+    assert all(same(runs[0], run) for run in runs[1:])
+    assert runs[0].on_grid("theta").shape == (10, 10)
+    assert runs[0].on_grid("momentum").shape[:2] == (10, 10)
+
+
+def test_what_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Chunks that are whole are not run again; lost, damaged and foreign ones are."""
+    design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, 40)})
+    folder = tmp_path / "kept"
+    whole = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **QUICK)
+    chunks = sorted(folder.glob("chunk_*.npz"))
+    assert len(chunks) == 40
+    before = [chunk.read_bytes() for chunk in chunks]
+    chunks[3].unlink()
+    chunks[5].write_bytes(before[5][:-40])
+    chunks[7].write_bytes(before[8])  # another chunk's
+    ran: list[int] = []
+    once = members.run_members
+    monkeypatch.setattr(execute, "run_members", lambda *a: ran.append(1) or once(*a))
+    again = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **QUICK)
+    assert len(ran) == 3 and same(whole, again)
+    assert [chunk.read_bytes() for chunk in chunks] == before
+    with pytest.raises(RunError, match="holds another sweep; choose another folder"):
+        eomgen.ensemble("two_body", design, folder=folder, **QUICK)
+    with pytest.raises(RunError, match="is no empty folder"):
+        eomgen.ensemble("two_body", design, folder=tmp_path, **QUICK)
+
+
+def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
+    """Killed with its workers at any time, it ends with the bytes of one that was not."""
+    command = [sys.executable, "-m", "eomgen", "sweep", "pendulum", "--workers", "2"]
+    command += "--vary theta=0:1:60 --t-end 20 --backend numpy".split()
+    process = subprocess.Popen(
+        [*command, "-o", str(tmp_path / "one")], start_new_session=True, stdout=subprocess.DEVNULL
+    )
+    folder = tmp_path / "one" / "pendulum_sweep"
+    due = time.monotonic() + 60
+    while len(list(folder.glob("chunk_*"))) < 5 and time.monotonic() < due:
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    kept = len(list(folder.glob("chunk_*")))
+    assert 5 <= kept < 60 and not (tmp_path / "one" / "pendulum_sweep.csv").exists()
+    for place in ("one", "two"):
+        assert main([*command[3:], "-o", str(tmp_path / place)]) == 0
+    files = [
+        sorted(p.relative_to(tmp_path / w) for p in (tmp_path / w).rglob("*.*") if p.name[0] != ".")
+        for w in ("one", "two")
+    ]
+    assert files[0] == files[1] and len(files[0]) == 63
+    for name in files[0]:
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), (
+            name
+        )
+
+
+def test_a_member_that_fails_is_a_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One is refused, one stops on its way; the others are as they would be alone."""
+    options = {"t_end": 4.0, "integrator": "rk4", "dt": 0.05, "samples": 9}
+    found = eomgen.ensemble(
+        "pendulum", {"theta_dot": (0.0, 1e308, 1.0), "bob_mass": (1.0, 1.0, -1.0)}, **options
+    )
+    assert found.status == ["finished", "stopped", "refused"]
+    assert (
+        found.rows is not None
+        and np.isnan(found.rows[2]).all()
+        and np.isnan(found.rows[1, -1]).all()
+    )
+    assert not found.messages[0] and "stopped at t = " in found.messages[1] and found.messages[2]
+    assert found.quantiles("theta").shape == (3, 9)
+    assert np.isfinite(found.quantiles("theta")).all()
+    assert main(f"sweep pendulum --vary bob_mass=-1,1 --t-end 1 -o {tmp_path}".split()) == 0
+    said = capsys.readouterr().out
+    assert "2 members, bob_mass varied; 1 finished" in said and "member 0 refused: " in said
+    table = (tmp_path / "pendulum_sweep.csv").read_text("utf-8")
+    rows = list(csv.DictReader(table.splitlines()))
+    assert [row["status"] for row in rows] == ["refused", "finished"]
+    assert rows[0]["theta (end)"] == "nan" and math.isfinite(float(rows[1]["theta (end)"]))
+
+
+def test_samples_follow_their_laws() -> None:
+    """Their quantiles do; a longer sample begins with the shorter one, another seed is another."""
+    laws = {"a": ("uniform", -1.0, 3.0), "b": ("normal", 2.0, 0.5), "c": ("loguniform", 0.1, 10.0)}
+    design = eomgen.sampled(laws, 20_000, seed=3)
+    expected = {
+        "a": (0.0, 1.0, 2.0),
+        "b": (2 - 0.33724, 2.0, 2 + 0.33724),
+        "c": (10**-0.5, 1.0, 10**0.5),
+    }
+    for i, name in enumerate(design.names):
+        found = np.quantile(design.values[:, i], (0.25, 0.5, 0.75))
+        assert found == pytest.approx(expected[name], abs=0.05), name
+    assert np.corrcoef(design.values.T)[0, 1] == pytest.approx(0.0, abs=0.03)
+    shorter = eomgen.sampled(laws, 100, seed=3)
+    assert np.array_equal(shorter.values, design.values[:100])
+    assert not np.array_equal(shorter.values, eomgen.sampled(laws, 100, seed=4).values)
+    assert np.isfinite(Law("normal", 0.0, 1.0).at(np.array([0.0, 0.5]))).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("", "--vary: name what is varied"),
+        ("--vary m", "--vary m: write NAME=LOW:HIGH:COUNT"),
+        (
+            "--vary bob_mass=1:2",
+            "=1:2: write LOW:HIGH:COUNT, or A,B,… for single values",
+        ),
+        ("--vary bob_mass=1:2:0", "0 is not a number of values"),
+        ("--vary bob_mass=1:2:2.5", "2.5 is not a number of values"),
+        ("--vary bob_mass=-1:2:3:log", "a logarithmic axis needs positive ends"),
+        ("--vary bob_mass=a,b", "has something that is not a finite number"),
+        ("--vary bob_mass=1,nan", "has something that is not a finite number"),
+        ("--vary q=1,2", "--vary: no parameter, state or input 'q'"),
+        ("--vary bob_mass=1,2 --vary bob_mass=3,4", "a name is given twice"),
+        (
+            "--vary bob_mass=1,2 --set bob_mass=1",
+            "is also given a fixed value; leave one out",
+        ),
+        ("--vary bob_mass=normal:1:0 --sample 3", "give a mean and a positive deviation"),
+        ("--vary bob_mass=2:1 --sample 3", "give two numbers, the smaller first"),
+        ("--vary bob_mass=odd:1:2 --sample 3", "'odd' is no distribution"),
+        ("--vary bob_mass=1:2 --sample 0", "--sample: 0 is not a number from 1 to"),
+        ("--vary bob_mass=1:2 --sample 2 --seed -1", "--seed: -1 is negative"),
+        ("--vary bob_mass=1,2 --of x", "--of: unknown name 'x'"),
+        (
+            "--vary bob_mass=1,2 --outputs inverse_dynamics",
+            "no output 'inverse_dynamics'",
+        ),
+        ("--vary bob_mass=1,2 --outputs all", "--outputs: name the functions to compute"),
+        ("--vary bob_mass=1,2 --workers 0", "--workers: 0 is no number of processes"),
+        ("--vary bob_mass=1,2 --samples 1", "samples: 1 is too few"),
+        ("--vary bob_mass=1,2 --t-end -1", "--t-end: -1 is not a positive time"),
+        ("--vary bob_mass=1,2 --backend x", "--backend: 'x' is none of auto, numpy, c"),
+        ("--vary bob_mass=1:2:30000000", "is not a number of values from 1 to"),
+    ],
+)
+def test_one_mistake_one_line(
+    options: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(f"sweep pendulum {options} -o {tmp_path} --integrator DOP853".split()) == 1
+    words = capsys.readouterr().err
+    assert said in words and words.count("\n") == 1
+
+
+def test_figures_fit_what_is_varied() -> None:
+    """A heat map over two, a curve over one, a histogram of a sample; a fan if rows are kept."""
+
+    def drawn(vary: Any, **options: Any) -> Figure:
+        return draw_sweep(eomgen.ensemble("pendulum", vary, **QUICK, **options), "theta")
+
+    two = drawn(eomgen.grid({"bob_mass": (1.0, 2.0), "theta": (0.1, 0.2, 0.3)}))
+    assert [axes.get_ylabel() for axes in two.axes] == [
+        "$\\mathrm{bob}_{\\mathrm{mass}}$",
+        "$\\theta$ at t = 1 s",
+    ]
+    one = drawn(eomgen.grid({"bob_mass": (2.0, 1.0)}), samples=5)
+    assert one.axes[0].get_lines()[0].get_xdata().tolist() == [1.0, 2.0]
+    assert one.axes[1].get_xlabel() == "t in s" and len(one.axes[1].get_lines()) == 3
+    some = drawn(
+        eomgen.sampled({"bob_mass": ("uniform", 1.0, 2.0), "gravity_g": ("normal", 9.8, 0.1)}, 30)
+    )
+    assert sum(bar.get_height() for bar in some.axes[0].patches) == 30
