@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from campaign import FULL
 from matplotlib.figure import Figure
 from mechanisms import BUILT_IN, Compiled, compiled
 from xdist.scheduler import LoadScopeScheduling
@@ -39,8 +40,22 @@ def _group(nodeid: str) -> str:
     return GROUPS.get(name, name)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes longest comes first."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """What takes longest comes first. Of cases that are more of the same, an ordinary run takes
+    every n-th, and of tests for full runs none; see the markers in pyproject.toml.
+    """
+    if not FULL:
+        seen: dict[str, int] = {}
+        left = []
+        for item in items:
+            name = item.nodeid.partition("[")[0]
+            seen[name] = seen.get(name, -1) + 1
+            every = item.get_closest_marker("every")
+            if item.get_closest_marker("full") or (every and seen[name] % every.args[0]):
+                left.append(item)
+        config.hook.pytest_deselected(items=left)
+        kept = set(map(id, left))
+        items[:] = [item for item in items if id(item) not in kept]
     rank = {name: i for i, name in enumerate(FIRST)}
     items.sort(key=lambda item: rank.get(_group(item.nodeid), len(FIRST)))
 

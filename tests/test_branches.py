@@ -151,6 +151,7 @@ v = { ball_y_dot = 3.0 }
 
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("scene", [QUADROTOR, ROPE], ids=["quadrotor", "rope"])
+@pytest.mark.every(2)
 def test_steps_are_as_long_as_their_error_allows(scene: str, method: str) -> None:
     """A saturated controller and a taut rope take as many steps as without the check."""
     problem = as_problem(module(scene))

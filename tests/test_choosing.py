@@ -203,6 +203,7 @@ def test_few_equal_steps() -> None:
 
 
 @pytest.mark.parametrize("target", some([5e-12], [1e-12]))
+@pytest.mark.full
 def test_beyond_the_floor_of_adaptive_methods(target: float) -> None:
     """A chaotic motion makes their rounding errors large; those of equal steps, summed with
     compensation, are a thousand times less.

@@ -297,6 +297,7 @@ def loads_by_hand(tree: SpatialTree, motion: SpatialMotion, law: tuple[str, ...]
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("law", [DAMPED, HUNT])
+@pytest.mark.every(2)
 def test_random_trees_move_as_under_loads_put_in_by_hand(
     law: tuple[str, ...], dimensions: int, route: str
 ) -> None:
@@ -411,6 +412,7 @@ def wrench(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> np.ndarra
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("geometry", GEOMETRY)
 @pytest.mark.parametrize("law", [SPRING, HERTZ, (*HUNT, *RUB)])
+@pytest.mark.every(3)
 def test_the_change_of_energy_is_the_power_of_the_contacts(
     law: tuple[str, ...], geometry: str, dimensions: int
 ) -> None:

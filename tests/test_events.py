@@ -169,6 +169,7 @@ def test_energy_after_bounces():
 
 
 @pytest.mark.parametrize("name", GENERAL)
+@pytest.mark.every(2)
 def test_every_integrator_bounces_and_rests(name):
     """Euler's method, of order 1, is accurate to its step; methods that are exact for parabolas are
     accurate to rounding.
@@ -351,6 +352,7 @@ def shaken(t):
 
 
 @pytest.mark.parametrize("name", A_FEW)
+@pytest.mark.every(2)
 def test_mass_leaves_a_shaken_table(name):
     """It lifts when the table accelerates downward by more than g, flies, and lands again."""
     problem = mechanism([0.0], [1.2], [[1.0]], force=weight, ground=shaken, bounce=0.0)
@@ -543,6 +545,7 @@ def test_works_follow_the_order_of_the_method():
 
 
 @pytest.mark.parametrize("name", A_FEW)
+@pytest.mark.every(2)
 def test_every_integrator_books_works(name):
     problem, powers = airy()
     order = getattr(INTEGRATORS[name], "order", 4)

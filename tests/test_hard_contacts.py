@@ -56,6 +56,7 @@ def ran(text: str, method: str, t_end: float, **given: float) -> tuple[Trajector
 
 @pytest.mark.parametrize("method", ["rk4", "DOP853"])
 @pytest.mark.parametrize("below", [1e-6, 1e-12, 0.0, -1e-12, -1e-6, -1e-3])
+@pytest.mark.every(3)
 def test_grazing(method: str, below: float) -> None:
     """A floor just missed, just touched, or just hit, in two swings: the run comes to its end,
     keeps its energy, and is never deeper than is stated. What misses is not disturbed.

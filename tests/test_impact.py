@@ -263,6 +263,7 @@ def test_a_rod_of_little_inertia_sticks() -> None:
 
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @pytest.mark.parametrize("name", list(MODELS))
+@pytest.mark.every(3)
 def test_impacts_against_dense_algebra(name: str, route: str) -> None:
     """Every contact of every model, sliding and sticking, from velocities of bodies alone."""
     scene, effect = MODELS[name]

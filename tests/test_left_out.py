@@ -134,6 +134,7 @@ PAIRS = [  # dimensions, the joint, what is locked, the weld in its place
     ("dimensions", "joint", "locked", "weld", "route"),
     [(*pair, r) for i, pair in enumerate(PAIRS) for r in some(ROUTES[i % 2 :][:1], ROUTES)],
 )
+@pytest.mark.every(2)
 def test_locked_is_welded(dimensions: int, joint: str, locked: str, weld: str, route: str) -> None:
     """The same numbers at the same cost: a locked joint is gone from the equations."""
     held = engine(leg(dimensions, joint, f"[locked]\n{locked}"), route)

@@ -421,6 +421,7 @@ AWKWARD = {
 
 
 @pytest.mark.parametrize("kind", AWKWARD)
+@pytest.mark.every(2)
 def test_awkward_names(kind: str) -> None:
     """A scene may call its quantities as it likes: the module means what the scene says."""
     words, joints = (text.split() for text in AWKWARD[kind])
@@ -436,6 +437,7 @@ def test_awkward_names(kind: str) -> None:
 @pytest.mark.parametrize(
     "bodies", ["A A_dot A_ddot", "B_A A A_B", "derivative np", "x y", "A_0 A_0_1 A"]
 )
+@pytest.mark.every(2)
 def test_awkward_bodies(bodies: str) -> None:
     """Bodies whose names read like one another's symbols put together are kept apart."""
     names = bodies.split()

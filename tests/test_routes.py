@@ -224,6 +224,7 @@ def assert_as_solved(
 
 
 @by_module
+@pytest.mark.every(2)
 def test_module_at_its_own_parameters(dimensions: int, seed: int, route: str) -> None:
     """Every output of a module against the solver; joint space against the accelerations."""
     tree, e = made(dimensions, seed, route)

@@ -172,6 +172,7 @@ MANY = {
         ),
     ],
 )
+@pytest.mark.every(2)
 def test_odd_motions_are_drawn(tmp_path: Path, changes: dict[str, Any], said: str) -> None:
     motion = swinging(**changes)
     figure = draw_motion(motion)

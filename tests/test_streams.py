@@ -39,9 +39,10 @@ COMMANDS = {
     "accuracy": f"accuracy pendulum {QUICK} -o {{out}}",
     "effects": "effects pendulum --no-motion -o {out}",
     "linearise": "linearise cart_pole",
+    "sweep": "sweep pendulum --vary theta=1,2 --t-end 0.1 --workers 1 -o {out}",
 }
 QUICKER = [name for name in COMMANDS if name != "accuracy"]
-WRITES = {"generate": 1, "simulate": 5, "view": 5, "accuracy": 3, "effects": 1}
+WRITES = {"generate": 1, "simulate": 5, "view": 5, "accuracy": 3, "sweep": 3, "effects": 1}
 FAULTS = {
     "full": ("> /dev/full", 1),
     "closed": (">&-", 0),
