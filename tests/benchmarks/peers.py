@@ -1,0 +1,266 @@
+"""Compiled derivatives and runs beside those of others, in one process, as paired measurements.
+
+    pip install -e '.[bench]' && python tests/benchmarks/peers.py [--rounds N]
+
+A derivative, one state after another in a loop of C or C++: the kernel of `eomgen.native` over 2000
+columns, beside Pinocchio's `abaInParallel` with one thread. Planar chains of 2 to 100 links are the
+same mechanism for both (accelerations are compared first); for the human figure Pinocchio has its
+own sample humanoid, of 34 degrees of freedom where the figure has 41.
+
+Runs at true errors of 1e-6, 1e-9 and 1e-12: steps of DOP853 in C, beside heyoka's Taylor series fed
+with the same program, and SciPy's DOP853 over the NumPy module. For each the loosest of a ladder of
+tolerances whose end is that near to a reference in extended precision. heyoka compiles first; that
+is told apart. Printed are medians, and of the ratios of paired rounds median and quartiles.
+"""
+
+import argparse
+import ctypes
+import os
+import platform
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from importlib.metadata import version
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+import pinocchio as pin
+from scipy.integrate import DOP853
+
+from eomgen.model.elaborate import elaborate
+from eomgen.model.model import Model
+from eomgen.native.accelerator import Accelerator
+from eomgen.native.library import compiled_library
+from eomgen.native.module import Kernels
+from eomgen.native.runs import MAIN, sources
+from eomgen.program.kernel import kernel
+from eomgen.run.integrate import integrate
+from eomgen.run.module import as_problem, load_module
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scene.built_in import BUILT_IN
+from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.store import generated_code, interfaced_program_of, key_of
+from eomgen.study.accuracy.measure import error
+from eomgen.study.accuracy.reference import reference
+
+COLUMNS = 2000
+ERRORS = (1e-6, 1e-9, 1e-12)
+LADDER = [10.0**-k for k in np.arange(4, 16.1, 0.5)]
+
+
+def chain(count: int) -> Model:
+    """The built-in chain with so many links."""
+    text = (BUILT_IN / "chain.toml").read_text("utf-8").replace("count = 10", f"count = {count}")
+    return replace(elaborate(parse_scene(text)), outputs=())
+
+
+def chain_of_pinocchio(count: int) -> Any:
+    """The same mechanism."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, -9.81, 0.0])
+    at, place = 0, pin.SE3.Identity()
+    for i in range(count):
+        at = model.addJoint(at, pin.JointModelRZ(), place, f"joint_{i}")
+        inertia = pin.Inertia(0.1, np.zeros(3), np.diag([1e-12, 1e-12, 3.3333333333333335e-4]))
+        model.appendBodyToJoint(at, inertia, pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])))
+        place = pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.0]))
+    return model
+
+
+def paired(rounds: int, *calls: Callable[[], object]) -> np.ndarray:
+    """Times of calls, (rounds, calls), s, by turns."""
+    times = np.empty((rounds, len(calls)))
+    for call in calls:
+        call()
+    for row in times:
+        for j, call in enumerate(calls):
+            start = time.perf_counter()
+            call()
+            row[j] = time.perf_counter() - start
+    return times
+
+
+def spread(ratios: np.ndarray) -> str:
+    low, middle, high = np.quantile(ratios, (0.25, 0.5, 0.75))
+    return f"{middle:.3g} ({low:.3g} to {high:.3g})"
+
+
+@cache
+def library(model: Model) -> tuple[Any, Any, float]:
+    """A model's Python module, the library of its compiled derivative, and the time to compile."""
+    module = load_module(generated_code(model).module, model.name)
+    texts = sources(*interfaced_program_of(model))
+    start = time.perf_counter()
+    made = compiled_library(f"bench {key_of(model)} {time.time()}", lambda: texts, MAIN)
+    return module, made, time.perf_counter() - start
+
+
+def derivatives(rounds: int) -> None:
+    """Print the table of derivatives."""
+    row("mechanism", "operations", "C, µs", "Pinocchio, µs", "ratio and quartiles", "compile, s")
+    row(*["---"] * 6)
+    cases = [(f"chain of {n}", chain(n), chain_of_pinocchio(n)) for n in (2, 10, 30, 100)]
+    figure, humanoid = elaborate(read_scene("human_figure")), pin.buildSampleModelHumanoidRandom()
+    cases.append(("human_figure (41), sample humanoid (34)", figure, humanoid))
+    rng = np.random.default_rng(1)
+    for name, model, peer in cases:
+        module, made, seconds = library(model)
+        y = rng.uniform(-1.0, 1.0, (len(module.STATES), COLUMNS))
+        ours, rates = compiled_columns(module, made, y)
+        theirs, found = columns_of_pinocchio(peer, y, rng)
+        times = paired(rounds, ours, theirs)
+        if is_same(peer, y):
+            worst = np.abs(rates[peer.nq :] - found).max() / np.abs(found).max()
+            assert worst < 1e-6, worst
+        per = np.median(times, axis=0) / COLUMNS * 1e6
+        row(
+            name,
+            module.COST["derivative"]["total"],
+            *(f"{x:.3g}" for x in per),
+            spread(times[:, 1] / times[:, 0]),
+            f"{seconds:.2g}",
+        )
+
+
+def row(*words: object) -> None:
+    """Print a row of a table."""
+    print(f"| {' | '.join(map(str, words))} |", flush=True)
+
+
+def is_same(peer: Any, y: np.ndarray) -> bool:
+    """Whether Pinocchio's model has the states of ours, in their order."""
+    return bool(peer.nq == peer.nv and 2 * peer.nv == len(y))
+
+
+def compiled_columns(module: Any, made: Any, y: np.ndarray) -> tuple[Callable[[], None], Any]:
+    """A call of our kernel for columns of states, and where it puts the derivatives."""
+    out, sound = np.empty_like(y), np.empty(COLUMNS, np.int8)
+    constants, inputs = Kernels(module, made).held(None), np.zeros(max(1, len(module.INPUTS)))
+    call, pointer = made.columns_derivative, ctypes.c_void_p
+    call.argtypes = (
+        *(ctypes.c_long, ctypes.c_double, *[pointer] * 3, ctypes.c_int, *[pointer] * 2),
+    )
+    given = (y.ctypes.data, constants, inputs.ctypes.data, 0)
+
+    def compute() -> None:
+        call(COLUMNS, 0.0, *given, out.ctypes.data, sound.ctypes.data)
+        assert sound[0]
+
+    return compute, out
+
+
+def columns_of_pinocchio(
+    peer: Any, y: np.ndarray, rng: np.random.Generator
+) -> tuple[Callable[[], None], Any]:
+    """A call of Pinocchio for as many states, the same if it has these, and its accelerations."""
+    low, high = -np.ones(peer.nq), np.ones(peer.nq)
+    q = np.array([pin.randomConfiguration(peer, low, high) for _ in range(COLUMNS)]).T
+    v, tau = rng.uniform(-1.0, 1.0, (2, peer.nv, COLUMNS))
+    if is_same(peer, y):
+        q, v, tau = y[: peer.nq], y[peer.nq :], np.zeros_like(tau)
+    q, v, tau = (np.asfortranarray(array) for array in (q, v, tau))
+    pool, found = pin.ModelPool(peer, 1), np.zeros((peer.nv, COLUMNS), order="F")
+    return lambda: pin.abaInParallel(1, pool, q, v, tau, found), found
+
+
+def taylor(model: Model, module: Any) -> tuple[Callable[[float], Any], float]:
+    """heyoka's integrator of a program for a tolerance, and the time to make the first one, s."""
+    one = kernel(interfaced_program_of(model)[0], "derivative")
+    variables = dict(zip(module.STATES, hy.make_vars(*module.STATES), strict=True))
+    known = one.known_values(dict(module.PARAMETERS), FloatScalars())
+    rates = one.moving(
+        known, [variables[name] for name in one.inputs], [getattr(hy, f) for f in one.functions]
+    )
+    system = [(variables[name], rate) for name, rate in zip(module.STATES, rates, strict=True)]
+
+    @cache
+    def made(tolerance: float) -> Any:
+        return hy.taylor_adaptive(system, list(module.initial_state()), tol=tolerance)
+
+    start = time.perf_counter()
+    made(LADDER[0])
+    return made, time.perf_counter() - start
+
+
+class Case:
+    """A motion, and its end by each method for a tolerance."""
+
+    def __init__(self, name: str, model: Model, t_end: float) -> None:
+        module = load_module(generated_code(model).module, model.name)
+        self.name, self.t_end, self.start = name, t_end, module.initial_state()
+        self.plain = as_problem(module)
+        accelerator = Accelerator(model, module, None, None)
+        accelerator.compile()
+        self.problem = accelerator.of(self.plain)
+        self.true = reference(model, module, t_end=t_end)
+        self.taylor, self.seconds = taylor(model, module)
+
+    def by_c(self, tolerance: float) -> Any:
+        bounds = {"rtol": tolerance, "atol": 0.1 * tolerance}
+        return integrate(self.problem, "DOP853", self.t_end, samples=2, **bounds).y[-1]
+
+    def by_heyoka(self, tolerance: float) -> Any:
+        integrator = self.taylor(tolerance)
+        integrator.time, integrator.state[:] = 0.0, self.start
+        integrator.propagate_until(self.t_end)
+        return integrator.state.copy()
+
+    def by_scipy(self, tolerance: float) -> Any:
+        bounds = {"rtol": max(tolerance, 2.3e-14), "atol": 0.1 * tolerance}
+        solver = DOP853(self.plain.derivative, 0.0, self.start, self.t_end, **bounds)
+        while solver.status == "running":
+            solver.step()
+        return solver.y
+
+    def loosest(self, method: Callable[[float], Any], most: float) -> Callable[[], Any] | None:
+        """The run of a method by its loosest tolerance with an error below `most`, if any."""
+        for tolerance in LADDER:
+            if error(method(tolerance), self.true.y[-1], self.true.scale) < most:
+                return partial(method, tolerance)
+        return None
+
+
+def runs(rounds: int) -> None:
+    """Print the table of runs."""
+    row("motion", "true error", "C", "heyoka", "NumPy, SciPy", "heyoka / C", "NumPy / C")
+    row(*["---"] * 7)
+    for case in (
+        Case("double_pendulum, 10 s", elaborate(read_scene("double_pendulum")), 10.0),
+        Case("chain of 10, 1 s", chain(10), 1.0),
+    ):
+        for most in ERRORS:
+            methods = (case.by_c, case.by_heyoka, case.by_scipy)
+            calls = [case.loosest(method, most) for method in methods]
+            columns = iter(paired(rounds, *(call for call in calls if call)).T)
+            times = [next(columns) if call else None for call in calls]
+            row(
+                case.name,
+                f"{most:g}",
+                *("not reached" if x is None else f"{1e3 * np.median(x):.3g} ms" for x in times),
+                *("" if x is None or times[0] is None else spread(x / times[0]) for x in times[1:]),
+            )
+        row(f"heyoka's compilation: {case.seconds:.2g} s", *[""] * 6)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--rounds", type=int, default=30)
+    rounds = parser.parse_args().rounds
+    compiler = subprocess.run(["cc", "--version"], capture_output=True, text=True).stdout
+    print(
+        f"{os.cpu_count()} cores, {platform.machine()}; {compiler.splitlines()[0]}; Python "
+        f"{platform.python_version()}, NumPy {np.__version__}, SciPy {version('scipy')}, "
+        f"Pinocchio {pin.__version__}, heyoka {hy.__version__}\n"
+    )
+    derivatives(rounds)
+    print()
+    runs(rounds)
+
+
+if __name__ == "__main__":
+    main()
