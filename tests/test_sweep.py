@@ -97,11 +97,12 @@ def test_what_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     chunks[3].unlink()
     chunks[5].write_bytes(before[5][:-40])
     chunks[7].write_bytes(before[8])  # another chunk's
+    chunks[9].write_bytes(before[9].replace(b"final.npy", b"finam.npy"))
     ran: list[int] = []
     once = members.run_members
     monkeypatch.setattr(execute, "run_members", lambda *a: ran.append(1) or once(*a))
     again = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **QUICK)
-    assert len(ran) == 3 and same(whole, again)
+    assert len(ran) == 4 and same(whole, again)
     assert [chunk.read_bytes() for chunk in chunks] == before
     with pytest.raises(RunError, match="holds another sweep; choose another folder"):
         eomgen.ensemble("two_body", design, folder=folder, **QUICK)

@@ -8,13 +8,22 @@ from functools import partial
 import numpy as np
 
 from eomgen.run import events
+from eomgen.run.calls import Calls, Count
 from eomgen.run.checks import check_repairs, check_rest_speed, numbers
 from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, repaired
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
-from eomgen.run.stepping import ANEW, Asked, adaptive_steps, begun, can_go_on, equal_steps
+from eomgen.run.stepping import (
+    ANEW,
+    Asked,
+    adaptive_steps,
+    begun,
+    can_go_on,
+    compiled_steps,
+    equal_steps,
+)
 from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Event, Outcome, Trajectory
 from eomgen.run.works import Account, Powers
@@ -100,7 +109,7 @@ def integrate(
     check_rest_speed(rest_speed)
     monitor = _monitor(guard, problem, method, asked) if guard else None
     repairs = monitor is not None and monitor.guard.repairs
-    calls = _Calls(_Count(1), _Count(2))
+    calls = Calls(Count(1), Count(2))
     counted = replace(
         problem,
         derivative=calls.derivatives.of(monitor.derivative if monitor else problem.derivative),
@@ -115,12 +124,9 @@ def integrate(
         checked = None if unstable or not method.explicit or repairs else problem
         begin, settings = equal_steps(asked, method, counted, checked)
     else:
-        # Compiled steps are not checked for what needs the state within a step.
+        # Compiled steps give no state within a step, and are not checked for contacts and the like.
         plain = not (monitor or powers or problem.contacts or problem.corners)
-        compiled = problem.compiled if plain else None
-        if compiled and compiled.derivative is not problem.derivative:
-            compiled = None
-        steps = compiled.steps if compiled else None
+        steps = compiled_steps(problem) if plain else None
         begin, settings = adaptive_steps(
             asked, method, problem, remarks.append, steps=steps, each=tally is not None
         )
@@ -146,7 +152,7 @@ def _trajectory(
     run: "_Run",
     problem: Problem,
     integrator: str,
-    calls: "_Calls",
+    calls: Calls,
     outcome: Outcome,
     message: str,
     resume: Resume,
@@ -203,44 +209,6 @@ def _monitor(
         check_repairs(problem, asked.resume is not None)
     tight = OF_TOLERANCE * asked.rtol if isinstance(method, Adaptive) else guard.bound
     return RoundingMonitor(guard, problem, min(guard.bound, tight))
-
-
-@dataclass
-class _Count:
-    """The number of calls of functions of t and y, and where one last raised an error.
-
-    `axes` is the number of axes of their values. If a function raises an error at a state that is
-    not finite, its value is nan instead, so that the method rejects the step.
-    """
-
-    axes: int
-    calls: int = 0
-    failed: tuple[float, FloatArray] | None = None
-
-    def of(
-        self, function: Callable[[float, FloatArray], FloatArray]
-    ) -> Callable[[float, FloatArray], FloatArray]:
-        """The same function, but its calls are counted."""
-
-        def counted(t: float, y: FloatArray) -> FloatArray:
-            self.calls += 1
-            try:
-                return function(t, y)
-            except (ArithmeticError, ValueError):
-                if not np.isfinite(y).all():
-                    return np.full((len(y),) * self.axes, np.nan)
-                self.failed = float(t), np.array(y)
-                raise
-
-        return counted
-
-
-@dataclass(frozen=True)
-class _Calls:
-    """The calls of the derivative and of the Jacobian in a run."""
-
-    derivatives: _Count
-    jacobians: _Count
 
 
 @dataclass
@@ -313,7 +281,7 @@ def _advances(
 def _follow(
     run: _Run,
     advances: Iterator[Advance],
-    calls: _Calls,
+    calls: Calls,
     problem: Problem,
     method: FixedStep | Adaptive,
     t_end: float,
@@ -356,7 +324,7 @@ def _follow(
     return outcome, f"stopped at {_place(problem, run)}: {outcome}"
 
 
-def _explained(calls: _Calls, problem: Problem, run: _Run, error: Explanation) -> Explanation:
+def _explained(calls: Calls, problem: Problem, run: _Run, error: Explanation) -> Explanation:
     """The model's explanation of an error in the step after (run.t, run.y), else the error itself.
 
     The state at which the derivative or the Jacobian raised the error is explained first, then the

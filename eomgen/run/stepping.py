@@ -141,6 +141,14 @@ def _settings(asked: Asked, dt: float | None) -> Resume:
     return numbers(grid=asked.grid, dt=dt, **given)
 
 
+def compiled_steps(problem: Problem) -> Callable[[str], Steps | None] | None:
+    """The compiled steps of a problem; None if it has none, or another derivative than they."""
+    compiled = problem.compiled
+    if compiled is None or compiled.derivative is not problem.derivative:
+        return None
+    return compiled.steps
+
+
 def can_go_on(method: FixedStep | Adaptive) -> bool:
     """Whether a run by a method can continue another one exactly, as if that had not ended."""
     return isinstance(method, FixedStep) or bool(method.memory)

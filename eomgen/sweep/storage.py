@@ -15,7 +15,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.files import check_folder, read_plain, write_whole
-from eomgen.run.archive import packed, unpacked
+from eomgen.run.archive import checked, packed, unpacked
 from eomgen.store import key_of
 from eomgen.sweep.design import Design
 from eomgen.sweep.members import Arrays, Task
@@ -44,12 +44,11 @@ class Storage:
         if not path.is_file():
             return None
         try:
-            arrays = unpacked(read_plain(path, LARGEST))
+            arrays = checked(unpacked(read_plain(path, LARGEST)))
         except Exception:  # a damaged archive may raise any error of zipfile and NumPy
             return None
         if str(arrays.pop(MARK, "")) != f"chunk {number} of the sweep {self.digest}":
             return None
-        arrays.pop("digest", None)
         return arrays
 
     def _path(self, number: int) -> Path:

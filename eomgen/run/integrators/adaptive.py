@@ -83,17 +83,17 @@ def advances(
     stepper.begin(t_start, resume)
     sampled, stalled, cut = int(np.searchsorted(times, t_start, side="right")), 0, 0
     left, factored, here = bounds.most - made, 0, 0
-    compiled = Strides(method, problem, t_end, bounds, times) if steps and method.compiled else None
+    compiled = None
+    if steps and method.compiled:
+        compiled = Strides(method, problem, t_end, bounds, times, steps)
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
-        found = steps(method.compiled) if steps and compiled else None
-        if compiled and found:
-            until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
-            stride = compiled.made(found, stepper.solver, sampled, until - here)
-            if stride:
-                yield from compiled.advances(stride, sampled, stepper.is_whole, each)
-                here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
-                continue
+        until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
+        stride = compiled.made(stepper.solver, sampled, until - here) if compiled else None
+        if compiled and stride:
+            yield from compiled.advances(stride, sampled, stepper.is_whole, each)
+            here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
+            continue
         here += 1
         step = stepper.step()
         t, y = step.end, step.last
@@ -107,12 +107,7 @@ def advances(
             cut += retry.seen
             continue
         passed = int(np.searchsorted(times, t, side="right"))
-        spanned = times[sampled:passed]
-        # The state at the step's end is known without dense output.
-        within = spanned[spanned < t]
-        states = step.states(within) if within.size else ()
-        samples = list(zip(within.tolist(), map(problem.unit, states), strict=True))
-        samples += [(t, y)] * (spanned.size - within.size)
+        samples = _samples(problem, step, times[sampled:passed])
         yield Advance(
             t,
             y,
@@ -129,6 +124,14 @@ def advances(
             return
         stepper.prepare_next(step)
     raise StepFailure(f"{bounds.most} steps did not suffice", method.remedy)
+
+
+def _samples(problem: Problem, step: Step, times: FloatArray) -> list[tuple[float, FloatArray]]:
+    """The rows of a step at times after its start; at its end no dense output is needed."""
+    within = times[times < step.end]
+    states = step.states(within) if within.size else ()
+    samples = list(zip(within.tolist(), map(problem.unit, states), strict=True))
+    return samples + [(step.end, step.last)] * (times.size - within.size)
 
 
 class _Stepper:

@@ -1,6 +1,6 @@
 """Steps of an adaptive method that compiled code makes, many at once."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, Protocol
 
@@ -26,7 +26,7 @@ class Tolerances(Protocol):
 
 
 class Strides:
-    """The compiled steps of a run, with rows at `times`."""
+    """The compiled steps of a run, with rows at `times`; `steps` is asked for them each time."""
 
     def __init__(
         self,
@@ -35,16 +35,21 @@ class Strides:
         t_end: float,
         bounds: Tolerances,
         times: FloatArray,
+        steps: Callable[[str], Steps | None],
     ) -> None:
+        self._steps = steps
         self._method, self._problem, self._t_end, self._bounds = method, problem, t_end, bounds
         self._times = times
         self._atol = np.array(np.broadcast_to(bounds.atol, problem.initial.shape), dtype=float)
         self._unusual = False
 
-    def made(self, steps: Steps, solver: Any, sampled: int, most: int) -> Stride | None:
+    def made(self, solver: Any, sampled: int, most: int) -> Stride | None:
         """Make at most so many steps and put the solver at their end; None if Python must make the
-        next. `sampled` is the number of rows so far.
+        next, or if there are no compiled ones yet. `sampled` is the number of rows so far.
         """
+        steps = self._steps(self._method.compiled)
+        if steps is None:
+            return None
         if self._unusual:  # the last stride ended before a step that Python must make
             self._unusual = False
             return None
