@@ -260,8 +260,17 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
         estimate = by_second_run(case, trial)
         error = estimate.last
+    told = ""
     if accelerator and accelerator.notice:
-        warnings.append(f"the run was not compiled: {accelerator.notice}")
+        told = f"the run was not compiled: {accelerator.notice}"
+    elif accelerator and plan.backend == "c" and not accelerator.used:
+        told = (
+            "no step was made in C: compiled are those of DOP853, in scenes without contacts, "
+            "stops and other one-sided forces, without guard and works"
+        )
+    if told:
+        warnings.append(told)
+        reporter.note(told)
     model = model.with_parameters(plan.parameters)
     return Run(
         model,

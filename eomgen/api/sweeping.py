@@ -248,6 +248,8 @@ def _kernels(plan: SweepPlan, reporter: Reporter) -> tuple[str, Mapping[str, str
 
     key = library_key(plan.model)
     usable: Any = getattr(find_integrator(plan.setting.integrator), "compiled", "")
+    if plan.backend == "c" and not usable:
+        reporter.note("the sweep is not compiled: only steps of DOP853 are")
     if plan.backend == "numpy" or not usable:
         return key, {}
     if plan.backend == "auto":
