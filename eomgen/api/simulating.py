@@ -21,6 +21,7 @@ from eomgen.scene.schema import SHOWN, Form, Route, Scene, Simulation
 from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
+    from eomgen.native.accelerator import Accelerator
     from eomgen.run.guard import Guard
     from eomgen.run.resume import Start
     from eomgen.run.tally import Follow
@@ -223,15 +224,9 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         "unstable": plan.unstable,
     }
     problem = problem_of(functions, *values, model)
-    accelerator = None
-    if plan.backend != "numpy":
-        from eomgen.native.accelerator import Accelerator
-
-        accelerator = Accelerator(model, functions, *values)
+    accelerator = _accelerator(plan, functions, values, reporter)
+    if accelerator:
         problem = accelerator.of(problem)
-        if plan.backend == "c":
-            with reporter.waiting(f"compiling {model.name} …"):
-                accelerator.compile()
     start = _start(plan, problem)
     if start is not None:
         problem = start.problem
@@ -260,15 +255,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
         estimate = by_second_run(case, trial)
         error = estimate.last
-    told = ""
-    if accelerator and accelerator.notice:
-        told = f"the run was not compiled: {accelerator.notice}"
-    elif accelerator and plan.backend == "c" and not accelerator.used:
-        told = (
-            "no step was made in C: compiled are those of DOP853, in scenes without contacts, "
-            "stops and other one-sided forces, without guard and works"
-        )
-    if told:
+    if told := _why_not_compiled(plan, accelerator):
         warnings.append(told)
         reporter.note(told)
     model = model.with_parameters(plan.parameters)
@@ -285,6 +272,36 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         begun=start.reported(trajectory) if start else "",
         compiled=accelerator is not None and accelerator.used,
     )
+
+
+def _accelerator(
+    plan: Plan,
+    module: GeneratedModule,
+    values: tuple[Mapping[str, float] | None, ...],
+    reporter: Reporter,
+) -> "Accelerator | None":
+    """The compiled steps of a plan; None if it asks for steps in Python."""
+    if plan.backend == "numpy":
+        return None
+    from eomgen.native.accelerator import Accelerator
+
+    accelerator = Accelerator(plan.model, module, *values)
+    if plan.backend == "c":
+        with reporter.waiting(f"compiling {plan.model.name} …"):
+            accelerator.compile()
+    return accelerator
+
+
+def _why_not_compiled(plan: Plan, accelerator: "Accelerator | None") -> str:
+    """Why a run that is long, or was to be compiled, took no compiled steps; "" if it need not."""
+    if accelerator and accelerator.notice:
+        return f"the run was not compiled: {accelerator.notice}"
+    if accelerator and plan.backend == "c" and not accelerator.used:
+        return (
+            "no step was made in C: compiled are those of DOP853, in scenes without contacts, "
+            "stops and other one-sided forces, without guard and works"
+        )
+    return ""
 
 
 def _run_case(
