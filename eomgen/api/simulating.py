@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, overridden, read, values_of
 from eomgen.api.reporter import SILENT, Reporter
+from eomgen.api.settings import setting_of
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
@@ -17,7 +18,7 @@ from eomgen.results import Run
 from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.problem import Problem
 from eomgen.scene.appearance import appearance_of
-from eomgen.scene.schema import SHOWN, Form, Route, Scene, Simulation
+from eomgen.scene.schema import SHOWN, Form, Route, Scene
 from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
@@ -390,35 +391,3 @@ def _start(plan: Plan, problem: Problem) -> "Start | None":
         ended = load_npz(path)
     limits = {"max_step": plan.max_step, "rest_speed": plan.scene.simulation.rest_speed}
     return going_on(ended, path, problem, plan.setting, **limits)
-
-
-def setting_of(
-    simulation: Simulation,
-    integrator: str | None = None,
-    *,
-    dt: float | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    reporter: Reporter = SILENT,
-) -> "Setting":
-    """The method with its tolerances or step; None stands for those of the scene, `simulation`.
-
-    Raises `RunError` for tolerances of a fixed-step method.
-    """
-    from eomgen.run.integrators import FixedStep, find_integrator
-    from eomgen.study.accuracy.trial import Setting
-
-    name = simulation.integrator if integrator is None else integrator
-    if not isinstance(find_integrator(name), FixedStep):
-        return Setting(
-            name,
-            simulation.rtol if rtol is None else rtol,
-            simulation.atol if atol is None else atol,
-            dt,
-        )
-    if rtol is not None or atol is not None:
-        rtol_name, atol_name, dt_name = map(reporter.argument, ("rtol", "atol", "dt"))
-        raise RunError(
-            f"{rtol_name}, {atol_name}: {name} takes equal steps; give {dt_name} instead"
-        )
-    return Setting(name, dt=simulation.dt if dt is None else dt)
