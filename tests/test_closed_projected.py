@@ -142,6 +142,7 @@ assert len(SQUARED) >= some(10, 16)
 
 
 @pytest.mark.parametrize(("seed", "dimensions", "most"), SQUARED)
+@pytest.mark.every(2)
 def test_closed_is_aba_in_60_digits(seed: int, dimensions: int, most: int) -> None:
     """Every joint type, rotations that are exact: to all digits but a few."""
     agree(squared(tree(seed, dimensions, most)), seed, EXACT)
@@ -294,6 +295,7 @@ def is_positive(expression: sp.Expr, given: dict[sp.Expr, sp.Expr], masses: set[
 
 
 @pytest.mark.parametrize("case", [*REPORTED, *SMALL[:12:2], *SMALL[11:16:2]], ids=str)
+@pytest.mark.every(2)
 def test_pivots_are_sums_of_weighted_squares(case: str | tuple[int, int, int]) -> None:
     """No pivot is a difference; weights of rotation are those of LᵀDL of a body's inertia."""
     equations = scene(case) if isinstance(case, str) else derive_projected(tree(*case))

@@ -156,6 +156,7 @@ def at_random(e: Engine, seed: int) -> tuple[np.ndarray, dict[str, float], Any]:
 
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize(("dimensions", "seed"), FEW)
+@pytest.mark.every(2)
 def test_as_the_undriven_scene(dimensions: int, seed: int, route: str) -> None:
     """At the same motion: M, V, G, F are its free rows, and f'' takes its part of M into V; the
     same forces keep the same motion; what else there is is the same.
@@ -219,6 +220,7 @@ def turned(tree: SpatialTree) -> bool:
         (SPACE, 47, "aba", True),
     ],
 )
+@pytest.mark.every(2)
 def test_jacobians(dimensions: int, seed: int, route: str, tangents: bool) -> None:
     """By state and by parameters, those of the drives among them, against differences."""
     e = made(dimensions, seed, route, tangents=tangents)

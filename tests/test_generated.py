@@ -113,6 +113,7 @@ def test_quarter_poses(built_in: Compiled) -> None:
 
 
 @pytest.mark.parametrize("tree", TREES, ids=lambda tree: tree.name)
+@pytest.mark.every(2)
 def test_random_trees(tree: Scene) -> None:
     """Chains, branches, several trees, point masses, pins anywhere: 20 states of each."""
     c = compiled(tree)

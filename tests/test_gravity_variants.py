@@ -274,6 +274,7 @@ VARIANTS = [
 
 
 @pytest.mark.parametrize(("scene", "more"), VARIANTS)
+@pytest.mark.every(2)
 def test_jacobian_and_energy(scene: str, more: str) -> None:
     """Jacobians as central differences have them; dE/dt is the power of what has no potential."""
     for route in ("aba", "ldl"):

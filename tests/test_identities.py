@@ -42,6 +42,7 @@ def assert_close(
     assert np.max(np.abs(actual - expected)) <= tolerance * size
 
 
+@pytest.mark.every(2)
 def test_mass_matrix(c: Compiled) -> None:
     """½ vᵀ M v is the kinetic energy; M is symmetric with positive eigenvalues, and is SymPy's."""
     eq = c.equations

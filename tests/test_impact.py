@@ -291,6 +291,7 @@ def test_impacts_against_dense_algebra(name: str, route: str) -> None:
 
 
 @pytest.mark.parametrize("name", list(MODELS))
+@pytest.mark.every(2)
 def test_normal_velocity_and_energy(name: str) -> None:
     """The contact parts at exactly e times its approach; no energy comes from nowhere."""
     engine = striking(*MODELS[name])

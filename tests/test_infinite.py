@@ -75,6 +75,7 @@ def run(text: str, integrator: str, t_end: float = 3.0) -> Trajectory:
         (MOTOR.format("-1/x**2"), "LSODA"),
     ],
 )
+@pytest.mark.every(2)
 def test_a_fall_into_the_centre(effect: str, integrator: str) -> None:
     """From rest at a the centre is reached at π/2 sqrt(a³/(2 μ)): there the run ends."""
     found = run(scene(effect, 1.0).replace("linear = 0.01", "linear = 1e-12"), integrator)

@@ -273,6 +273,7 @@ def test_double_pendulum_without_velocity_forces(route: str) -> None:
 @pytest.mark.parametrize(
     ("dimensions", "seed"), [(PLANE, 3), (PLANE, 38), (SPACE, 11), (SPACE, 14)]
 )
+@pytest.mark.every(2)
 def test_without_velocity_forces(dimensions: int, seed: int, route: str) -> None:
     """V is 0 and h is G; accelerations, inverse dynamics and joint forces are those of the whole
     scene at rest in the same place; what moves still moves; the Jacobian is exact.

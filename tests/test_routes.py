@@ -62,6 +62,7 @@ def in_floats(
 
 
 @pytest.mark.parametrize(("dimensions", "seed"), [*product((PLANE, SPACE), SEEDS)])
+@pytest.mark.every(2)
 def test_accelerations(dimensions: int, seed: int) -> None:
     """By both routes, in either kind of axes by turns, or in both, as three others have them."""
     tree, text = drawn(seed, dimensions, MOST[seed % 3])
@@ -271,6 +272,7 @@ FORCE = "applied_force"
 
 
 @by_module
+@pytest.mark.every(2)
 def test_module_at_other_parameters(dimensions: int, seed: int, route: str) -> None:
     """Parameters by name and in order: as the solver has a tree of other numbers."""
     tree, e = made(dimensions, seed, route)
@@ -363,6 +365,7 @@ def test_closed_is_aba(seed: int, most: int) -> None:
 
 @pytest.mark.parametrize("dimensions", (PLANE, SPACE))
 @pytest.mark.parametrize("seed", FEW)
+@pytest.mark.every(2)
 def test_ldl_is_aba(dimensions: int, seed: int) -> None:
     """Over all joint types: to 50 digits but for rotations that the scene gives in degrees.
 

@@ -138,6 +138,7 @@ def test_a_terminal_of_ascii(tmp_path: Path, name: str, how: str) -> None:
 
 
 @pytest.mark.parametrize("name", some(QUICKER[::2], list(COMMANDS)))
+@pytest.mark.every(2)
 def test_a_full_output_ends_no_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
