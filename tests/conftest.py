@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from campaign import FULL
+from campaign import FULL, is_kept
 from matplotlib.figure import Figure
 from mechanisms import BUILT_IN, Compiled, compiled
 from xdist.scheduler import LoadScopeScheduling
@@ -42,7 +42,7 @@ def _group(nodeid: str) -> str:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """What takes longest comes first. Of cases that are more of the same, an ordinary run takes
-    every n-th, and of tests for full runs none; see the markers in pyproject.toml.
+    one of every n, and of tests for full runs none; see the markers in pyproject.toml.
     """
     if not FULL:
         seen: dict[str, int] = {}
@@ -51,11 +51,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             name = item.nodeid.partition("[")[0]
             seen[name] = seen.get(name, -1) + 1
             every = item.get_closest_marker("every")
-            if item.get_closest_marker("full") or (every and seen[name] % every.args[0]):
+            if item.get_closest_marker("full") or (every and not is_kept(seen[name], *every.args)):
                 left.append(item)
         config.hook.pytest_deselected(items=left)
-        kept = set(map(id, left))
-        items[:] = [item for item in items if id(item) not in kept]
+        gone = set(map(id, left))
+        items[:] = [item for item in items if id(item) not in gone]
     rank = {name: i for i, name in enumerate(FIRST)}
     items.sort(key=lambda item: rank.get(_group(item.nodeid), len(FIRST)))
 

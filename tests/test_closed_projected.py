@@ -142,7 +142,6 @@ assert len(SQUARED) >= some(10, 16)
 
 
 @pytest.mark.parametrize(("seed", "dimensions", "most"), SQUARED)
-@pytest.mark.every(2)
 def test_closed_is_aba_in_60_digits(seed: int, dimensions: int, most: int) -> None:
     """Every joint type, rotations that are exact: to all digits but a few."""
     agree(squared(tree(seed, dimensions, most)), seed, EXACT)

@@ -298,7 +298,6 @@ def couple(
 
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @both_dimensions
-@pytest.mark.every(3)
 def test_random_trees_under_fields_forces_and_torques(dimensions: int, route: str) -> None:
     """Formula, attraction, vortex, steering, a planet, body axes, turning drag, a PD and a lag."""
     rng = np.random.default_rng(8)

@@ -263,7 +263,6 @@ def test_a_rod_of_little_inertia_sticks() -> None:
 
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @pytest.mark.parametrize("name", list(MODELS))
-@pytest.mark.every(3)
 def test_impacts_against_dense_algebra(name: str, route: str) -> None:
     """Every contact of every model, sliding and sticking, from velocities of bodies alone."""
     scene, effect = MODELS[name]
@@ -291,7 +290,6 @@ def test_impacts_against_dense_algebra(name: str, route: str) -> None:
 
 
 @pytest.mark.parametrize("name", list(MODELS))
-@pytest.mark.every(2)
 def test_normal_velocity_and_energy(name: str) -> None:
     """The contact parts at exactly e times its approach; no energy comes from nowhere."""
     engine = striking(*MODELS[name])

@@ -75,7 +75,6 @@ def run(text: str, integrator: str, t_end: float = 3.0) -> Trajectory:
         (MOTOR.format("-1/x**2"), "LSODA"),
     ],
 )
-@pytest.mark.every(2)
 def test_a_fall_into_the_centre(effect: str, integrator: str) -> None:
     """From rest at a the centre is reached at π/2 sqrt(a³/(2 μ)): there the run ends."""
     found = run(scene(effect, 1.0).replace("linear = 0.01", "linear = 1e-12"), integrator)
@@ -123,7 +122,7 @@ def test_infinite_at_the_start(
         ("1/max(0.9 - x, 0)", 0.5, 2.0, 0.84, 0.95),
     ],
 )
-@pytest.mark.every(3)
+@pytest.mark.every(2)
 def test_undefined_on_the_way(
     formula: str, x: float, v: float, low: float, high: float, integrator: str
 ) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bookkeeping import growth
-from campaign import some
+from campaign import some, thinned
 from engine import MP, Digits, Engine, along, apart, engine, exact, read
 from spatial_trees import ENDS, random_spatial_tree
 
@@ -261,7 +261,7 @@ def moment(name: str, route: str, seed: int) -> Moment:
     return Moment(compiled(name, route), seed)
 
 
-@pytest.fixture(params=some(CASES[::2], CASES), ids=lambda case: "-".join(case).strip("-"))
+@pytest.fixture(params=thinned(CASES, 2), ids=lambda case: "-".join(case).strip("-"))
 def m(request: pytest.FixtureRequest) -> Moment:
     """Every built-in scene by its own route, small ones and some trees by another."""
     return moment(*request.param, 61)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scaled_trees
-from campaign import some
+from campaign import some, thinned
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scaled_trees import apart, drawn, dynamics, found, size_of, state, truth
@@ -98,7 +98,7 @@ ONCE_SILENT = {
 }
 
 
-@pytest.mark.parametrize("number", some([*ONCE_SILENT][::2], [*ONCE_SILENT]))
+@pytest.mark.parametrize("number", thinned(ONCE_SILENT, 2))
 def test_not_silent_again(number: int) -> None:
     """What the campaign found. No route keeps its digits for those that are refused, or told."""
     outcome = "refused" if number in REFUSED else "told" if number in REPORTED else "right"
@@ -118,7 +118,7 @@ ONCE_REFUSED = {
 }
 
 
-@pytest.mark.parametrize("number", some([*ONCE_REFUSED][::2], [*ONCE_REFUSED]))
+@pytest.mark.parametrize("number", thinned(ONCE_REFUSED, 2))
 def test_not_refused(number: int) -> None:
     """Pushed about as if it were alone, a body that is slight beside others costs digits."""
     assert tried(*case(number)) == "right", ONCE_REFUSED[number]

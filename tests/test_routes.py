@@ -62,7 +62,6 @@ def in_floats(
 
 
 @pytest.mark.parametrize(("dimensions", "seed"), [*product((PLANE, SPACE), SEEDS)])
-@pytest.mark.every(2)
 def test_accelerations(dimensions: int, seed: int) -> None:
     """By both routes, in either kind of axes by turns, or in both, as three others have them."""
     tree, text = drawn(seed, dimensions, MOST[seed % 3])

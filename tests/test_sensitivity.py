@@ -180,7 +180,6 @@ def state(e: Engine, seed: int) -> tuple[np.ndarray, dict, dict]:
 
 
 @every_case
-@pytest.mark.every(2)
 def test_derivatives_are_exact(name: str, route: str) -> None:
     """Written out, and along directions as for large models, by the program and by the module."""
     forms = [made(name, route)]
@@ -198,7 +197,6 @@ def test_derivatives_are_exact(name: str, route: str) -> None:
 
 
 @every_case
-@pytest.mark.every(2)
 def test_entries_are_exact_one_by_one(name: str, route: str) -> None:
     """Small entries beside large ones too: each to 1e-12 of the largest in its own row."""
     e = made(name, route)
@@ -212,7 +210,6 @@ def test_entries_are_exact_one_by_one(name: str, route: str) -> None:
 
 
 @every_case
-@pytest.mark.every(2)
 def test_both_forms_for_columns_of_states(name: str, route: str) -> None:
     """Many states at once give each one's own matrix, written out or not; so does no input."""
     e = made(name, route)

@@ -121,7 +121,6 @@ def test_outlines() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg"])
-@pytest.mark.every(2)
 def test_figure_files_are_ours_and_reproducible(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"
     save_figure(swinging(), path)

@@ -165,7 +165,6 @@ def places(text: str) -> Iterator[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("hostile", [HOSTILE, LONG], ids=["hostile", "long"])
-@pytest.mark.every(2)
 def test_text_of_a_scene_is_never_shown_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], hostile: str
 ) -> None:

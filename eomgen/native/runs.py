@@ -137,12 +137,13 @@ class CompiledSteps:
             ctypes.byref(made),
         )
         n = made.value
+        passed = int(sampled[n - 1]) if n else 0
         return Stride(
             ends[:n],
             states[:n],
             {"h_abs": lengths[:n], "f": slopes[:n], "lost": losses[:n]},
             derivatives[:n],
             sampled[:n],
-            rows,
+            rows[:passed].copy(),  # the array for all rows to come is not kept with them
             usual=why != _UNUSUAL,
         )

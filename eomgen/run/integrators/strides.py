@@ -86,7 +86,7 @@ class Strides:
         count = len(stride.ends)
         lengths = np.diff(stride.ends, prepend=self._start)
         capped = lengths >= self._bounds.longest * (1 - 1e-9)
-        times, before, called = self._times.tolist(), 0, 0
+        before, called = 0, 0
         for first in range(count) if each else (0,):
             last = first if each else count - 1
             passed = int(stride.sampled[last])
@@ -96,7 +96,7 @@ class Strides:
             yield Advance(
                 t,
                 y,
-                list(zip(times[at], stride.rows[before:passed], strict=True)),
+                list(zip(self._times[at].tolist(), stride.rows[before:passed], strict=True)),
                 self._problem,
                 _unknown,
                 steps=last + 1 - first,
