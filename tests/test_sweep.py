@@ -3,6 +3,7 @@
 import csv
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,10 +19,11 @@ import eomgen
 from eomgen.cli import main
 from eomgen.errors import RunError
 from eomgen.show.sweep import draw_sweep
-from eomgen.sweep import execute, members
+from eomgen.sweep import execute, together
 from eomgen.sweep.design import Law
 from eomgen.sweep.ensemble import Ensemble
 
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 MASSES = (0.5, 1.0, 1.7)
 QUICK: dict[str, Any] = {"t_end": 1.0, "integrator": "DOP853", "rtol": 1e-8}
 
@@ -86,11 +88,33 @@ def test_nothing_depends_on_who_runs_it(tmp_path: Path) -> None:
     assert runs[0].on_grid("momentum").shape[:2] == (10, 10)
 
 
-def test_what_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+TOGETHER: dict[str, Any] = {"integrator": "rk4", "dt": 0.01, "t_end": 0.5, "backend": "c"}
+
+
+@pytest.mark.skipif(CC is None, reason="there is no C compiler")
+def test_members_that_run_together(tmp_path: Path) -> None:
+    """In one thread or two, kept in a folder or not: the same bytes."""
+    design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, 30), "theta": np.linspace(-1.0, 1.0, 10)})
+    runs = [
+        eomgen.ensemble("two_body", design, outputs=("momentum",), **TOGETHER, **options)
+        for options in ({}, {"workers": 2}, {"folder": tmp_path / "kept"})
+    ]
+    assert all(same(runs[0], run) for run in runs[1:])
+    alone = eomgen.ensemble("two_body", {"m_A": [design.values[7, 0]]}, **TOGETHER)
+    assert alone.finished.all()
+
+
+@pytest.mark.parametrize(
+    "options", [{}, pytest.param(TOGETHER, marks=pytest.mark.skipif(CC is None, reason="no CC"))]
+)
+def test_what_was_stopped_goes_on(
+    options: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Chunks that are whole are not run again; lost, damaged and foreign ones are."""
+    asked = options or QUICK
     design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, 40)})
     folder = tmp_path / "kept"
-    whole = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **QUICK)
+    whole = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **asked)
     chunks = sorted(folder.glob("chunk_*.npz"))
     assert len(chunks) == 40
     before = [chunk.read_bytes() for chunk in chunks]
@@ -99,15 +123,15 @@ def test_what_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     chunks[7].write_bytes(before[8])  # another chunk's
     chunks[9].write_bytes(before[9].replace(b"final.npy", b"finam.npy"))
     ran: list[int] = []
-    once = members.run_members
-    monkeypatch.setattr(execute, "run_members", lambda *a: ran.append(1) or once(*a))
-    again = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **QUICK)
+    once = together.run_chunk
+    monkeypatch.setattr(execute, "run_chunk", lambda *a: ran.append(1) or once(*a))
+    again = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **asked)
     assert len(ran) == 4 and same(whole, again)
     assert [chunk.read_bytes() for chunk in chunks] == before
     with pytest.raises(RunError, match="holds another sweep; choose another folder"):
-        eomgen.ensemble("two_body", design, folder=folder, **QUICK)
+        eomgen.ensemble("two_body", design, folder=folder, **asked)
     with pytest.raises(RunError, match="is no empty folder"):
-        eomgen.ensemble("two_body", design, folder=tmp_path, **QUICK)
+        eomgen.ensemble("two_body", design, folder=tmp_path, **asked)
 
 
 def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from eomgen.sweep.ensemble import Ensemble
 from eomgen.sweep.execute import chunk_size, execute
 from eomgen.sweep.members import Task
 from eomgen.sweep.storage import opened
+from eomgen.sweep.together import METHOD, build
 
 __all__ = ["Design", "Ensemble", "Law", "ensemble", "grid", "plan_sweep", "run_sweep", "sampled"]
 
@@ -174,8 +175,8 @@ def run_sweep(
     model = plan.model
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     state_names: tuple[str, ...] = functions.STATES
-    key, kernels = _kernels(plan, reporter)
-    times = _times(plan)
+    times, dt, every = _times(plan)
+    key, kernels, vectors = _kernels(plan, functions, reporter)
     task = Task(
         model=model,
         source=module.source,
@@ -195,10 +196,16 @@ def run_sweep(
             "max_step": plan.max_step,
             "rest_speed": plan.scene.simulation.rest_speed,
         },
+        vectors=vectors,
+        dt=dt,
+        every=every,
     )
+    if (kernels or vectors) and not scheduler:
+        task = _built(task, plan, reporter)
     storage = None
     if folder is not None:
-        storage = opened(folder, task, plan.design, chunk_size(len(plan.design.values)))
+        size = chunk_size(len(plan.design.values), bool(task.vectors))
+        storage = opened(folder, task, plan.design, size)
     with reporter.progress(f"sweeping {model.name}") as progress:
         found = execute(
             task, plan.design, storage, workers=workers, scheduler=scheduler, progress=progress
@@ -217,15 +224,17 @@ def run_sweep(
     )
 
 
-def _times(plan: SweepPlan) -> tuple[float, ...]:
-    """The times of the rows that are kept, s."""
+def _times(plan: SweepPlan) -> tuple[tuple[float, ...], float, int]:
+    """The times of the rows that are kept, s; for fixed steps also the step, and that each so many
+    are kept.
+    """
     method = find_integrator(plan.setting.integrator)
     if not isinstance(method, FixedStep):
-        return tuple(np.linspace(0.0, plan.t_end, plan.samples).tolist())
+        return tuple(np.linspace(0.0, plan.t_end, plan.samples).tolist()), 0.0, 1
     given = (plan.setting.integrator, plan.t_end, plan.setting.dt, plan.samples, MOST_STEPS)
     dt, every = check_steps(*given)
     steps = int(count_steps(plan.t_end, dt))
-    return (*(i * dt for i in range(0, steps, every)), plan.t_end)
+    return (*(i * dt for i in range(0, steps, every)), plan.t_end), dt, every
 
 
 def _kind(name: str, model: Model, states: Sequence[str], reporter: Reporter) -> str:
@@ -239,8 +248,13 @@ def _kind(name: str, model: Model, states: Sequence[str], reporter: Reporter) ->
     raise AssertionError(name)
 
 
-def _kernels(plan: SweepPlan, reporter: Reporter) -> tuple[str, Mapping[str, str]]:
-    """The key and the C sources of compiled steps; no sources if they would not pay."""
+def _kernels(
+    plan: SweepPlan, functions: Any, reporter: Reporter
+) -> tuple[str, Mapping[str, str], Mapping[str, str]]:
+    """The key and the C sources of compiled steps, and those of kernels for several members at
+    once; none if they would not pay.
+    """
+    from eomgen.native import lanes
     from eomgen.native.accelerator import library_key
     from eomgen.native.compiler import find_compiler
     from eomgen.native.library import kept_library
@@ -248,19 +262,41 @@ def _kernels(plan: SweepPlan, reporter: Reporter) -> tuple[str, Mapping[str, str
     from eomgen.store import interfaced_program_of
 
     key = library_key(plan.model)
-    usable: Any = getattr(find_integrator(plan.setting.integrator), "compiled", "")
-    if plan.backend == "c" and not usable:
-        reporter.note("the sweep is not compiled: only steps of DOP853 are")
-    if plan.backend == "numpy" or not usable:
-        return key, {}
-    if plan.backend == "auto":
-        try:
-            find_compiler()
-        except RunError as error:
-            reporter.note(f"the sweep is not compiled: {error}")
-            return key, {}
-        if len(plan.design.values) < MANY and kept_library(key) is None:
-            return key, {}
-    else:
+    together = plan.setting.integrator == METHOD and not getattr(functions, "CONTACTS", ())
+    alone: Any = getattr(find_integrator(plan.setting.integrator), "compiled", "")
+    if plan.backend == "numpy":
+        return key, {}, {}
+    if not (together or alone):
+        if plan.backend == "c":
+            reporter.note(
+                "the sweep is not compiled: only steps of DOP853 are, and of rk4 without contacts"
+            )
+        return key, {}, {}
+    try:
         find_compiler()
-    return key, sources(*interfaced_program_of(plan.model))
+    except RunError as error:
+        if plan.backend == "c":
+            raise
+        reporter.note(f"the sweep is not compiled: {error}")
+        return key, {}, {}
+    few = plan.backend == "auto" and len(plan.design.values) < MANY
+    if few and (together or kept_library(key) is None):
+        return key, {}, {}
+    program = interfaced_program_of(plan.model)
+    if together:
+        return key, {}, lanes.sources(*program, plan.outputs)
+    return key, sources(*program), {}
+
+
+def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:
+    """The task with its kernels compiled, or without them if that fails. With the backend "c" it
+    raises `RunError` instead.
+    """
+    try:
+        build(task)
+    except RunError as error:
+        if plan.backend == "c":
+            raise
+        reporter.note(f"the sweep is not compiled: {error}")
+        return replace(task, kernels={}, vectors={})
+    return task

@@ -17,11 +17,15 @@ _SUM, _PRODUCT, _ATOM = 1, 2, 3
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a language spells each function, its reserved words, and the format of a number."""
+    """How a language spells each function, its reserved words, and the format of a number.
+
+    assigned  functions whose value is always assigned to a variable
+    """
 
     functions: Mapping[str, str]
     reserved: frozenset[str]
     number: str = "{}"
+    assigned: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -163,7 +167,7 @@ def print_block(
             functions[step.operation] = None
         source, level = _expression(step.operation, [text[o] for o in step.operands], dialect)
         long = len(source) > LONGEST_INLINE and i not in results
-        if i in kept or uses[i] > 1 or long:
+        if i in kept or uses[i] > 1 or long or step.operation in dialect.assigned:
             lines.append((names[i], source))
             assigned.append(i)
             text[i] = (names[i], _ATOM)

@@ -3,7 +3,13 @@
 import math
 import signal
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    Executor,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from importlib import import_module
@@ -15,19 +21,23 @@ import numpy as np
 from eomgen.errors import RunError
 from eomgen.run.progress import Progress
 from eomgen.sweep.design import Design
-from eomgen.sweep.members import Arrays, Task, run_members
+from eomgen.sweep.members import Arrays, Task
 from eomgen.sweep.storage import Storage
+from eomgen.sweep.together import run_chunk
 
-LARGEST_CHUNK, CHUNKS = 256, 64
-"""Greatest number of members in a chunk, and about how many chunks there are if it is less."""
+LARGEST_CHUNK, TOGETHER, CHUNKS = 256, 4096, 64
+"""Greatest number of members in a chunk that run one by one, or together; and about how many chunks
+there are if it is less.
+"""
 
 Job = tuple[int, np.ndarray]
 """The number of a chunk, and the values of its members."""
 
 
-def chunk_size(members: int) -> int:
+def chunk_size(members: int, together: bool) -> int:
     """Number of members in a chunk; it depends on nothing else, so that a sweep can go on."""
-    return max(1, min(LARGEST_CHUNK, math.ceil(members / CHUNKS)))
+    largest = TOGETHER if together else LARGEST_CHUNK
+    return max(1, min(largest, math.ceil(members / CHUNKS)))
 
 
 def execute(
@@ -43,7 +53,7 @@ def execute(
 
     Raises `RunError` if workers fail, or if the scheduler cannot be reached.
     """
-    size = chunk_size(len(design.values))
+    size = chunk_size(len(design.values), bool(task.vectors))
     count = math.ceil(len(design.values) / size)
     chunks: dict[int, Arrays] = {}
     if storage:
@@ -65,19 +75,17 @@ def _results(
     if scheduler:
         yield from _by_dask(task, jobs, scheduler)
     elif workers > 1 and len(jobs) > 1:
-        yield from _by_processes(task, jobs, min(workers, len(jobs)))
+        yield from _by_workers(task, jobs, min(workers, len(jobs)))
     else:
         for number, values in jobs:
-            yield number, run_members(task, values)
+            yield number, run_chunk(task, values)
 
 
-def _by_processes(task: Task, jobs: Sequence[Job], workers: int) -> Iterator[tuple[int, Arrays]]:
+def _by_workers(task: Task, jobs: Sequence[Job], workers: int) -> Iterator[tuple[int, Arrays]]:
     left = iter(jobs)
-    # Ctrl-C is heard here; a worker would print a traceback.
-    deaf = (signal.SIGINT, signal.SIG_IGN)
-    with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=deaf) as pool:
+    with _pool(task, workers) as pool:
         running = {
-            pool.submit(run_members, task, values): number
+            pool.submit(run_chunk, task, values): number
             for number, values in islice(left, 2 * workers)
         }
         try:
@@ -86,13 +94,22 @@ def _by_processes(task: Task, jobs: Sequence[Job], workers: int) -> Iterator[tup
                 for future in done:
                     number = running.pop(future)
                     for following, values in islice(left, 1):
-                        running[pool.submit(run_members, task, values)] = following
+                        running[pool.submit(run_chunk, task, values)] = following
                     yield number, future.result()
         except BrokenProcessPool:
             raise RunError("a worker process ended unexpectedly, out of memory perhaps") from None
         finally:
             for future in running:
                 future.cancel()
+
+
+def _pool(task: Task, workers: int) -> Executor:
+    """Threads if compiled code makes the runs, which lets other threads go on; else processes."""
+    if task.vectors:
+        return ThreadPoolExecutor(workers)
+    # Ctrl-C is heard here; a worker would print a traceback.
+    deaf = (signal.SIGINT, signal.SIG_IGN)
+    return ProcessPoolExecutor(workers, initializer=signal.signal, initargs=deaf)
 
 
 def _by_dask(task: Task, jobs: Sequence[Job], scheduler: str) -> Iterator[tuple[int, Arrays]]:
@@ -108,8 +125,7 @@ def _by_dask(task: Task, jobs: Sequence[Job], scheduler: str) -> Iterator[tuple[
     with client:
         shared = client.scatter(task, broadcast=True, hash=False)
         futures = {
-            client.submit(run_members, shared, values, pure=False): number
-            for number, values in jobs
+            client.submit(run_chunk, shared, values, pure=False): number for number, values in jobs
         }
         try:
             for future in distributed.as_completed(list(futures)):

@@ -39,6 +39,9 @@ class Task:
     t_end       end time, s
     times       (n,) of the rows that are kept, s; the last is `t_end`
     settings    further arguments of `run.integrate.integrate`
+    vectors     the C sources of kernels for several members at once, see `sweep.together`; empty
+                if members run one by one
+    dt, every   for these the step, s, and that each `every`-th is kept
     """
 
     model: Model
@@ -53,6 +56,9 @@ class Task:
     t_end: float
     times: tuple[float, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
+    vectors: Mapping[str, str] = field(default_factory=dict)
+    dt: float = 0.0
+    every: int = 1
 
 
 def run_members(task: Task, values: FloatArray) -> Arrays:
@@ -66,7 +72,7 @@ def run_members(task: Task, values: FloatArray) -> Arrays:
     NAME     each of the outputs, (m, n, …) at these times, or (m, …) at the end
     """
     runs = [_run(task, row) for row in values.tolist()]
-    module: Any = _module(task.source)
+    module = module_of(task.source)
     ny, many = len(module.STATES), len(task.times) > 2
     nothing = np.full(ny, np.nan)
     found: Arrays = {
@@ -105,7 +111,7 @@ def _given(task: Task, row: Sequence[float]) -> dict[str, dict[str, float]]:
 
 
 def _problem(task: Task, row: Sequence[float]) -> Problem:
-    module: Any = _module(task.source)
+    module = module_of(task.source)
     given = _given(task, row)
     values = given["parameter"] or None, given["input"] or None
     explain = explained(task.model, *given_values(module, *values))
@@ -116,7 +122,7 @@ def _problem(task: Task, row: Sequence[float]) -> Problem:
             initial[module.STATES.index(name)] = value
         problem = replace(problem, initial=initial)
         problem = replace(problem, initial=problem.unit(initial))
-    library = _library(task)
+    library = _library(task.key, tuple(task.kernels.items())) if task.kernels else None
     if library is None:
         return problem
     steps = CompiledSteps(module, library, *values)
@@ -161,23 +167,30 @@ def _output(
 @lru_cache(64)
 def _shape(source: str, name: str) -> tuple[int, ...]:
     """The shape of an output."""
-    module: Any = _module(source)
+    module = module_of(source)
     return np.shape(getattr(module, name)(0.0, module.initial_state()))
 
 
 @lru_cache(4)
-def _module(source: str) -> Any:
+def module_of(source: str) -> Any:
+    """The module of a source text."""
     return load_module(source, "sweep")
 
 
-def _library(task: Task) -> Any:
+def compiled_steps(task: Task) -> Any:
+    """The library of compiled steps, or None if there are no sources. Raises `RunError`."""
     return _compiled(task.key, tuple(task.kernels.items())) if task.kernels else None
 
 
 @lru_cache(4)
 def _compiled(key: str, kernels: tuple[tuple[str, str], ...]) -> Any:
-    """The library of kernels; None where there is no compiler: the results are the same."""
+    return compiled_library(key, lambda: dict(kernels), MAIN)
+
+
+@lru_cache(4)
+def _library(task_key: str, kernels: tuple[tuple[str, str], ...]) -> Any:
+    """The same; None where it cannot be made: steps in Python have the same results."""
     try:
-        return compiled_library(key, lambda: dict(kernels), MAIN)
+        return _compiled(task_key, kernels)
     except RunError:
         return None

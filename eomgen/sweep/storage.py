@@ -88,7 +88,7 @@ def digest_of(task: Task, design: Design, size: int) -> str:
     parts: tuple[Any, ...] = (
         *(key_of(task.model), task.source, design.names, design.values.tobytes(), size),
         *(task.kinds, _sorted(task.parameters), _sorted(task.inputs), task.outputs, task.t_end),
-        *(task.times, _sorted(task.settings)),
+        *(task.times, _sorted(task.settings), bool(task.vectors)),
     )
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 

@@ -59,14 +59,14 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
     `-std=c99` in GCC) and with the same mathematical library, each function returns the same bits
     as that of the Python module.
     """
-    return _files(_context(program, interface), interface)
+    return _files(context(program, interface), interface)
 
 
-def _files(context: Mapping[str, Any], interface: Interface) -> dict[str, str]:
+def _files(values: Mapping[str, Any], interface: Interface) -> dict[str, str]:
     name = interface.name
-    shared = {key: context[key] for key in _SHARED}
+    shared = {key: values[key] for key in _SHARED}
     return {
-        f"{name}.c": render(TEMPLATES, "module.c.jinja", context),
+        f"{name}.c": render(TEMPLATES, "module.c.jinja", values),
         f"{name}.h": render(
             TEMPLATES,
             "module.h.jinja",
@@ -78,7 +78,7 @@ def _files(context: Mapping[str, Any], interface: Interface) -> dict[str, str]:
                 "states": _table(interface.states),
                 "inputs": _table(interface.inputs),
                 "parameters": _table(interface.parameters),
-                "held": len(context["held"]),
+                "held": len(values["held"]),
                 "left_out": interface.left_out,
             },
         ),
@@ -91,22 +91,22 @@ def library(program: Program, interface: Interface) -> Mapping[str, str]:
     `MAIN` defines `checked_NAME` and `columns_NAME` for each output, which report whether a result
     is valid.
     """
-    context = _context(program, interface)
+    values = context(program, interface)
     checked = {
         "prefix": interface.name,
         "states": len(interface.states),
         "inputs": len(interface.inputs),
         "parameters": len(interface.parameters),
-        "held": len(context["held"]),
-        "kernels": context["kernels"],
+        "held": len(values["held"]),
+        "kernels": values["kernels"],
     }
-    return {**_files(context, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
+    return {**_files(values, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
 
 
 _SHARED = ("scene", "prefix", "kernels")
 
 
-def _context(program: Program, interface: Interface) -> dict[str, Any]:
+def context(program: Program, interface: Interface) -> dict[str, Any]:
     """Values for the template of the source."""
     kernels, constants = kernels_of(program, interface, DIALECT)
     refused = refusals(interface, DIALECT)
@@ -134,11 +134,11 @@ def _context(program: Program, interface: Interface) -> dict[str, Any]:
         "checks": checks,
         "fixed": constants.lines,
         "held": list(place.items()),
-        "kernels": [_written(kernel, place) for kernel in kernels],
+        "kernels": [written(kernel, place) for kernel in kernels],
     }
 
 
-def _written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
+def written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
     """A kernel as values for the templates."""
     function, block = kernel.function, kernel.block
     size = math.prod(function.shape)

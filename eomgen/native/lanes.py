@@ -1,0 +1,152 @@
+"""Compiled kernels for several states at once, one in each lane of vector registers.
+
+The width is that of the widest registers that this processor has. It changes no bit of a result.
+"""
+
+import ctypes
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.codegen.backends import c_lanes
+from eomgen.codegen.interface import Interface
+from eomgen.native.library import compiled_library
+from eomgen.native.module import USUAL, USUAL_CONSTANT
+from eomgen.program.program import Program
+from eomgen.run.integrators.fixed_step import count_steps
+from eomgen.run.problem import USUAL_LENGTH, FloatArray
+
+FLAGS: dict[int, tuple[str, ...]] = {8: ("-mavx512f", "-mfma"), 4: ("-mavx2", "-mfma"), 2: ()}
+"""Flags of the compiler for vectors of so many doubles."""
+PROBE = """
+int width(void) {
+#if defined __x86_64__ || defined __i386__
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("fma")) return 8;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return 4;
+#endif
+    return 2;
+}
+"""
+_POINTER, _LONG, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_int64
+
+
+def sources(
+    program: Program, interface: Interface, outputs: tuple[str, ...] = ()
+) -> Mapping[str, str]:
+    """The C sources of the derivative, of initial states and of these outputs, name to text."""
+    kept = ("derivative", "initial_state", *outputs)
+    program = replace(program, outputs={n: v for n, v in program.outputs.items() if n in kept})
+    functions = tuple(f for f in interface.functions if f.name in kept)
+    return c_lanes.files(program, replace(interface, functions=functions), USUAL_LENGTH)
+
+
+@cache
+def width() -> int:
+    """The number of doubles in a vector register of this processor: 2, 4 or 8.
+
+    Raises `RunError` if there is no compiler.
+    """
+    probe = compiled_library("width of vectors", lambda: {"probe.c": PROBE}, "probe.c")
+    return int(probe.width())
+
+
+class _Columns(ctypes.Structure):
+    _fields_ = (("values", _POINTER), ("many", _LONG))
+
+
+class _Times(ctypes.Structure):
+    _fields_ = (
+        *((name, _REAL) for name in ("t_start", "t_end", "dt", "last")),
+        *((name, _WHOLE) for name in ("steps", "every")),
+    )
+
+
+class Lanes:
+    """The library of some sources, for vectors of `lanes` doubles.
+
+    Arrays have a column for each of n states. Constants and inputs have as many columns, or one for
+    all. Raises `RunError` if there is no compiler, or if it fails.
+    """
+
+    def __init__(self, texts: Mapping[str, str], lanes: int | None = None) -> None:
+        lanes = lanes or width()
+        about = f"lanes {lanes} {sorted(texts.items())!r}"
+        flags = (f"-DWIDTH={lanes}", *FLAGS[lanes])
+        self._library = compiled_library(about, lambda: texts, c_lanes.MAIN, *flags)
+        sizes = (_LONG * 5).in_dll(self._library, "sizes")
+        self.states, self.inputs, self.parameters, self.constants, self.lanes = sizes
+        text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(self._library, "outputs")))
+        lines = (line.split() for line in text.decode().splitlines())
+        self.outputs = {name: tuple(map(int, shape)) for name, *shape in lines}
+
+    def prepare(self, p: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+        """The constants (nk, n) and the initial states (ny, n) of parameters (n, np), and which of
+        them kernels can compute with: those that are not refused, and of usual size.
+        """
+        p = np.ascontiguousarray(p, dtype=float)
+        n = len(p)
+        k, y = np.zeros((self.constants, n)), np.zeros((self.states, n))
+        codes = np.zeros(n, dtype=np.intc)
+        call = self._library.prepare
+        call.argtypes, call.restype = [_LONG, *[_POINTER] * 4], None
+        call(n, *(array.ctypes.data for array in (p, k, y, codes)))
+        return k, y, (codes == 0) & _usual(p, k)
+
+    def output(
+        self, name: str, t: float, y: FloatArray, k: FloatArray, u: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """An output at time t and states (ny, n): (…, n), and which columns are valid."""
+        y = np.ascontiguousarray(y, dtype=float)
+        n, shape = y.shape[1], self.outputs[name]
+        out, sound = np.empty((math.prod(shape), n)), np.zeros(n, dtype=np.int8)
+        call = self._library[f"columns_{name}"]
+        call.argtypes, call.restype = [_LONG, _REAL, *[_Columns] * 3, *[_POINTER] * 2], None
+        call(n, t, *map(_columns, (y, k, u)), out.ctypes.data, sound.ctypes.data)
+        return out.reshape(*shape, n), sound != 0
+
+    def rk4(
+        self, y: FloatArray, k: FloatArray, u: FloatArray, *, t_end: float, dt: float, every: int
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Runs from states (ny, n) at 0 to `t_end` by the classical Runge-Kutta method, with steps
+        of `dt`: rows (r, ny, n) after each `every`-th step and at the end, and which runs are
+        valid: finite, and with steps that look short enough for stability.
+        """
+        y = np.ascontiguousarray(y, dtype=float)
+        n, steps = y.shape[1], int(count_steps(t_end, dt))
+        whole = abs(steps * dt - t_end) <= 4 * math.ulp(t_end)
+        last = dt if whole else t_end - (steps - 1) * dt
+        rows = np.empty((math.ceil(steps / every), self.states, n))
+        sound = np.zeros(n, dtype=np.int8)
+        times = _Times(0.0, t_end, dt, last, steps, every)
+        call = self._library.rk4
+        call.argtypes, call.restype = [_POINTER, _LONG, *[_Columns] * 3, *[_POINTER] * 2], None
+        call(
+            ctypes.byref(times),
+            n,
+            *map(_columns, (y, k, u)),
+            rows.ctypes.data,
+            sound.ctypes.data,
+        )
+        return rows, sound != 0
+
+
+def _columns(array: FloatArray) -> _Columns:
+    """An array of one column, or of one for each state; it must outlive the call."""
+    assert array.flags.c_contiguous and array.dtype == np.float64
+    return _Columns(array.ctypes.data, array.shape[1] > 1)
+
+
+def _usual(p: FloatArray, k: FloatArray) -> NDArray[np.bool_]:
+    """Which sets have parameters (n, np) and constants (nk, n) such that kernels do not underflow
+    by accident; see `native.module.are_usual`.
+    """
+    sizes, fixed = np.abs(p), np.abs(k)
+    usual = (sizes == 0) | ((sizes > 1 / USUAL) & (sizes < USUAL))
+    known = (fixed == 0) | ((fixed > 1e-240) & (fixed < 1e-160))
+    known |= (fixed > 1 / USUAL_CONSTANT) & (fixed < USUAL_CONSTANT)
+    return np.asarray(usual.all(axis=1) & known.all(axis=0))
