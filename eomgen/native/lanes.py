@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,10 +78,10 @@ class Lanes:
         lanes = lanes or width()
         about = f"lanes {lanes} {sorted(texts.items())!r}"
         flags = (f"-DWIDTH={lanes}", *FLAGS[lanes])
-        self._library = compiled_library(about, lambda: texts, c_lanes.MAIN, *flags)
-        sizes = (_LONG * 5).in_dll(self._library, "sizes")
+        self.library = compiled_library(about, lambda: texts, c_lanes.MAIN, *flags)
+        sizes = (_LONG * 5).in_dll(self.library, "sizes")
         self.states, self.inputs, self.parameters, self.constants, self.lanes = sizes
-        text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(self._library, "outputs")))
+        text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(self.library, "outputs")))
         lines = (line.split() for line in text.decode().splitlines())
         self.outputs = {name: tuple(map(int, shape)) for name, *shape in lines}
 
@@ -92,10 +93,16 @@ class Lanes:
         n = len(p)
         k, y = np.zeros((self.constants, n)), np.zeros((self.states, n))
         codes = np.zeros(n, dtype=np.intc)
-        call = self._library.prepare
+        call = self.library.prepare
         call.argtypes, call.restype = [_LONG, *[_POINTER] * 4], None
         call(n, *(array.ctypes.data for array in (p, k, y, codes)))
         return k, y, (codes == 0) & _usual(p, k)
+
+    def function(self, name: str) -> Any:
+        """The compiled function of an output, see `templates/c/lanes.c.jinja`."""
+        call = self.library[f"columns_{name}"]
+        call.argtypes, call.restype = [_LONG, _REAL, *[_Columns] * 3, *[_POINTER] * 2], None
+        return call
 
     def output(
         self, name: str, t: float, y: FloatArray, k: FloatArray, u: FloatArray
@@ -104,9 +111,7 @@ class Lanes:
         y = np.ascontiguousarray(y, dtype=float)
         n, shape = y.shape[1], self.outputs[name]
         out, sound = np.empty((math.prod(shape), n)), np.zeros(n, dtype=np.int8)
-        call = self._library[f"columns_{name}"]
-        call.argtypes, call.restype = [_LONG, _REAL, *[_Columns] * 3, *[_POINTER] * 2], None
-        call(n, t, *map(_columns, (y, k, u)), out.ctypes.data, sound.ctypes.data)
+        self.function(name)(n, t, *columns_of(y, k, u), out.ctypes.data, sound.ctypes.data)
         return out.reshape(*shape, n), sound != 0
 
     def rk4(
@@ -123,22 +128,24 @@ class Lanes:
         rows = np.empty((math.ceil(steps / every), self.states, n))
         sound = np.zeros(n, dtype=np.int8)
         times = _Times(0.0, t_end, dt, last, steps, every)
-        call = self._library.rk4
+        call = self.library.rk4
         call.argtypes, call.restype = [_POINTER, _LONG, *[_Columns] * 3, *[_POINTER] * 2], None
         call(
             ctypes.byref(times),
             n,
-            *map(_columns, (y, k, u)),
+            *columns_of(y, k, u),
             rows.ctypes.data,
             sound.ctypes.data,
         )
         return rows, sound != 0
 
 
-def _columns(array: FloatArray) -> _Columns:
-    """An array of one column, or of one for each state; it must outlive the call."""
-    assert array.flags.c_contiguous and array.dtype == np.float64
-    return _Columns(array.ctypes.data, array.shape[1] > 1)
+def columns_of(*arrays: FloatArray) -> list[_Columns]:
+    """Arrays of one column, or of one for each state, as arguments of the library's functions; they
+    must outlive the call.
+    """
+    assert all(array.flags.c_contiguous and array.dtype == np.float64 for array in arrays)
+    return [_Columns(array.ctypes.data, array.shape[1] > 1) for array in arrays]
 
 
 def _usual(p: FloatArray, k: FloatArray) -> NDArray[np.bool_]:

@@ -1,11 +1,15 @@
 """Compiled derivatives and runs beside those of others, in one process, as paired measurements.
 
-    pip install -e '.[bench]' && python tests/benchmarks/peers.py [--rounds N]
+    pip install -e '.[bench]' && python tests/benchmarks/peers.py [--rounds N] [--only TABLE ...]
 
 A derivative, one state after another in a loop of C or C++: the kernel of `eomgen.native` over 2000
 columns, beside Pinocchio's `abaInParallel` with one thread. Planar chains of 2 to 100 links are the
 same mechanism for both (accelerations are compared first); for the human figure Pinocchio has its
 own sample humanoid, of 34 degrees of freedom where the figure has 41.
+
+The same for several states at once in vector registers, beside Pinocchio and beside the same
+program by JAX and by CasADi; and ensembles of runs by the classical Runge-Kutta method, on one core
+and on all of them.
 
 Runs at true errors of 1e-6, 1e-9 and 1e-12: steps of DOP853 in C, beside heyoka's Taylor series fed
 with the same program, and SciPy's DOP853 over the NumPy module. For each the loosest of a ladder of
@@ -20,14 +24,15 @@ import platform
 import subprocess
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache, partial
 from importlib.metadata import version
+from importlib.util import find_spec
 from typing import Any
 
-import heyoka as hy
 import numpy as np
+import peer_lanes
 import pinocchio as pin
+from paired import COLUMNS, chain, chain_of_pinocchio, paired, row, spread
 from scipy.integrate import DOP853
 
 from eomgen.model.elaborate import elaborate
@@ -40,52 +45,14 @@ from eomgen.program.kernel import kernel
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
 from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.built_in import BUILT_IN
-from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.scene.reader import read_scene
 from eomgen.store import generated_code, interfaced_program_of, key_of
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.reference import reference
 
-COLUMNS = 2000
+PEERS = ("heyoka", "jax", "casadi")
 ERRORS = (1e-6, 1e-9, 1e-12)
 LADDER = [10.0**-k for k in np.arange(4, 16.1, 0.5)]
-
-
-def chain(count: int) -> Model:
-    """The built-in chain with so many links."""
-    text = (BUILT_IN / "chain.toml").read_text("utf-8").replace("count = 10", f"count = {count}")
-    return replace(elaborate(parse_scene(text)), outputs=())
-
-
-def chain_of_pinocchio(count: int) -> Any:
-    """The same mechanism."""
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, -9.81, 0.0])
-    at, place = 0, pin.SE3.Identity()
-    for i in range(count):
-        at = model.addJoint(at, pin.JointModelRZ(), place, f"joint_{i}")
-        inertia = pin.Inertia(0.1, np.zeros(3), np.diag([1e-12, 1e-12, 3.3333333333333335e-4]))
-        model.appendBodyToJoint(at, inertia, pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])))
-        place = pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.0]))
-    return model
-
-
-def paired(rounds: int, *calls: Callable[[], object]) -> np.ndarray:
-    """Times of calls, (rounds, calls), s, by turns."""
-    times = np.empty((rounds, len(calls)))
-    for call in calls:
-        call()
-    for row in times:
-        for j, call in enumerate(calls):
-            start = time.perf_counter()
-            call()
-            row[j] = time.perf_counter() - start
-    return times
-
-
-def spread(ratios: np.ndarray) -> str:
-    low, middle, high = np.quantile(ratios, (0.25, 0.5, 0.75))
-    return f"{middle:.3g} ({low:.3g} to {high:.3g})"
 
 
 @cache
@@ -98,15 +65,19 @@ def library(model: Model) -> tuple[Any, Any, float]:
     return module, made, time.perf_counter() - start
 
 
+def mechanisms() -> list[tuple[str, Model, Any]]:
+    """Names of mechanisms, their models, and those of Pinocchio."""
+    cases = [(f"chain of {n}", chain(n), chain_of_pinocchio(n)) for n in (2, 10, 30, 100)]
+    figure, humanoid = elaborate(read_scene("human_figure")), pin.buildSampleModelHumanoidRandom()
+    return [*cases, ("human_figure (41), sample humanoid (34)", figure, humanoid)]
+
+
 def derivatives(rounds: int) -> None:
     """Print the table of derivatives."""
     row("mechanism", "operations", "C, µs", "Pinocchio, µs", "ratio and quartiles", "compile, s")
     row(*["---"] * 6)
-    cases = [(f"chain of {n}", chain(n), chain_of_pinocchio(n)) for n in (2, 10, 30, 100)]
-    figure, humanoid = elaborate(read_scene("human_figure")), pin.buildSampleModelHumanoidRandom()
-    cases.append(("human_figure (41), sample humanoid (34)", figure, humanoid))
     rng = np.random.default_rng(1)
-    for name, model, peer in cases:
+    for name, model, peer in mechanisms():
         module, made, seconds = library(model)
         y = rng.uniform(-1.0, 1.0, (len(module.STATES), COLUMNS))
         ours, rates = compiled_columns(module, made, y)
@@ -125,9 +96,19 @@ def derivatives(rounds: int) -> None:
         )
 
 
-def row(*words: object) -> None:
-    """Print a row of a table."""
-    print(f"| {' | '.join(map(str, words))} |", flush=True)
+def vectors(rounds: int) -> None:
+    """Print the tables of many states at once."""
+    rng = np.random.default_rng(1)
+    cases = []
+    for name, model, peer in mechanisms():
+        module = load_module(generated_code(model).module, model.name)
+        y = rng.uniform(-1.0, 1.0, (len(module.STATES), COLUMNS))
+        cases.append((name, model, columns_of_pinocchio(peer, y, rng)[0], y))
+    peer_lanes.table(cases, rounds)
+    print()
+    built_in = ("two_body", "double_pendulum", "tumbling_body", "human_figure")
+    models = [(name, elaborate(read_scene(name))) for name in built_in]
+    peer_lanes.ensembles(models, os.cpu_count() or 1, max(5, rounds // 3))
 
 
 def is_same(peer: Any, y: np.ndarray) -> bool:
@@ -168,6 +149,8 @@ def columns_of_pinocchio(
 
 def taylor(model: Model, module: Any) -> tuple[Callable[[float], Any], float]:
     """heyoka's integrator of a program for a tolerance, and the time to make the first one, s."""
+    import heyoka as hy
+
     one = kernel(interfaced_program_of(model)[0], "derivative")
     variables = dict(zip(module.STATES, hy.make_vars(*module.STATES), strict=True))
     known = one.known_values(dict(module.PARAMETERS), FloatScalars())
@@ -249,17 +232,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
+    tables = {"derivatives": derivatives, "vectors": vectors, "runs": runs}
     parser.add_argument("--rounds", type=int, default=30)
-    rounds = parser.parse_args().rounds
+    parser.add_argument("--only", nargs="+", choices=tables, default=tables, metavar="TABLE")
+    given = parser.parse_args()
     compiler = subprocess.run(["cc", "--version"], capture_output=True, text=True).stdout
     print(
         f"{os.cpu_count()} cores, {platform.machine()}; {compiler.splitlines()[0]}; Python "
         f"{platform.python_version()}, NumPy {np.__version__}, SciPy {version('scipy')}, "
-        f"Pinocchio {pin.__version__}, heyoka {hy.__version__}\n"
+        f"Pinocchio {pin.__version__}"
+        + "".join(f", {name} {version(name)}" for name in PEERS if find_spec(name))
     )
-    derivatives(rounds)
-    print()
-    runs(rounds)
+    for name in given.only:
+        print()
+        tables[name](given.rounds)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,58 @@
+"""What the tables of `peers.py` share: mechanisms, times by turns, and rows of tables."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from eomgen.model.elaborate import elaborate
+from eomgen.model.model import Model
+from eomgen.scene.built_in import BUILT_IN
+from eomgen.scene.reader import parse_scene
+
+COLUMNS = 2000
+
+
+def chain(count: int) -> Model:
+    """The built-in chain with so many links."""
+    text = (BUILT_IN / "chain.toml").read_text("utf-8").replace("count = 10", f"count = {count}")
+    return replace(elaborate(parse_scene(text)), outputs=())
+
+
+def chain_of_pinocchio(count: int) -> Any:
+    """The same mechanism."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, -9.81, 0.0])
+    at, place = 0, pin.SE3.Identity()
+    for i in range(count):
+        at = model.addJoint(at, pin.JointModelRZ(), place, f"joint_{i}")
+        inertia = pin.Inertia(0.1, np.zeros(3), np.diag([1e-12, 1e-12, 3.3333333333333335e-4]))
+        model.appendBodyToJoint(at, inertia, pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])))
+        place = pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.0]))
+    return model
+
+
+def paired(rounds: int, *calls: Callable[[], object]) -> np.ndarray:
+    """Times of calls, (rounds, calls), s, by turns."""
+    times = np.empty((rounds, len(calls)))
+    for call in calls:
+        call()
+    for row in times:
+        for j, call in enumerate(calls):
+            start = time.perf_counter()
+            call()
+            row[j] = time.perf_counter() - start
+    return times
+
+
+def spread(ratios: np.ndarray) -> str:
+    low, middle, high = np.quantile(ratios, (0.25, 0.5, 0.75))
+    return f"{middle:.3g} ({low:.3g} to {high:.3g})"
+
+
+def row(*words: object) -> None:
+    """Print a row of a table."""
+    print(f"| {' | '.join(map(str, words))} |", flush=True)
