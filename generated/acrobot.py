@@ -864,15 +864,26 @@ def _alone(call, y, name, reach, closely=False):
 def _together(call, result, given, reach):
     """Fill a result of many states, a row a value; a column of it that has no value is nan.
 
-    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns.
+    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns. A block
+    of columns at a time, for the memory of intermediate values.
     """
+    columns = result.shape[-1]
+    block = max(64, min(2048, 2**18 * columns // max(1, result.size)))
+    for start in range(0, columns, block):
+        of = slice(start, start + block)
+        _block(call, result[..., of], [part[..., of] if part.__class__ is _ARRAY else part for part in given], reach)
+    return result
+
+
+def _block(call, result, given, reach):
+    """The same for the columns of a block."""
     arrays = [part for part in given if part.__class__ is _ARRAY]
     with _strict(reach):
         try:
             for row, value in zip(result, call(*given)):
                 row[:] = value
             if all(isfinite(part.sum()) for part in arrays):
-                return result
+                return
         except ArithmeticError:
             pass
     result[:] = nan
@@ -881,7 +892,7 @@ def _together(call, result, given, reach):
             for row, value in zip(result, call(*given)):
                 row[:] = value
         except ArithmeticError:
-            return result
+            return
         sizes = np.zeros(result.shape[-1])
         for part in map(np.abs, (*arrays, result)):
             sizes = np.maximum(sizes, part.max(axis=tuple(range(part.ndim - 1)), initial=0.0))
@@ -892,7 +903,6 @@ def _together(call, result, given, reach):
                 call(*(part[..., [i]] if part.__class__ is _ARRAY else part for part in given))
             except ArithmeticError:
                 result[..., i] = nan
-    return result
 
 
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):

@@ -2,6 +2,7 @@
 
 import math
 import re
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -197,6 +198,24 @@ def test_columns_keep_apart() -> None:
     assert (np.isfinite(found[1]) == [True, False, False, False, True]).all()
     for k in (0, 4):
         assert found[:, k] == pytest.approx(module.derivative(0.0, y[:, k]), rel=1e-14)
+
+
+def test_columns_in_blocks() -> None:
+    """Thousands of states are computed in blocks, with the results of a few, in little memory."""
+    module = engine(scene(MOTOR.format("t*x + sin(t)"), 2.0)).module
+    rng = np.random.default_rng(1)
+    y, t = rng.uniform(-1.0, 1.0, (2, 5000)), rng.uniform(0.0, 9.0, 5000)
+    y[0, 4500] = np.inf
+    whole = module.derivative(t, y)
+    parts = [module.derivative(t[i : i + 7], y[:, i : i + 7]) for i in range(0, 5000, 7)]
+    assert np.array_equal(whole, np.hstack(parts), equal_nan=True)
+    assert np.flatnonzero(np.isnan(whole[1])).tolist() == [4500]
+    assert module.derivative(t[:0], y[:, :0]).shape == (2, 0)
+    many = np.repeat(y[:, :1], 100_000, axis=1)
+    tracemalloc.start()
+    module.derivative(0.0, many)
+    assert tracemalloc.get_traced_memory()[1] < 1.5 * many.nbytes  # the result is one of them
+    tracemalloc.stop()
 
 
 def test_parameters_of_the_run_count() -> None:

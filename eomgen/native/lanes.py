@@ -21,7 +21,11 @@ from eomgen.program.program import Program
 from eomgen.run.integrators.fixed_step import count_steps
 from eomgen.run.problem import USUAL_LENGTH, FloatArray
 
-FLAGS: dict[int, tuple[str, ...]] = {8: ("-mavx512f", "-mfma"), 4: ("-mavx2", "-mfma"), 2: ()}
+FLAGS: dict[int, tuple[str, ...]] = {
+    8: ("-O3", "-mavx512f", "-mfma"),
+    4: ("-O3", "-mavx2", "-mfma"),
+    2: ("-O3",),
+}
 """Flags of the compiler for vectors of so many doubles."""
 PROBE = """
 int width(void) {
