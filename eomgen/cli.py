@@ -255,6 +255,7 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
     _values(parser)
     parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
     parser.add_argument("--plot", metavar="FILE", type=_path, help="figure (DIR/NAME.png)")
+    parser.add_argument("--no-pictures", action="store_true", help="write no figure and no page")
     parser.add_argument("--view", action="store_true", help="open the page when done")
     _force(parser)
 

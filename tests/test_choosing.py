@@ -269,6 +269,7 @@ def test_what_was_put_aside(monkeypatch: pytest.MonkeyPatch) -> None:
         return run(self, setting, most=cut, **given)
 
     monkeypatch.setattr(Case, "run", slow)
+    monkeypatch.setattr(choosing, "_candidates", lambda search: ["LSODA", "DOP853"])
     choice = meet(case, 1e-16)
     assert not choice.met
     tightest = {

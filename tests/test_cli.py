@@ -124,6 +124,23 @@ def test_only_our_own_files_are_removed(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["theirs.html"]
 
 
+def test_a_run_without_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It loads no Matplotlib, leaves no picture of an earlier run, and none can be asked for."""
+    run = ["simulate", "pendulum", "--t-end", "0.1", "-o", str(tmp_path)]
+    assert main(run) == 0
+    assert len(list(tmp_path.iterdir())) == 5
+    code = (
+        "import sys; from eomgen.cli import main; code = main(sys.argv[1:]); "
+        "sys.exit(code or 10 * ('scipy' in sys.modules or 'matplotlib' in sys.modules))"
+    )
+    subprocess.run([sys.executable, "-c", code, *run, "--no-pictures"], check=True)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".py", ".npz", ".csv"}
+    capsys.readouterr()
+    for other in (["--plot", "a.svg"], ["--view"]):
+        assert main([*run, "--no-pictures", *other]) == 1
+        assert f"{other[0]} asks for a picture" in capsys.readouterr().err
+
+
 def test_a_damaged_store_is_done_without(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,6 +3,7 @@
 import csv
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +11,12 @@ from eomgen.errors import RunError
 from eomgen.files import check_folder, check_writable, remove_ours, write_whole
 from eomgen.results import Run
 from eomgen.run.trajectory import is_own_table, save_csv, save_npz
-from eomgen.sweep.ensemble import Ensemble
+
+if TYPE_CHECKING:
+    from eomgen.sweep.ensemble import Ensemble
 
 KINDS = ("py", "npz", "csv", "png", "html")
+PICTURES = ("png", "html")
 
 
 def output_paths(
@@ -22,12 +26,12 @@ def output_paths(
 
     Makes the folders. Raises `RunError` for a path that cannot be written, before the run begins.
     """
-    from eomgen.show.style import check_figure
-
     paths = {kind: folder / f"{name}.{kind}" for kind in KINDS}
     if figure is not None:
         paths["png"] = figure
-    check_figure(paths["png"], force=force)
+        from eomgen.show.style import check_figure  # it loads Matplotlib
+
+        check_figure(figure, force=force)
     for kind, path in paths.items():
         check_folder(path.parent)
         own = kind == "csv" and path.is_file() and is_own_table(path)
@@ -35,15 +39,20 @@ def output_paths(
     return paths
 
 
-def save_run(run: Run, paths: dict[str, Path], *, force: bool = False) -> str:
-    """Write all files. If figure and page cannot be drawn, remove their paths from `paths` and
-    return why; otherwise return "".
+def save_run(
+    run: Run, paths: dict[str, Path], *, pictures: bool = True, force: bool = False
+) -> str:
+    """Write all files. If figure and page cannot be drawn, or without `pictures`, remove those of
+    an earlier run and their paths from `paths`. Return why they cannot be drawn, or "".
     """
     run.module.save(paths["py"], force=force)
     # The table first: the archive of the earlier run shows whether its table is ours to overwrite.
     save_csv(run.trajectory, paths["csv"], force=force)
     save_npz(run.trajectory, paths["npz"], force=force)
-    return _save_pictures(run, paths, force)
+    if pictures:
+        return _save_pictures(run, paths, force)
+    _remove_pictures(paths)
+    return ""
 
 
 def _save_pictures(run: Run, paths: dict[str, Path], force: bool) -> str:
@@ -56,16 +65,22 @@ def _save_pictures(run: Run, paths: dict[str, Path], force: bool) -> str:
         save_figure(run.motion, paths["png"], force=force)
         save_page(run.motion, run.module.poses, parameters, paths["html"], force=force)
     except (RunError, KeyboardInterrupt) as error:
-        # Figure and page of an earlier run do not belong to the new numbers.
-        for kind in ("png", "html"):
-            remove_ours(paths.pop(kind))
+        _remove_pictures(paths)
         if isinstance(error, KeyboardInterrupt):
             raise
         return str(error)
     return ""
 
 
-def save_sweep(found: Ensemble, of: str, table: Path, figure: Path, *, force: bool = False) -> None:
+def _remove_pictures(paths: dict[str, Path]) -> None:
+    """Figure and page of an earlier run do not belong to the new numbers."""
+    for kind in PICTURES:
+        remove_ours(paths.pop(kind))
+
+
+def save_sweep(
+    found: "Ensemble", of: str, table: Path, figure: Path, *, force: bool = False
+) -> None:
     """Write the table and the figure of a sweep. Raises `RunError` if a file cannot be written.
 
     The table has a line for each member: its number, how and when it ended, its varied values, its

@@ -26,6 +26,9 @@ from eomgen.run.trajectory import Trajectory
 
 def simulate(given: Arguments) -> int:
     """Simulate; write module, trajectory, figure and page, also those of a run that stopped."""
+    if given.no_pictures and (given.view or given.plot is not None):
+        other = "--view" if given.view else "--plot"
+        raise RunError(f"--no-pictures draws nothing, and {other} asks for a picture; drop one")
     scene, model, name = read_whole(given.scene, given)
     reporter = reporter_of(given, given.scene)
     parameters, inputs = given_values(given, model)
@@ -56,7 +59,7 @@ def simulate(given: Arguments) -> int:
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
     run = run_plan(plan, reporter=reporter)
-    drawing = save_run(run, paths, force=given.force)
+    drawing = save_run(run, paths, pictures=not given.no_pictures, force=given.force)
     missed = _report(given, run)
     for path in paths.values():
         print(f"    wrote {path}")

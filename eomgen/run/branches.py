@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.schedule import Schedule
@@ -317,6 +316,8 @@ class _Search:
         first, last = value(bracket.start), value(bracket.end)
         if not first * last < 0:  # 0 at an end, or not finite
             return bracket.start if first == 0 else bracket.end
+        from scipy.optimize import brentq  # here: few runs need it, and it loads slowly
+
         return float(brentq(value, bracket.start, bracket.end, xtol=1e-12 * step.length))
 
     def _at(self, shares: FloatArray) -> FloatArray:

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.optimize import brentq
 
 from eomgen.run.contacts import (
     STILL,
@@ -333,6 +332,8 @@ def _first_zero(
 
 
 def _root(function: Callable[[float], float], a: float, b: float) -> float:
+    from scipy.optimize import brentq  # here: few runs need it, and it loads slowly
+
     return float(brentq(function, a, b, xtol=max(1e-14 * (b - a), 1e-300), rtol=1e-15))
 
 

@@ -1,5 +1,6 @@
 """Integration of a problem: checks of the arguments, the steps, and the trajectory."""
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -356,9 +357,12 @@ def _check_start(problem: Problem, run: _Run) -> None:
 
 
 def _is_finite(advance: Advance) -> bool:
-    return bool(
-        np.isfinite(advance.y).all() and all(np.isfinite(y).all() for _, y in advance.samples)
-    )
+    return all(map(_has_numbers, (advance.y, *(y for _, y in advance.samples))))
+
+
+def _has_numbers(y: FloatArray) -> bool:
+    """Whether all numbers are finite; a finite sum, which is found sooner, says so, too."""
+    return math.isfinite(y.sum()) or bool(np.isfinite(y).all())
 
 
 def _place(problem: Problem, run: _Run) -> str:

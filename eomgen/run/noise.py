@@ -38,10 +38,12 @@ class Fast:
     """Properties of the fast modes of a motion.
 
     stiff  whether explicit steps would be many times shorter than accuracy requires
+    decay  the greatest decay rate of a mode, 1/s
     noise  (ny,), greatest change of each state in a step by rounding errors of the derivative
     """
 
     stiff: bool
+    decay: float
     noise: FloatArray
 
 
@@ -50,13 +52,14 @@ def fast(problem: Problem, states: Iterable[tuple[float, FloatArray]], span: flo
 
     States at which the derivative or the Jacobian is not finite are ignored.
     """
-    stiff, most = False, np.zeros(len(problem.states))
+    stiff, decay, most = False, 0.0, np.zeros(len(problem.states))
     for t, y in states:
         modes, noise = _modes_and_noise(problem.derivative, problem.jacobian, t, y, span)
         quick = np.abs(modes) * span > MANY
         stiff = stiff or bool((-modes[quick].real * span > DAMPED).any())
+        decay = max(decay, float((-modes.real).max(initial=0.0)))
         most = np.maximum(most, noise)
-    return Fast(stiff, most)
+    return Fast(stiff, decay, most)
 
 
 def step_noise(

@@ -83,28 +83,32 @@ class Strides:
         """The steps as one `Advance`, or as one for each; with `resumes` a run can continue from
         their ends.
         """
-        count = len(stride.ends)
+        ends = stride.ends.tolist()
         lengths = np.diff(stride.ends, prepend=self._start)
-        capped = lengths >= self._bounds.longest * (1 - 1e-9)
-        before, called = 0, 0
-        for first in range(count) if each else (0,):
-            last = first if each else count - 1
-            passed = int(stride.sampled[last])
-            at = slice(sampled + before, sampled + passed)
-            t, y = float(stride.ends[last]), stride.states[last]
-            memory = {name: values[last] for name, values in stride.memory.items()}
+        capped = np.cumsum(lengths >= self._bounds.longest * (1 - 1e-9)).tolist()
+        derivatives, passed = stride.derivatives.tolist(), stride.sampled.tolist()
+        times = self._times[sampled : sampled + passed[-1]].tolist()
+        steps, rows, called, shortened = 0, 0, 0, 0
+        for i in range(len(ends)) if each else (len(ends) - 1,):
+            at = slice(rows, passed[i])
             yield Advance(
-                t,
-                y,
-                list(zip(self._times[at].tolist(), stride.rows[before:passed], strict=True)),
+                ends[i],
+                stride.states[i],
+                list(zip(times[at], stride.rows[at], strict=True)) if at.stop > rows else [],
                 self._problem,
                 _unknown,
-                steps=last + 1 - first,
-                derivatives=int(stride.derivatives[last]) - called,
-                resume=partial(continuation, t, y, memory) if resumes else None,
-                capped=int(capped[first : last + 1].sum()),
+                steps=i + 1 - steps,
+                derivatives=derivatives[i] - called,
+                resume=partial(_after, stride, i) if resumes else None,
+                capped=capped[i] - shortened,
             )
-            before, called = passed, int(stride.derivatives[last])
+            steps, rows, called, shortened = i + 1, passed[i], derivatives[i], capped[i]
+
+
+def _after(stride: Stride, i: int) -> Resume:
+    """What a later run needs to continue after step i."""
+    memory = {name: values[i] for name, values in stride.memory.items()}
+    return continuation(float(stride.ends[i]), stride.states[i], memory)
 
 
 def continuation(t: float, y: FloatArray, memory: Mapping[str, Any]) -> Resume:

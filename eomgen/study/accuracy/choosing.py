@@ -44,6 +44,9 @@ BETTER = 1.5
 work."""
 OVERRUN = 3.0
 """A run is stopped after so many times its expected work, and other methods are tried."""
+SLOWED = 2.0
+"""Steps of DOP853 that last so many times the fastest decay are limited by stability, not accuracy:
+above about 6 they are unstable."""
 LOOSE = 1e-5
 """Equal steps are tried for required errors down to this."""
 FEW_ROWS = 257
@@ -148,26 +151,42 @@ def _missed(
 def _candidates(search: Search) -> list[str]:
     """The methods to try, in this order; each was the cheapest for some scene.
 
-    With contacts, a multistep method restarts at each impact, so one-step methods replace it. For
-    stiff motion an implicit method comes first: stability would force explicit ones to take
+    For smooth motion DOP853 comes first, whose steps are made in compiled code where that is
+    possible. With contacts, a multistep method restarts at each impact, so one-step methods replace
+    it. For stiff motion an implicit method comes first: stability would force explicit ones to take
     thousands of steps.
     """
     others = ["LSODA", "DOP853"] if search.case.problem.contacts is None else ["RK45", "DOP853"]
-    return [STIFF, *others] if search.fast.stiff else others
+    if search.fast.stiff:
+        return [STIFF, *others]
+    return ["DOP853"] if _smooth(search.case) else others
+
+
+def _slowed(search: Search) -> bool:
+    """Whether no run finished, or stability limits the steps of the tightest."""
+    run = search.tightest_run
+    if run is None or not search.runs:
+        return True
+    steps = max(1, run.trajectory.counts["steps"])
+    return search.fast.decay * search.case.t_end / steps >= SLOWED
 
 
 def race(search: Search, asked: str | None, loose: bool) -> list[str]:
     """Run each method once; stop runs that take much more work than another. Return the names of
     all methods that were run.
 
-    If a run needed Jacobians, or none finished, `STIFF` is run, too. Else, if the motion is smooth
-    and the required error is `loose`, rk4 is run, too: it spends no time on step control.
+    If stability limits the steps of DOP853, LSODA is run, too, which changes over to an implicit
+    method. If a run needed Jacobians, or none finished, `STIFF` is run, too. Else, if the motion is
+    smooth and the required error is `loose`, rk4 is run, too: it spends no time on step control.
     """
     names = [method_of(asked).name] if asked is not None else _candidates(search)
     for name in names:
         _first(search, method_of(name))
     if asked is not None:
         return names
+    if "LSODA" not in names and search.case.problem.contacts is None and _slowed(search):
+        names.append("LSODA")
+        _first(search, method_of("LSODA"))
     more = []
     if not search.runs or any(run.trajectory.counts["jacobians"] for run in search.runs):
         more = [STIFF]

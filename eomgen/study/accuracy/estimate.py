@@ -23,6 +23,9 @@ from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
 
 LAST = 0.1
 """Part of a run's time, at its end, over which differences are taken."""
+NEAREST = 2
+"""Of the looser runs of a method, so many tell of the tightest run's error: errors of much looser
+ones may fall faster than theory says."""
 CAUTION = 0.8
 """If only one difference is known, the theoretical exponent is reduced by this factor."""
 MORE = 1.5
@@ -236,8 +239,9 @@ def by_looser_run(
     The difference is mostly the error of the second run and so an upper bound of the run's own. It
     is not much larger if errors do not fall with the tolerance, as with LSODA near rounding, or if
     rounding causes them. Errors of equal steps fall as theory predicts, except for rounding, which
-    the samples show. As two runs may agree by accident, the estimate is at least what the other
-    runs' differences give when extrapolated by theory, and at least what the samples differ by.
+    the samples show. As two runs may agree by accident, the estimate is at least what the
+    differences of the `NEAREST` other runs give when extrapolated by theory, and at least what the
+    samples differ by.
     """
     if not all(other.trajectory.finished for other in (second, *samples)):
         return Estimate(math.inf, math.inf, math.nan, second)
@@ -248,7 +252,7 @@ def by_looser_run(
     if samples and method.equal_steps and last < SMALL:
         last /= math.pow(second.tolerance / run.tolerance, CAUTION * method.exponent)
     last = max(last, floor)
-    for other in others:
+    for other in sorted(others, key=lambda other: other.tolerance)[:NEAREST]:
         gap = difference(one, other.trajectory, scale)
         theory = math.pow(other.tolerance / run.tolerance, CAUTION * method.exponent)
         if gap < WRONG:
