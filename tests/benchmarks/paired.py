@@ -22,16 +22,18 @@ def chain(count: int) -> Model:
     return replace(elaborate(parse_scene(text)), outputs=())
 
 
-def chain_of_pinocchio(count: int) -> Any:
-    """The same mechanism."""
+def chain_of_pinocchio(
+    count: int, mass: float = 0.1, half: float = 0.1, inertia: float = 3.3333333333333335e-4
+) -> Any:
+    """The same mechanism, or one of other rods: mass, half the length, inertia."""
     model = pin.Model()
     model.gravity.linear = np.array([0.0, -9.81, 0.0])
     at, place = 0, pin.SE3.Identity()
     for i in range(count):
         at = model.addJoint(at, pin.JointModelRZ(), place, f"joint_{i}")
-        inertia = pin.Inertia(0.1, np.zeros(3), np.diag([1e-12, 1e-12, 3.3333333333333335e-4]))
-        model.appendBodyToJoint(at, inertia, pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])))
-        place = pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.0]))
+        about_com = pin.Inertia(mass, np.zeros(3), np.diag([1e-12, 1e-12, inertia]))
+        model.appendBodyToJoint(at, about_com, pin.SE3(np.eye(3), np.array([half, 0.0, 0.0])))
+        place = pin.SE3(np.eye(3), np.array([2 * half, 0.0, 0.0]))
     return model
 
 

@@ -14,7 +14,9 @@ and on all of them.
 Runs at true errors of 1e-6, 1e-9 and 1e-12: steps of DOP853 in C, beside heyoka's Taylor series fed
 with the same program, and SciPy's DOP853 over the NumPy module. For each the loosest of a ladder of
 tolerances whose end is that near to a reference in extended precision. heyoka compiles first; that
-is told apart. Printed are medians, and of the ratios of paired rounds median and quartiles.
+is told apart. The same beside MuJoCo, and beside Pinocchio and SymPy's lambdify in SciPy.
+
+Printed are medians, and of the ratios of paired rounds median and quartiles.
 """
 
 import argparse
@@ -30,6 +32,7 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+import peer_engines
 import peer_lanes
 import pinocchio as pin
 from paired import COLUMNS, chain, chain_of_pinocchio, paired, row, spread
@@ -50,7 +53,7 @@ from eomgen.store import generated_code, interfaced_program_of, key_of
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.reference import reference
 
-PEERS = ("heyoka", "jax", "casadi")
+PEERS = ("heyoka", "mujoco", "jax", "casadi")
 ERRORS = (1e-6, 1e-9, 1e-12)
 LADDER = [10.0**-k for k in np.arange(4, 16.1, 0.5)]
 
@@ -173,7 +176,8 @@ class Case:
 
     def __init__(self, name: str, model: Model, t_end: float) -> None:
         module = load_module(generated_code(model).module, model.name)
-        self.name, self.t_end, self.start = name, t_end, module.initial_state()
+        self.name, self.model, self.t_end = name, model, t_end
+        self.start = module.initial_state()
         self.plain = as_problem(module)
         accelerator = Accelerator(model, module, None, None)
         accelerator.compile()
@@ -228,11 +232,21 @@ def runs(rounds: int) -> None:
         row(f"heyoka's compilation: {case.seconds:.2g} s", *[""] * 6)
 
 
+def engines(rounds: int) -> None:
+    """Print the table of runs beside MuJoCo, and Pinocchio and lambdify in SciPy."""
+    row("motion", "true error", "peer", "its time", "peer / C, DOP853")
+    row(*["---"] * 5)
+    pendulum = Case("double_pendulum, 10 s", elaborate(read_scene("double_pendulum")), 10.0)
+    peer_engines.engines(pendulum, 2, 1.0, 0.5, 1 / 12)
+    hanging = Case("chain of 10, 1 s", chain(10), 1.0)
+    peer_engines.engines(hanging, 10, 0.1, 0.1, 3.3333333333333335e-4)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    tables = {"derivatives": derivatives, "vectors": vectors, "runs": runs}
+    tables = {"derivatives": derivatives, "vectors": vectors, "runs": runs, "engines": engines}
     parser.add_argument("--rounds", type=int, default=30)
     parser.add_argument("--only", nargs="+", choices=tables, default=tables, metavar="TABLE")
     given = parser.parse_args()
