@@ -97,3 +97,12 @@ def test_what_fails_fails_alike(method: str) -> None:
     compiled, python = both(FALL, t_end=5.0, integrator=method, dt=1e-3, unstable=True)
     assert compiled.compiled
     assert_same(compiled, python)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_time_counts(method: str) -> None:
+    """A force that depends on time, at each node of a step."""
+    pushed = FALL.replace("-1/x**2", "sin(3*t)*x")
+    compiled, python = both(pushed, t_end=1.0, integrator=method, dt=1e-2)
+    assert compiled.compiled
+    assert_same(compiled, python)
