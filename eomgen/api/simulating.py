@@ -111,9 +111,10 @@ def simulate(
     unstable    allow steps of an explicit fixed-step method that are too long for stability
     estimate    estimate the error by a second run
     resume      continue an earlier run: a `Run`, or its archive `.npz`
-    backend     "numpy": make all steps in Python; "c": make those of DOP853 in compiled C code,
-                with the same bits; "auto": do so if a library is in the store, or if the run is
-                longer than compiling takes and there is a compiler
+    backend     "numpy": make all steps in Python; "c": make those of DOP853 and of rk4, euler
+                and semi_implicit_euler in compiled C code, with the same bits; "auto": do so if a
+                library is in the store, or if the run is longer than compiling takes and there is a
+                compiler
     follow      called with time and state after each step; a true result stops the run
 
     A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
@@ -299,8 +300,9 @@ def _why_not_compiled(plan: Plan, accelerator: "Accelerator | None") -> str:
         return f"the run was not compiled: {accelerator.notice}"
     if accelerator and plan.backend == "c" and not accelerator.used:
         return (
-            "no step was made in C: compiled are those of DOP853, in scenes without contacts, "
-            "stops and other one-sided forces, without guard and works"
+            "no step was made in C: compiled are those of DOP853, rk4, euler and "
+            "semi_implicit_euler, in scenes without contacts, stops and other one-sided forces, "
+            "without guard and works"
         )
     return ""
 

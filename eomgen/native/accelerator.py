@@ -18,7 +18,7 @@ from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.native.runs import MAIN, CompiledSteps, sources
-from eomgen.run.compiled import Compiled, Steps
+from eomgen.run.compiled import Compiled, EqualSteps, Steps
 from eomgen.run.problem import Problem
 from eomgen.store import interfaced_program_of, key_of
 
@@ -47,18 +47,26 @@ class Accelerator:
         """The problem of the module, or of one with other constants, with its compiled steps."""
         made: list[CompiledSteps] = []
 
-        def steps(name: str) -> Steps | None:
+        def library() -> CompiledSteps | None:
             if self._due:
                 self._look()
             if self._library is None:
                 return None
             if not made:
                 made.append(CompiledSteps(module or self._module, self._library, *self._values))
-            found = made[0].named(name)
+            return made[0]
+
+        def steps(name: str) -> Steps | None:
+            found = held.named(name) if (held := library()) else None
             self.used = self.used or found is not None
             return found
 
-        return replace(problem, compiled=Compiled(problem.derivative, steps))
+        def equal(name: str) -> EqualSteps | None:
+            found = held.equal(name) if (held := library()) else None
+            self.used = self.used or found is not None
+            return found
+
+        return replace(problem, compiled=Compiled(problem.derivative, steps, equal))
 
     def compile(self) -> None:
         """Compile now, unless the library is in the store.
@@ -95,6 +103,6 @@ def _digest() -> str:
     here = Path(__file__).resolve().parent
     methods = here.parent / "run" / "integrators"
     found = hashlib.sha256()
-    for path in (*sorted(here.glob("*.py")), *sorted(methods.glob("do*.py"))):
+    for path in (*sorted(here.glob("*.py")), *sorted(methods.glob("*.py"))):
         found.update(path.name.encode() + b"\0" + path.read_bytes())
     return found.hexdigest()

@@ -10,9 +10,10 @@ import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.native import equal_steps
 from eomgen.native.module import Kernels, are_usual
 from eomgen.program.program import Program
-from eomgen.run.compiled import Array, Steps, Stride
+from eomgen.run.compiled import Array, EqualSteps, Steps, Stride
 from eomgen.run.integrators import dormand_prince_8 as dop853
 from eomgen.run.integrators.dop853_coefficients import NODES, Row
 from eomgen.run.module import given_values
@@ -54,7 +55,8 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "greatest": repr(dop853.GREATEST),
         "short_weight": repr(dop853.SHORT_WEIGHT),
     }
-    return {**c.library(program, interface), MAIN: render(c.TEMPLATES, "runs.c.jinja", context)}
+    main = render(c.TEMPLATES, "runs.c.jinja", context) + equal_steps.source(interface)
+    return {**c.library(program, interface), MAIN: main}
 
 
 def _sum(row: Row) -> str:
@@ -92,7 +94,7 @@ class CompiledSteps:
         self._constants = (_REAL * max(1, len(constants)))(*constants) if usual else None
         self._inputs = kernels.given(u)
         self._states = kernels.states
-        self._call = library.dop853
+        self._library, self._call = library, library.dop853
         self._call.restype = ctypes.c_int
         self._call.argtypes = [_POINTER, _WHOLE, _REAL, _REAL, *[_POINTER] * 5]
 
@@ -102,6 +104,12 @@ class CompiledSteps:
             return None
         held = ctypes.cast(self._constants, _POINTER), self._inputs.ctypes.data
         return partial(self._dop853, held)
+
+    def equal(self, name: str) -> EqualSteps | None:
+        """The same for methods with equal steps."""
+        if self._constants is None or self._inputs is None or name not in equal_steps.METHODS:
+            return None
+        return equal_steps.steps(self._library, name, self._constants, self._inputs)
 
     def _dop853(
         self,

@@ -60,13 +60,60 @@ class Steps(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class EqualStride:
+    """Some steps of equal length, in order: m of them, which may be none.
+
+    ends         (m,), their times, s
+    states       (m, ny), the states there
+    losses       (m, ny), the rounding errors of the sums there, which the next step adds
+    calls        derivatives in each step
+    rate         (ny,), change of the state in the last step, by its length
+    place, slope (ny,), the last derivative evaluated, and the state where
+    usual        whether the next step may be made so, too
+    """
+
+    ends: Array
+    states: Array
+    losses: Array
+    calls: int
+    rate: Array
+    place: Array
+    slope: Array
+    usual: bool
+
+
+class EqualSteps(Protocol):
+    """Makes `most` steps, or fewer, from the state `y` at t, where `made` steps end.
+
+    Step i ends at t_start + i dt, and before `t_end`. No step is made whose rate differs from that
+    of the step before by more than `limits[1]`; the first one's is compared with `limits[0]`.
+    """
+
+    def __call__(
+        self,
+        t: float,
+        y: Array,
+        lost: Array,
+        *,
+        t_start: float,
+        t_end: float,
+        dt: float,
+        made: int,
+        most: int,
+        limits: tuple[Array, Array],
+    ) -> EqualStride: ...
+
+
+@dataclass(frozen=True, eq=False)
 class Compiled:
     """Compiled steps of a problem.
 
     derivative  the function whose steps they are: they serve no problem with another one
     steps       the steps of a method, by its name; None if there are none, or not yet. It is asked
                 again and again during a run, and may begin to compile when the run is a long one
+    equal       the same for methods with equal steps
     """
 
     derivative: Callable[[float, Array], Array]
     steps: Callable[[str], Steps | None]
+    equal: Callable[[str], EqualSteps | None]

@@ -123,13 +123,17 @@ def integrate(
         # Evaluations to check stability do not count. They need a Jacobian with all digits, which
         # doubles do not give where the derivative is repaired.
         checked = None if unstable or not method.explicit or repairs else problem
-        begin, settings = equal_steps(asked, method, counted, checked)
+        plain = not (monitor or powers or problem.contacts)
+        compiled = compiled_steps(problem) if plain else None
+        begin, settings = equal_steps(
+            asked, method, counted, checked, compiled=compiled, each=tally is not None
+        )
     else:
         # Compiled steps give no state within a step, and are not checked for contacts and the like.
         plain = not (monitor or powers or problem.contacts or problem.corners)
-        steps = compiled_steps(problem) if plain else None
+        compiled = compiled_steps(problem) if plain else None
         begin, settings = adaptive_steps(
-            asked, method, problem, remarks.append, steps=steps, each=tally is not None
+            asked, method, problem, remarks.append, compiled=compiled, each=tally is not None
         )
 
     gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else GAP_CHECKS

@@ -1,7 +1,8 @@
 """The steps of a run, from its arguments."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from eomgen.run.checks import (
     longest_steps,
     numbers,
 )
-from eomgen.run.compiled import Steps
+from eomgen.run.compiled import Compiled
 from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
 from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume
 from eomgen.run.problem import Problem
@@ -59,11 +60,19 @@ class Asked:
 
 
 def equal_steps(
-    asked: Asked, method: FixedStep, problem: Problem, checked: Problem | None
+    asked: Asked,
+    method: FixedStep,
+    problem: Problem,
+    checked: Problem | None,
+    *,
+    compiled: Compiled | None = None,
+    each: bool = True,
 ) -> tuple[Begin, Resume]:
     """A function that begins equal steps, and the settings that a later run compares.
 
-    checked  the problem by whose Jacobian the stability of steps is checked; None for no check
+    checked   the problem by whose Jacobian the stability of steps is checked; None for no check
+    compiled  compiled steps of the problem, if it has some
+    each      whether each compiled step becomes an `Advance`
 
     Raises `RunError` for an invalid step.
     """
@@ -71,6 +80,7 @@ def equal_steps(
         raise RunError(f"max_step: {asked.integrator} takes equal steps; give --dt instead")
     dt, every = check_steps(asked.integrator, asked.span, asked.dt, asked.samples, asked.max_steps)
     change = method.prepare(problem)
+    steps = partial(compiled.equal, method.compiled) if compiled and method.compiled else None
 
     def begin(
         problem: Problem, t: float, made: int, resume: Resume | None = None
@@ -86,6 +96,8 @@ def equal_steps(
             checked=problem if checked and problem.contacts else checked,
             stability=method.stability,
             resume=resume,
+            compiled=steps,
+            each=each,
         )
 
     return begin, _settings(asked, dt)
@@ -97,14 +109,14 @@ def adaptive_steps(
     problem: Problem,
     remark: Remark,
     *,
-    steps: Callable[[str], Steps | None] | None = None,
+    compiled: Compiled | None = None,
     each: bool = True,
 ) -> tuple[Begin, Resume]:
     """A function that begins adaptive steps, and the settings that a later run compares.
 
-    remark  called with the method's remarks
-    steps   see `run.compiled.Compiled`
-    each    whether each compiled step becomes an `Advance`
+    remark    called with the method's remarks
+    compiled  compiled steps of the problem, if it has some
+    each      whether each compiled step becomes an `Advance`
 
     Raises `RunError` if `dt` is given, or `max_step` is invalid.
     """
@@ -129,7 +141,7 @@ def adaptive_steps(
             made=made,
             remark=remark,
             resume=resume,
-            steps=steps,
+            steps=compiled.steps if compiled else None,
             each=each,
         )
 
@@ -141,12 +153,12 @@ def _settings(asked: Asked, dt: float | None) -> Resume:
     return numbers(grid=asked.grid, dt=dt, **given)
 
 
-def compiled_steps(problem: Problem) -> Callable[[str], Steps | None] | None:
+def compiled_steps(problem: Problem) -> Compiled | None:
     """The compiled steps of a problem; None if it has none, or another derivative than they."""
     compiled = problem.compiled
     if compiled is None or compiled.derivative is not problem.derivative:
         return None
-    return compiled.steps
+    return compiled
 
 
 def can_go_on(method: FixedStep | Adaptive) -> bool:

@@ -126,7 +126,7 @@ def _problem(task: Task, row: Sequence[float]) -> Problem:
     if library is None:
         return problem
     steps = CompiledSteps(module, library, *values)
-    return replace(problem, compiled=Compiled(problem.derivative, steps.named))
+    return replace(problem, compiled=Compiled(problem.derivative, steps.named, steps.equal))
 
 
 def _status(run: Trajectory | str) -> int:

@@ -20,4 +20,4 @@ def stability(z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     return 1 + z
 
 
-INTEGRATOR = FixedStep(lambda _: change, order=1, stability=stability)
+INTEGRATOR = FixedStep(lambda _: change, order=1, stability=stability, compiled="euler")

@@ -1,11 +1,13 @@
 """Steps of equal length."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
 
+from eomgen.run.compiled import EqualSteps
+from eomgen.run.integrators.equal_strides import EqualStrides, advances_of
 from eomgen.run.integrators.interface import Advance, Change, Resume, Stability
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
@@ -33,6 +35,8 @@ def advances(
     checked: Problem | None = None,
     stability: Stability | None = None,
     resume: Resume | None = None,
+    compiled: Callable[[], EqualSteps | None] | None = None,
+    each: bool = True,
 ) -> Iterator[Advance]:
     """Yield the steps of a method from time `t` on, with a sample at every `every`-th and the last.
 
@@ -44,6 +48,9 @@ def advances(
     checked    the problem by whose Jacobian the stability of steps is checked; None for no check
     stability  the method's stability function, if it has one
     resume     what an `Advance` of an earlier run gave
+    compiled   compiled steps of the method, of which it is asked again and again; None if there
+               are none. They have the same bits
+    each       whether each compiled step is yielded, or many at once
     """
     steps = int(count_steps(t_end - t_start, dt))
     first = min(math.floor((t - t_start) / dt + 1e-9) + 1, steps)
@@ -51,7 +58,17 @@ def advances(
     lost = np.zeros_like(y) if resume is None else resume["lost"]
     monitor = StabilityMonitor(change, stability)
     recorded = monitor.recording(problem) if checked else problem
-    for i in range(first, steps + 1):
+    strides = EqualStrides(compiled, t_start, t_end, dt) if compiled else None
+    i = first - 1
+    while i < steps:
+        if strides and i >= first:
+            stride = strides.made(i, steps, t, y, lost, monitor if checked else None)
+            if stride:
+                yield from advances_of(stride, i, every, problem, _continuation, each)
+                i += len(stride.ends)
+                t, y, lost = float(stride.ends[-1]), stride.states[-1], stride.losses[-1]
+                continue
+        i += 1
         # From the start each time: a sum of steps would accumulate rounding errors.
         mark = t_start + i * dt
         whole = i < steps or abs(mark - t_end) <= 4 * math.ulp(t_end)

@@ -59,6 +59,7 @@ class FixedStep:
     remedy     what to change when a run fails
     explicit   whether a step may be too long for stability
     stability  its stability function, if that is a function of hλ alone
+    compiled   name of its compiled steps, "" if there are none
     """
 
     prepare: Callable[[Problem], Change]
@@ -66,6 +67,7 @@ class FixedStep:
     remedy: str = SHORTER
     explicit: bool = True
     stability: Stability | None = None
+    compiled: str = ""
 
 
 @dataclass(frozen=True)

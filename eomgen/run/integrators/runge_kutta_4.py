@@ -23,4 +23,6 @@ def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     return TABLEAU.change(problem.derivative, t, y, h)
 
 
-INTEGRATOR = FixedStep(lambda _: change, TABLEAU.order, stability=TABLEAU.stability)
+INTEGRATOR = FixedStep(
+    lambda _: change, TABLEAU.order, stability=TABLEAU.stability, compiled="runge_kutta_4"
+)

@@ -20,4 +20,4 @@ def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     return kick
 
 
-INTEGRATOR = FixedStep(lambda _: change, order=1)
+INTEGRATOR = FixedStep(lambda _: change, order=1, compiled="semi_implicit_euler")

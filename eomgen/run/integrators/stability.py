@@ -71,7 +71,8 @@ class StabilityMonitor:
     _last: FloatArray | None = None
     _largest: FloatArray | float = 0.0
     _allowed: FloatArray | float = 0.0
-    _worked: float = 0.0
+    _steps: int = 0
+    _calls: int = 0
     _spent: float = 0.0
     _highest: float = 0.0
     _skipped: tuple[float, tuple[float, FloatArray, FloatArray, float] | None] = (0.0, None)
@@ -93,7 +94,7 @@ class StabilityMonitor:
         Raises `UnstableStepError` if it is too long.
         """
         evaluated = self._evaluated
-        self._worked += len(evaluated) + 25 / len(y)
+        self._count(1, len(evaluated))
         rate, last = step / h, self._last
         self._last = rate
         # Most steps end here: the largest rates are only updated at a jump.
@@ -120,6 +121,29 @@ class StabilityMonitor:
             if size > self._skipped[0]:
                 self._skipped = size, (t, y, step, h)
 
+    def _count(self, steps: int, calls: int) -> None:
+        """Count steps, and the derivatives at hand at their checks: that of the step before too."""
+        self._steps += steps
+        self._calls += calls
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray] | None:
+        """The rate of the last step and the changes from it that are not jumps, (ny,) each; None
+        before the first step. A step with such rates needs no check: see `passed`.
+        """
+        if self._last is None:
+            return None
+        return self._last, np.asarray(self._allowed)
+
+    def passed(
+        self, steps: int, calls: int, rate: FloatArray, place: FloatArray, slope: FloatArray
+    ) -> None:
+        """Take steps without jumps, of `calls` derivatives each, as `check` would: the rate of the
+        last one, the state at which it evaluated its last derivative, and this, (ny,) each.
+        """
+        self._count(steps, steps * (len(self._evaluated) + calls))
+        self._last, self._evaluated[:] = rate, [(place, slope)]
+
     def finish(self, problem: Problem) -> None:
         """At the end of a run, check the step with the largest jump that was not checked.
 
@@ -138,7 +162,8 @@ class StabilityMonitor:
     ) -> bool:
         """Whether a jump is checked: if time is left for it, or if rates keep growing."""
         size = float(np.max(np.abs(rate) / np.array(problem.sizes or (1.0,))))
-        if self._spent <= SHARE * self._worked + BRIEF / len(rate):
+        worked = self._calls + 25 * self._steps / len(rate)
+        if self._spent <= SHARE * worked + BRIEF / len(rate):
             self._highest = max(self._highest, size)
             return True
         if size > GREATER * self._highest and not h * fastest(problem, evaluated) < FAST:

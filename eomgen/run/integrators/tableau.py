@@ -5,7 +5,7 @@ if and only if every rooted tree of up to p nodes has the elementary weight 1/γ
 Wanner, Solving ODEs I, theorem II.2.13. The order conditions are generated from the trees.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations_with_replacement, product
@@ -77,13 +77,14 @@ class ButcherTableau:
         y: FloatArray,
         h: float,
     ) -> FloatArray:
-        """Return y(t + h) - y(t), (ny,), for an explicit method."""
-        a, b, _ = self.arrays
-        slopes = np.empty((len(b), len(y)))
-        slopes[0] = derivative(t + self.c[0] * h, y)
-        for i in range(1, len(b)):
-            slopes[i] = derivative(t + self.c[i] * h, y + h * (a[i, :i] @ slopes[:i]))
-        return h * (b @ slopes)
+        """Return y(t + h) - y(t), (ny,), for an explicit method.
+
+        Sums are taken term by term, for the same bits on every machine and in compiled steps.
+        """
+        slopes = [derivative(t + self.c[0] * h, y)]
+        for row, node in zip(self.a[1:], self.c[1:], strict=True):
+            slopes.append(derivative(t + node * h, y + h * _sum(row, slopes)))
+        return h * _sum(self.b, slopes)
 
     def stability(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """The stability function R(z) of an explicit method at z = hλ (n,).
@@ -95,6 +96,19 @@ class ButcherTableau:
         for i in range(1, len(b)):
             stages[i] += z * (a[i, :i] @ stages[:i])
         return np.asarray(1 + z * (b @ stages))
+
+
+def terms(row: Sequence[float]) -> list[tuple[int, float]]:
+    """The factors of a sum over slopes that are not 0, with their numbers, in order."""
+    return [(j, factor) for j, factor in enumerate(row) if factor]
+
+
+def _sum(row: Sequence[float], slopes: Sequence[FloatArray]) -> FloatArray:
+    """The sum of the slopes by their factors, in order; some factor must not be 0."""
+    total, *others = (factor * slopes[j] for j, factor in terms(row))
+    for term in others:
+        total = total + term
+    return total
 
 
 @cache
