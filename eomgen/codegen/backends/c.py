@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from eomgen.codegen.backends.conditions import Test, refusals
+from eomgen.codegen.backends.division import divided
 from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.language.formula import names_in
@@ -31,7 +32,7 @@ MACROS = (
     "DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE MAXFLOAT"
 )
 """Macros of <math.h> or of compilers."""
-OURS = "y p u k out extra real R failed"
+OURS = "y p u k out extra between real R failed"
 C_NAMES = {"abs": "fabs"}
 """Names of functions of formulas that differ in C."""
 OWN = {
@@ -134,7 +135,7 @@ def context(program: Program, interface: Interface) -> dict[str, Any]:
         "checks": checks,
         "fixed": constants.lines,
         "held": list(place.items()),
-        "kernels": [written(kernel, place) for kernel in kernels],
+        "kernels": [_in_parts(written(kernel, place)) for kernel in kernels],
     }
 
 
@@ -176,6 +177,15 @@ def written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
         "results": block.results,
         "operations": kernel.counts["total"],
     }
+
+
+def _in_parts(kernel: dict[str, Any]) -> dict[str, Any]:
+    """The same kernel in parts, if it is long."""
+    division = divided(kernel["lines"], kernel["given"], kernel["results"])
+    if division is None:
+        return {**kernel, "parts": (), "between": 0}
+    parts = {"given": division.given, "lines": (), "parts": division.parts}
+    return {**kernel, **parts, "between": max(1, division.size)}
 
 
 def _places(names: Sequence[str], array: str) -> list[tuple[str, str]]:
