@@ -10,7 +10,7 @@ from eomgen.run.compiled import Steps, Stride
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import FloatArray, Problem
 
-MOST = 256
+MOST = 1024
 """Greatest number of steps at once: between them progress is shown, and Ctrl-C is heard."""
 
 
