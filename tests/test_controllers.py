@@ -342,7 +342,7 @@ def test_power() -> None:
 def test_absence_is_free() -> None:
     """No states, functions or names of controllers where there are none."""
     bare = quick(WHEEL)
-    bounded = re.compile(r"\bm(ax|in)\(\w+, ")  # of a value, by a limit
+    bounded = re.compile(r"\bm(ax|in)\([a-z_]\w*, ")  # of a value, by a limit
     assert not bounded.search(bare.source) and ", x=None" not in bare.source
     assert bounded.search(quick(WHEEL + servo("pd", "limit = 1")).source)
     straight = quick(WHEEL + servo("pd"))
