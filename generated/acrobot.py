@@ -22,7 +22,7 @@ Parameters p, with the scene's values:
     g = 9.8      m/s^2   gravitational acceleration
 
 Effects: gravity, motor.
-One call of `derivative` takes 32 operations: 3 add, 8 sub, 16 mul, 1 div, 3 sin, 1 cos; 32 more on
+One call of `derivative` takes 30 operations: 3 add, 7 sub, 15 mul, 1 div, 3 sin, 1 cos; 33 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -85,9 +85,9 @@ JOINTS = ('shoulder', 'elbow')
 POINTS = ('feet',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 3, "sub": 8, "mul": 16, "div": 1, "sin": 3, "cos": 1, "total": 32, "parameters": 32},
-    "jacobian": {"add": 14, "sub": 10, "mul": 45, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 84, "parameters": 34},
-    "forward_dynamics": {"add": 5, "sub": 8, "mul": 16, "div": 1, "sin": 3, "cos": 1, "total": 34, "parameters": 32},
+    "derivative": {"add": 3, "sub": 7, "mul": 15, "div": 1, "sin": 3, "cos": 1, "total": 30, "parameters": 33},
+    "jacobian": {"add": 14, "sub": 8, "mul": 43, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 80, "parameters": 35},
+    "forward_dynamics": {"add": 5, "sub": 7, "mul": 15, "div": 1, "sin": 3, "cos": 1, "total": 32, "parameters": 33},
     "inverse_dynamics": {"add": 12, "sub": 2, "mul": 15, "sin": 3, "cos": 1, "total": 33, "parameters": 21},
     "mass_matrix": {"add": 2, "mul": 2, "cos": 1, "total": 5, "parameters": 16},
     "velocity_force": {"add": 1, "sub": 1, "mul": 6, "sin": 1, "total": 9, "parameters": 2},
@@ -99,14 +99,14 @@ COST = {
     "effect_powers": {"add": 5, "sub": 1, "mul": 8, "neg": 1, "sin": 2, "total": 17, "parameters": 3},
     "momentum": {"add": 14, "sub": 3, "mul": 28, "sin": 2, "cos": 2, "total": 49, "parameters": 2},
     "centre_of_mass": {"add": 4, "sub": 3, "mul": 12, "sin": 2, "cos": 2, "total": 23, "parameters": 4},
-    "joint_forces": {"add": 11, "sub": 9, "mul": 30, "div": 1, "neg": 3, "sin": 3, "cos": 3, "total": 60, "parameters": 36},
+    "joint_forces": {"add": 11, "sub": 8, "mul": 29, "div": 1, "neg": 3, "sin": 3, "cos": 3, "total": 58, "parameters": 38},
     "body_poses": {"add": 3, "sub": 2, "mul": 6, "neg": 1, "sin": 2, "cos": 2, "total": 16, "parameters": 2},
     "body_velocities": {"add": 6, "mul": 10, "sin": 2, "cos": 2, "total": 20, "parameters": 1},
     "point_positions": {"add": 4, "sub": 3, "mul": 6, "sin": 2, "cos": 2, "total": 17, "parameters": 2},
     "point_velocities": {"add": 8, "mul": 10, "sin": 2, "cos": 2, "total": 22, "parameters": 1},
     "point_jacobians": {"add": 9, "mul": 6, "sin": 2, "cos": 2, "total": 19, "parameters": 1},
     "input_jacobian": {"add": 1, "sub": 3, "mul": 6, "div": 1, "sin": 1, "cos": 1, "total": 13, "parameters": 27},
-    "parameter_jacobian": {"add": 28, "sub": 24, "mul": 80, "div": 9, "neg": 8, "sin": 3, "cos": 1, "total": 153, "parameters": 91},
+    "parameter_jacobian": {"add": 28, "sub": 22, "mul": 82, "div": 9, "neg": 8, "sin": 3, "cos": 1, "total": 153, "parameters": 93},
 }
 
 
@@ -143,34 +143,34 @@ def _fixed(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
     m_2_squared = m_2 * m_2
     k51 = c_2_squared * l_1_squared
     k2 = m_2_squared * k51 / pivot_lower
-    k21 = m_2 * l_1
-    k3 = c_2 * k21
-    k22 = m_2 * c_2
-    k4 = g * k22
+    k22 = m_2 * l_1
+    k3 = c_2 * k22
+    k23 = m_2 * c_2
+    k18 = m_2 * g
+    k4 = c_2 * k18
     k5 = 1.0 / pivot_lower
-    k25 = m_1 * c_1
-    k6 = g * k25
-    k7 = g * k21
-    k8 = k2 * 2.0
-    k9 = k3 * 2.0
+    k9 = g * k22
+    k19 = m_1 * g
+    k10 = c_1 * k19
+    k6 = k9 + k10
+    k7 = k2 * 2.0
+    k8 = k3 * 2.0
     k52 = m_1 * c_1_squared
     k53 = m_2 * l_1_squared
     k54 = m_2 * 2.0
     k26 = l_1 * c_2
-    k10 = k54 * k26
-    k11 = I_2 + (I_1 + (k52 + (k44 + k53)))
-    k12 = I_1 / 2.0
-    k13 = I_2 / 2.0
-    k14 = m_1 / 2.0
-    k17 = c_1 - l_1
-    k15 = l_1 - c_1
-    k16 = m_2 / 2.0
-    k18 = m_2 * g
-    k19 = m_1 * g
+    k11 = k54 * k26
+    k12 = I_2 + (I_1 + (k52 + (k44 + k53)))
+    k13 = I_1 / 2.0
+    k14 = I_2 / 2.0
+    k15 = m_1 / 2.0
+    k20 = c_1 - l_1
+    k16 = l_1 - c_1
+    k17 = m_2 / 2.0
     k55 = m_1 + m_2
-    k20 = 1.0 / k55
-    k23 = k21 + k25
-    k24 = g * k55
+    k21 = 1.0 / k55
+    k24 = k22 + m_1 * c_1
+    k25 = g * k55
     k27 = pivot_lower * c_1_squared / pivot_lower
     k28 = c_1 * g
     k56 = c_1_squared * (m_1 * c_2_squared) + (I_1 * c_2_squared + I_2 * l_1_squared)
@@ -194,28 +194,28 @@ def _fixed(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
     k43 = k5 * k59 / pivot_lower
     return {
         "initial_state": (),
-        "derivative": (k1, k2, k3, k4, k5, k6, k7),
-        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9),
-        "forward_dynamics": (k1, k2, k3, k4, k5, k6, k7),
-        "inverse_dynamics": (pivot_lower, k3, k4, k6, k7, k10, k11),
-        "mass_matrix": (pivot_lower, k3, k10, k11),
+        "derivative": (k1, k2, k3, k4, k5, k6),
+        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8),
+        "forward_dynamics": (k1, k2, k3, k4, k5, k6),
+        "inverse_dynamics": (pivot_lower, k3, k4, k9, k10, k11, k12),
+        "mass_matrix": (pivot_lower, k3, k11, k12),
         "velocity_force": (k3,),
-        "gravity_force": (k4, k6, k7),
-        "bias_force": (k3, k4, k6, k7),
+        "gravity_force": (k4, k9, k10),
+        "bias_force": (k3, k4, k9, k10),
         "applied_force": (),
-        "kinetic_energy": (c_1, c_2, k12, k13, k14, k15, k16),
-        "potential_energy": (c_1, c_2, k17, k18, k19),
-        "effect_powers": (c_1, c_2, k15, k18, k19),
-        "momentum": (m_1, m_2, I_1, I_2, c_1, c_2, k17, k15),
-        "centre_of_mass": (m_1, m_2, c_1, c_2, k17, k15, k20),
-        "joint_forces": (k1, k2, k21, k3, k22, k4, k5, k6, k7, k18, k23, k24),
-        "body_poses": (c_1, c_2, k17, k15),
-        "body_velocities": (c_1, c_2, k15),
-        "point_positions": (c_1, c_2, k17, k15),
-        "point_velocities": (c_1, c_2, k15),
-        "point_jacobians": (c_1, c_2, k15),
+        "kinetic_energy": (c_1, c_2, k13, k14, k15, k16, k17),
+        "potential_energy": (c_1, c_2, k18, k19, k20),
+        "effect_powers": (c_1, c_2, k18, k19, k16),
+        "momentum": (m_1, m_2, I_1, I_2, c_1, c_2, k20, k16),
+        "centre_of_mass": (m_1, m_2, c_1, c_2, k20, k16, k21),
+        "joint_forces": (k1, k2, k22, k3, k23, k18, k4, k5, k6, k24, k25),
+        "body_poses": (c_1, c_2, k20, k16),
+        "body_velocities": (c_1, c_2, k16),
+        "point_positions": (c_1, c_2, k20, k16),
+        "point_velocities": (c_1, c_2, k16),
+        "point_jacobians": (c_1, c_2, k16),
         "input_jacobian": (k1, k2, k3, k5),
-        "parameter_jacobian": (k1, k2, k21, k3, k22, k4, k5, k25, k6, k7, k26, k18, k19, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43),
+        "parameter_jacobian": (k1, k2, k22, k3, k23, k18, k4, k5, k19, k6, k26, k24, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43),
     }
 
 
@@ -265,17 +265,16 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """32 operations: 3 add, 8 sub, 16 mul, 1 div, 3 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6, k7 = k
+    """30 operations: 3 add, 7 sub, 15 mul, 1 div, 3 sin, 1 cos."""
+    k1, k2, k3, k4, k5, k6 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
     load_lower = tau - sin(theta_1 + theta_2) * k4 - k3 * (sin_theta_2 * (theta_1_dot * theta_1_dot))
-    sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     s1 = k3 * (sin_theta_2 * (omega_lower * omega_lower)) - tau - k5 * (coupling_lower_upper * load_lower)
-    alpha_upper = (s1 - sin_theta_1 * k6 - sin_theta_1 * k7) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    alpha_upper = (s1 - sin(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         theta_1_dot,
         theta_2_dot,
@@ -285,8 +284,8 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """84 operations: 14 add, 10 sub, 45 mul, 5 div, 4 neg, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k8, k9 = k
+    """80 operations: 14 add, 8 sub, 43 mul, 5 div, 4 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k7, k8 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
@@ -296,20 +295,18 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     s2 = theta_1 + theta_2
     theta_1_dot_squared = theta_1_dot * theta_1_dot
     load_lower = tau - sin(s2) * k4 - k3 * (sin_theta_2 * theta_1_dot_squared)
-    sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
     s1 = k3 * (sin_theta_2 * omega_lower_squared) - tau - k5 * (coupling_lower_upper * load_lower)
-    alpha_upper = (s1 - sin_theta_1 * k6 - sin_theta_1 * k7) / pivot_upper
+    alpha_upper = (s1 - sin(theta_1) * k6) / pivot_upper
     s3 = k4 * cos(s2)
-    cos_theta_1 = cos(theta_1)
-    s4 = (k5 * (coupling_lower_upper * s3) - k6 * cos_theta_1 - k7 * cos_theta_1) / pivot_upper
+    s4 = (k5 * (coupling_lower_upper * s3) - k6 * cos(theta_1)) / pivot_upper
     s5 = sin_theta_2 * k3
     s6 = s3 + k3 * (cos_theta_2 * theta_1_dot_squared)
     s7 = k5 * (load_lower * s5 + coupling_lower_upper * s6) + k3 * (cos_theta_2 * omega_lower_squared)
-    s8 = (s7 - alpha_upper * (sin_theta_2 * cos_theta_2 * k8)) / pivot_upper
-    s9 = k9 * (theta_1_dot * sin_theta_2)
-    s10 = k9 * (sin_theta_2 * omega_lower)
+    s8 = (s7 - alpha_upper * (sin_theta_2 * cos_theta_2 * k7)) / pivot_upper
+    s9 = k8 * (theta_1_dot * sin_theta_2)
+    s10 = k8 * (sin_theta_2 * omega_lower)
     s11 = (k5 * (coupling_lower_upper * s9) + s10) / pivot_upper
     s12 = s10 / pivot_upper
     return (
@@ -333,19 +330,18 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """34 operations: 5 add, 8 sub, 16 mul, 1 div, 3 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6, k7 = k
+    """32 operations: 5 add, 7 sub, 15 mul, 1 div, 3 sin, 1 cos."""
+    k1, k2, k3, k4, k5, k6 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     tau__theta_1, tau__theta_2 = extra
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
-    sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     s13 = tau + tau__theta_2
     load_lower_2 = s13 - sin(theta_1 + theta_2) * k4 - k3 * (sin_theta_2 * (theta_1_dot * theta_1_dot))
     s14 = tau__theta_1 + k3 * (sin_theta_2 * (omega_lower * omega_lower)) - s13 - k5 * (coupling_lower_upper * load_lower_2)
-    alpha_upper_2 = (s14 - sin_theta_1 * k6 - sin_theta_1 * k7) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    alpha_upper_2 = (s14 - sin(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         alpha_upper_2,
         k5 * (load_lower_2 - coupling_lower_upper * alpha_upper_2) - alpha_upper_2,
@@ -354,34 +350,35 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """33 operations: 12 add, 2 sub, 15 mul, 3 sin, 1 cos."""
-    pivot_lower, k3, k4, k6, k7, k10, k11 = k
+    pivot_lower, k3, k4, k9, k10, k11, k12 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     theta_1_ddot, theta_2_ddot = extra
     sin_theta_2 = sin(theta_2)
     cos_theta_2 = cos(theta_2)
-    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
-    s16 = sin(theta_1 + theta_2) * k4
+    theta_1_dot_squared = theta_1_dot * theta_1_dot
+    s15 = sin(theta_1 + theta_2) * k4
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    s17 = pivot_lower + cos_theta_2 * k3
-    s18 = sin_theta_1 * k6 + (theta_1_ddot * (cos_theta_2 * k10 + k11) + theta_2_ddot * s17)
+    s16 = pivot_lower + cos_theta_2 * k3
+    s17 = sin_theta_1 * k10 + (theta_1_ddot * (cos_theta_2 * k11 + k12) + theta_2_ddot * s16)
+    s18 = k3 * (sin_theta_2 * theta_1_dot_squared) + (s15 + (theta_1_ddot * s16 + theta_2_ddot * pivot_lower))
     return (
-        k3 * (s15 - sin_theta_2 * (omega_lower * omega_lower)) + (sin_theta_1 * k7 + (s16 + s18)),
-        k3 * s15 + (s16 + (theta_1_ddot * s17 + theta_2_ddot * pivot_lower)) - tau,
+        k3 * (sin_theta_2 * (theta_1_dot_squared - omega_lower * omega_lower)) + (sin_theta_1 * k9 + (s15 + s17)),
+        s18 - tau,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     """5 operations: 2 add, 2 mul, 1 cos."""
-    pivot_lower, k3, k10, k11 = k
+    pivot_lower, k3, k11, k12 = k
     _, theta_2, _, _ = y
     cos_theta_2 = cos(theta_2)
-    s17 = pivot_lower + cos_theta_2 * k3
+    s16 = pivot_lower + cos_theta_2 * k3
     return (
-        cos_theta_2 * k10 + k11,
-        s17,
-        s17,
+        cos_theta_2 * k11 + k12,
+        s16,
+        s16,
         pivot_lower,
     )
 
@@ -391,38 +388,38 @@ def _velocity_force(y, k, u=(), extra=(), sin=sin):
     k3, = k
     _, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
-    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    theta_1_dot_squared = theta_1_dot * theta_1_dot
     omega_lower = theta_1_dot + theta_2_dot
     return (
-        k3 * (s15 - sin_theta_2 * (omega_lower * omega_lower)),
-        k3 * s15,
+        k3 * (sin_theta_2 * (theta_1_dot_squared - omega_lower * omega_lower)),
+        k3 * (sin_theta_2 * theta_1_dot_squared),
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), sin=sin):
     """8 operations: 3 add, 3 mul, 2 sin."""
-    k4, k6, k7 = k
+    k4, k9, k10 = k
     theta_1, theta_2, _, _ = y
-    s16 = sin(theta_1 + theta_2) * k4
+    s15 = sin(theta_1 + theta_2) * k4
     sin_theta_1 = sin(theta_1)
     return (
-        sin_theta_1 * k7 + (s16 + sin_theta_1 * k6),
-        s16,
+        sin_theta_1 * k9 + (s15 + sin_theta_1 * k10),
+        s15,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin):
     """19 operations: 6 add, 1 sub, 9 mul, 3 sin."""
-    k3, k4, k6, k7 = k
+    k3, k4, k9, k10 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
-    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
-    s16 = sin(theta_1 + theta_2) * k4
+    theta_1_dot_squared = theta_1_dot * theta_1_dot
+    s15 = sin(theta_1 + theta_2) * k4
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     return (
-        k3 * (s15 - sin_theta_2 * (omega_lower * omega_lower)) + (sin_theta_1 * k7 + (s16 + sin_theta_1 * k6)),
-        s16 + k3 * s15,
+        k3 * (sin_theta_2 * (theta_1_dot_squared - omega_lower * omega_lower)) + (sin_theta_1 * k9 + (s15 + sin_theta_1 * k10)),
+        s15 + k3 * (sin_theta_2 * theta_1_dot_squared),
     )
 
 
@@ -437,7 +434,7 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
     """35 operations: 11 add, 20 mul, 2 sin, 2 cos."""
-    c_1, c_2, k12, k13, k14, k15, k16 = k
+    c_1, c_2, k13, k14, k15, k16, k17 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s2 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
@@ -445,43 +442,43 @@ def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
     xd_upper = c_1 * s19
     s20 = theta_1_dot * sin(theta_1)
     yd_upper = c_1 * s20
-    xd_lower = s19 * k15 + (xd_upper + c_2 * (omega_lower * cos(s2)))
-    yd_lower = s20 * k15 + (yd_upper + c_2 * (sin(s2) * omega_lower))
-    s21 = (xd_upper * xd_upper + yd_upper * yd_upper) * k14 + (theta_1_dot * theta_1_dot * k12 + omega_lower * omega_lower * k13)
+    xd_lower = s19 * k16 + (xd_upper + c_2 * (omega_lower * cos(s2)))
+    yd_lower = s20 * k16 + (yd_upper + c_2 * (sin(s2) * omega_lower))
+    s21 = (xd_upper * xd_upper + yd_upper * yd_upper) * k15 + (theta_1_dot * theta_1_dot * k13 + omega_lower * omega_lower * k14)
     return (
-        (xd_lower * xd_lower + yd_lower * yd_lower) * k16 + s21,
+        (xd_lower * xd_lower + yd_lower * yd_lower) * k17 + s21,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
     """11 operations: 1 add, 3 sub, 5 mul, 2 cos."""
-    c_1, c_2, k17, k18, k19 = k
+    c_1, c_2, k18, k19, k20 = k
     theta_1, theta_2, _, _ = y
     cos_theta_1 = cos(theta_1)
     s22 = c_1 * cos_theta_1
     return (
-        (cos_theta_1 * k17 - s22 - c_2 * cos(theta_1 + theta_2)) * k18 - s22 * k19,
+        k18 * (cos_theta_1 * k20 - s22 - c_2 * cos(theta_1 + theta_2)) - k19 * s22,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), sin=sin):
     """17 operations: 5 add, 1 sub, 8 mul, 1 neg, 2 sin."""
-    c_1, c_2, k15, k18, k19 = k
+    c_1, c_2, k18, k19, k16 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     omega_lower = theta_1_dot + theta_2_dot
     s20 = theta_1_dot * sin(theta_1)
     yd_upper = c_1 * s20
-    s23 = (s20 * k15 + (yd_upper + c_2 * (sin(theta_1 + theta_2) * omega_lower))) * k18
+    s23 = k18 * (s20 * k16 + (yd_upper + c_2 * (sin(theta_1 + theta_2) * omega_lower)))
     return (
-        -(s23 + yd_upper * k19),
+        -(s23 + k19 * yd_upper),
         tau * (omega_lower - theta_1_dot),
     )
 
 
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """49 operations: 14 add, 3 sub, 28 mul, 2 sin, 2 cos."""
-    m_1, m_2, I_1, I_2, c_1, c_2, k17, k15 = k
+    m_1, m_2, I_1, I_2, c_1, c_2, k20, k16 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s2 = theta_1 + theta_2
     sin_theta_1_theta_2 = sin(s2)
@@ -493,11 +490,11 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     xd_upper = c_1 * s19
     s20 = theta_1_dot * sin_theta_1
     yd_upper = c_1 * s20
-    xd_lower = s19 * k15 + (xd_upper + c_2 * (omega_lower * cos_theta_1_theta_2))
-    yd_lower = s20 * k15 + (yd_upper + c_2 * (sin_theta_1_theta_2 * omega_lower))
+    xd_lower = s19 * k16 + (xd_upper + c_2 * (omega_lower * cos_theta_1_theta_2))
+    yd_lower = s20 * k16 + (yd_upper + c_2 * (sin_theta_1_theta_2 * omega_lower))
     s22 = c_1 * cos_theta_1
     x_upper = c_1 * sin_theta_1
-    s24 = yd_lower * (sin_theta_1 * k15 + (x_upper + c_2 * sin_theta_1_theta_2)) - xd_lower * (cos_theta_1 * k17 - s22 - c_2 * cos_theta_1_theta_2)
+    s24 = yd_lower * (sin_theta_1 * k16 + (x_upper + c_2 * sin_theta_1_theta_2)) - xd_lower * (cos_theta_1 * k20 - s22 - c_2 * cos_theta_1_theta_2)
     s25 = m_1 * (yd_upper * x_upper + xd_upper * s22) + (I_2 * omega_lower + I_1 * theta_1_dot)
     return (
         m_2 * xd_lower + m_1 * xd_upper,
@@ -508,7 +505,7 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """23 operations: 4 add, 3 sub, 12 mul, 2 sin, 2 cos."""
-    m_1, m_2, c_1, c_2, k17, k15, k20 = k
+    m_1, m_2, c_1, c_2, k20, k16, k21 = k
     theta_1, theta_2, _, _ = y
     s2 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
@@ -516,14 +513,14 @@ def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     s22 = c_1 * cos_theta_1
     x_upper = c_1 * sin_theta_1
     return (
-        (m_2 * (sin_theta_1 * k15 + (x_upper + c_2 * sin(s2))) + m_1 * x_upper) * k20,
-        k20 * (m_2 * (cos_theta_1 * k17 - s22 - c_2 * cos(s2)) - m_1 * s22),
+        (m_2 * (sin_theta_1 * k16 + (x_upper + c_2 * sin(s2))) + m_1 * x_upper) * k21,
+        k21 * (m_2 * (cos_theta_1 * k20 - s22 - c_2 * cos(s2)) - m_1 * s22),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """60 operations: 11 add, 9 sub, 30 mul, 1 div, 3 neg, 3 sin, 3 cos."""
-    k1, k2, k21, k3, k22, k4, k5, k6, k7, k18, k23, k24 = k
+    """58 operations: 11 add, 8 sub, 29 mul, 1 div, 3 neg, 3 sin, 3 cos."""
+    k1, k2, k22, k3, k23, k18, k4, k5, k6, k24, k25 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
@@ -536,29 +533,29 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
     s1 = k3 * (sin_theta_2 * omega_lower_squared) - tau - k5 * (coupling_lower_upper * load_lower)
-    alpha_upper = (s1 - sin_theta_1 * k6 - sin_theta_1 * k7) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    alpha_upper = (s1 - sin_theta_1 * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     alpha_lower = k5 * (load_lower - coupling_lower_upper * alpha_upper)
     cos_theta_1_theta_2 = cos(s2)
     cos_theta_1 = cos(theta_1)
     s26 = theta_1_dot_squared * sin_theta_1 - alpha_upper * cos_theta_1
     s27 = sin_theta_1_theta_2 * omega_lower_squared - alpha_lower * cos_theta_1_theta_2
-    s28 = k22 * s27
+    s28 = k23 * s27
     s29 = sin_theta_1 * alpha_upper + theta_1_dot_squared * cos_theta_1
     s30 = sin_theta_1_theta_2 * alpha_lower + omega_lower_squared * cos_theta_1_theta_2
-    s31 = k22 * s30
+    s31 = k23 * s30
     return (
-        k23 * s26 + s28,
-        -(s31 + (k24 + k23 * s29)),
+        k24 * s26 + s28,
+        -(s31 + (k25 + k24 * s29)),
         0.0,
-        s28 + k21 * s26,
-        -(k21 * s29 + (k18 + s31)),
+        s28 + k22 * s26,
+        -(k22 * s29 + (k18 + s31)),
         -tau,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
     """16 operations: 3 add, 2 sub, 6 mul, 1 neg, 2 sin, 2 cos."""
-    c_1, c_2, k17, k15 = k
+    c_1, c_2, k20, k16 = k
     theta_1, theta_2, _, _ = y
     s2 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
@@ -569,15 +566,15 @@ def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
         x_upper,
         -s22,
         theta_1,
-        sin_theta_1 * k15 + (x_upper + c_2 * sin(s2)),
-        cos_theta_1 * k17 - s22 - c_2 * cos(s2),
+        sin_theta_1 * k16 + (x_upper + c_2 * sin(s2)),
+        cos_theta_1 * k20 - s22 - c_2 * cos(s2),
         s2,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """20 operations: 6 add, 10 mul, 2 sin, 2 cos."""
-    c_1, c_2, k15 = k
+    c_1, c_2, k16 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s2 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
@@ -589,15 +586,15 @@ def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
         xd_upper,
         yd_upper,
         theta_1_dot,
-        s19 * k15 + (xd_upper + c_2 * (omega_lower * cos(s2))),
-        s20 * k15 + (yd_upper + c_2 * (sin(s2) * omega_lower)),
+        s19 * k16 + (xd_upper + c_2 * (omega_lower * cos(s2))),
+        s20 * k16 + (yd_upper + c_2 * (sin(s2) * omega_lower)),
         omega_lower,
     )
 
 
 def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
     """17 operations: 4 add, 3 sub, 6 mul, 2 sin, 2 cos."""
-    c_1, c_2, k17, k15 = k
+    c_1, c_2, k20, k16 = k
     theta_1, theta_2, _, _ = y
     s2 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
@@ -605,14 +602,14 @@ def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
     s32 = c_2 * cos(s2)
     s33 = c_2 * sin(s2)
     return (
-        s33 + (sin_theta_1 * k15 + (c_1 * sin_theta_1 + s33)),
-        cos_theta_1 * k17 - c_1 * cos_theta_1 - s32 - s32,
+        s33 + (sin_theta_1 * k16 + (c_1 * sin_theta_1 + s33)),
+        cos_theta_1 * k20 - c_1 * cos_theta_1 - s32 - s32,
     )
 
 
 def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """22 operations: 8 add, 10 mul, 2 sin, 2 cos."""
-    c_1, c_2, k15 = k
+    c_1, c_2, k16 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s2 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
@@ -621,14 +618,14 @@ def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     s34 = c_2 * (omega_lower * cos(s2))
     s35 = c_2 * (sin(s2) * omega_lower)
     return (
-        s34 + (s19 * k15 + (c_1 * s19 + s34)),
-        s35 + (s20 * k15 + (c_1 * s20 + s35)),
+        s34 + (s19 * k16 + (c_1 * s19 + s34)),
+        s35 + (s20 * k16 + (c_1 * s20 + s35)),
     )
 
 
 def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     """19 operations: 9 add, 6 mul, 2 sin, 2 cos."""
-    c_1, c_2, k15 = k
+    c_1, c_2, k16 = k
     theta_1, theta_2, _, _ = y
     s2 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
@@ -636,9 +633,9 @@ def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     s32 = c_2 * cos(s2)
     s33 = c_2 * sin(s2)
     return (
-        s32 + (cos_theta_1 * k15 + (c_1 * cos_theta_1 + s32)),
+        s32 + (cos_theta_1 * k16 + (c_1 * cos_theta_1 + s32)),
         s32 + s32,
-        s33 + (sin_theta_1 * k15 + (c_1 * sin_theta_1 + s33)),
+        s33 + (sin_theta_1 * k16 + (c_1 * sin_theta_1 + s33)),
         s33 + s33,
     )
 
@@ -659,8 +656,8 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """153 operations: 28 add, 24 sub, 80 mul, 9 div, 8 neg, 3 sin, 1 cos."""
-    k1, k2, k21, k3, k22, k4, k5, k25, k6, k7, k26, k18, k19, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43 = k
+    """153 operations: 28 add, 22 sub, 82 mul, 9 div, 8 neg, 3 sin, 1 cos."""
+    k1, k2, k22, k3, k23, k18, k4, k5, k19, k6, k26, k24, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
@@ -669,35 +666,34 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
     sin_theta_1_theta_2 = sin(theta_1 + theta_2)
-    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
-    load_lower = tau - sin_theta_1_theta_2 * k4 - k3 * s15
-    s38 = coupling_lower_upper * load_lower
+    s38 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    load_lower = tau - sin_theta_1_theta_2 * k4 - k3 * s38
+    s39 = coupling_lower_upper * load_lower
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    s39 = sin_theta_2 * (omega_lower * omega_lower)
-    alpha_upper = (k3 * s39 - tau - k5 * s38 - sin_theta_1 * k6 - sin_theta_1 * k7) / pivot_upper
-    s40 = load_lower - coupling_lower_upper * alpha_upper
-    s41 = (sin_theta_1 * k28 + alpha_upper * k27) / pivot_upper
-    s42 = cos_theta_2 * k26
-    s43 = sin_theta_1_theta_2 * k31 + s15 * k26
-    s44 = s39 * k26 - (k5 * (load_lower * s42 - coupling_lower_upper * s43) - s38 * k32)
-    s45 = (s44 - sin_theta_1 * k33 - alpha_upper * (k29 + s37 * k30)) / pivot_upper
-    s46 = s40 * k32 + k5 * (s43 + (alpha_upper * s42 + coupling_lower_upper * s45))
-    s47 = alpha_upper * k34 / pivot_upper
-    s48 = (s38 * k37 - alpha_upper * (k35 - s37 * k36)) / pivot_upper
-    s49 = cos_theta_2 * k22
-    s50 = k22 * s15
-    s51 = k22 * s39 - k5 * (load_lower * s49 - coupling_lower_upper * s50) - sin_theta_1 * k18
-    s52 = (s51 - alpha_upper * (k38 + s37 * k39)) / pivot_upper
-    s53 = (sin_theta_1 * k19 + alpha_upper * k40) / pivot_upper
-    s54 = cos_theta_2 * k21
-    s55 = sin_theta_1_theta_2 * k18 + k21 * s15
-    s56 = k21 * s39 - (k5 * (load_lower * s54 - coupling_lower_upper * s55) - s38 * k43)
-    s57 = (s56 - alpha_upper * (k41 + s37 * k42)) / pivot_upper
-    s58 = s40 * k43 + k5 * (s55 + (alpha_upper * s54 + coupling_lower_upper * s57))
-    s59 = sin_theta_1_theta_2 * k22
-    s60 = k5 * (coupling_lower_upper * s59) - sin_theta_1 * k25 - k21 * sin_theta_1
-    s61 = s60 / pivot_upper
+    s40 = sin_theta_2 * (omega_lower * omega_lower)
+    alpha_upper = (k3 * s40 - tau - k5 * s39 - sin_theta_1 * k6) / pivot_upper
+    s41 = load_lower - coupling_lower_upper * alpha_upper
+    s42 = (sin_theta_1 * k28 + alpha_upper * k27) / pivot_upper
+    s43 = cos_theta_2 * k26
+    s44 = sin_theta_1_theta_2 * k31 + s38 * k26
+    s45 = s40 * k26 - (k5 * (load_lower * s43 - coupling_lower_upper * s44) - s39 * k32)
+    s46 = (s45 - sin_theta_1 * k33 - alpha_upper * (k29 + s37 * k30)) / pivot_upper
+    s47 = s41 * k32 + k5 * (s44 + (alpha_upper * s43 + coupling_lower_upper * s46))
+    s48 = alpha_upper * k34 / pivot_upper
+    s49 = (s39 * k37 - alpha_upper * (k35 - s37 * k36)) / pivot_upper
+    s50 = cos_theta_2 * k23
+    s51 = k23 * (theta_1_dot * (theta_1_dot * sin_theta_2))
+    s52 = k23 * (omega_lower * (sin_theta_2 * omega_lower)) - k5 * (load_lower * s50 - coupling_lower_upper * s51)
+    s53 = (s52 - k18 * sin_theta_1 - alpha_upper * (k38 + s37 * k39)) / pivot_upper
+    s54 = (sin_theta_1 * k19 + alpha_upper * k40) / pivot_upper
+    s55 = cos_theta_2 * k22
+    s56 = sin_theta_1_theta_2 * k18 + k22 * s38
+    s57 = k22 * s40 - (k5 * (load_lower * s55 - coupling_lower_upper * s56) - s39 * k43)
+    s58 = (s57 - alpha_upper * (k41 + s37 * k42)) / pivot_upper
+    s59 = s41 * k43 + k5 * (s56 + (alpha_upper * s55 + coupling_lower_upper * s58))
+    s60 = sin_theta_1_theta_2 * k23
+    s61 = (k5 * (coupling_lower_upper * s60) - sin_theta_1 * k24) / pivot_upper
     return (
         0.0,
         0.0,
@@ -715,22 +711,22 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s41,
-        s45,
-        -s47,
-        s48,
-        s52,
-        -s53,
-        s57,
+        -s42,
+        s46,
+        -s48,
+        s49,
+        s53,
+        -s54,
+        s58,
         s61,
-        s41 + k5 * (coupling_lower_upper * s41),
-        -(s45 + s46),
-        s47 + k5 * (coupling_lower_upper * s47),
-        -(s48 + (s40 * k37 + k5 * (coupling_lower_upper * s48))),
-        -(s52 + k5 * (s50 + (alpha_upper * s49 + coupling_lower_upper * s52))),
-        s53 + k5 * (coupling_lower_upper * s53),
-        -(s57 + s58),
-        -(s61 + k5 * (s59 + coupling_lower_upper * s61)),
+        s42 + k5 * (coupling_lower_upper * s42),
+        -(s46 + s47),
+        s48 + k5 * (coupling_lower_upper * s48),
+        -(s49 + (s41 * k37 + k5 * (coupling_lower_upper * s49))),
+        -(s53 + k5 * (s51 + (alpha_upper * s50 + coupling_lower_upper * s53))),
+        s54 + k5 * (coupling_lower_upper * s54),
+        -(s58 + s59),
+        -(s61 + k5 * (s60 + coupling_lower_upper * s61)),
     )
 
 

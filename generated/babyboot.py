@@ -20,7 +20,7 @@ Parameters p, with the scene's values:
     g = 9.81        m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 20 operations: 2 add, 13 mul, 1 div, 1 neg, 2 sin, 1 cos; 17 more on
+One call of `derivative` takes 19 operations: 2 add, 12 mul, 1 div, 1 neg, 2 sin, 1 cos; 18 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -83,9 +83,9 @@ JOINTS = ('swing', 'twist')
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 2, "mul": 13, "div": 1, "neg": 1, "sin": 2, "cos": 1, "total": 20, "parameters": 17},
+    "derivative": {"add": 2, "mul": 12, "div": 1, "neg": 1, "sin": 2, "cos": 1, "total": 19, "parameters": 18},
     "jacobian": {"add": 2, "sub": 2, "mul": 23, "div": 5, "neg": 4, "sin": 2, "cos": 2, "total": 40, "parameters": 20},
-    "parameter_jacobian": {"add": 4, "sub": 5, "mul": 31, "div": 9, "neg": 8, "sin": 2, "cos": 1, "total": 60, "parameters": 26},
+    "parameter_jacobian": {"add": 4, "sub": 5, "mul": 33, "div": 9, "neg": 8, "sin": 2, "cos": 1, "total": 62, "parameters": 27},
     "forward_dynamics": {"add": 2, "sub": 2, "mul": 13, "div": 1, "sin": 2, "cos": 1, "total": 21, "parameters": 17},
     "inverse_dynamics": {"add": 4, "mul": 12, "sin": 2, "cos": 1, "total": 19, "parameters": 14},
     "mass_matrix": {"add": 1, "mul": 2, "sin": 1, "total": 4, "parameters": 8},
@@ -98,7 +98,7 @@ COST = {
     "effect_powers": {"add": 1, "sub": 1, "mul": 10, "sin": 2, "cos": 1, "total": 15, "parameters": 4},
     "momentum": {"add": 5, "sub": 6, "mul": 29, "sin": 2, "cos": 2, "total": 44, "parameters": 9},
     "centre_of_mass": {"sub": 2, "mul": 8, "div": 2, "sin": 1, "cos": 1, "total": 14, "parameters": 3},
-    "joint_forces": {"add": 42, "sub": 27, "mul": 132, "div": 1, "neg": 11, "sin": 2, "cos": 2, "total": 217, "parameters": 19},
+    "joint_forces": {"add": 42, "sub": 27, "mul": 132, "div": 1, "neg": 11, "sin": 2, "cos": 2, "total": 217, "parameters": 20},
     "body_poses": {"mul": 8, "neg": 4, "sin": 2, "cos": 2, "total": 16, "parameters": 2},
     "body_velocities": {"add": 3, "sub": 3, "mul": 24, "neg": 2, "sin": 2, "cos": 2, "total": 36, "parameters": 2},
 }
@@ -138,55 +138,56 @@ def _fixed(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
     if not I_Bz >= 0.0:
         return "inertia_com zz of B is negative"
     l_A_squared = l_A * l_A
-    k22 = m_A * l_A_squared
+    k23 = m_A * l_A_squared
     l_B_squared = l_B * l_B
-    k23 = m_B * l_B_squared
-    k1 = k23 + (k22 + (I_A + I_Bx))
-    k2 = k23 + (k22 + (I_A + I_By))
-    k20 = m_A * l_A
-    k10 = k20 + m_B * l_B
-    k3 = g * k10
-    k4 = I_By - I_Bx
-    k5 = k4 * 2.0
-    k6 = 1.0 / I_Bz
-    k7 = k2 - k1
-    k8 = k4 * k6
-    k9 = k5 * k6
-    k11 = l_A * g
-    k12 = l_B * g
-    k13 = k6 / I_Bz
-    k14 = m_A * (l_A * 2.0)
-    k15 = m_A * g
-    k16 = m_B * (l_B * 2.0)
-    k17 = m_B * g
-    k18 = I_Bx - I_By
-    k19 = l_A - l_B - l_A
-    inertia_A_xx = I_A + l_A * k20
-    moment_B_z = m_B * k19
-    k24 = k19 * moment_B_z
-    inertia_B_xx = I_Bx + k24
-    inertia_B_yy = I_By + k24
-    k21 = m_A + m_B
+    k24 = m_B * l_B_squared
+    k1 = k24 + (k23 + (I_A + I_Bx))
+    k2 = k24 + (k23 + (I_A + I_By))
+    k21 = m_A * l_A
+    k8 = k21 + m_B * l_B
+    k3 = g * k8
+    k17 = I_By - I_Bx
+    k4 = k17 * 2.0
+    k9 = 1.0 / I_Bz
+    k5 = k17 * k9
+    k6 = k2 - k1
+    k7 = 2.0 * k5
+    k10 = l_A * g
+    k11 = l_B * g
+    k12 = k17 * (k9 / I_Bz)
+    k13 = m_A * (l_A * 2.0)
+    k14 = m_A * g
+    k15 = m_B * (l_B * 2.0)
+    k16 = m_B * g
+    k18 = I_Bx + (I_A + (k23 + k24))
+    k19 = I_Bx - I_By
+    k20 = l_A - l_B - l_A
+    inertia_A_xx = I_A + l_A * k21
+    moment_B_z = m_B * k20
+    k25 = k20 * moment_B_z
+    inertia_B_xx = I_Bx + k25
+    inertia_B_yy = I_By + k25
+    k22 = m_A + m_B
     return {
         "initial_state": (),
-        "derivative": (k1, k2, k3, k4, k5, k6),
-        "jacobian": (k1, k2, k3, k5, k7, k8, k9),
-        "parameter_jacobian": (l_A_squared, l_B_squared, k1, k2, k10, k3, k4, k5, k6, k11, k12, k13, k14, k15, k16, k17),
-        "forward_dynamics": (k1, k2, k3, k4, k5, k6),
-        "inverse_dynamics": (I_Bz, k1, k3, k4, k5, k18),
-        "mass_matrix": (I_Bz, k1, k4),
-        "velocity_force": (k5, k18),
+        "derivative": (k1, k2, k3, k4, k5),
+        "jacobian": (k1, k2, k3, k4, k5, k6, k7),
+        "parameter_jacobian": (l_A_squared, l_B_squared, k1, k2, k8, k3, k4, k9, k10, k11, k12, k13, k14, k15, k16),
+        "forward_dynamics": (k1, k2, k3, k17, k4, k9),
+        "inverse_dynamics": (I_Bz, k3, k17, k4, k18, k19),
+        "mass_matrix": (I_Bz, k17, k18),
+        "velocity_force": (k4, k19),
         "gravity_force": (k3,),
-        "bias_force": (k3, k5, k18),
+        "bias_force": (k3, k4, k19),
         "applied_force": (),
-        "kinetic_energy": (m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, k19),
-        "potential_energy": (l_A, k15, k17, k19),
-        "effect_powers": (l_A, k15, k17, k19),
-        "momentum": (I_Bz, k20, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy),
-        "centre_of_mass": (m_A, m_B, l_A, k19, k21),
-        "joint_forces": (m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k3, k4, k5, k6, k19),
-        "body_poses": (l_A, k19),
-        "body_velocities": (l_A, k19),
+        "kinetic_energy": (m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, k20),
+        "potential_energy": (l_A, k14, k16, k20),
+        "effect_powers": (l_A, k14, k16, k20),
+        "momentum": (I_Bz, k21, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy),
+        "centre_of_mass": (m_A, m_B, l_A, k20, k22),
+        "joint_forces": (m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k3, k4, k5, k20),
+        "body_poses": (l_A, k20),
+        "body_velocities": (l_A, k20),
     }
 
 
@@ -236,24 +237,24 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """20 operations: 2 add, 13 mul, 1 div, 1 neg, 2 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6 = k
+    """19 operations: 2 add, 12 mul, 1 div, 1 neg, 2 sin, 1 cos."""
+    k1, k2, k3, k4, k5 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     s1 = cos_q_B * sin_q_B
-    s2 = (sin(q_A) * k3 + k5 * (q_B_dot * (q_A_dot * s1))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
+    s2 = (sin(q_A) * k3 + k4 * (s1 * (q_A_dot * q_B_dot))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
     return (
         q_A_dot,
         q_B_dot,
         -s2,
-        k4 * (s1 * (q_A_dot * q_A_dot)) * k6,
+        k5 * (q_A_dot * (q_A_dot * s1)),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     """40 operations: 2 add, 2 sub, 23 mul, 5 div, 4 neg, 2 sin, 2 cos."""
-    k1, k2, k3, k5, k7, k8, k9 = k
+    k1, k2, k3, k4, k5, k6, k7 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     s3 = cos_q_B * cos_q_B
@@ -262,8 +263,9 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     pivot_q_A_dot = s3 * k1 + s4 * k2
     s1 = cos_q_B * sin_q_B
     s5 = q_A_dot * s1
-    s6 = s3 - s4
-    s7 = k5 * (q_B_dot * (q_A_dot * s6)) - (sin(q_A) * k3 + k5 * (q_B_dot * s5)) / pivot_q_A_dot * (2.0 * s1 * k7)
+    s6 = q_A_dot * q_B_dot
+    s7 = s3 - s4
+    s8 = k4 * (s6 * s7) - (sin(q_A) * k3 + k4 * (s1 * s6)) / pivot_q_A_dot * (2.0 * s1 * k6)
     return (
         0.0,
         0.0,
@@ -274,19 +276,19 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         1.0,
         -k3 * cos(q_A) / pivot_q_A_dot,
-        -s7 / pivot_q_A_dot,
-        -k5 * (q_B_dot * s1) / pivot_q_A_dot,
-        -k5 * s5 / pivot_q_A_dot,
+        -s8 / pivot_q_A_dot,
+        -k4 * (q_B_dot * s1) / pivot_q_A_dot,
+        -k4 * s5 / pivot_q_A_dot,
         0.0,
-        q_A_dot * q_A_dot * s6 * k8,
-        s5 * k9,
+        k5 * (q_A_dot * q_A_dot * s7),
+        s5 * k7,
         0.0,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """60 operations: 4 add, 5 sub, 31 mul, 9 div, 8 neg, 2 sin, 1 cos."""
-    l_A_squared, l_B_squared, k1, k2, k10, k3, k4, k5, k6, k11, k12, k13, k14, k15, k16, k17 = k
+    """62 operations: 4 add, 5 sub, 33 mul, 9 div, 8 neg, 2 sin, 1 cos."""
+    l_A_squared, l_B_squared, k1, k2, k8, k3, k4, k9, k10, k11, k12, k13, k14, k15, k16 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     s3 = cos_q_B * cos_q_B
@@ -295,12 +297,11 @@ def _parameter_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     pivot_q_A_dot = s3 * k1 + s4 * k2
     sin_q_A = sin(q_A)
     s1 = cos_q_B * sin_q_B
-    s8 = q_B_dot * (q_A_dot * s1)
-    s2 = (sin_q_A * k3 + k5 * s8) / pivot_q_A_dot
-    s9 = s1 * (q_A_dot * q_A_dot)
-    s10 = s3 + s4
-    s11 = 2.0 * s8
-    s12 = s9 * k6
+    s5 = q_A_dot * s1
+    s2 = (sin_q_A * k3 + k4 * (s1 * (q_A_dot * q_B_dot))) / pivot_q_A_dot
+    s9 = s3 + s4
+    s10 = 2.0 * (q_B_dot * s5)
+    s11 = s1 * (q_A_dot * q_A_dot) * k9
     return (
         0.0,
         0.0,
@@ -320,21 +321,21 @@ def _parameter_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        -(sin_q_A * k11 - s2 * (l_A_squared * s10)) / pivot_q_A_dot,
-        -(sin_q_A * k12 - s2 * (l_B_squared * s10)) / pivot_q_A_dot,
-        s2 * s10 / pivot_q_A_dot,
-        (s11 + s3 * s2) / pivot_q_A_dot,
-        -(s11 - s4 * s2) / pivot_q_A_dot,
+        -(sin_q_A * k10 - s2 * (l_A_squared * s9)) / pivot_q_A_dot,
+        -(sin_q_A * k11 - s2 * (l_B_squared * s9)) / pivot_q_A_dot,
+        s2 * s9 / pivot_q_A_dot,
+        (s10 + s3 * s2) / pivot_q_A_dot,
+        -(s10 - s4 * s2) / pivot_q_A_dot,
         0.0,
-        -(sin_q_A * k15 - s2 * (s10 * k14)) / pivot_q_A_dot,
-        -(sin_q_A * k17 - s2 * (s10 * k16)) / pivot_q_A_dot,
-        -k10 * sin_q_A / pivot_q_A_dot,
+        -(sin_q_A * k14 - s2 * (s9 * k13)) / pivot_q_A_dot,
+        -(sin_q_A * k16 - s2 * (s9 * k15)) / pivot_q_A_dot,
+        -k8 * sin_q_A / pivot_q_A_dot,
         0.0,
         0.0,
         0.0,
-        -s12,
-        s12,
-        -k4 * s9 * k13,
+        -s11,
+        s11,
+        -q_A_dot * s5 * k12,
         0.0,
         0.0,
         0.0,
@@ -343,38 +344,38 @@ def _parameter_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 def _forward_dynamics(y, k, u=(), extra=(), cos=cos, sin=sin):
     """21 operations: 2 add, 2 sub, 13 mul, 1 div, 2 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6 = k
+    k1, k2, k3, k17, k4, k9 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     tau__q_A_dot, tau__q_B_dot = extra
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     s1 = cos_q_B * sin_q_B
     return (
-        (tau__q_A_dot - sin(q_A) * k3 - k5 * (q_B_dot * (q_A_dot * s1))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2),
-        k6 * (k4 * (s1 * (q_A_dot * q_A_dot)) + tau__q_B_dot),
+        (tau__q_A_dot - sin(q_A) * k3 - k4 * (s1 * (q_A_dot * q_B_dot))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2),
+        k9 * (k17 * (s1 * (q_A_dot * q_A_dot)) + tau__q_B_dot),
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), cos=cos, sin=sin):
     """19 operations: 4 add, 12 mul, 2 sin, 1 cos."""
-    I_Bz, k1, k3, k4, k5, k18 = k
+    I_Bz, k3, k17, k4, k18, k19 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     vd__q_A_dot, vd__q_B_dot = extra
     sin_q_B = sin(q_B)
     s1 = cos(q_B) * sin_q_B
     return (
-        k5 * (q_B_dot * (q_A_dot * s1)) + (sin(q_A) * k3 + vd__q_A_dot * (k1 + sin_q_B * sin_q_B * k4)),
-        I_Bz * vd__q_B_dot + s1 * (q_A_dot * q_A_dot) * k18,
+        k4 * (q_B_dot * (q_A_dot * s1)) + (sin(q_A) * k3 + vd__q_A_dot * (sin_q_B * sin_q_B * k17 + k18)),
+        I_Bz * vd__q_B_dot + s1 * (q_A_dot * q_A_dot) * k19,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), sin=sin):
     """4 operations: 1 add, 2 mul, 1 sin."""
-    I_Bz, k1, k4 = k
+    I_Bz, k17, k18 = k
     _, q_B, _, _ = y
     sin_q_B = sin(q_B)
     return (
-        k1 + sin_q_B * sin_q_B * k4,
+        sin_q_B * sin_q_B * k17 + k18,
         0.0,
         0.0,
         I_Bz,
@@ -383,12 +384,12 @@ def _mass_matrix(y, k, u=(), extra=(), sin=sin):
 
 def _velocity_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     """9 operations: 7 mul, 1 sin, 1 cos."""
-    k5, k18 = k
+    k4, k19 = k
     _, q_B, q_A_dot, q_B_dot = y
     s1 = cos(q_B) * sin(q_B)
     return (
-        k5 * (q_B_dot * (q_A_dot * s1)),
-        s1 * (q_A_dot * q_A_dot) * k18,
+        k4 * (q_B_dot * (q_A_dot * s1)),
+        s1 * (q_A_dot * q_A_dot) * k19,
     )
 
 
@@ -404,12 +405,12 @@ def _gravity_force(y, k, u=(), extra=(), sin=sin):
 
 def _bias_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     """12 operations: 1 add, 8 mul, 2 sin, 1 cos."""
-    k3, k5, k18 = k
+    k3, k4, k19 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     s1 = cos(q_B) * sin(q_B)
     return (
-        sin(q_A) * k3 + k5 * (q_B_dot * (q_A_dot * s1)),
-        s1 * (q_A_dot * q_A_dot) * k18,
+        sin(q_A) * k3 + k4 * (q_B_dot * (q_A_dot * s1)),
+        s1 * (q_A_dot * q_A_dot) * k19,
     )
 
 
@@ -423,177 +424,176 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     """27 operations: 6 add, 19 mul, 1 sin, 1 cos."""
-    m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, k19 = k
+    m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, k20 = k
     _, q_B, q_A_dot, q_B_dot = y
     omega_B_x = q_A_dot * cos(q_B)
-    s13 = q_A_dot * sin(q_B)
-    s14 = l_A * q_A_dot
-    s15 = k19 * s13
-    s16 = k19 * omega_B_x
-    s17 = m_A * (s14 * s14) + q_A_dot * (I_A * q_A_dot) + m_B * (s15 * s15 + s16 * s16)
-    s18 = omega_B_x * (I_Bx * omega_B_x) + s13 * (I_By * s13) + q_B_dot * (I_Bz * q_B_dot)
+    s12 = q_A_dot * sin(q_B)
+    s13 = l_A * q_A_dot
+    s14 = k20 * s12
+    s15 = k20 * omega_B_x
+    s16 = m_A * (s13 * s13) + q_A_dot * (I_A * q_A_dot) + m_B * (s14 * s14 + s15 * s15)
+    s17 = omega_B_x * (I_Bx * omega_B_x) + s12 * (I_By * s12) + q_B_dot * (I_Bz * q_B_dot)
     return (
-        0.5 * (s17 + s18),
+        0.5 * (s16 + s17),
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
     """6 operations: 1 sub, 4 mul, 1 cos."""
-    l_A, k15, k17, k19 = k
+    l_A, k14, k16, k20 = k
     q_A, _, _, _ = y
     cos_q_A = cos(q_A)
     return (
-        k17 * (cos_q_A * k19) - k15 * (l_A * cos_q_A),
+        k16 * (cos_q_A * k20) - k14 * (l_A * cos_q_A),
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
     """15 operations: 1 add, 1 sub, 10 mul, 2 sin, 1 cos."""
-    l_A, k15, k17, k19 = k
+    l_A, k14, k16, k20 = k
     q_A, q_B, q_A_dot, _ = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
-    s19 = sin_q_A * k19 * (cos_q_B * (q_A_dot * cos_q_B) + sin_q_B * (q_A_dot * sin_q_B))
+    s18 = sin_q_A * k20 * (cos_q_B * (q_A_dot * cos_q_B) + sin_q_B * (q_A_dot * sin_q_B))
     return (
-        k17 * s19 - k15 * (q_A_dot * (l_A * sin_q_A)),
+        k16 * s18 - k14 * (q_A_dot * (l_A * sin_q_A)),
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """44 operations: 5 add, 6 sub, 29 mul, 2 sin, 2 cos."""
-    I_Bz, k20, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy = k
+    I_Bz, k21, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     cos_q_A = cos(q_A)
-    s20 = sin_q_B * cos_q_A
-    s21 = cos_q_B * cos_q_A
-    s22 = sin_q_B * sin_q_A
-    s23 = cos_q_B * sin_q_A
+    s19 = sin_q_B * cos_q_A
+    s20 = cos_q_B * cos_q_A
+    s21 = sin_q_B * sin_q_A
+    s22 = cos_q_B * sin_q_A
     omega_B_x = q_A_dot * cos_q_B
-    s13 = q_A_dot * sin_q_B
-    s24 = I_Bz * q_B_dot
-    s25 = q_A_dot * k20
-    s26 = moment_B_z * s13
-    s27 = moment_B_z * omega_B_x
-    s28 = inertia_B_xx * omega_B_x
-    s29 = inertia_B_yy * s13
+    s12 = q_A_dot * sin_q_B
+    s23 = I_Bz * q_B_dot
+    s24 = q_A_dot * k21
+    s25 = moment_B_z * s12
+    s26 = moment_B_z * omega_B_x
+    s27 = inertia_B_xx * omega_B_x
+    s28 = inertia_B_yy * s12
     return (
-        sin_q_B * s27 - cos_q_B * s26,
-        cos_q_A * s25 - (s20 * s26 + s21 * s27),
-        sin_q_A * s25 - (s22 * s26 + s23 * s27),
-        q_A_dot * inertia_A_xx + (cos_q_B * s28 + sin_q_B * s29),
-        s20 * s28 - s21 * s29 - sin_q_A * s24,
-        s22 * s28 - s23 * s29 + cos_q_A * s24,
+        sin_q_B * s26 - cos_q_B * s25,
+        cos_q_A * s24 - (s19 * s25 + s20 * s26),
+        sin_q_A * s24 - (s21 * s25 + s22 * s26),
+        q_A_dot * inertia_A_xx + (cos_q_B * s27 + sin_q_B * s28),
+        s19 * s27 - s20 * s28 - sin_q_A * s23,
+        s21 * s27 - s22 * s28 + cos_q_A * s23,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """14 operations: 2 sub, 8 mul, 2 div, 1 sin, 1 cos."""
-    m_A, m_B, l_A, k19, k21 = k
+    m_A, m_B, l_A, k20, k22 = k
     q_A, _, _, _ = y
     sin_q_A = sin(q_A)
     cos_q_A = cos(q_A)
     return (
         0.0,
-        (m_A * (l_A * sin_q_A) - m_B * (sin_q_A * k19)) / k21,
-        (m_B * (cos_q_A * k19) - m_A * (l_A * cos_q_A)) / k21,
+        (m_A * (l_A * sin_q_A) - m_B * (sin_q_A * k20)) / k22,
+        (m_B * (cos_q_A * k20) - m_A * (l_A * cos_q_A)) / k22,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
     """217 operations: 42 add, 27 sub, 132 mul, 1 div, 11 neg, 2 sin, 2 cos."""
-    m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k3, k4, k5, k6, k19 = k
+    m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k3, k4, k5, k20 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     s1 = cos_q_B * sin_q_B
-    s2 = (sin_q_A * k3 + k5 * (q_B_dot * (q_A_dot * s1))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
-    q_A_dot_squared = q_A_dot * q_A_dot
-    q_B_ddot = k4 * (s1 * q_A_dot_squared) * k6
+    s2 = (sin_q_A * k3 + k4 * (s1 * (q_A_dot * q_B_dot))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
+    q_B_ddot = k5 * (q_A_dot * (q_A_dot * s1))
     cos_q_A = cos(q_A)
-    s20 = sin_q_B * cos_q_A
-    s21 = cos_q_B * cos_q_A
-    s22 = sin_q_B * sin_q_A
-    s23 = cos_q_B * sin_q_A
+    s19 = sin_q_B * cos_q_A
+    s20 = cos_q_B * cos_q_A
+    s21 = sin_q_B * sin_q_A
+    s22 = cos_q_B * sin_q_A
     omega_B_x = q_A_dot * cos_q_B
-    s13 = q_A_dot * sin_q_B
-    s30 = sin_q_A * k19
-    s31 = cos_q_A * k19
-    s32 = cos_q_B * omega_B_x + sin_q_B * s13
-    s33 = s20 * omega_B_x - s21 * s13 - q_B_dot * sin_q_A
-    s34 = s22 * omega_B_x - s23 * s13 + q_B_dot * cos_q_A
+    s12 = q_A_dot * sin_q_B
+    s29 = sin_q_A * k20
+    s30 = cos_q_A * k20
+    s31 = cos_q_B * omega_B_x + sin_q_B * s12
+    s32 = s19 * omega_B_x - s20 * s12 - q_B_dot * sin_q_A
+    s33 = s21 * omega_B_x - s22 * s12 + q_B_dot * cos_q_A
     a_A_y = g * sin_q_A
     a_A_z = g * cos_q_A
-    s35 = q_B_dot * s13
-    s36 = q_B_dot * omega_B_x
-    s37 = cos_q_B * s2 + s35
-    s38 = sin_q_B * s2 - s36
-    s39 = a_A_y - l_A * s2
-    s40 = a_A_z + l_A * q_A_dot_squared
-    s41 = m_A * (cos_q_A * s39 - sin_q_A * s40)
-    s42 = m_A * (sin_q_A * s39 + cos_q_A * s40)
-    s43 = sin_q_B * a_A_y + k19 * (s36 + s38)
-    s44 = cos_q_B * a_A_y + k19 * (s37 - s35)
-    s45 = a_A_z - k19 * (omega_B_x * omega_B_x + s13 * s13)
-    s46 = cos_q_B * s37 + sin_q_B * s38
-    s47 = s21 * s38 - s20 * s37 - sin_q_A * q_B_ddot
-    s48 = s23 * s38 - s22 * s37 + q_B_ddot * cos_q_A
-    s49 = I_Bx * cos_q_B
-    s50 = I_By * sin_q_B
-    s51 = I_Bx * s20
-    s52 = I_By * s21
-    s53 = I_Bz * sin_q_A
-    s54 = I_Bx * s22
-    s55 = I_By * s23
-    s56 = I_Bz * cos_q_A
-    s57 = cos_q_B * s49 + sin_q_B * s50
-    s58 = s20 * s49 - s21 * s50
-    s59 = s22 * s49 - s23 * s50
-    s60 = cos_q_B * s51 - sin_q_B * s52
-    s61 = s20 * s51 + s21 * s52 + sin_q_A * s53
-    s62 = s22 * s51 + s23 * s52 - cos_q_A * s53
-    s63 = cos_q_B * s54 - sin_q_B * s55
-    s64 = s20 * s54 + s21 * s55 - sin_q_A * s56
-    s65 = s22 * s54 + s23 * s55 + cos_q_A * s56
-    s66 = m_B * (cos_q_B * s43 - sin_q_B * s44)
-    s67 = m_B * (s20 * s43 + s21 * s44 - sin_q_A * s45)
-    s68 = m_B * (s22 * s43 + s23 * s44 + cos_q_A * s45)
-    s69 = s32 * s57 + s33 * s58 + s34 * s59
-    s70 = s32 * s60 + s33 * s61 + s34 * s62
-    s71 = s32 * s63 + s33 * s64 + s34 * s65
-    s72 = s47 * s58 - s46 * s57 + s48 * s59 + (s33 * s71 - s34 * s70)
-    s73 = s47 * s61 - s46 * s60 + s48 * s62 + (s34 * s69 - s32 * s71)
-    s74 = s47 * s64 - s46 * s63 + s48 * s65 + (s32 * s70 - s33 * s69)
-    s75 = l_A * sin_q_A * s42 + l_A * cos_q_A * s41 - I_A * s2 + (s72 - (s30 * s68 + s31 * s67))
-    s76 = -s66
+    s34 = q_B_dot * s12
+    s35 = q_B_dot * omega_B_x
+    s36 = cos_q_B * s2 + s34
+    s37 = sin_q_B * s2 - s35
+    s38 = a_A_y - l_A * s2
+    s39 = a_A_z + l_A * (q_A_dot * q_A_dot)
+    s40 = m_A * (cos_q_A * s38 - sin_q_A * s39)
+    s41 = m_A * (sin_q_A * s38 + cos_q_A * s39)
+    s42 = sin_q_B * a_A_y + k20 * (s35 + s37)
+    s43 = cos_q_B * a_A_y + k20 * (s36 - s34)
+    s44 = a_A_z - k20 * (omega_B_x * omega_B_x + s12 * s12)
+    s45 = cos_q_B * s36 + sin_q_B * s37
+    s46 = s20 * s37 - s19 * s36 - sin_q_A * q_B_ddot
+    s47 = s22 * s37 - s21 * s36 + q_B_ddot * cos_q_A
+    s48 = I_Bx * cos_q_B
+    s49 = I_By * sin_q_B
+    s50 = I_Bx * s19
+    s51 = I_By * s20
+    s52 = I_Bz * sin_q_A
+    s53 = I_Bx * s21
+    s54 = I_By * s22
+    s55 = I_Bz * cos_q_A
+    s56 = cos_q_B * s48 + sin_q_B * s49
+    s57 = s19 * s48 - s20 * s49
+    s58 = s21 * s48 - s22 * s49
+    s59 = cos_q_B * s50 - sin_q_B * s51
+    s60 = s19 * s50 + s20 * s51 + sin_q_A * s52
+    s61 = s21 * s50 + s22 * s51 - cos_q_A * s52
+    s62 = cos_q_B * s53 - sin_q_B * s54
+    s63 = s19 * s53 + s20 * s54 - sin_q_A * s55
+    s64 = s21 * s53 + s22 * s54 + cos_q_A * s55
+    s65 = m_B * (cos_q_B * s42 - sin_q_B * s43)
+    s66 = m_B * (s19 * s42 + s20 * s43 - sin_q_A * s44)
+    s67 = m_B * (s21 * s42 + s22 * s43 + cos_q_A * s44)
+    s68 = s31 * s56 + s32 * s57 + s33 * s58
+    s69 = s31 * s59 + s32 * s60 + s33 * s61
+    s70 = s31 * s62 + s32 * s63 + s33 * s64
+    s71 = s46 * s57 - s45 * s56 + s47 * s58 + (s32 * s70 - s33 * s69)
+    s72 = s46 * s60 - s45 * s59 + s47 * s61 + (s33 * s68 - s31 * s70)
+    s73 = s46 * s63 - s45 * s62 + s47 * s64 + (s31 * s69 - s32 * s68)
+    s74 = l_A * sin_q_A * s41 + l_A * cos_q_A * s40 - I_A * s2 + (s71 - (s29 * s67 + s30 * s66))
+    s75 = -s65
     return (
-        s76,
+        s75,
+        -(s40 + s66),
         -(s41 + s67),
-        -(s42 + s68),
-        -s75,
-        -(s73 + s31 * s66),
-        -(s74 + s30 * s66),
-        s76,
+        -s74,
+        -(s72 + s30 * s65),
+        -(s73 + s29 * s65),
+        s75,
+        -s66,
         -s67,
-        -s68,
+        -s71,
         -s72,
         -s73,
-        -s74,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     """16 operations: 8 mul, 4 neg, 2 sin, 2 cos."""
-    l_A, k19 = k
+    l_A, k20 = k
     q_A, q_B, _, _ = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
-    s77 = -sin_q_A
+    s76 = -sin_q_A
     cos_q_A = cos(q_A)
     return (
         1.0,
@@ -602,7 +602,7 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         cos_q_A,
-        s77,
+        s76,
         l_A * sin_q_A,
         0.0,
         sin_q_A,
@@ -614,30 +614,30 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         sin_q_B * cos_q_A,
         cos_q_B * cos_q_A,
-        s77,
-        -sin_q_A * k19,
+        s76,
+        -sin_q_A * k20,
         sin_q_B * sin_q_A,
         cos_q_B * sin_q_A,
         cos_q_A,
-        cos_q_A * k19,
+        cos_q_A * k20,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
     """36 operations: 3 add, 3 sub, 24 mul, 2 neg, 2 sin, 2 cos."""
-    l_A, k19 = k
+    l_A, k20 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     cos_q_A = cos(q_A)
     omega_B_x = q_A_dot * cos_q_B
-    s13 = q_A_dot * sin_q_B
-    s30 = sin_q_A * k19
-    s31 = cos_q_A * k19
-    s32 = cos_q_B * omega_B_x + sin_q_B * s13
-    s33 = sin_q_B * cos_q_A * omega_B_x - cos_q_B * cos_q_A * s13 - q_B_dot * sin_q_A
-    s34 = sin_q_B * sin_q_A * omega_B_x - cos_q_B * sin_q_A * s13 + q_B_dot * cos_q_A
+    s12 = q_A_dot * sin_q_B
+    s29 = sin_q_A * k20
+    s30 = cos_q_A * k20
+    s31 = cos_q_B * omega_B_x + sin_q_B * s12
+    s32 = sin_q_B * cos_q_A * omega_B_x - cos_q_B * cos_q_A * s12 - q_B_dot * sin_q_A
+    s33 = sin_q_B * sin_q_A * omega_B_x - cos_q_B * sin_q_A * s12 + q_B_dot * cos_q_A
     return (
         0.0,
         q_A_dot * (l_A * cos_q_A),
@@ -645,12 +645,12 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
         q_A_dot,
         0.0,
         0.0,
-        s31 * s33 + s30 * s34,
-        -s31 * s32,
-        -s30 * s32,
+        s30 * s32 + s29 * s33,
+        -s30 * s31,
+        -s29 * s31,
+        s31,
         s32,
         s33,
-        s34,
     )
 
 

@@ -116,11 +116,11 @@ CONTACTS = {
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 14, "sub": 18, "mul": 41, "div": 9, "neg": 1, "sin": 2, "cos": 2, "total": 87, "parameters": 3},
-    "jacobian": {"add": 64, "sub": 88, "mul": 154, "div": 29, "neg": 1, "sin": 2, "cos": 2, "total": 340, "parameters": 5},
+    "jacobian": {"add": 65, "sub": 87, "mul": 153, "div": 29, "neg": 1, "sin": 2, "cos": 2, "total": 339, "parameters": 5},
     "gaps": {"add": 3, "sub": 4, "mul": 2, "sin": 2, "total": 11, "parameters": 1},
     "gap_rates": {"add": 4, "sub": 1, "mul": 4, "cos": 2, "total": 11, "parameters": 1},
     "impact": {"add": 40, "sub": 38, "mul": 90, "div": 17, "neg": 1, "sin": 2, "cos": 2, "sqrt": 1, "max": 6, "select": 1, "total": 198, "parameters": 4},
-    "held": {"add": 33, "sub": 40, "mul": 82, "div": 12, "sin": 2, "cos": 2, "sqrt": 3, "max": 3, "total": 177, "parameters": 5},
+    "held": {"add": 33, "sub": 40, "mul": 80, "div": 12, "sin": 2, "cos": 2, "sqrt": 3, "max": 3, "total": 175, "parameters": 5},
 }
 
 
@@ -266,7 +266,7 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """340 operations: 64 add, 88 sub, 154 mul, 29 div, 1 neg, 2 sin, 2 cos."""
+    """339 operations: 65 add, 87 sub, 153 mul, 29 div, 1 neg, 2 sin, 2 cos."""
     m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, k1, k2 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     angle_B = theta + phi
@@ -336,7 +336,7 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
     s47 = x_A_dot + x_A_dot
     s48 = theta_dot * velocity_B_y
     s49 = s28 - x_A_dot
-    s50 = a_B_y - theta_dot * velocity_B_x - theta_dot * s49
+    s50 = a_B_y - theta_dot * (velocity_B_x + s49)
     s51 = s48 - (a_B_x + s48)
     s52 = velocity_B_y + velocity_B_y
     s53 = s49 + s49
@@ -545,7 +545,7 @@ def _impact(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, select=select, sqrt
 
 
 def _held(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt):
-    """177 operations: 33 add, 40 sub, 82 mul, 12 div, 2 sin, 2 cos, 3 sqrt, 3 max."""
+    """175 operations: 33 add, 40 sub, 80 mul, 12 div, 2 sin, 2 cos, 3 sqrt, 3 max."""
     m_A, I_A, m_B, l_A, g, ground_radius, ground_friction, moment_B_x, inertia_B_zz, k3, ground_slip_speed_squared = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     force__ground_end_A, force__ground_elbow, force__ground_end_B = extra
@@ -580,36 +580,36 @@ def _held(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt):
     omega_B_z_squared = omega_B_z * omega_B_z
     s122 = cos_angle_B * k3
     s123 = sin_angle_B * k3
-    s124 = ground_radius * theta_dot
-    s125 = x_A_dot + s28 + s124
-    s126 = s125 * s125
-    s127 = ground_friction * force__ground_end_A / sqrt(max(s126 + ground_slip_speed_squared, 1e-300))
-    s128 = s125 * s127
-    s129 = s28 - x_A_dot - s124
-    s130 = s129 * s129
-    s131 = ground_friction * force__ground_elbow / sqrt(max(ground_slip_speed_squared + s130, 1e-300))
-    s132 = s129 * s131
-    s133 = omega_B_z * s123 - (x_A_dot - s28) - ground_radius * omega_B_z
-    s134 = s133 * s133
-    s135 = ground_friction * force__ground_end_B / sqrt(max(ground_slip_speed_squared + s134, 1e-300))
-    s136 = s133 * s135
-    s137 = ground_radius * s132 + (s1 * force__ground_elbow - s2 * s132) - (ground_radius * s128 + (s1 * force__ground_end_A + s2 * s128))
-    s138 = ground_radius * s136 + (s122 * force__ground_end_B - s123 * s136)
-    s139 = s138 - (s4 * s16 - s3 * s17)
-    s140 = m_B * s16 + s3 * omega_B_z_squared + s5 * s139
-    s141 = s6 * s139 - (m_B * s17 + s4 * omega_B_z_squared)
-    s142 = s137 + (s138 + (s1 * force__ground_end_B - s2 * s136)) - (s138 + (s1 * s141 + s2 * s140))
-    s143 = force__ground_end_B + (force__ground_end_A + force__ground_elbow) - (s141 + s13 * s142)
-    delta_A_1_x_2 = (s136 + (s132 - s128) - (s12 * s142 - s140 + s15 * s143)) / (m_A + s7 - s10 * s12 - s14 * s15)
-    delta_A_2_y_4 = s143 / pivot_A_2 - s15 * delta_A_1_x_2
-    alpha_A_z_3 = s142 / pivot_A - (s12 * delta_A_1_x_2 + s13 * delta_A_2_y_4)
-    s144 = s1 * alpha_A_z_3
-    alpha_B_z_4 = s139 / inertia_B_zz - (s6 * (delta_A_2_y_4 + s144) - s5 * (delta_A_1_x_2 - s2 * alpha_A_z_3))
+    s124 = omega_B_z * s123
+    s125 = ground_radius * theta_dot
+    s126 = x_A_dot + s28 + s125
+    s127 = s126 * s126
+    s128 = ground_friction * force__ground_end_A / sqrt(max(s127 + ground_slip_speed_squared, 1e-300))
+    s129 = s126 * s128
+    s130 = s28 - x_A_dot - s125
+    s131 = s130 * s130
+    s132 = ground_friction * force__ground_elbow / sqrt(max(ground_slip_speed_squared + s131, 1e-300))
+    s133 = s130 * s132
+    s134 = s124 - (x_A_dot - s28) - ground_radius * omega_B_z
+    s135 = s134 * s134
+    s136 = ground_friction * force__ground_end_B / sqrt(max(ground_slip_speed_squared + s135, 1e-300))
+    s137 = s134 * s136
+    s138 = ground_radius * s133 + (s1 * force__ground_elbow - s2 * s133) - (ground_radius * s129 + (s1 * force__ground_end_A + s2 * s129))
+    s139 = ground_radius * s137 + (s122 * force__ground_end_B - s123 * s137)
+    s140 = s139 - (s4 * s16 - s3 * s17)
+    s141 = m_B * s16 + s3 * omega_B_z_squared + s5 * s140
+    s142 = s6 * s140 - (m_B * s17 + s4 * omega_B_z_squared)
+    s143 = s138 + (s139 + (s1 * force__ground_end_B - s2 * s137)) - (s139 + (s1 * s142 + s2 * s141))
+    s144 = force__ground_end_B + (force__ground_end_A + force__ground_elbow) - (s142 + s13 * s143)
+    delta_A_1_x_2 = (s137 + (s133 - s129) - (s12 * s143 - s141 + s15 * s144)) / (m_A + s7 - s10 * s12 - s14 * s15)
+    delta_A_2_y_4 = s144 / pivot_A_2 - s15 * delta_A_1_x_2
+    alpha_A_z_3 = s143 / pivot_A - (s12 * delta_A_1_x_2 + s13 * delta_A_2_y_4)
+    s145 = s1 * alpha_A_z_3
+    alpha_B_z_4 = s140 / inertia_B_zz - (s6 * (delta_A_2_y_4 + s145) - s5 * (delta_A_1_x_2 - s2 * alpha_A_z_3))
     phi_ddot_2 = alpha_B_z_4 - alpha_A_z_3
     y_A_ddot = delta_A_2_y_4 - g
-    s145 = s144 - theta_dot * (l_A * (theta_dot * sin_theta))
-    s146 = y_A_ddot + s145
-    s147 = s122 * (alpha_A_z_3 + phi_ddot_2) - omega_B_z * (k3 * (sin_angle_B * omega_B_z))
+    s146 = s145 - theta_dot * (l_A * (theta_dot * sin_theta))
+    s147 = y_A_ddot + s146
     return (
         x_A_dot,
         y_A_dot,
@@ -619,12 +619,12 @@ def _held(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt):
         y_A_ddot,
         alpha_A_z_3,
         phi_ddot_2,
-        y_A_ddot - s145,
-        s146,
-        s146 + s147,
-        force__ground_end_A * (y_A_dot - s88) - s126 * s127,
-        velocity_B_y * force__ground_elbow - s130 * s131,
-        force__ground_end_B * (velocity_B_y + omega_B_z * s122) - s134 * s135,
+        y_A_ddot - s146,
+        s147,
+        s147 + (s122 * (alpha_A_z_3 + phi_ddot_2) - omega_B_z * s124),
+        force__ground_end_A * (y_A_dot - s88) - s127 * s128,
+        velocity_B_y * force__ground_elbow - s131 * s132,
+        force__ground_end_B * (velocity_B_y + omega_B_z * s122) - s135 * s136,
     )
 
 

@@ -16,7 +16,7 @@ Parameters p, with the scene's values:
     g = 9.81   m/s^2  gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 31 operations: 7 add, 2 sub, 16 mul, 1 div, 1 neg, 1 sin, 3 cos; 22
+One call of `derivative` takes 28 operations: 7 add, 1 sub, 14 mul, 1 div, 1 neg, 1 sin, 3 cos; 23
 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -71,24 +71,24 @@ JOINTS = ('shoulder', 'elbow')
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 7, "sub": 2, "mul": 16, "div": 1, "neg": 1, "sin": 1, "cos": 3, "total": 31, "parameters": 22},
-    "jacobian": {"add": 14, "sub": 8, "mul": 45, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 82, "parameters": 24},
-    "forward_dynamics": {"add": 4, "sub": 8, "mul": 16, "div": 1, "sin": 1, "cos": 3, "total": 33, "parameters": 22},
-    "inverse_dynamics": {"add": 12, "sub": 1, "mul": 15, "sin": 1, "cos": 3, "total": 32, "parameters": 19},
+    "derivative": {"add": 7, "sub": 1, "mul": 14, "div": 1, "neg": 1, "sin": 1, "cos": 3, "total": 28, "parameters": 23},
+    "jacobian": {"add": 14, "sub": 7, "mul": 37, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 73, "parameters": 25},
+    "forward_dynamics": {"add": 4, "sub": 7, "mul": 14, "div": 1, "sin": 1, "cos": 3, "total": 30, "parameters": 23},
+    "inverse_dynamics": {"add": 12, "sub": 1, "mul": 14, "sin": 1, "cos": 3, "total": 31, "parameters": 19},
     "mass_matrix": {"add": 2, "mul": 2, "cos": 1, "total": 5, "parameters": 12},
-    "velocity_force": {"add": 1, "sub": 1, "mul": 6, "sin": 1, "total": 9, "parameters": 3},
-    "gravity_force": {"add": 3, "mul": 3, "cos": 2, "total": 8, "parameters": 8},
-    "bias_force": {"add": 6, "sub": 1, "mul": 9, "sin": 1, "cos": 2, "total": 19, "parameters": 10},
+    "velocity_force": {"add": 1, "sub": 1, "mul": 5, "sin": 1, "total": 8, "parameters": 3},
+    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 9},
+    "bias_force": {"add": 5, "sub": 1, "mul": 7, "sin": 1, "cos": 2, "total": 16, "parameters": 11},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 11, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 10},
+    "kinetic_energy": {"add": 11, "mul": 17, "sin": 2, "cos": 2, "total": 32, "parameters": 10},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 4},
     "effect_powers": {"add": 5, "mul": 6, "neg": 1, "cos": 2, "total": 14, "parameters": 4},
-    "momentum": {"add": 17, "mul": 24, "neg": 1, "sin": 2, "cos": 2, "total": 46, "parameters": 8},
+    "momentum": {"add": 17, "mul": 22, "neg": 1, "sin": 2, "cos": 2, "total": 44, "parameters": 8},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 4},
-    "joint_forces": {"add": 12, "sub": 6, "mul": 30, "div": 1, "sin": 3, "cos": 3, "total": 55, "parameters": 30},
+    "joint_forces": {"add": 12, "sub": 5, "mul": 28, "div": 1, "sin": 3, "cos": 3, "total": 52, "parameters": 31},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 2},
-    "body_velocities": {"add": 6, "mul": 8, "neg": 2, "sin": 2, "cos": 2, "total": 20, "parameters": 2},
-    "parameter_jacobian": {"add": 29, "sub": 13, "mul": 66, "div": 6, "neg": 5, "sin": 1, "cos": 3, "total": 123, "parameters": 53},
+    "body_velocities": {"add": 6, "mul": 7, "neg": 2, "sin": 2, "cos": 2, "total": 19, "parameters": 2},
+    "parameter_jacobian": {"add": 29, "sub": 10, "mul": 63, "div": 6, "neg": 5, "sin": 1, "cos": 3, "total": 117, "parameters": 56},
 }
 
 
@@ -123,78 +123,80 @@ def _fixed(m_1, m_2, l_1, l_2, g):
     if not m_2 * (l_2 * l_2) / 12.0 >= 0.0:
         return "inertia_com of lower is negative"
     l_2_squared = l_2 * l_2
-    k42 = m_2 * l_2_squared
-    pivot_lower = k42 / 3.0
+    k43 = m_2 * l_2_squared
+    pivot_lower = k43 / 3.0
     l_1_squared = l_1 * l_1
-    k43 = m_2 * 3.0
-    k44 = k43 + m_1 * 4.0
-    k1 = l_1_squared * k44 / 12.0
-    k2 = l_1_squared * k43 / 4.0
-    k23 = m_2 * l_1
-    k10 = l_2 * k23
-    k3 = k10 / 2.0
-    k45 = m_2 * l_2
-    k4 = g * k45 / 2.0
+    k44 = m_2 * 3.0
+    k45 = k44 + m_1 * 4.0
+    k1 = l_1_squared * k45 / 12.0
+    k2 = l_1_squared * k44 / 4.0
+    k24 = m_2 * l_1
+    k11 = l_2 * k24
+    k3 = k11 / 2.0
+    k46 = m_2 * l_2
+    k4 = g * k46 / 2.0
     k5 = 1.0 / pivot_lower
-    k6 = g * k23
-    k46 = m_1 * l_1
-    k7 = g * k46 / 2.0
-    k8 = k2 * 2.0
-    k9 = 2.0 * k3
-    k47 = m_1 * l_1_squared
-    k11 = k47 / 3.0 + (pivot_lower + m_2 * l_1_squared)
-    k12 = l_1 / 2.0
-    k13 = m_1 / 2.0
-    k14 = l_2 / 2.0
-    k15 = m_2 / 2.0
-    k16 = k47 / 24.0
-    k17 = k42 / 24.0
-    k18 = m_2 * g
-    k19 = m_1 * g
-    k20 = k42 / 12.0
-    k21 = k47 / 12.0
-    k48 = m_1 + m_2
-    k22 = 1.0 / k48
-    k24 = k45 / 2.0
-    k25 = l_1 * (m_1 + m_2 * 2.0) / 2.0
-    k26 = g * k48
-    k27 = l_1_squared * 4.0 / 12.0
-    k28 = l_1 * g
-    k29 = k28 / 2.0
-    k49 = 3.0 * l_1_squared
-    k30 = k49 / 12.0
-    k31 = k49 / 4.0
-    k32 = l_1 * l_2 / 2.0
-    k33 = l_2 * g / 2.0
-    k34 = k5 * (l_2_squared / 3.0) / pivot_lower
-    k50 = l_1 * 2.0
-    k35 = k44 * k50 / 12.0
-    k36 = k43 * k50 / 4.0
-    k37 = k19 / 2.0
-    k38 = k23 / 2.0
-    k39 = k18 / 2.0
-    k40 = k5 * (m_2 * (l_2 * 2.0) / 3.0) / pivot_lower
-    k41 = k46 / 2.0
+    k7 = g * k24
+    k47 = m_1 * l_1
+    k8 = g * k47 / 2.0
+    k6 = k7 + k8
+    k9 = k2 * 2.0
+    k10 = 2.0 * k3
+    k48 = m_1 * l_1_squared
+    k12 = k48 / 3.0 + (pivot_lower + m_2 * l_1_squared)
+    k13 = l_1 / 2.0
+    k14 = m_1 / 2.0
+    k15 = l_2 / 2.0
+    k16 = m_2 / 2.0
+    k17 = k48 / 24.0
+    k18 = k43 / 24.0
+    k19 = m_2 * g
+    k20 = m_1 * g
+    k21 = k43 / 12.0
+    k22 = k48 / 12.0
+    k49 = m_1 + m_2
+    k23 = 1.0 / k49
+    k25 = k46 / 2.0
+    k50 = m_2 * 2.0
+    k26 = l_1 * (m_1 + k50) / 2.0
+    k27 = g * k49
+    k28 = l_1_squared * 4.0 / 12.0
+    k29 = l_1 * g
+    k30 = k29 / 2.0
+    k51 = 3.0 * l_1_squared
+    k31 = k51 / 12.0
+    k32 = k51 / 4.0
+    k33 = l_1 * l_2 / 2.0
+    k34 = l_2 * g / 2.0
+    k35 = k5 * (l_2_squared / 3.0) / pivot_lower
+    k52 = l_1 * 2.0
+    k36 = k45 * k52 / 12.0
+    k37 = k44 * k52 / 4.0
+    k38 = k19 + k20 / 2.0
+    k39 = k24 / 2.0
+    k40 = k19 / 2.0
+    k41 = k5 * (l_2 * k50 / 3.0) / pivot_lower
+    k42 = k24 + k47 / 2.0
     return {
         "initial_state": (),
-        "derivative": (k1, k2, k3, k4, k5, k6, k7),
-        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9),
-        "forward_dynamics": (k1, k2, k3, k4, k5, k6, k7),
-        "inverse_dynamics": (pivot_lower, k10, k3, k4, k6, k7, k11),
-        "mass_matrix": (pivot_lower, k10, k3, k11),
+        "derivative": (k1, k2, k3, k4, k5, k6),
+        "jacobian": (k1, k2, k3, k4, k5, k7, k8, k6, k9, k10),
+        "forward_dynamics": (k1, k2, k3, k4, k5, k6),
+        "inverse_dynamics": (pivot_lower, k11, k3, k4, k7, k8, k12),
+        "mass_matrix": (pivot_lower, k11, k3, k12),
         "velocity_force": (k3,),
-        "gravity_force": (k4, k6, k7),
-        "bias_force": (k3, k4, k6, k7),
+        "gravity_force": (k4, k6),
+        "bias_force": (k3, k4, k6),
         "applied_force": (),
-        "kinetic_energy": (k12, k13, k14, k15, k16, k17),
-        "potential_energy": (k12, k14, k18, k19),
-        "effect_powers": (k12, k14, k18, k19),
-        "momentum": (m_1, m_2, k12, k14, k20, k21),
-        "centre_of_mass": (m_1, m_2, k12, k14, k22),
-        "joint_forces": (k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k25, k26),
-        "body_poses": (k12, k14),
-        "body_velocities": (k12, k14),
-        "parameter_jacobian": (k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41),
+        "kinetic_energy": (k13, k14, k15, k16, k17, k18),
+        "potential_energy": (k13, k15, k19, k20),
+        "effect_powers": (k13, k15, k19, k20),
+        "momentum": (m_1, m_2, k13, k15, k21, k22),
+        "centre_of_mass": (m_1, m_2, k13, k15, k23),
+        "joint_forces": (k1, k2, k24, k3, k4, k5, k6, k19, k25, k26, k27),
+        "body_poses": (k13, k15),
+        "body_velocities": (k13, k15),
+        "parameter_jacobian": (k1, k2, k3, k4, k5, k6, k25, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42),
     }
 
 
@@ -244,27 +246,27 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """31 operations: 7 add, 2 sub, 16 mul, 1 div, 1 neg, 1 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k7 = k
+    """28 operations: 7 add, 1 sub, 14 mul, 1 div, 1 neg, 1 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
-    s1 = cos(theta_1 + theta_2) * k4 + k3 * (sin_theta_2 * (theta_1_dot * theta_1_dot))
-    cos_theta_1 = cos(theta_1)
+    s1 = sin_theta_2 * k3
+    s2 = cos(theta_1 + theta_2) * k4 + theta_1_dot * theta_1_dot * s1
     omega_lower = theta_1_dot + theta_2_dot
-    s2 = k5 * (coupling_lower_upper * s1) + k3 * (sin_theta_2 * (omega_lower * omega_lower))
-    alpha_upper = (s2 - cos_theta_1 * k6 - cos_theta_1 * k7) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    load_upper = k5 * (coupling_lower_upper * s2) + s1 * (omega_lower * omega_lower) - cos(theta_1) * k6
+    alpha_upper = load_upper / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         theta_1_dot,
         theta_2_dot,
         alpha_upper,
-        -(alpha_upper + k5 * (s1 + coupling_lower_upper * alpha_upper)),
+        -(alpha_upper + k5 * (s2 + coupling_lower_upper * alpha_upper)),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """82 operations: 14 add, 8 sub, 45 mul, 5 div, 4 neg, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k8, k9 = k
+    """73 operations: 14 add, 7 sub, 37 mul, 5 div, 4 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k7, k8, k6, k9, k10 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     pivot_upper = k1 + sin_theta_2 * sin_theta_2 * k2
@@ -272,23 +274,24 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     coupling_lower_upper = cos_theta_2 * k3
     s3 = theta_1 + theta_2
     theta_1_dot_squared = theta_1_dot * theta_1_dot
-    s1 = cos(s3) * k4 + k3 * (sin_theta_2 * theta_1_dot_squared)
-    cos_theta_1 = cos(theta_1)
+    s1 = sin_theta_2 * k3
+    s2 = cos(s3) * k4 + theta_1_dot_squared * s1
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
-    s2 = k5 * (coupling_lower_upper * s1) + k3 * (sin_theta_2 * omega_lower_squared)
-    alpha_upper = (s2 - cos_theta_1 * k6 - cos_theta_1 * k7) / pivot_upper
+    load_upper = k5 * (coupling_lower_upper * s2) + s1 * omega_lower_squared - cos(theta_1) * k6
+    alpha_upper = load_upper / pivot_upper
     s4 = k4 * sin(s3)
     sin_theta_1 = sin(theta_1)
-    s5 = (k7 * sin_theta_1 + (k6 * sin_theta_1 - k5 * (coupling_lower_upper * s4))) / pivot_upper
-    s6 = sin_theta_2 * k3
-    s7 = k3 * (cos_theta_2 * theta_1_dot_squared) - s4
-    s8 = k5 * (coupling_lower_upper * s7 - s1 * s6) + k3 * (cos_theta_2 * omega_lower_squared)
-    s9 = (s8 - alpha_upper * (sin_theta_2 * cos_theta_2 * k8)) / pivot_upper
-    s10 = k9 * (theta_1_dot * sin_theta_2)
-    s11 = k9 * (sin_theta_2 * omega_lower)
-    s12 = (k5 * (coupling_lower_upper * s10) + s11) / pivot_upper
-    s13 = s11 / pivot_upper
+    s5 = coupling_lower_upper * k5
+    s6 = (k8 * sin_theta_1 + (k7 * sin_theta_1 - s4 * s5)) / pivot_upper
+    s7 = coupling_lower_upper * theta_1_dot_squared - s4
+    s8 = k5 * (coupling_lower_upper * s7 - s1 * s2) + coupling_lower_upper * omega_lower_squared
+    s9 = (s8 - alpha_upper * (sin_theta_2 * cos_theta_2 * k9)) / pivot_upper
+    s10 = sin_theta_2 * k10
+    s11 = theta_1_dot * s10
+    s12 = omega_lower * s10
+    s13 = (s5 * s11 + s12) / pivot_upper
+    s14 = s12 / pivot_upper
     return (
         0.0,
         0.0,
@@ -298,30 +301,29 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         1.0,
-        s5,
+        s6,
         s9,
-        s12,
         s13,
-        -(s5 + k5 * (coupling_lower_upper * s5 - s4)),
-        -(s9 + k5 * (s7 + (coupling_lower_upper * s9 - alpha_upper * s6))),
-        -(s12 + k5 * (s10 + coupling_lower_upper * s12)),
-        -(s13 + k5 * (coupling_lower_upper * s13)),
+        s14,
+        -(s6 + k5 * (coupling_lower_upper * s6 - s4)),
+        -(s9 + k5 * (s7 + (coupling_lower_upper * s9 - s1 * alpha_upper))),
+        -(s13 + k5 * (s11 + coupling_lower_upper * s13)),
+        -(s14 + s5 * s14),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """33 operations: 4 add, 8 sub, 16 mul, 1 div, 1 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k7 = k
+    """30 operations: 4 add, 7 sub, 14 mul, 1 div, 1 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau__theta_1, tau__theta_2 = extra
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
-    cos_theta_1 = cos(theta_1)
+    s1 = sin_theta_2 * k3
     omega_lower = theta_1_dot + theta_2_dot
-    load_lower = tau__theta_2 - cos(theta_1 + theta_2) * k4 - k3 * (sin_theta_2 * (theta_1_dot * theta_1_dot))
-    s14 = tau__theta_1 + k3 * (sin_theta_2 * (omega_lower * omega_lower)) - tau__theta_2
-    load_upper = s14 - k5 * (coupling_lower_upper * load_lower) - cos_theta_1 * k6 - cos_theta_1 * k7
-    alpha_upper_2 = load_upper / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    load_lower = tau__theta_2 - cos(theta_1 + theta_2) * k4 - theta_1_dot * theta_1_dot * s1
+    s15 = tau__theta_1 + s1 * (omega_lower * omega_lower) - tau__theta_2 - coupling_lower_upper * k5 * load_lower
+    alpha_upper_2 = (s15 - cos(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         alpha_upper_2,
         k5 * (load_lower - coupling_lower_upper * alpha_upper_2) - alpha_upper_2,
@@ -329,32 +331,32 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """32 operations: 12 add, 1 sub, 15 mul, 1 sin, 3 cos."""
-    pivot_lower, k10, k3, k4, k6, k7, k11 = k
+    """31 operations: 12 add, 1 sub, 14 mul, 1 sin, 3 cos."""
+    pivot_lower, k11, k3, k4, k7, k8, k12 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     theta_1_ddot, theta_2_ddot = extra
-    sin_theta_2 = sin(theta_2)
     cos_theta_2 = cos(theta_2)
-    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    theta_1_dot_squared = theta_1_dot * theta_1_dot
     s16 = cos(theta_1 + theta_2) * k4
+    s1 = sin(theta_2) * k3
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     s17 = pivot_lower + cos_theta_2 * k3
-    s18 = cos_theta_1 * k6 + (theta_1_ddot * (cos_theta_2 * k10 + k11) + theta_2_ddot * s17)
+    s18 = cos_theta_1 * k7 + (theta_1_ddot * (cos_theta_2 * k11 + k12) + theta_2_ddot * s17)
     return (
-        k3 * (s15 - sin_theta_2 * (omega_lower * omega_lower)) + (s16 + (cos_theta_1 * k7 + s18)),
-        k3 * s15 + (s16 + (theta_1_ddot * s17 + theta_2_ddot * pivot_lower)),
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s16 + (cos_theta_1 * k8 + s18)),
+        theta_1_dot_squared * s1 + (s16 + (theta_1_ddot * s17 + theta_2_ddot * pivot_lower)),
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     """5 operations: 2 add, 2 mul, 1 cos."""
-    pivot_lower, k10, k3, k11 = k
+    pivot_lower, k11, k3, k12 = k
     _, theta_2, _, _ = y
     cos_theta_2 = cos(theta_2)
     s17 = pivot_lower + cos_theta_2 * k3
     return (
-        cos_theta_2 * k10 + k11,
+        cos_theta_2 * k11 + k12,
         s17,
         s17,
         pivot_lower,
@@ -362,42 +364,40 @@ def _mass_matrix(y, k, u=(), extra=(), cos=cos):
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin):
-    """9 operations: 1 add, 1 sub, 6 mul, 1 sin."""
+    """8 operations: 1 add, 1 sub, 5 mul, 1 sin."""
     k3, = k
     _, theta_2, theta_1_dot, theta_2_dot = y
-    sin_theta_2 = sin(theta_2)
-    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    theta_1_dot_squared = theta_1_dot * theta_1_dot
+    s1 = sin(theta_2) * k3
     omega_lower = theta_1_dot + theta_2_dot
     return (
-        k3 * (s15 - sin_theta_2 * (omega_lower * omega_lower)),
-        k3 * s15,
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower),
+        theta_1_dot_squared * s1,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
-    """8 operations: 3 add, 3 mul, 2 cos."""
-    k4, k6, k7 = k
+    """6 operations: 2 add, 2 mul, 2 cos."""
+    k4, k6 = k
     theta_1, theta_2, _, _ = y
     s16 = cos(theta_1 + theta_2) * k4
-    cos_theta_1 = cos(theta_1)
     return (
-        s16 + (cos_theta_1 * k6 + cos_theta_1 * k7),
+        s16 + cos(theta_1) * k6,
         s16,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """19 operations: 6 add, 1 sub, 9 mul, 1 sin, 2 cos."""
-    k3, k4, k6, k7 = k
+    """16 operations: 5 add, 1 sub, 7 mul, 1 sin, 2 cos."""
+    k3, k4, k6 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    sin_theta_2 = sin(theta_2)
-    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    theta_1_dot_squared = theta_1_dot * theta_1_dot
     s16 = cos(theta_1 + theta_2) * k4
-    cos_theta_1 = cos(theta_1)
+    s1 = sin(theta_2) * k3
     omega_lower = theta_1_dot + theta_2_dot
     return (
-        k3 * (s15 - sin_theta_2 * (omega_lower * omega_lower)) + (s16 + (cos_theta_1 * k6 + cos_theta_1 * k7)),
-        s16 + k3 * s15,
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s16 + cos(theta_1) * k6),
+        s16 + theta_1_dot_squared * s1,
     )
 
 
@@ -410,182 +410,189 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """33 operations: 11 add, 18 mul, 2 sin, 2 cos."""
-    k12, k13, k14, k15, k16, k17 = k
+    """32 operations: 11 add, 17 mul, 2 sin, 2 cos."""
+    k13, k14, k15, k16, k17, k18 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s3 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s19 = k12 * (theta_1_dot * sin(theta_1))
-    yd_upper = k12 * (theta_1_dot * cos(theta_1))
-    s20 = k14 * (omega_lower * sin(s3)) + (s19 + s19)
-    yd_lower = k14 * (cos(s3) * omega_lower) + (yd_upper + yd_upper)
-    s21 = (s19 * s19 + yd_upper * yd_upper) * k13 + (s20 * s20 + yd_lower * yd_lower) * k15
+    s19 = theta_1_dot * k13
+    s20 = sin(theta_1) * s19
+    yd_upper = cos(theta_1) * s19
+    s21 = sin(s3) * (omega_lower * k15) + (s20 + s20)
+    yd_lower = omega_lower * (cos(s3) * k15) + (yd_upper + yd_upper)
+    s22 = (s20 * s20 + yd_upper * yd_upper) * k14 + (s21 * s21 + yd_lower * yd_lower) * k16
     return (
-        omega_lower * omega_lower * k17 + (theta_1_dot * theta_1_dot * k16 + s21),
+        omega_lower * omega_lower * k18 + (theta_1_dot * theta_1_dot * k17 + s22),
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    k12, k14, k18, k19 = k
+    k13, k15, k19, k20 = k
     theta_1, theta_2, _, _ = y
-    y_upper = sin(theta_1) * k12
+    y_upper = sin(theta_1) * k13
     return (
-        (sin(theta_1 + theta_2) * k14 + (y_upper + y_upper)) * k18 + y_upper * k19,
+        (sin(theta_1 + theta_2) * k15 + (y_upper + y_upper)) * k19 + y_upper * k20,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos):
     """14 operations: 5 add, 6 mul, 1 neg, 2 cos."""
-    k12, k14, k18, k19 = k
+    k13, k15, k19, k20 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    yd_upper = k12 * (theta_1_dot * cos(theta_1))
-    yd_lower = k14 * (cos(theta_1 + theta_2) * (theta_1_dot + theta_2_dot)) + (yd_upper + yd_upper)
+    yd_upper = cos(theta_1) * (theta_1_dot * k13)
+    yd_lower = (theta_1_dot + theta_2_dot) * (cos(theta_1 + theta_2) * k15) + (yd_upper + yd_upper)
     return (
-        -(yd_lower * k18 + yd_upper * k19),
+        -(yd_lower * k19 + yd_upper * k20),
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """46 operations: 17 add, 24 mul, 1 neg, 2 sin, 2 cos."""
-    m_1, m_2, k12, k14, k20, k21 = k
+    """44 operations: 17 add, 22 mul, 1 neg, 2 sin, 2 cos."""
+    m_1, m_2, k13, k15, k21, k22 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s3 = theta_1 + theta_2
-    cos_theta_1_theta_2 = cos(s3)
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     sin_theta_1_theta_2 = sin(s3)
     sin_theta_1 = sin(theta_1)
-    s19 = k12 * (theta_1_dot * sin_theta_1)
-    yd_upper = k12 * (theta_1_dot * cos_theta_1)
-    s20 = k14 * (omega_lower * sin_theta_1_theta_2) + (s19 + s19)
-    yd_lower = k14 * (cos_theta_1_theta_2 * omega_lower) + (yd_upper + yd_upper)
-    y_upper = sin_theta_1 * k12
-    x_upper = cos_theta_1 * k12
-    s22 = yd_lower * (cos_theta_1_theta_2 * k14 + (x_upper + x_upper)) + s20 * (sin_theta_1_theta_2 * k14 + (y_upper + y_upper))
-    s23 = omega_lower * k20 + (m_1 * (yd_upper * x_upper + s19 * y_upper) + m_2 * s22)
+    s19 = theta_1_dot * k13
+    s20 = sin_theta_1 * s19
+    yd_upper = cos_theta_1 * s19
+    s21 = sin_theta_1_theta_2 * (omega_lower * k15) + (s20 + s20)
+    s23 = cos(s3) * k15
+    yd_lower = omega_lower * s23 + (yd_upper + yd_upper)
+    y_upper = sin_theta_1 * k13
+    x_upper = cos_theta_1 * k13
+    s24 = yd_lower * (s23 + (x_upper + x_upper)) + s21 * (sin_theta_1_theta_2 * k15 + (y_upper + y_upper))
+    s25 = omega_lower * k21 + (m_1 * (yd_upper * x_upper + s20 * y_upper) + m_2 * s24)
     return (
-        -(m_2 * s20 + m_1 * s19),
+        -(m_2 * s21 + m_1 * s20),
         m_2 * yd_lower + m_1 * yd_upper,
-        theta_1_dot * k21 + s23,
+        theta_1_dot * k22 + s25,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
     """21 operations: 7 add, 10 mul, 2 sin, 2 cos."""
-    m_1, m_2, k12, k14, k22 = k
+    m_1, m_2, k13, k15, k23 = k
     theta_1, theta_2, _, _ = y
     s3 = theta_1 + theta_2
-    y_upper = sin(theta_1) * k12
-    x_upper = cos(theta_1) * k12
+    y_upper = sin(theta_1) * k13
+    x_upper = cos(theta_1) * k13
     return (
-        (m_2 * (cos(s3) * k14 + (x_upper + x_upper)) + m_1 * x_upper) * k22,
-        k22 * (m_2 * (sin(s3) * k14 + (y_upper + y_upper)) + m_1 * y_upper),
+        (m_2 * (cos(s3) * k15 + (x_upper + x_upper)) + m_1 * x_upper) * k23,
+        k23 * (m_2 * (sin(s3) * k15 + (y_upper + y_upper)) + m_1 * y_upper),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """55 operations: 12 add, 6 sub, 30 mul, 1 div, 3 sin, 3 cos."""
-    k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k25, k26 = k
+    """52 operations: 12 add, 5 sub, 28 mul, 1 div, 3 sin, 3 cos."""
+    k1, k2, k24, k3, k4, k5, k6, k19, k25, k26, k27 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
     s3 = theta_1 + theta_2
     cos_theta_1_theta_2 = cos(s3)
     theta_1_dot_squared = theta_1_dot * theta_1_dot
-    s1 = cos_theta_1_theta_2 * k4 + k3 * (sin_theta_2 * theta_1_dot_squared)
+    s1 = sin_theta_2 * k3
+    s2 = cos_theta_1_theta_2 * k4 + theta_1_dot_squared * s1
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
-    s2 = k5 * (coupling_lower_upper * s1) + k3 * (sin_theta_2 * omega_lower_squared)
-    alpha_upper = (s2 - cos_theta_1 * k6 - cos_theta_1 * k7) / (k1 + sin_theta_2 * sin_theta_2 * k2)
-    s24 = k5 * (s1 + coupling_lower_upper * alpha_upper)
+    load_upper = k5 * (coupling_lower_upper * s2) + s1 * omega_lower_squared - cos_theta_1 * k6
+    alpha_upper = load_upper / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s26 = k5 * (s2 + coupling_lower_upper * alpha_upper)
     sin_theta_1_theta_2 = sin(s3)
     sin_theta_1 = sin(theta_1)
-    s25 = k24 * (cos_theta_1_theta_2 * omega_lower_squared - s24 * sin_theta_1_theta_2)
-    s26 = alpha_upper * sin_theta_1 + theta_1_dot_squared * cos_theta_1
-    s27 = theta_1_dot_squared * sin_theta_1 - cos_theta_1 * alpha_upper
-    s28 = k24 * (omega_lower_squared * sin_theta_1_theta_2 + cos_theta_1_theta_2 * s24)
+    s27 = k25 * (cos_theta_1_theta_2 * omega_lower_squared - s26 * sin_theta_1_theta_2)
+    s28 = alpha_upper * sin_theta_1 + theta_1_dot_squared * cos_theta_1
+    s29 = theta_1_dot_squared * sin_theta_1 - cos_theta_1 * alpha_upper
+    s30 = k25 * (omega_lower_squared * sin_theta_1_theta_2 + cos_theta_1_theta_2 * s26)
     return (
-        s25 + k25 * s26,
-        k25 * s27 + s28 - k26,
+        s27 + k26 * s28,
+        k26 * s29 + s30 - k27,
         0.0,
-        s25 + k23 * s26,
-        s28 + k23 * s27 - k18,
+        s27 + k24 * s28,
+        s30 + k24 * s29 - k19,
         0.0,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     """13 operations: 5 add, 4 mul, 2 sin, 2 cos."""
-    k12, k14 = k
+    k13, k15 = k
     theta_1, theta_2, _, _ = y
     s3 = theta_1 + theta_2
-    y_upper = sin(theta_1) * k12
-    x_upper = cos(theta_1) * k12
+    y_upper = sin(theta_1) * k13
+    x_upper = cos(theta_1) * k13
     return (
         x_upper,
         y_upper,
         theta_1,
-        cos(s3) * k14 + (x_upper + x_upper),
-        sin(s3) * k14 + (y_upper + y_upper),
+        cos(s3) * k15 + (x_upper + x_upper),
+        sin(s3) * k15 + (y_upper + y_upper),
         s3,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """20 operations: 6 add, 8 mul, 2 neg, 2 sin, 2 cos."""
-    k12, k14 = k
+    """19 operations: 6 add, 7 mul, 2 neg, 2 sin, 2 cos."""
+    k13, k15 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s3 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s19 = k12 * (theta_1_dot * sin(theta_1))
-    yd_upper = k12 * (theta_1_dot * cos(theta_1))
+    s19 = theta_1_dot * k13
+    s20 = sin(theta_1) * s19
+    yd_upper = cos(theta_1) * s19
     return (
-        -s19,
+        -s20,
         yd_upper,
         theta_1_dot,
-        -(k14 * (omega_lower * sin(s3)) + (s19 + s19)),
-        k14 * (cos(s3) * omega_lower) + (yd_upper + yd_upper),
+        -(sin(s3) * (omega_lower * k15) + (s20 + s20)),
+        omega_lower * (cos(s3) * k15) + (yd_upper + yd_upper),
         omega_lower,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """123 operations: 29 add, 13 sub, 66 mul, 6 div, 5 neg, 1 sin, 3 cos."""
-    k1, k2, k23, k3, k4, k5, k6, k7, k18, k24, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41 = k
+    """117 operations: 29 add, 10 sub, 63 mul, 6 div, 5 neg, 1 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k25, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
-    s29 = sin_theta_2 * sin_theta_2
-    pivot_upper = k1 + s29 * k2
+    s31 = sin_theta_2 * sin_theta_2
+    pivot_upper = k1 + s31 * k2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
     cos_theta_1_theta_2 = cos(theta_1 + theta_2)
-    s15 = sin_theta_2 * (theta_1_dot * theta_1_dot)
-    s1 = cos_theta_1_theta_2 * k4 + k3 * s15
-    s30 = coupling_lower_upper * s1
+    theta_1_dot_squared = theta_1_dot * theta_1_dot
+    s32 = sin_theta_2 * theta_1_dot_squared
+    s1 = sin_theta_2 * k3
+    s2 = cos_theta_1_theta_2 * k4 + theta_1_dot_squared * s1
+    s33 = coupling_lower_upper * s2
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    s31 = sin_theta_2 * (omega_lower * omega_lower)
-    alpha_upper = (k5 * s30 + k3 * s31 - cos_theta_1 * k6 - cos_theta_1 * k7) / pivot_upper
-    s32 = s1 + coupling_lower_upper * alpha_upper
-    s33 = (cos_theta_1 * k29 + alpha_upper * k27) / pivot_upper
-    s34 = cos_theta_2 * k32
-    s35 = cos_theta_1_theta_2 * k33 + s15 * k32
-    s36 = k5 * (s1 * s34 + coupling_lower_upper * s35) - s30 * k34 + s31 * k32 - cos_theta_1 * k28
-    s37 = (s36 - alpha_upper * (k30 + s29 * k31)) / pivot_upper
-    s38 = k5 * (s35 + (alpha_upper * s34 + coupling_lower_upper * s37)) - s32 * k34
-    s39 = cos_theta_2 * k24
-    s40 = s15 * k24
-    s41 = k5 * (s1 * s39 + coupling_lower_upper * s40) + s31 * k24 - cos_theta_1 * k18
-    s42 = (s41 - cos_theta_1 * k37 - alpha_upper * (k35 + s29 * k36)) / pivot_upper
-    s43 = cos_theta_2 * k38
-    s44 = cos_theta_1_theta_2 * k39 + s15 * k38
-    s45 = (k5 * (s1 * s43 + coupling_lower_upper * s44) - s30 * k40 + s31 * k38) / pivot_upper
-    s46 = k5 * (s44 + (alpha_upper * s43 + coupling_lower_upper * s45)) - s32 * k40
-    s47 = cos_theta_1_theta_2 * k24
-    s48 = k5 * (coupling_lower_upper * s47) - k23 * cos_theta_1 - cos_theta_1 * k41
-    s49 = s48 / pivot_upper
+    omega_lower_squared = omega_lower * omega_lower
+    s34 = sin_theta_2 * omega_lower_squared
+    alpha_upper = (k5 * s33 + s1 * omega_lower_squared - cos_theta_1 * k6) / pivot_upper
+    s35 = s2 + coupling_lower_upper * alpha_upper
+    s5 = coupling_lower_upper * k5
+    s36 = (cos_theta_1 * k30 + alpha_upper * k28) / pivot_upper
+    s37 = cos_theta_2 * k33
+    s38 = cos_theta_1_theta_2 * k34 + s32 * k33
+    s39 = k5 * (s2 * s37 + coupling_lower_upper * s38) - s33 * k35 + s34 * k33 - cos_theta_1 * k29
+    s40 = (s39 - alpha_upper * (k31 + s31 * k32)) / pivot_upper
+    s41 = k5 * (s38 + (alpha_upper * s37 + coupling_lower_upper * s40)) - s35 * k35
+    s42 = cos_theta_2 * k25
+    s43 = s32 * k25
+    s44 = k5 * (s2 * s42 + coupling_lower_upper * s43) + s34 * k25 - cos_theta_1 * k38
+    s45 = (s44 - alpha_upper * (k36 + s31 * k37)) / pivot_upper
+    s46 = cos_theta_2 * k39
+    s47 = cos_theta_1_theta_2 * k40 + s32 * k39
+    s48 = (k5 * (s2 * s46 + coupling_lower_upper * s47) - s33 * k41 + s34 * k39) / pivot_upper
+    s49 = k5 * (s47 + (alpha_upper * s46 + coupling_lower_upper * s48)) - s35 * k41
+    s50 = cos_theta_1_theta_2 * k25
+    s51 = (s5 * s50 - cos_theta_1 * k42) / pivot_upper
     return (
         0.0,
         0.0,
@@ -597,16 +604,16 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s33,
-        s37,
-        s42,
+        -s36,
+        s40,
         s45,
-        s49,
-        s33 + k5 * (coupling_lower_upper * s33),
-        -(s37 + s38),
-        -(s42 + k5 * (s40 + (alpha_upper * s39 + coupling_lower_upper * s42))),
-        -(s45 + s46),
-        -(s49 + k5 * (s47 + coupling_lower_upper * s49)),
+        s48,
+        s51,
+        s36 + s5 * s36,
+        -(s40 + s41),
+        -(s45 + k5 * (s43 + (alpha_upper * s42 + coupling_lower_upper * s45))),
+        -(s48 + s49),
+        -(s51 + k5 * (s50 + coupling_lower_upper * s51)),
     )
 
 

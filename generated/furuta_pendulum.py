@@ -83,10 +83,10 @@ POINTS = ('tip',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 3, "sub": 4, "mul": 16, "div": 1, "sin": 1, "cos": 1, "total": 26, "parameters": 29},
-    "jacobian": {"add": 6, "sub": 9, "mul": 41, "div": 4, "neg": 2, "sin": 1, "cos": 1, "total": 64, "parameters": 31},
+    "jacobian": {"add": 6, "sub": 9, "mul": 39, "div": 4, "neg": 2, "sin": 1, "cos": 1, "total": 62, "parameters": 30},
     "input_jacobian": {"add": 1, "mul": 4, "div": 1, "neg": 1, "sin": 1, "cos": 1, "total": 9, "parameters": 18},
-    "parameter_jacobian": {"add": 10, "sub": 11, "mul": 55, "div": 8, "neg": 6, "sin": 1, "cos": 1, "total": 92, "parameters": 66},
-    "forward_dynamics": {"add": 5, "sub": 5, "mul": 19, "div": 1, "sin": 1, "cos": 1, "total": 32, "parameters": 32},
+    "parameter_jacobian": {"add": 10, "sub": 11, "mul": 50, "div": 8, "neg": 6, "sin": 1, "cos": 1, "total": 87, "parameters": 64},
+    "forward_dynamics": {"add": 5, "sub": 5, "mul": 18, "div": 1, "sin": 1, "cos": 1, "total": 31, "parameters": 32},
     "inverse_dynamics": {"add": 5, "sub": 3, "mul": 17, "sin": 1, "cos": 1, "total": 27, "parameters": 20},
     "mass_matrix": {"add": 1, "mul": 3, "sin": 1, "cos": 1, "total": 6, "parameters": 14},
     "velocity_force": {"sub": 1, "mul": 10, "neg": 1, "sin": 1, "cos": 1, "total": 14, "parameters": 9},
@@ -148,107 +148,108 @@ def _refused(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
 
 def _fixed(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
     """The constants of each kernel, which depend on parameters only; or what is wrong, as text."""
-    k33 = m_arm * (l_arm * l_arm) / 12.0
-    k36 = m_pendulum * (l_pendulum * l_pendulum) / 12.0
+    k31 = m_arm * (l_arm * l_arm) / 12.0
+    k34 = m_pendulum * (l_pendulum * l_pendulum) / 12.0
     if not m_arm > 0.0:
         return "mass of arm is not positive"
-    if not k33 >= 0.0:
+    if not k31 >= 0.0:
         return "inertia_com yy of arm is negative"
-    if not k33 >= 0.0:
+    if not k31 >= 0.0:
         return "inertia_com zz of arm is negative"
     if not m_pendulum > 0.0:
         return "mass of pendulum is not positive"
-    if not k36 >= 0.0:
+    if not k34 >= 0.0:
         return "inertia_com xx of pendulum is negative"
-    if not k36 >= 0.0:
+    if not k34 >= 0.0:
         return "inertia_com yy of pendulum is negative"
     l_pendulum_squared = l_pendulum * l_pendulum
-    k42 = m_pendulum * l_pendulum_squared
-    pivot_phi_dot = k42 / 3.0
+    k41 = m_pendulum * l_pendulum_squared
+    pivot_phi_dot = k41 / 3.0
     gear_squared = gear * gear
-    k31 = J_rotor * gear_squared
+    k42 = J_rotor * gear_squared
     l_arm_squared = l_arm * l_arm
     k43 = m_arm * l_arm_squared
     k44 = k43 / 3.0
     k45 = m_pendulum * l_arm_squared
     k46 = l_pendulum_squared * 4.0 + l_arm_squared * 9.0
     k1 = m_pendulum * k46 / 12.0
-    k2 = k44 + (k31 + k45 / 4.0)
+    k2 = k44 + (k42 + k45 / 4.0)
     k47 = l_arm * 3.0
     k48 = m_pendulum * k47
     k3 = g * k48 / 4.0
-    k49 = m_pendulum * 2.0
-    k4 = l_pendulum_squared * k49 / 3.0
-    k50 = l_arm * m_pendulum
-    k5 = l_pendulum * k50 / 2.0
-    k51 = l_pendulum * 2.0
-    k6 = g * 3.0 / k51
-    k7 = k47 / k51
-    k8 = k1 * 2.0
-    k9 = 2.0 * k5
-    k10 = l_arm_squared / 3.0
-    k52 = l_arm * 2.0
-    k11 = m_pendulum * (9.0 * k52) / 12.0
-    k12 = m_arm * k52 / 3.0 + m_pendulum * k52 / 4.0
-    k13 = g * (m_pendulum * 3.0) / 4.0
+    k4 = l_pendulum_squared * (m_pendulum * 2.0) / 3.0
+    k49 = l_arm * m_pendulum
+    k5 = l_pendulum * k49 / 2.0
+    k50 = l_pendulum * 2.0
+    k6 = g * 3.0 / k50
+    k7 = k47 / k50
+    k8 = 2.0 * k5
+    k9 = l_arm_squared / 3.0
+    k51 = l_arm * 2.0
+    k52 = m_pendulum * k51
+    k10 = 9.0 * k52 / 12.0
+    k11 = m_arm * k51 / 3.0 + k52 / 4.0
+    k36 = m_pendulum * g
+    k12 = 3.0 * k36 / 4.0
     k53 = m_pendulum * l_pendulum
-    k14 = k53 / 2.0
-    k15 = 3.0 / k51
-    k16 = l_arm_squared / 4.0
-    k17 = k46 / 12.0
-    k18 = g * k47 / 4.0
-    k19 = l_pendulum_squared * 2.0 / 3.0
-    k20 = l_arm * l_pendulum / 2.0
-    k21 = m_pendulum * (4.0 * k51) / 12.0
-    k22 = k49 * k51 / 3.0
-    k23 = k50 / 2.0
-    k24 = 2.0 * k6 / k51
-    k25 = 2.0 * k7 / k51
-    k26 = 2.0 * (J_rotor * gear)
-    k27 = k48 / 4.0
-    k28 = 1.0 / pivot_phi_dot
-    k29 = k45 + (k31 + k44)
-    k30 = g * k53 / 2.0
-    k32 = l_arm / 2.0
-    k34 = k32 + k32
-    k35 = l_pendulum / 2.0
-    moment_arm_x = m_arm * k32
-    inertia_arm_yy = k33 + k32 * moment_arm_x
-    moment_pendulum_x = m_pendulum * k34
-    k38 = m_pendulum * k35
-    inertia_pendulum_zz = k34 * moment_pendulum_x
-    k54 = k35 * k38
-    inertia_pendulum_xz = k35 * moment_pendulum_x
-    inertia_pendulum_xx = k36 + k54
-    inertia_pendulum_yy = k36 + (inertia_pendulum_zz + k54)
-    k40 = m_arm * g
-    k37 = m_pendulum * g
-    k39 = m_arm + m_pendulum
-    k41 = k35 + k35
+    k13 = k53 / 2.0
+    k14 = 3.0 / k50
+    k15 = l_arm_squared / 4.0
+    k16 = k46 / 12.0
+    k17 = g * k47 / 4.0
+    k18 = l_pendulum_squared * 2.0 / 3.0
+    k19 = l_arm * l_pendulum / 2.0
+    k54 = m_pendulum * k50
+    k20 = 4.0 * k54 / 12.0
+    k21 = 2.0 * k54 / 3.0
+    k22 = k49 / 2.0
+    k23 = 2.0 * k6 / k50
+    k24 = 2.0 * k7 / k50
+    k25 = J_rotor * gear
+    k26 = k48 / 4.0
+    k27 = 1.0 / pivot_phi_dot
+    k28 = k45 + (k42 + k44)
+    k29 = g * k53 / 2.0
+    k30 = l_arm / 2.0
+    k32 = k30 + k30
+    k33 = l_pendulum / 2.0
+    moment_arm_x = m_arm * k30
+    inertia_arm_yy = k31 + k30 * moment_arm_x
+    moment_pendulum_x = m_pendulum * k32
+    k37 = m_pendulum * k33
+    inertia_pendulum_zz = k32 * moment_pendulum_x
+    k55 = k33 * k37
+    inertia_pendulum_xz = k33 * moment_pendulum_x
+    inertia_pendulum_xx = k34 + k55
+    inertia_pendulum_yy = k34 + (inertia_pendulum_zz + k55)
+    k35 = gear * k25
+    k39 = m_arm * g
+    k38 = m_arm + m_pendulum
+    k40 = k33 + k33
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
-        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9),
+        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8),
         "input_jacobian": (k1, k2, k7),
-        "parameter_jacobian": (gear_squared, k1, k2, k3, k4, k5, k7, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27),
-        "forward_dynamics": (k1, k2, k3, k4, k5, k6, k7, k28),
-        "inverse_dynamics": (pivot_phi_dot, k4, k5, k29, k30),
-        "mass_matrix": (pivot_phi_dot, k5, k29),
+        "parameter_jacobian": (gear_squared, k1, k2, k3, k4, k5, k7, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26),
+        "forward_dynamics": (k1, k2, k3, k4, k5, k6, k7, k27),
+        "inverse_dynamics": (pivot_phi_dot, k4, k5, k28, k29),
+        "mass_matrix": (pivot_phi_dot, k5, k28),
         "velocity_force": (pivot_phi_dot, k4, k5),
-        "gravity_force": (k30,),
-        "bias_force": (pivot_phi_dot, k4, k5, k30),
+        "gravity_force": (k29,),
+        "bias_force": (pivot_phi_dot, k4, k5, k29),
         "applied_force": (),
-        "kinetic_energy": (m_arm, m_pendulum, k31, k32, k33, k34, k35, k36),
-        "potential_energy": (k35, k37),
-        "effect_powers": (k34, k35, k37),
-        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k38, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
-        "centre_of_mass": (m_arm, m_pendulum, k32, k34, k35, k39),
-        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k32, k33, k34, k35, k36, k40),
-        "body_poses": (k32, k34, k35),
-        "body_velocities": (k32, k34, k35),
-        "point_positions": (k34, k41),
-        "point_velocities": (k34, k41),
-        "point_jacobians": (k34, k41),
+        "kinetic_energy": (m_arm, m_pendulum, k30, k31, k32, k33, k34, k35),
+        "potential_energy": (k36, k33),
+        "effect_powers": (k36, k32, k33),
+        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k37, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
+        "centre_of_mass": (m_arm, m_pendulum, k30, k32, k33, k38),
+        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k30, k31, k32, k33, k34, k39),
+        "body_poses": (k30, k32, k33),
+        "body_velocities": (k30, k32, k33),
+        "point_positions": (k32, k40),
+        "point_velocities": (k32, k40),
+        "point_jacobians": (k32, k40),
     }
 
 
@@ -316,8 +317,8 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """64 operations: 6 add, 9 sub, 41 mul, 4 div, 2 neg, 1 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k8, k9 = k
+    """62 operations: 6 add, 9 sub, 39 mul, 4 div, 2 neg, 1 sin, 1 cos."""
+    k1, k2, k3, k4, k5, k6, k7, k8 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
@@ -329,11 +330,12 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     s4 = cos_phi * s3 + k5 * (phi_dot * phi_dot)
     theta_ddot = (tau + sin_phi * s4) / pivot_theta_dot
     s5 = sin_phi * cos_phi
-    s6 = sin_phi * (cos_phi * (k5 * (sin_phi * theta_dot_squared)) - sin_phi * s3)
-    s7 = (cos_phi * s4 + s6 - theta_ddot * (s5 * k8)) / pivot_theta_dot
+    s6 = cos_phi * s4 + sin_phi * (theta_dot_squared * (k5 * s5) - sin_phi * s3) - 2.0 * (k1 * (theta_ddot * s5))
+    s7 = s6 / pivot_theta_dot
     s8 = theta_dot * 2.0
-    s9 = sin_phi * (cos_phi * (phi_dot * k4 + k5 * (cos_phi * s8))) / pivot_theta_dot
-    s10 = sin_phi * (phi_dot * k9 - cos_phi * (theta_dot * k4)) / pivot_theta_dot
+    s9 = s5 * (phi_dot * k4 + s8 * (cos_phi * k5)) / pivot_theta_dot
+    s10 = cos_phi * k7
+    s11 = sin_phi * (phi_dot * k8 - k4 * (theta_dot * cos_phi)) / pivot_theta_dot
     return (
         0.0,
         0.0,
@@ -346,11 +348,11 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         s7,
         -s9,
-        s10,
+        s11,
         0.0,
         theta_dot_squared * (cos_phi * cos_phi - s2) - cos_phi * k6 - k7 * (cos_phi * s7 - sin_phi * theta_ddot),
-        s5 * s8 + k7 * (cos_phi * s9),
-        -k7 * (cos_phi * s10),
+        s5 * s8 + s9 * s10,
+        -s10 * s11,
     )
 
 
@@ -359,40 +361,41 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     k1, k2, k7 = k
     _, phi, _, _ = y
     sin_phi = sin(phi)
-    s11 = 1.0 / (sin_phi * sin_phi * k1 + k2)
+    s12 = 1.0 / (sin_phi * sin_phi * k1 + k2)
     return (
         0.0,
         0.0,
-        s11,
-        -k7 * (cos(phi) * s11),
+        s12,
+        -cos(phi) * k7 * s12,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """92 operations: 10 add, 11 sub, 55 mul, 8 div, 6 neg, 1 sin, 1 cos."""
-    gear_squared, k1, k2, k3, k4, k5, k7, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27 = k
+    """87 operations: 10 add, 11 sub, 50 mul, 8 div, 6 neg, 1 sin, 1 cos."""
+    gear_squared, k1, k2, k3, k4, k5, k7, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
     s2 = sin_phi * sin_phi
     pivot_theta_dot = s2 * k1 + k2
-    s12 = theta_dot * phi_dot
+    s13 = theta_dot * phi_dot
     cos_phi = cos(phi)
-    s13 = theta_dot * theta_dot * cos_phi
+    s14 = theta_dot * theta_dot * cos_phi
     phi_dot_squared = phi_dot * phi_dot
-    drive_theta_dot = tau + sin_phi * (cos_phi * (k3 - k4 * s12 - k5 * s13) + k5 * phi_dot_squared)
+    drive_theta_dot = tau + sin_phi * (cos_phi * (k3 - k4 * s13 - k5 * s14) + k5 * phi_dot_squared)
     theta_ddot = drive_theta_dot / pivot_theta_dot
-    s14 = cos_phi * theta_ddot
-    s15 = theta_ddot * k10 / pivot_theta_dot
-    s16 = sin_phi * (cos_phi * (k13 - s13 * k14) + phi_dot_squared * k14) - theta_ddot * (s2 * k11 + k12)
-    s17 = s16 / pivot_theta_dot
-    s18 = sin_phi * (cos_phi * (k18 - s12 * k19 - s13 * k20) + phi_dot_squared * k20)
-    s19 = (s18 - theta_ddot * (k16 + s2 * k17)) / pivot_theta_dot
-    s20 = sin_phi * (phi_dot_squared * k23 - cos_phi * (s12 * k22 + s13 * k23)) - theta_ddot * (s2 * k21)
-    s21 = s20 / pivot_theta_dot
-    s22 = gear_squared * theta_ddot / pivot_theta_dot
-    s23 = theta_ddot * k26 / pivot_theta_dot
-    s24 = sin_phi * (cos_phi * k27) / pivot_theta_dot
+    s15 = cos_phi * theta_ddot
+    s10 = cos_phi * k7
+    s16 = theta_ddot * k9 / pivot_theta_dot
+    s17 = sin_phi * (cos_phi * (k12 - s14 * k13) + phi_dot_squared * k13) - theta_ddot * (s2 * k10 + k11)
+    s18 = s17 / pivot_theta_dot
+    s19 = sin_phi * (cos_phi * (k17 - s13 * k18 - s14 * k19) + phi_dot_squared * k19)
+    s20 = (s19 - theta_ddot * (k15 + s2 * k16)) / pivot_theta_dot
+    s21 = sin_phi * (phi_dot_squared * k22 - cos_phi * (s13 * k21 + s14 * k22)) - theta_ddot * (s2 * k20)
+    s22 = s21 / pivot_theta_dot
+    s23 = gear_squared * theta_ddot / pivot_theta_dot
+    s24 = k25 * (2.0 * theta_ddot) / pivot_theta_dot
+    s25 = sin_phi * cos_phi * k26 / pivot_theta_dot
     return (
         0.0,
         0.0,
@@ -408,26 +411,26 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s15,
-        s17,
-        s19,
-        s21,
-        -s22,
+        -s16,
+        s18,
+        s20,
+        s22,
         -s23,
-        s24,
-        k7 * (cos_phi * s15),
-        -(s14 * k15 + k7 * (cos_phi * s17)),
-        -k7 * (cos_phi * s19),
-        sin_phi * k24 - (k7 * (cos_phi * s21) - s14 * k25),
-        k7 * (cos_phi * s22),
-        k7 * (cos_phi * s23),
-        -(sin_phi * k15 + k7 * (cos_phi * s24)),
+        -s24,
+        s25,
+        s10 * s16,
+        -(s15 * k14 + s10 * s18),
+        -s10 * s20,
+        sin_phi * k23 - (s10 * s22 - s15 * k24),
+        s10 * s23,
+        s10 * s24,
+        -(sin_phi * k14 + s10 * s25),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """32 operations: 5 add, 5 sub, 19 mul, 1 div, 1 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k28 = k
+    """31 operations: 5 add, 5 sub, 18 mul, 1 div, 1 sin, 1 cos."""
+    k1, k2, k3, k4, k5, k6, k7, k27 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     tau__theta_dot, tau__phi_dot = extra
@@ -435,42 +438,43 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     theta_dot_squared = theta_dot * theta_dot
     cos_phi = cos(phi)
     s1 = cos_phi * (k3 - k4 * (theta_dot * phi_dot) - k5 * (theta_dot_squared * cos_phi))
-    drive_theta_dot_2 = sin_phi * (s1 + k5 * (phi_dot * phi_dot)) + (tau + tau__theta_dot) - k7 * (cos_phi * tau__phi_dot)
+    s10 = cos_phi * k7
+    drive_theta_dot_2 = sin_phi * (s1 + k5 * (phi_dot * phi_dot)) + (tau + tau__theta_dot) - s10 * tau__phi_dot
     theta_ddot_2 = drive_theta_dot_2 / (sin_phi * sin_phi * k1 + k2)
-    s25 = theta_dot_squared * (sin_phi * cos_phi) + tau__phi_dot * k28 - sin_phi * k6
+    s26 = theta_dot_squared * (sin_phi * cos_phi) + tau__phi_dot * k27 - sin_phi * k6
     return (
         theta_ddot_2,
-        s25 - k7 * (cos_phi * theta_ddot_2),
+        s26 - s10 * theta_ddot_2,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """27 operations: 5 add, 3 sub, 17 mul, 1 sin, 1 cos."""
-    pivot_phi_dot, k4, k5, k29, k30 = k
+    pivot_phi_dot, k4, k5, k28, k29 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     vd__theta_dot, vd__phi_dot = extra
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     s5 = sin_phi * cos_phi
-    s26 = vd__theta_dot * (pivot_phi_dot * (sin_phi * sin_phi) + k29) + k5 * (cos_phi * vd__phi_dot - sin_phi * (phi_dot * phi_dot))
-    s27 = pivot_phi_dot * (vd__phi_dot - theta_dot * theta_dot * s5) + sin_phi * k30
+    s27 = vd__theta_dot * (pivot_phi_dot * (sin_phi * sin_phi) + k28) + k5 * (cos_phi * vd__phi_dot - sin_phi * (phi_dot * phi_dot))
+    s28 = pivot_phi_dot * (vd__phi_dot - theta_dot * theta_dot * s5) + sin_phi * k29
     return (
-        k4 * (phi_dot * (theta_dot * s5)) + s26 - tau,
-        k5 * (cos_phi * vd__theta_dot) + s27,
+        theta_dot * (phi_dot * (k4 * s5)) + s27 - tau,
+        cos_phi * k5 * vd__theta_dot + s28,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), sin=sin, cos=cos):
     """6 operations: 1 add, 3 mul, 1 sin, 1 cos."""
-    pivot_phi_dot, k5, k29 = k
+    pivot_phi_dot, k5, k28 = k
     _, phi, _, _ = y
     sin_phi = sin(phi)
-    s28 = cos(phi) * k5
+    s29 = cos(phi) * k5
     return (
-        pivot_phi_dot * (sin_phi * sin_phi) + k29,
-        s28,
-        s28,
+        pivot_phi_dot * (sin_phi * sin_phi) + k28,
+        s29,
+        s29,
         pivot_phi_dot,
     )
 
@@ -482,30 +486,30 @@ def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_phi = sin(phi)
     s5 = sin_phi * cos(phi)
     return (
-        k4 * (phi_dot * (theta_dot * s5)) - k5 * (sin_phi * (phi_dot * phi_dot)),
-        -pivot_phi_dot * (theta_dot * theta_dot * s5),
+        theta_dot * (phi_dot * (k4 * s5)) - k5 * (sin_phi * (phi_dot * phi_dot)),
+        -theta_dot * theta_dot * (pivot_phi_dot * s5),
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), sin=sin):
     """2 operations: 1 mul, 1 sin."""
-    k30, = k
+    k29, = k
     _, phi, _, _ = y
     return (
         0.0,
-        sin(phi) * k30,
+        sin(phi) * k29,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     """15 operations: 2 sub, 11 mul, 1 sin, 1 cos."""
-    pivot_phi_dot, k4, k5, k30 = k
+    pivot_phi_dot, k4, k5, k29 = k
     _, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     s5 = sin_phi * cos(phi)
     return (
-        k4 * (phi_dot * (theta_dot * s5)) - k5 * (sin_phi * (phi_dot * phi_dot)),
-        sin_phi * k30 - pivot_phi_dot * (theta_dot * theta_dot * s5),
+        theta_dot * (phi_dot * (k4 * s5)) - k5 * (sin_phi * (phi_dot * phi_dot)),
+        sin_phi * k29 - theta_dot * theta_dot * (pivot_phi_dot * s5),
     )
 
 
@@ -520,101 +524,101 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
     """32 operations: 8 add, 22 mul, 1 sin, 1 cos."""
-    m_arm, m_pendulum, k31, k32, k33, k34, k35, k36 = k
+    m_arm, m_pendulum, k30, k31, k32, k33, k34, k35 = k
     _, phi, theta_dot, phi_dot = y
     omega_pendulum_y = theta_dot * sin(phi)
-    s29 = theta_dot * k32
-    s30 = m_arm * (s29 * s29) + theta_dot * (theta_dot * k33) + k31 * (theta_dot * theta_dot)
-    s31 = k35 * omega_pendulum_y
-    s32 = k34 * (theta_dot * cos(phi)) + phi_dot * k35
-    s33 = k34 * omega_pendulum_y
-    s34 = s30 + m_pendulum * (s31 * s31 + s32 * s32 + s33 * s33) + (phi_dot * (phi_dot * k36) + omega_pendulum_y * (k36 * omega_pendulum_y))
+    s30 = theta_dot * k30
+    s31 = m_arm * (s30 * s30) + theta_dot * (theta_dot * k31) + theta_dot * theta_dot * k35
+    s32 = k33 * omega_pendulum_y
+    s33 = theta_dot * cos(phi) * k32 + phi_dot * k33
+    s34 = k32 * omega_pendulum_y
+    s35 = s31 + m_pendulum * (s32 * s32 + s33 * s33 + s34 * s34) + (phi_dot * (phi_dot * k34) + omega_pendulum_y * (k34 * omega_pendulum_y))
     return (
-        0.5 * s34,
+        0.5 * s35,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
     """4 operations: 2 mul, 1 neg, 1 cos."""
-    k35, k37 = k
+    k36, k33 = k
     _, phi, _, _ = y
     return (
-        -k37 * (cos(phi) * k35),
+        -k36 * (cos(phi) * k33),
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), sin=sin, cos=cos):
     """32 operations: 3 add, 4 sub, 20 mul, 1 neg, 2 sin, 2 cos."""
-    k34, k35, k37 = k
+    k36, k32, k33 = k
     theta, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
     cos_phi = cos(phi)
+    omega_pendulum_z = theta_dot * cos_phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s35 = sin_phi * sin_theta
-    s36 = sin_phi * cos_theta
+    s36 = sin_phi * sin_theta
+    s37 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
-    omega_pendulum_z = theta_dot * cos_phi
-    s37 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s35 * omega_pendulum_z
-    s38 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s36 * omega_pendulum_z
-    s39 = (k34 * sin_theta + k35 * s36) * s37 - (k34 * cos_theta - k35 * s35) * s38
+    s38 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + omega_pendulum_z * s36
+    s39 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - omega_pendulum_z * s37
+    s40 = (k32 * sin_theta + k33 * s37) * s38 - (k32 * cos_theta - k33 * s36) * s39
     return (
-        -k37 * s39,
+        -k36 * s40,
         theta_dot * tau,
     )
 
 
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """56 operations: 12 add, 4 sub, 35 mul, 1 neg, 2 sin, 2 cos."""
-    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k38, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
+    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k37, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
+    omega_pendulum_z = theta_dot * cos_phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s40 = cos_phi * sin_theta
-    s35 = sin_phi * sin_theta
-    s41 = cos_phi * cos_theta
-    s36 = sin_phi * cos_theta
+    s41 = cos_phi * sin_theta
+    s36 = sin_phi * sin_theta
+    s42 = cos_phi * cos_theta
+    s37 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
-    omega_pendulum_z = theta_dot * cos_phi
-    s42 = theta_dot * moment_arm_x
-    s43 = k38 * omega_pendulum_y
-    s44 = moment_pendulum_x * omega_pendulum_z + phi_dot * k38
-    s45 = moment_pendulum_x * omega_pendulum_y
-    s46 = phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z
-    s47 = inertia_pendulum_yy * omega_pendulum_y
-    s48 = phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z
+    s43 = theta_dot * moment_arm_x
+    s44 = k37 * omega_pendulum_y
+    s45 = omega_pendulum_z * moment_pendulum_x + phi_dot * k37
+    s46 = moment_pendulum_x * omega_pendulum_y
+    s47 = phi_dot * inertia_pendulum_xx + omega_pendulum_z * inertia_pendulum_xz
+    s48 = inertia_pendulum_yy * omega_pendulum_y
+    s49 = phi_dot * inertia_pendulum_xz + omega_pendulum_z * inertia_pendulum_zz
     return (
-        -(sin_theta * s42 + (cos_theta * s43 + s40 * s44 + s35 * s45)),
-        cos_theta * s42 + (s41 * s44 - sin_theta * s43 + s36 * s45),
-        sin_phi * s44 - cos_phi * s45,
-        cos_theta * s46 - s40 * s47 + s35 * s48,
-        sin_theta * s46 + s41 * s47 - s36 * s48,
-        theta_dot * inertia_arm_yy + (sin_phi * s47 + cos_phi * s48),
+        -(sin_theta * s43 + (cos_theta * s44 + s41 * s45 + s36 * s46)),
+        cos_theta * s43 + (s42 * s45 - sin_theta * s44 + s37 * s46),
+        sin_phi * s45 - cos_phi * s46,
+        cos_theta * s47 - s41 * s48 + s36 * s49,
+        sin_theta * s47 + s42 * s48 - s37 * s49,
+        theta_dot * inertia_arm_yy + (sin_phi * s48 + cos_phi * s49),
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """26 operations: 3 add, 1 sub, 14 mul, 3 div, 1 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, k32, k34, k35, k39 = k
+    m_arm, m_pendulum, k30, k32, k33, k38 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s49 = m_arm * (k32 * cos_theta) + m_pendulum * (k34 * cos_theta - k35 * (sin_phi * sin_theta))
-    s50 = m_arm * (k32 * sin_theta) + m_pendulum * (k34 * sin_theta + k35 * (sin_phi * cos_theta))
+    s50 = m_arm * (k30 * cos_theta) + m_pendulum * (k32 * cos_theta - k33 * (sin_phi * sin_theta))
+    s51 = m_arm * (k30 * sin_theta) + m_pendulum * (k32 * sin_theta + k33 * (sin_phi * cos_theta))
     return (
-        s49 / k39,
-        s50 / k39,
-        -m_pendulum * (cos(phi) * k35) / k39,
+        s50 / k38,
+        s51 / k38,
+        -m_pendulum * (cos(phi) * k33) / k38,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """231 operations: 47 add, 35 sub, 135 mul, 1 div, 9 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k32, k33, k34, k35, k36, k40 = k
+    m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k30, k31, k32, k33, k34, k39 = k
     theta, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
@@ -623,211 +627,211 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     s1 = cos_phi * (k3 - k4 * (theta_dot * phi_dot) - k5 * (theta_dot_squared * cos_phi))
     phi_dot_squared = phi_dot * phi_dot
     theta_ddot = (tau + sin_phi * (s1 + k5 * phi_dot_squared)) / (sin_phi * sin_phi * k1 + k2)
-    s14 = cos_phi * theta_ddot
-    phi_ddot = theta_dot_squared * (sin_phi * cos_phi) - sin_phi * k6 - k7 * s14
+    s15 = cos_phi * theta_ddot
+    phi_ddot = theta_dot_squared * (sin_phi * cos_phi) - sin_phi * k6 - k7 * s15
+    omega_pendulum_z = theta_dot * cos_phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s40 = cos_phi * sin_theta
-    s35 = sin_phi * sin_theta
-    s41 = cos_phi * cos_theta
-    s36 = sin_phi * cos_theta
+    s41 = cos_phi * sin_theta
+    s36 = sin_phi * sin_theta
+    s42 = cos_phi * cos_theta
+    s37 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
-    omega_pendulum_z = theta_dot * cos_phi
-    s51 = k32 * cos_theta
-    s52 = k32 * sin_theta
-    s53 = k34 * cos_theta
-    s54 = k34 * sin_theta
-    s55 = cos_phi * k35
-    s37 = phi_dot * cos_theta - s40 * omega_pendulum_y + s35 * omega_pendulum_z
-    s38 = phi_dot * sin_theta + s41 * omega_pendulum_y - s36 * omega_pendulum_z
-    s56 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s57 = phi_dot * omega_pendulum_z
-    s58 = phi_dot * omega_pendulum_y
-    s59 = sin_phi * theta_ddot + s57
-    s60 = s14 - s58
+    s52 = k30 * cos_theta
+    s53 = k30 * sin_theta
+    s54 = k32 * cos_theta
+    s55 = k32 * sin_theta
+    s56 = cos_phi * k33
+    s38 = phi_dot * cos_theta - s41 * omega_pendulum_y + omega_pendulum_z * s36
+    s39 = phi_dot * sin_theta + s42 * omega_pendulum_y - omega_pendulum_z * s37
+    s57 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s58 = phi_dot * omega_pendulum_z
+    s59 = phi_dot * omega_pendulum_y
+    s60 = sin_phi * theta_ddot + s58
+    s61 = s15 - s59
     omega_pendulum_y_squared = omega_pendulum_y * omega_pendulum_y
-    s61 = theta_dot_squared * k32
-    s62 = theta_ddot * k32
-    s63 = m_arm * (cos_theta * s61 + sin_theta * s62)
-    s64 = m_arm * (cos_theta * s62 - sin_theta * s61)
-    s65 = k34 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k35 * (s57 + s59)
-    s66 = k34 * (s58 + s60) - k35 * (omega_pendulum_y * omega_pendulum_z - phi_ddot)
-    s67 = g * sin_phi + s66
-    s68 = g * cos_phi + (k34 * (s57 - s59) + k35 * (phi_dot_squared + omega_pendulum_y_squared))
-    s69 = phi_ddot * cos_theta - s40 * s59 + s35 * s60
-    s70 = phi_ddot * sin_theta + s41 * s59 - s36 * s60
-    s71 = sin_phi * s59 + cos_phi * s60
-    s72 = k36 * cos_theta
-    s73 = k36 * s40
-    s74 = k36 * sin_theta
-    s75 = k36 * s41
-    s76 = sin_phi * k36
-    s77 = cos_theta * s72 + s40 * s73
-    s78 = sin_theta * s72 - s41 * s73
-    s79 = sin_phi * s73
-    s80 = cos_theta * s74 - s40 * s75
-    s81 = sin_theta * s74 + s41 * s75
-    s82 = sin_phi * s75
-    s83 = s40 * s76
-    s84 = s41 * s76
-    s85 = sin_phi * s76
-    s86 = m_pendulum * (s35 * s68 - (cos_theta * s65 + s40 * s67))
-    s87 = m_pendulum * (s41 * s67 - sin_theta * s65 - s36 * s68)
-    s88 = m_pendulum * (sin_phi * s67 + cos_phi * s68)
-    s89 = s37 * s77 + s38 * s78 - s56 * s79
-    s90 = s37 * s80 + s38 * s81 + s56 * s82
-    s91 = s38 * s84 - s37 * s83 + s56 * s85
-    s92 = s69 * s80 + s70 * s81 + s71 * s82 + (s56 * s89 - s37 * s91)
-    s93 = s53 - k35 * s35 - s53
-    s94 = s54 + k35 * s36 - s54
-    s95 = s55 * s86 + s88 * s93
-    s96 = s69 * s77 + s70 * s78 - s71 * s79 + (s38 * s91 - s56 * s90) + (s88 * s94 + s55 * s87)
-    s97 = s70 * s84 - s69 * s83 + s71 * s85 + (s37 * s90 - s38 * s89) + (s87 * s93 - s86 * s94)
-    s98 = theta_ddot * k33 + (s51 * s64 + s52 * s63) + (s97 + (s53 * s87 - s54 * s86))
+    s62 = theta_dot_squared * k30
+    s63 = theta_ddot * k30
+    s64 = m_arm * (cos_theta * s62 + sin_theta * s63)
+    s65 = m_arm * (cos_theta * s63 - sin_theta * s62)
+    s66 = k32 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k33 * (s58 + s60)
+    s67 = k32 * (s59 + s61) - k33 * (omega_pendulum_z * omega_pendulum_y - phi_ddot)
+    s68 = g * sin_phi + s67
+    s69 = g * cos_phi + (k32 * (s58 - s60) + k33 * (phi_dot_squared + omega_pendulum_y_squared))
+    s70 = phi_ddot * cos_theta - s41 * s60 + s36 * s61
+    s71 = phi_ddot * sin_theta + s42 * s60 - s37 * s61
+    s72 = sin_phi * s60 + cos_phi * s61
+    s73 = k34 * cos_theta
+    s74 = k34 * s41
+    s75 = k34 * sin_theta
+    s76 = k34 * s42
+    s77 = sin_phi * k34
+    s78 = cos_theta * s73 + s41 * s74
+    s79 = sin_theta * s73 - s42 * s74
+    s80 = sin_phi * s74
+    s81 = cos_theta * s75 - s41 * s76
+    s82 = sin_theta * s75 + s42 * s76
+    s83 = sin_phi * s76
+    s84 = s41 * s77
+    s85 = s42 * s77
+    s86 = sin_phi * s77
+    s87 = m_pendulum * (s36 * s69 - (cos_theta * s66 + s41 * s68))
+    s88 = m_pendulum * (s42 * s68 - sin_theta * s66 - s37 * s69)
+    s89 = m_pendulum * (sin_phi * s68 + cos_phi * s69)
+    s90 = s38 * s78 + s39 * s79 - s57 * s80
+    s91 = s38 * s81 + s39 * s82 + s57 * s83
+    s92 = s39 * s85 - s38 * s84 + s57 * s86
+    s93 = s70 * s81 + s71 * s82 + s72 * s83 + (s57 * s90 - s38 * s92)
+    s94 = s54 - k33 * s36 - s54
+    s95 = s55 + k33 * s37 - s55
+    s96 = s56 * s87 + s89 * s94
+    s97 = s70 * s78 + s71 * s79 - s72 * s80 + (s39 * s92 - s57 * s91) + (s89 * s95 + s56 * s88)
+    s98 = s71 * s85 - s70 * s84 + s72 * s86 + (s38 * s91 - s39 * s90) + (s88 * s94 - s87 * s95)
+    s99 = theta_ddot * k31 + (s52 * s65 + s53 * s64) + (s98 + (s54 * s88 - s55 * s87))
     return (
-        s63 - s86,
-        -(s64 + s87),
-        -(k40 + s88),
-        -(k40 * s52 + (s96 + s54 * s88)),
-        k40 * s51 - (s92 - s95 - s53 * s88),
-        -s98,
-        -s86,
+        s64 - s87,
+        -(s65 + s88),
+        -(k39 + s89),
+        -(k39 * s53 + (s97 + s55 * s89)),
+        k39 * s52 - (s93 - s96 - s54 * s89),
+        -s99,
         -s87,
         -s88,
-        -s96,
-        s95 - s92,
+        -s89,
         -s97,
+        s96 - s93,
+        -s98,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
     """21 operations: 1 add, 1 sub, 11 mul, 4 neg, 2 sin, 2 cos."""
-    k32, k34, k35 = k
+    k30, k32, k33 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s35 = sin_phi * sin_theta
-    s36 = sin_phi * cos_theta
+    s36 = sin_phi * sin_theta
+    s37 = sin_phi * cos_theta
     return (
         cos_theta,
         -sin_theta,
         0.0,
-        k32 * cos_theta,
+        k30 * cos_theta,
         sin_theta,
         cos_theta,
         0.0,
-        k32 * sin_theta,
+        k30 * sin_theta,
         0.0,
         0.0,
         1.0,
         0.0,
         cos_theta,
         -cos_phi * sin_theta,
-        s35,
-        k34 * cos_theta - k35 * s35,
+        s36,
+        k32 * cos_theta - k33 * s36,
         sin_theta,
         cos_phi * cos_theta,
-        -s36,
-        k34 * sin_theta + k35 * s36,
+        -s37,
+        k32 * sin_theta + k33 * s37,
         0.0,
         sin_phi,
         cos_phi,
-        -cos_phi * k35,
+        -cos_phi * k33,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """45 operations: 6 add, 4 sub, 29 mul, 2 neg, 2 sin, 2 cos."""
-    k32, k34, k35 = k
+    k30, k32, k33 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
+    omega_pendulum_z = theta_dot * cos_phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s35 = sin_phi * sin_theta
-    s36 = sin_phi * cos_theta
+    s36 = sin_phi * sin_theta
+    s37 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
-    omega_pendulum_z = theta_dot * cos_phi
-    s99 = k34 * cos_theta - k35 * s35
-    s100 = k34 * sin_theta + k35 * s36
-    s55 = cos_phi * k35
-    s37 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s35 * omega_pendulum_z
-    s38 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s36 * omega_pendulum_z
-    s56 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s100 = k32 * cos_theta - k33 * s36
+    s101 = k32 * sin_theta + k33 * s37
+    s56 = cos_phi * k33
+    s38 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + omega_pendulum_z * s36
+    s39 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - omega_pendulum_z * s37
+    s57 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
     return (
-        -theta_dot * (k32 * sin_theta),
-        theta_dot * (k32 * cos_theta),
+        -theta_dot * (k30 * sin_theta),
+        theta_dot * (k30 * cos_theta),
         0.0,
         0.0,
         0.0,
         theta_dot,
-        -(s55 * s38 + s100 * s56),
-        s99 * s56 + s55 * s37,
-        s100 * s37 - s99 * s38,
-        s37,
+        -(s56 * s39 + s101 * s57),
+        s100 * s57 + s56 * s38,
+        s101 * s38 - s100 * s39,
         s38,
-        s56,
+        s39,
+        s57,
     )
 
 
 def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
     """14 operations: 1 add, 1 sub, 7 mul, 1 neg, 2 sin, 2 cos."""
-    k34, k41 = k
+    k32, k40 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     return (
-        k34 * cos_theta - sin_phi * sin_theta * k41,
-        k34 * sin_theta + sin_phi * cos_theta * k41,
-        -cos(phi) * k41,
+        k32 * cos_theta - sin_phi * sin_theta * k40,
+        k32 * sin_theta + sin_phi * cos_theta * k40,
+        -cos(phi) * k40,
     )
 
 
 def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """40 operations: 6 add, 4 sub, 25 mul, 1 neg, 2 sin, 2 cos."""
-    k34, k41 = k
+    k32, k40 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
+    omega_pendulum_z = theta_dot * cos_phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s35 = sin_phi * sin_theta
-    s36 = sin_phi * cos_theta
+    s36 = sin_phi * sin_theta
+    s37 = sin_phi * cos_theta
     omega_pendulum_y = theta_dot * sin_phi
-    omega_pendulum_z = theta_dot * cos_phi
-    s37 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + s35 * omega_pendulum_z
-    s38 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - s36 * omega_pendulum_z
-    s56 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s101 = k34 * cos_theta - s35 * k41
-    s102 = k34 * sin_theta + s36 * k41
-    s103 = cos_phi * k41
+    s38 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + omega_pendulum_z * s36
+    s39 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - omega_pendulum_z * s37
+    s57 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s102 = k32 * cos_theta - s36 * k40
+    s103 = k32 * sin_theta + s37 * k40
+    s104 = cos_phi * k40
     return (
-        -(s38 * s103 + s56 * s102),
-        s56 * s101 + s37 * s103,
-        s37 * s102 - s38 * s101,
+        -(s39 * s104 + s57 * s103),
+        s57 * s102 + s38 * s104,
+        s38 * s103 - s39 * s102,
     )
 
 
 def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     """20 operations: 1 add, 2 sub, 11 mul, 2 neg, 2 sin, 2 cos."""
-    k34, k41 = k
+    k32, k40 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s101 = k34 * cos_theta - sin_phi * sin_theta * k41
-    s102 = k34 * sin_theta + sin_phi * cos_theta * k41
-    s103 = cos(phi) * k41
+    s102 = k32 * cos_theta - sin_phi * sin_theta * k40
+    s103 = k32 * sin_theta + sin_phi * cos_theta * k40
+    s104 = cos(phi) * k40
     return (
-        -s102,
-        -sin_theta * s103,
-        s101,
-        cos_theta * s103,
+        -s103,
+        -sin_theta * s104,
+        s102,
+        cos_theta * s104,
         0.0,
-        cos_theta * s102 - sin_theta * s101,
+        cos_theta * s103 - sin_theta * s102,
     )
 
 

@@ -12,7 +12,7 @@ Parameters p, with the scene's values:
     gravity_g = 9.81        m/s^2  gravitational acceleration, downwards of gravity
 
 Effects: gravity.
-One call of `derivative` takes 3 operations: 2 mul, 1 cos; 5 more on parameters alone are done once.
+One call of `derivative` takes 2 operations: 1 mul, 1 cos; 6 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
@@ -58,7 +58,7 @@ JOINTS = ('pivot',)
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"mul": 2, "cos": 1, "total": 3, "parameters": 5},
+    "derivative": {"mul": 1, "cos": 1, "total": 2, "parameters": 6},
     "jacobian": {"mul": 1, "neg": 1, "sin": 1, "total": 3, "parameters": 6},
     "forward_dynamics": {"add": 1, "mul": 2, "cos": 1, "total": 4, "parameters": 5},
     "inverse_dynamics": {"sub": 1, "mul": 2, "cos": 1, "total": 4, "parameters": 4},
@@ -72,10 +72,10 @@ COST = {
     "effect_powers": {"mul": 3, "cos": 1, "total": 4, "parameters": 1},
     "momentum": {"add": 1, "mul": 11, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 0},
     "centre_of_mass": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
-    "joint_forces": {"add": 1, "sub": 2, "mul": 9, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 6},
+    "joint_forces": {"add": 1, "sub": 2, "mul": 8, "neg": 1, "sin": 1, "cos": 1, "total": 14, "parameters": 7},
     "body_poses": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
     "body_velocities": {"mul": 4, "neg": 1, "sin": 1, "cos": 1, "total": 7, "parameters": 0},
-    "parameter_jacobian": {"sub": 2, "mul": 6, "cos": 1, "total": 9, "parameters": 16},
+    "parameter_jacobian": {"mul": 3, "cos": 1, "total": 4, "parameters": 20},
 }
 
 
@@ -85,37 +85,36 @@ def _fixed(bob_mass, pivot_r_child_x, gravity_g):
         return "mass of bob is not positive"
     pivot_r_child_x_squared = pivot_r_child_x * pivot_r_child_x
     pivot_bob = bob_mass * pivot_r_child_x_squared
-    k6 = bob_mass * pivot_r_child_x
-    k1 = gravity_g * k6
-    k2 = 1.0 / pivot_bob
-    k3 = k1 * k2
-    k4 = bob_mass / 2.0
-    k5 = bob_mass * gravity_g
-    k7 = pivot_r_child_x_squared * k2 / pivot_bob
-    k8 = gravity_g * (pivot_r_child_x * k2)
-    k9 = k2 * (bob_mass * (pivot_r_child_x * 2.0)) / pivot_bob
-    k10 = k2 * k5
-    k11 = k6 * k2
+    k7 = bob_mass * pivot_r_child_x
+    k6 = bob_mass * gravity_g
+    k2 = pivot_r_child_x * k6
+    k3 = 1.0 / pivot_bob
+    k1 = k2 * k3
+    k4 = pivot_r_child_x * k7
+    k5 = bob_mass / 2.0
+    k8 = gravity_g * (pivot_r_child_x * k3) - k2 * (pivot_r_child_x_squared * k3 / pivot_bob)
+    k9 = k6 * k3 - k2 * (k3 * (bob_mass * (pivot_r_child_x * 2.0)) / pivot_bob)
+    k10 = pivot_r_child_x * (bob_mass * k3)
     return {
         "initial_state": (),
-        "derivative": (k1, k2),
-        "jacobian": (k3,),
-        "forward_dynamics": (k1, k2),
-        "inverse_dynamics": (pivot_bob, k1),
+        "derivative": (k1,),
+        "jacobian": (k1,),
+        "forward_dynamics": (k2, k3),
+        "inverse_dynamics": (k2, k4),
         "mass_matrix": (pivot_bob,),
         "velocity_force": (),
-        "gravity_force": (k1,),
-        "bias_force": (k1,),
+        "gravity_force": (k2,),
+        "bias_force": (k2,),
         "applied_force": (),
-        "kinetic_energy": (pivot_r_child_x, k4),
-        "potential_energy": (pivot_r_child_x, k5),
-        "effect_powers": (pivot_r_child_x, k5),
+        "kinetic_energy": (pivot_r_child_x, k5),
+        "potential_energy": (pivot_r_child_x, k6),
+        "effect_powers": (pivot_r_child_x, k6),
         "momentum": (bob_mass, pivot_r_child_x),
         "centre_of_mass": (pivot_r_child_x,),
-        "joint_forces": (k6, k1, k2, k5),
+        "joint_forces": (k7, k6, k1),
         "body_poses": (pivot_r_child_x,),
         "body_velocities": (pivot_r_child_x,),
-        "parameter_jacobian": (k1, k7, k8, k9, k10, k11),
+        "parameter_jacobian": (k8, k9, k10),
     }
 
 
@@ -157,44 +156,44 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), cos=cos):
-    """3 operations: 2 mul, 1 cos."""
-    k1, k2 = k
+    """2 operations: 1 mul, 1 cos."""
+    k1, = k
     theta, theta_dot = y
     return (
         theta_dot,
-        cos(theta) * k1 * k2,
+        cos(theta) * k1,
     )
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin):
     """3 operations: 1 mul, 1 neg, 1 sin."""
-    k3, = k
+    k1, = k
     theta, _ = y
     return (
         0.0,
         1.0,
-        -sin(theta) * k3,
+        -k1 * sin(theta),
         0.0,
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), cos=cos):
     """4 operations: 1 add, 2 mul, 1 cos."""
-    k1, k2 = k
+    k2, k3 = k
     theta, _ = y
     tau__theta, = extra
     return (
-        k2 * (tau__theta + cos(theta) * k1),
+        k3 * (tau__theta + cos(theta) * k2),
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), cos=cos):
     """4 operations: 1 sub, 2 mul, 1 cos."""
-    pivot_bob, k1 = k
+    k2, k4 = k
     theta, _ = y
     theta_ddot, = extra
     return (
-        theta_ddot * pivot_bob - cos(theta) * k1,
+        theta_ddot * k4 - cos(theta) * k2,
     )
 
 
@@ -215,19 +214,19 @@ def _velocity_force(y, k, u=(), extra=()):
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """3 operations: 1 mul, 1 neg, 1 cos."""
-    k1, = k
+    k2, = k
     theta, _ = y
     return (
-        -cos(theta) * k1,
+        -cos(theta) * k2,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), cos=cos):
     """3 operations: 1 mul, 1 neg, 1 cos."""
-    k1, = k
+    k2, = k
     theta, _ = y
     return (
-        -cos(theta) * k1,
+        -cos(theta) * k2,
     )
 
 
@@ -240,30 +239,30 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     """10 operations: 1 add, 7 mul, 1 sin, 1 cos."""
-    pivot_r_child_x, k4 = k
+    pivot_r_child_x, k5 = k
     theta, theta_dot = y
     xd_bob = pivot_r_child_x * (theta_dot * sin(theta))
     s1 = pivot_r_child_x * (theta_dot * cos(theta))
     return (
-        (xd_bob * xd_bob + s1 * s1) * k4,
+        (xd_bob * xd_bob + s1 * s1) * k5,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """4 operations: 2 mul, 1 neg, 1 sin."""
-    pivot_r_child_x, k5 = k
+    pivot_r_child_x, k6 = k
     theta, _ = y
     return (
-        -pivot_r_child_x * sin(theta) * k5,
+        -k6 * (pivot_r_child_x * sin(theta)),
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos):
     """4 operations: 3 mul, 1 cos."""
-    pivot_r_child_x, k5 = k
+    pivot_r_child_x, k6 = k
     theta, theta_dot = y
     return (
-        pivot_r_child_x * (theta_dot * cos(theta)) * k5,
+        k6 * (pivot_r_child_x * (theta_dot * cos(theta))),
     )
 
 
@@ -294,16 +293,16 @@ def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """15 operations: 1 add, 2 sub, 9 mul, 1 neg, 1 sin, 1 cos."""
-    k6, k1, k2, k5 = k
+    """14 operations: 1 add, 2 sub, 8 mul, 1 neg, 1 sin, 1 cos."""
+    k7, k6, k1 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
-    alpha_bob = cos_theta * k1 * k2
+    alpha_bob = cos_theta * k1
     sin_theta = sin(theta)
     theta_dot_squared = theta_dot * theta_dot
     return (
-        -k6 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
-        k6 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k5,
+        -k7 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
+        k7 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k6,
         0.0,
     )
 
@@ -331,18 +330,17 @@ def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), cos=cos):
-    """9 operations: 2 sub, 6 mul, 1 cos."""
-    k1, k7, k8, k9, k10, k11 = k
+    """4 operations: 3 mul, 1 cos."""
+    k8, k9, k10 = k
     theta, _ = y
     cos_theta = cos(theta)
-    load_bob = cos_theta * k1
     return (
         0.0,
         0.0,
         0.0,
-        cos_theta * k8 - load_bob * k7,
-        cos_theta * k10 - load_bob * k9,
-        cos_theta * k11,
+        cos_theta * k8,
+        cos_theta * k9,
+        cos_theta * k10,
     )
 
 

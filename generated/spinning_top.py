@@ -19,7 +19,7 @@ Parameters p, with the scene's values:
     g = 9.81        m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 49 operations: 10 add, 5 sub, 32 mul, 1 div, 1 neg; 12 more on
+One call of `derivative` takes 48 operations: 10 add, 5 sub, 31 mul, 1 div, 1 neg; 12 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -80,10 +80,10 @@ JOINTS = ('tip',)
 POINTS = ('peg',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 10, "sub": 5, "mul": 32, "div": 1, "neg": 1, "total": 49, "parameters": 12},
-    "jacobian": {"add": 6, "sub": 7, "mul": 52, "div": 5, "neg": 8, "total": 78, "parameters": 12},
-    "parameter_jacobian": {"add": 9, "sub": 2, "mul": 29, "div": 1, "neg": 4, "total": 45, "parameters": 41},
-    "forward_dynamics": {"add": 7, "sub": 2, "mul": 20, "div": 1, "total": 30, "parameters": 14},
+    "derivative": {"add": 10, "sub": 5, "mul": 31, "div": 1, "neg": 1, "total": 48, "parameters": 12},
+    "jacobian": {"add": 6, "sub": 7, "mul": 44, "div": 5, "neg": 8, "total": 70, "parameters": 12},
+    "parameter_jacobian": {"add": 9, "sub": 2, "mul": 29, "div": 1, "neg": 4, "total": 45, "parameters": 40},
+    "forward_dynamics": {"add": 7, "sub": 2, "mul": 19, "div": 1, "total": 29, "parameters": 14},
     "inverse_dynamics": {"add": 7, "sub": 2, "mul": 20, "div": 1, "total": 30, "parameters": 9},
     "mass_matrix": {"total": 0, "parameters": 3},
     "velocity_force": {"mul": 4, "total": 4, "parameters": 6},
@@ -95,7 +95,7 @@ COST = {
     "effect_powers": {"add": 11, "sub": 5, "mul": 27, "div": 1, "neg": 1, "total": 45, "parameters": 1},
     "momentum": {"add": 15, "sub": 9, "mul": 36, "div": 1, "total": 61, "parameters": 3},
     "centre_of_mass": {"add": 5, "sub": 2, "mul": 18, "div": 4, "total": 29, "parameters": 0},
-    "joint_forces": {"add": 66, "sub": 16, "mul": 133, "div": 2, "neg": 6, "total": 223, "parameters": 12},
+    "joint_forces": {"add": 66, "sub": 16, "mul": 132, "div": 2, "neg": 6, "total": 222, "parameters": 12},
     "body_poses": {"add": 9, "sub": 6, "mul": 19, "div": 1, "total": 35, "parameters": 0},
     "body_velocities": {"add": 15, "sub": 9, "mul": 34, "div": 1, "total": 59, "parameters": 0},
     "point_positions": {"add": 5, "sub": 2, "mul": 15, "div": 1, "total": 23, "parameters": 2},
@@ -133,14 +133,13 @@ def _fixed(m, h, I_1, I_3, g):
     k16 = k21 + (I_1 - I_3)
     k1 = k16 / pivot_tip_wy
     moment_top_z = m * h
-    k17 = g * moment_top_z
-    k2 = k17 / pivot_tip_wy
-    k18 = I_3 - I_1 - k21
-    k3 = k18 / pivot_tip_wy
+    k2 = g * moment_top_z / pivot_tip_wy
+    k17 = I_3 - I_1 - k21
+    k3 = k17 / pivot_tip_wy
     k4 = (h_squared - h_squared * k1) / pivot_tip_wy
     k5 = (h * g - h_squared * k2) / pivot_tip_wy
     k6 = (h_squared + h_squared * k3) / pivot_tip_wy
-    k22 = m * (h * 2.0)
+    k22 = 2.0 * moment_top_z
     k7 = (k22 - k1 * k22) / pivot_tip_wy
     k19 = m * g
     k8 = (k19 - k2 * k22) / pivot_tip_wy
@@ -151,6 +150,7 @@ def _fixed(m, h, I_1, I_3, g):
     k13 = 1.0 / pivot_tip_wy
     k14 = moment_top_z / pivot_tip_wy
     k15 = 1.0 / I_3
+    k18 = h * k19
     inertia_top_xx = I_1 + h * moment_top_z
     k20 = h + h * 0.9
     return {
@@ -161,8 +161,8 @@ def _fixed(m, h, I_1, I_3, g):
         "forward_dynamics": (k1, k2, k3, k13, k15),
         "inverse_dynamics": (I_3, pivot_tip_wy, k16, k17, k18),
         "mass_matrix": (I_3, pivot_tip_wy),
-        "velocity_force": (k16, k18),
-        "gravity_force": (k17,),
+        "velocity_force": (k16, k17),
+        "gravity_force": (k18,),
         "bias_force": (k16, k17, k18),
         "applied_force": (),
         "kinetic_energy": (m, h, I_1, I_3),
@@ -228,48 +228,47 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=()):
-    """49 operations: 10 add, 5 sub, 32 mul, 1 div, 1 neg."""
+    """48 operations: 10 add, 5 sub, 31 mul, 1 div, 1 neg."""
     k1, k2, k3 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    k_top = 2.0 * (1.0 / s1)
-    s2 = tip_wx * 0.5
-    s3 = tip_wy * 0.5
-    s4 = tip_wz * 0.5
+    s2 = 2.0 * (1.0 / s1) * k2
+    s3 = tip_wx * 0.5
+    s4 = tip_wy * 0.5
+    s5 = tip_wz * 0.5
     return (
-        -(tip_qx * s2 + tip_qy * s3 + tip_qz * s4),
-        tip_qw * s2 + tip_qy * s4 - tip_qz * s3,
-        tip_qw * s3 + tip_qz * s2 - tip_qx * s4,
-        tip_qw * s4 + tip_qx * s3 - tip_qy * s2,
-        k1 * (tip_wy * tip_wz) + k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k2,
-        k3 * (tip_wx * tip_wz) - k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k2,
+        -(tip_qx * s3 + tip_qy * s4 + tip_qz * s5),
+        tip_qw * s3 + tip_qy * s5 - tip_qz * s4,
+        tip_qw * s4 + tip_qz * s3 - tip_qx * s5,
+        tip_qw * s5 + tip_qx * s4 - tip_qy * s3,
+        k1 * (tip_wy * tip_wz) + (tip_qw * tip_qx + tip_qy * tip_qz) * s2,
+        k3 * (tip_wx * tip_wz) - (tip_qx * tip_qz - tip_qw * tip_qy) * s2,
         0.0,
     )
 
 
 def _jacobian(y, k, u=(), extra=()):
-    """78 operations: 6 add, 7 sub, 52 mul, 5 div, 8 neg."""
+    """70 operations: 6 add, 7 sub, 44 mul, 5 div, 8 neg."""
     k1, k2, k3 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s5 = 1.0 / s1
-    k_top = 2.0 * s5
+    k_top = 2.0 * (1.0 / s1)
     s6 = tip_qx * tip_qz - tip_qw * tip_qy
     s7 = tip_qw * tip_qx + tip_qy * tip_qz
-    s2 = tip_wx * 0.5
-    s3 = tip_wy * 0.5
-    s4 = tip_wz * 0.5
-    s8 = 2.0 * (s5 * (tip_qw * 2.0) / s1)
-    s9 = tip_qy * k_top
-    s10 = tip_qx * k_top
-    s11 = 2.0 * (s5 * (tip_qx * 2.0) / s1)
-    s12 = tip_qz * k_top
-    s13 = tip_qw * k_top
-    s14 = -s2
-    s15 = -s4
-    s16 = 2.0 * (s5 * (tip_qy * 2.0) / s1)
-    s17 = -s3
-    s18 = 2.0 * (s5 * (tip_qz * 2.0) / s1)
+    s3 = tip_wx * 0.5
+    s4 = tip_wy * 0.5
+    s5 = tip_wz * 0.5
+    s8 = tip_qw * k_top
+    s9 = 2.0 * (s8 / s1)
+    s10 = tip_qy * k_top
+    s11 = tip_qx * k_top
+    s12 = 2.0 * (s11 / s1)
+    s13 = tip_qz * k_top
+    s14 = -s3
+    s15 = -s5
+    s16 = 2.0 * (s10 / s1)
+    s17 = -s4
+    s18 = 2.0 * (s13 / s1)
     s19 = tip_qx * 0.5
     s20 = -s19
     s21 = tip_qw * 0.5
@@ -285,38 +284,38 @@ def _jacobian(y, k, u=(), extra=()):
         s20,
         s24,
         s25,
-        s2,
+        s3,
         0.0,
-        s4,
+        s5,
         s17,
         s21,
         s25,
         s23,
-        s3,
+        s4,
         s15,
         0.0,
-        s2,
+        s3,
         s22,
         s21,
         s20,
+        s5,
         s4,
-        s3,
         s14,
         0.0,
         s24,
         s19,
         s21,
-        k2 * (s10 - s7 * s8),
-        k2 * (s13 - s7 * s11),
-        k2 * (s12 - s7 * s16),
-        k2 * (s9 - s7 * s18),
+        k2 * (s11 - s7 * s9),
+        k2 * (s8 - s7 * s12),
+        k2 * (s13 - s7 * s16),
+        k2 * (s10 - s7 * s18),
         0.0,
         tip_wz * k1,
         tip_wy * k1,
-        k2 * (s6 * s8 + s9),
-        -k2 * (s12 - s6 * s11),
-        k2 * (s13 + s6 * s16),
-        -k2 * (s10 - s6 * s18),
+        k2 * (s6 * s9 + s10),
+        -k2 * (s13 - s6 * s12),
+        k2 * (s8 + s6 * s16),
+        -k2 * (s11 - s6 * s18),
         tip_wz * k3,
         0.0,
         tip_wx * k3,
@@ -380,15 +379,15 @@ def _parameter_jacobian(y, k, u=(), extra=()):
 
 
 def _forward_dynamics(y, k, u=(), extra=()):
-    """30 operations: 7 add, 2 sub, 20 mul, 1 div."""
+    """29 operations: 7 add, 2 sub, 19 mul, 1 div."""
     k1, k2, k3, k13, k15 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     tau__tip_wx, tau__tip_wy, tau__tip_wz = extra
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    k_top = 2.0 * (1.0 / s1)
+    s2 = 2.0 * (1.0 / s1) * k2
     return (
-        k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k2 + (k1 * (tip_wy * tip_wz) + k13 * tau__tip_wx),
-        k3 * (tip_wx * tip_wz) + k13 * tau__tip_wy - k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k2,
+        (tip_qw * tip_qx + tip_qy * tip_qz) * s2 + (k1 * (tip_wy * tip_wz) + k13 * tau__tip_wx),
+        k3 * (tip_wx * tip_wz) + k13 * tau__tip_wy - (tip_qx * tip_qz - tip_qw * tip_qy) * s2,
         tau__tip_wz * k15,
     )
 
@@ -401,8 +400,8 @@ def _inverse_dynamics(y, k, u=(), extra=()):
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
     k_top = 2.0 * (1.0 / s1)
     return (
-        pivot_tip_wy * vd__tip_wx + tip_wy * tip_wz * k18 - k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k17,
-        k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k17 + (pivot_tip_wy * vd__tip_wy + k16 * (tip_wx * tip_wz)),
+        pivot_tip_wy * vd__tip_wx + tip_wy * tip_wz * k17 - k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k18,
+        k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k18 + (pivot_tip_wy * vd__tip_wy + k16 * (tip_wx * tip_wz)),
         I_3 * vd__tip_wz,
     )
 
@@ -425,10 +424,10 @@ def _mass_matrix(y, k, u=(), extra=()):
 
 def _velocity_force(y, k, u=(), extra=()):
     """4 operations: 4 mul."""
-    k16, k18 = k
+    k16, k17 = k
     _, _, _, _, tip_wx, tip_wy, tip_wz = y
     return (
-        tip_wy * tip_wz * k18,
+        tip_wy * tip_wz * k17,
         k16 * (tip_wx * tip_wz),
         0.0,
     )
@@ -436,13 +435,13 @@ def _velocity_force(y, k, u=(), extra=()):
 
 def _gravity_force(y, k, u=(), extra=()):
     """20 operations: 4 add, 1 sub, 13 mul, 1 div, 1 neg."""
-    k17, = k
+    k18, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
     k_top = 2.0 * (1.0 / s1)
     return (
-        -k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k17,
-        k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k17,
+        -k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k18,
+        k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k18,
         0.0,
     )
 
@@ -454,8 +453,8 @@ def _bias_force(y, k, u=(), extra=()):
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
     k_top = 2.0 * (1.0 / s1)
     return (
-        tip_wy * tip_wz * k18 - k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k17,
-        k16 * (tip_wx * tip_wz) + k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k17,
+        tip_wy * tip_wz * k17 - k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k18,
+        k16 * (tip_wx * tip_wz) + k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k18,
         0.0,
     )
 
@@ -568,15 +567,15 @@ def _centre_of_mass(y, k, u=(), extra=()):
 
 
 def _joint_forces(y, k, u=(), extra=()):
-    """223 operations: 66 add, 16 sub, 133 mul, 2 div, 6 neg."""
+    """222 operations: 66 add, 16 sub, 132 mul, 2 div, 6 neg."""
     m, h, I_1, I_3, g, k1, k2, k3 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    k_top = 2.0 * (1.0 / s1)
     s26 = tip_wy * tip_wz
-    tip_wx_dot = k1 * s26 + k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k2
+    s2 = 2.0 * (1.0 / s1) * k2
+    tip_wx_dot = k1 * s26 + (tip_qw * tip_qx + tip_qy * tip_qz) * s2
     s27 = tip_wx * tip_wz
-    tip_wy_dot = k3 * s27 - k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k2
+    tip_wy_dot = k3 * s27 - (tip_qx * tip_qz - tip_qw * tip_qy) * s2
     s31 = 2.0 / s1
     s32 = tip_qx * s31
     s33 = tip_qy * s31

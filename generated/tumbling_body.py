@@ -25,7 +25,7 @@ Parameters p, with the scene's values:
     stem_at_y = 0.0833           m       point from the centre of mass of stem, y
 
 Effects: none.
-One call of `derivative` takes 33 operations: 5 add, 3 sub, 24 mul, 1 neg; 6 more on parameters
+One call of `derivative` takes 30 operations: 5 add, 3 sub, 21 mul, 1 neg; 9 more on parameters
 alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -98,9 +98,9 @@ JOINTS = ()
 POINTS = ('stem',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 5, "sub": 3, "mul": 24, "neg": 1, "total": 33, "parameters": 6},
+    "derivative": {"add": 5, "sub": 3, "mul": 21, "neg": 1, "total": 30, "parameters": 9},
     "jacobian": {"mul": 13, "neg": 6, "total": 19, "parameters": 9},
-    "parameter_jacobian": {"mul": 12, "neg": 6, "total": 18, "parameters": 9},
+    "parameter_jacobian": {"mul": 9, "neg": 6, "total": 15, "parameters": 12},
     "forward_dynamics": {"add": 3, "mul": 12, "total": 15, "parameters": 7},
     "inverse_dynamics": {"add": 3, "mul": 12, "total": 15, "parameters": 3},
     "mass_matrix": {"total": 0, "parameters": 0},
@@ -141,28 +141,28 @@ def _fixed(m, I_1, I_2, I_3, stem_at_y):
         return "inertia_com yy of nut is negative"
     if not I_3 >= 0.0:
         return "inertia_com zz of nut is negative"
-    k1 = I_2 - I_3
-    k2 = 1.0 / I_1
-    k3 = I_3 - I_1
-    k4 = 1.0 / I_2
-    k5 = I_1 - I_2
+    k10 = I_2 - I_3
+    k4 = 1.0 / I_1
+    k1 = k10 * k4
+    k11 = I_3 - I_1
+    k5 = 1.0 / I_2
+    k2 = k11 * k5
+    k12 = I_1 - I_2
     k6 = 1.0 / I_3
-    k7 = k3 * k4
-    k8 = k5 * k6
-    k9 = k1 * k2
-    k10 = k2 / I_1
-    k11 = k4 / I_2
-    k12 = k6 / I_3
+    k3 = k12 * k6
+    k7 = k10 * (k4 / I_1)
+    k8 = k11 * (k5 / I_2)
+    k9 = k12 * (k6 / I_3)
     k13 = 1.0 / m
     k14 = I_3 - I_2
     k15 = I_1 - I_3
     k16 = I_2 - I_1
     return {
         "initial_state": (),
-        "derivative": (k1, k2, k3, k4, k5, k6),
-        "jacobian": (k7, k8, k9),
-        "parameter_jacobian": (k1, k2, k3, k4, k5, k6, k10, k11, k12),
-        "forward_dynamics": (k1, k2, k3, k4, k5, k6, k13),
+        "derivative": (k1, k2, k3),
+        "jacobian": (k1, k2, k3),
+        "parameter_jacobian": (k4, k5, k6, k7, k8, k9),
+        "forward_dynamics": (k10, k4, k11, k5, k12, k6, k13),
         "inverse_dynamics": (m, I_1, I_2, I_3, k14, k15, k16),
         "mass_matrix": (m, I_1, I_2, I_3),
         "velocity_force": (k14, k15, k16),
@@ -238,8 +238,8 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=()):
-    """33 operations: 5 add, 3 sub, 24 mul, 1 neg."""
-    k1, k2, k3, k4, k5, k6 = k
+    """30 operations: 5 add, 3 sub, 21 mul, 1 neg."""
+    k1, k2, k3 = k
     _, _, _, nut_qw, nut_qx, nut_qy, nut_qz, nut_x_dot, nut_y_dot, nut_z_dot, nut_wx, nut_wy, nut_wz = y
     s1 = nut_wx * 0.5
     s2 = nut_wy * 0.5
@@ -255,15 +255,15 @@ def _derivative(y, k, u=(), extra=()):
         0.0,
         0.0,
         0.0,
-        k1 * (nut_wy * nut_wz) * k2,
-        k3 * (nut_wx * nut_wz) * k4,
-        k5 * (nut_wx * nut_wy) * k6,
+        nut_wy * nut_wz * k1,
+        nut_wx * nut_wz * k2,
+        nut_wx * nut_wy * k3,
     )
 
 
 def _jacobian(y, k, u=(), extra=()):
     """19 operations: 13 mul, 6 neg."""
-    k7, k8, k9 = k
+    k1, k2, k3 = k
     _, _, _, nut_qw, nut_qx, nut_qy, nut_qz, _, _, _, nut_wx, nut_wy, nut_wz = y
     s1 = nut_wx * 0.5
     s2 = nut_wy * 0.5
@@ -420,8 +420,8 @@ def _jacobian(y, k, u=(), extra=()):
         0.0,
         0.0,
         0.0,
-        nut_wz * k9,
-        nut_wy * k9,
+        nut_wz * k1,
+        nut_wy * k1,
         0.0,
         0.0,
         0.0,
@@ -432,11 +432,9 @@ def _jacobian(y, k, u=(), extra=()):
         0.0,
         0.0,
         0.0,
-        nut_wz * k7,
+        nut_wz * k2,
         0.0,
-        nut_wx * k7,
-        0.0,
-        0.0,
+        nut_wx * k2,
         0.0,
         0.0,
         0.0,
@@ -445,22 +443,24 @@ def _jacobian(y, k, u=(), extra=()):
         0.0,
         0.0,
         0.0,
-        nut_wy * k8,
-        nut_wx * k8,
+        0.0,
+        0.0,
+        nut_wy * k3,
+        nut_wx * k3,
         0.0,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=()):
-    """18 operations: 12 mul, 6 neg."""
-    k1, k2, k3, k4, k5, k6, k10, k11, k12 = k
+    """15 operations: 9 mul, 6 neg."""
+    k4, k5, k6, k7, k8, k9 = k
     _, _, _, _, _, _, _, _, _, _, nut_wx, nut_wy, nut_wz = y
     s14 = nut_wy * nut_wz
     s15 = nut_wx * nut_wz
     s16 = nut_wx * nut_wy
-    s17 = s15 * k4
+    s17 = s15 * k5
     s18 = s16 * k6
-    s19 = s14 * k2
+    s19 = s14 * k4
     return (
         0.0,
         0.0,
@@ -513,35 +513,35 @@ def _parameter_jacobian(y, k, u=(), extra=()):
         0.0,
         0.0,
         0.0,
-        -k1 * s14 * k10,
+        -s14 * k7,
         s19,
         -s19,
         0.0,
         0.0,
         -s17,
-        -k3 * s15 * k11,
+        -s15 * k8,
         s17,
         0.0,
         0.0,
         s18,
         -s18,
-        -k5 * s16 * k12,
+        -s16 * k9,
         0.0,
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=()):
     """15 operations: 3 add, 12 mul."""
-    k1, k2, k3, k4, k5, k6, k13 = k
+    k10, k4, k11, k5, k12, k6, k13 = k
     _, _, _, _, _, _, _, _, _, _, nut_wx, nut_wy, nut_wz = y
     tau__nut_x_dot, tau__nut_y_dot, tau__nut_z_dot, tau__nut_wx, tau__nut_wy, tau__nut_wz = extra
     return (
         tau__nut_x_dot * k13,
         tau__nut_y_dot * k13,
         tau__nut_z_dot * k13,
-        k2 * (k1 * (nut_wy * nut_wz) + tau__nut_wx),
-        k4 * (k3 * (nut_wx * nut_wz) + tau__nut_wy),
-        k6 * (k5 * (nut_wx * nut_wy) + tau__nut_wz),
+        k4 * (k10 * (nut_wy * nut_wz) + tau__nut_wx),
+        k5 * (k11 * (nut_wx * nut_wz) + tau__nut_wy),
+        k6 * (k12 * (nut_wx * nut_wy) + tau__nut_wz),
     )
 
 

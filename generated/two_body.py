@@ -22,7 +22,7 @@ Parameters p, with the scene's values:
     g = 9.81    m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 46 operations: 10 add, 3 sub, 25 mul, 1 div, 1 neg, 3 sin, 3 cos; 37
+One call of `derivative` takes 46 operations: 10 add, 3 sub, 25 mul, 1 div, 1 neg, 3 sin, 3 cos; 35
 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -89,13 +89,13 @@ JOINTS = ('hinge',)
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 10, "sub": 3, "mul": 25, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 46, "parameters": 37},
-    "jacobian": {"add": 24, "sub": 13, "mul": 79, "div": 4, "neg": 3, "sin": 3, "cos": 3, "total": 129, "parameters": 38},
-    "forward_dynamics": {"add": 12, "sub": 10, "mul": 33, "div": 1, "sin": 3, "cos": 3, "total": 62, "parameters": 38},
+    "derivative": {"add": 10, "sub": 3, "mul": 25, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 46, "parameters": 35},
+    "jacobian": {"add": 24, "sub": 13, "mul": 79, "div": 4, "neg": 3, "sin": 3, "cos": 3, "total": 129, "parameters": 36},
+    "forward_dynamics": {"add": 12, "sub": 10, "mul": 33, "div": 1, "sin": 3, "cos": 3, "total": 62, "parameters": 36},
     "inverse_dynamics": {"add": 19, "sub": 8, "mul": 37, "sin": 3, "cos": 3, "total": 70, "parameters": 20},
     "mass_matrix": {"add": 5, "mul": 6, "neg": 2, "sin": 2, "cos": 3, "total": 18, "parameters": 15},
     "velocity_force": {"add": 4, "sub": 1, "mul": 14, "neg": 2, "sin": 3, "cos": 2, "total": 26, "parameters": 3},
-    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 7},
+    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 5},
     "bias_force": {"add": 6, "sub": 3, "mul": 16, "neg": 1, "sin": 3, "cos": 2, "total": 31, "parameters": 8},
     "applied_force": {"total": 0, "parameters": 0},
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
@@ -103,7 +103,7 @@ COST = {
     "effect_powers": {"add": 5, "mul": 6, "neg": 1, "cos": 2, "total": 14, "parameters": 2},
     "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
-    "joint_forces": {"add": 9, "sub": 2, "mul": 25, "div": 1, "sin": 3, "cos": 3, "total": 43, "parameters": 36},
+    "joint_forces": {"add": 9, "sub": 2, "mul": 25, "div": 1, "sin": 3, "cos": 3, "total": 43, "parameters": 34},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 0},
     "body_velocities": {"add": 4, "sub": 2, "mul": 8, "sin": 2, "cos": 2, "total": 18, "parameters": 0},
     "parameter_jacobian": {"add": 45, "sub": 27, "mul": 140, "div": 7, "neg": 6, "sin": 3, "cos": 3, "total": 231, "parameters": 129},
@@ -126,24 +126,22 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g):
     k49 = l_B_squared * k48
     k50 = k49 / mass_A
     pivot_B = I_B + k50
-    k51 = m_A * I_B
-    k52 = m_B * I_B
-    k53 = k49 + (k51 + k52)
-    k54 = m_A * I_A
-    k55 = I_A * m_B
-    k56 = m_B * k54
+    k51 = k49 + I_B * mass_A
+    k52 = m_A * I_A
+    k53 = I_A * m_B
+    k54 = m_B * k52
     l_A_squared = l_A * l_A
-    k57 = I_B * k48
-    k58 = k54 + k55
-    k1 = (l_A_squared * k57 + (l_B_squared * k56 + I_B * k58)) / k53
+    k55 = I_B * k48
+    k56 = k52 + k53
+    k1 = (l_A_squared * k55 + (l_B_squared * k54 + I_B * k56)) / k51
     m_A_squared = m_A * m_A
     m_B_squared = m_B * m_B
-    k59 = l_B_squared * l_A_squared
-    k60 = m_A_squared * k59
-    k61 = mass_A * k53
-    k2 = m_B_squared * k60 / k61
-    k62 = l_A * k48
-    k3 = l_B * k62 / mass_A
+    k57 = l_B_squared * l_A_squared
+    k58 = m_A_squared * k57
+    k59 = mass_A * k51
+    k2 = m_B_squared * k58 / k59
+    k60 = l_A * k48
+    k3 = l_B * k60 / mass_A
     k4 = 1.0 / pivot_B
     k9 = m_B * l_A
     k5 = k9 / mass_A
@@ -154,48 +152,48 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g):
     k22 = m_A * g
     k23 = m_B * g
     k11 = k22 + k23
-    k63 = m_B * l_B_squared
+    k61 = m_B * l_B_squared
     k12 = l_B * k9
-    k13 = I_B + k63
-    k64 = m_B * 2.0
-    k14 = k64 * (l_A * l_B)
-    k15 = I_B + (I_A + (k63 + m_B * l_A_squared))
-    k16 = g * k9
-    k17 = g * k10
+    k13 = I_B + k61
+    k62 = m_B * 2.0
+    k14 = k62 * (l_A * l_B)
+    k15 = I_B + (I_A + (k61 + m_B * l_A_squared))
+    k16 = l_A * k23
+    k17 = l_B * k23
     k18 = I_A / 2.0
     k19 = I_B / 2.0
     k20 = m_A / 2.0
     k21 = m_B / 2.0
-    k24 = k62 / mass_A
+    k24 = k60 / mass_A
     k25 = l_B * k48 / mass_A
-    k65 = I_A * I_B
-    k26 = (k52 * l_A_squared + (k65 + l_B_squared * k55) - k1 * k13) / k53
-    k27 = (m_B_squared * (k59 * (m_A * 2.0)) - k2 * (k53 + mass_A * k13)) / k61
+    k63 = I_A * I_B
+    k26 = (m_B * I_B * l_A_squared + (k63 + l_B_squared * k53) - k1 * k13) / k51
+    k27 = (m_B_squared * (k57 * (m_A * 2.0)) - k2 * (k51 + mass_A * k13)) / k59
     k28 = (k12 - k3) / mass_A
-    k29 = k4 * ((k63 - k50) / mass_A) / pivot_B
+    k29 = k4 * ((k61 - k50) / mass_A) / pivot_B
     k30 = k5 / mass_A
     k31 = k6 / mass_A
-    k32 = k53 / k53
-    k66 = m_A * l_B_squared
-    k67 = I_B + k66
-    k33 = (k51 * l_A_squared + (k65 + l_B_squared * k54) - k1 * k67) / k53
-    k34 = (k60 * k64 - k2 * (k53 + mass_A * k67)) / k61
+    k32 = k51 / k51
+    k64 = m_A * l_B_squared
+    k65 = I_B + k64
+    k33 = (m_A * I_B * l_A_squared + (k63 + l_B_squared * k52) - k1 * k65) / k51
+    k34 = (k58 * k62 - k2 * (k51 + mass_A * k65)) / k59
     k35 = (l_B * (m_A * l_A) - k3) / mass_A
-    k36 = k4 * ((k66 - k50) / mass_A) / pivot_B
+    k36 = k4 * ((k64 - k50) / mass_A) / pivot_B
     k37 = (l_A - k5) / mass_A
     k38 = (l_B - k6) / mass_A
-    k39 = (k58 + k48 * l_A_squared - mass_A * k1) / k53
-    k40 = k2 * (mass_A * mass_A) / k61
+    k39 = (k56 + k48 * l_A_squared - mass_A * k1) / k51
+    k40 = k2 * (mass_A * mass_A) / k59
     k41 = k4 / pivot_B
-    k68 = l_A * 2.0
-    k42 = k57 * k68 / k53
-    k43 = m_B_squared * (m_A_squared * (l_B_squared * k68)) / k61
+    k66 = l_A * 2.0
+    k42 = k55 * k66 / k51
+    k43 = m_B_squared * (m_A_squared * (l_B_squared * k66)) / k59
     k44 = m_B / mass_A
-    k69 = l_B * 2.0
-    k70 = k48 * k69
-    k45 = (k56 * k69 - k1 * k70) / k53
-    k46 = (m_B_squared * (m_A_squared * (l_A_squared * k69)) - k2 * (mass_A * k70)) / k61
-    k47 = k4 * (k70 / mass_A) / pivot_B
+    k67 = l_B * 2.0
+    k68 = k48 * k67
+    k45 = (k54 * k67 - k1 * k68) / k51
+    k46 = (m_B_squared * (m_A_squared * (l_A_squared * k67)) - k2 * (mass_A * k68)) / k59
+    k47 = k4 * (k68 / mass_A) / pivot_B
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6),
@@ -438,24 +436,23 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta_phi = sin(s1)
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s27 = sin_phi * theta_dot_squared
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s28 = sin_theta * k9 + sin_theta_phi * k10
-    s29 = x_A_ddot * mass_A - theta_ddot * s28 - k9 * (theta_dot_squared * cos_theta)
-    s30 = cos_theta * k9 + cos_theta_phi * k10
-    s31 = k10 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s30 + k11))
-    s32 = cos_phi * k12 + k13
-    s33 = y_A_ddot * s30 + (phi_ddot * s32 + theta_ddot * (cos_phi * k14 + k15)) - x_A_ddot * s28
-    s34 = cos_theta_phi * k17
-    s35 = k10 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s34 + (theta_ddot * s32 + phi_ddot * k13))
+    s27 = sin_theta * k9 + sin_theta_phi * k10
+    s28 = x_A_ddot * mass_A - theta_ddot * s27 - k9 * (theta_dot_squared * cos_theta)
+    s29 = cos_theta * k9 + cos_theta_phi * k10
+    s30 = k10 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s29 + k11))
+    s31 = cos_phi * k12 + k13
+    s32 = y_A_ddot * s29 + (phi_ddot * s31 + theta_ddot * (cos_phi * k14 + k15)) - x_A_ddot * s27
+    s33 = cos_theta_phi * k17
+    s34 = k10 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s33 + (theta_ddot * s31 + phi_ddot * k13))
     return (
-        s29 - k10 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
-        s31 - k9 * (theta_dot_squared * sin_theta),
-        k12 * (s27 - sin_phi * omega_B_squared) + (s34 + (s33 + cos_theta * k16)),
-        s27 * k12 + s35,
+        s28 - k10 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
+        s30 - k9 * (theta_dot_squared * sin_theta),
+        k12 * (sin_phi * (theta_dot_squared - omega_B_squared)) + (s33 + (s32 + cos_theta * k16)),
+        sin_phi * theta_dot_squared * k12 + s34,
     )
 
 
@@ -465,28 +462,28 @@ def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
     _, _, theta, phi, _, _, _, _ = y
     cos_phi = cos(phi)
     s1 = theta + phi
-    s36 = sin(s1) * k10
-    s37 = -s36
-    s38 = -(sin(theta) * k9 + s36)
-    s39 = cos(s1) * k10
-    s30 = cos(theta) * k9 + s39
-    s32 = cos_phi * k12 + k13
+    s35 = sin(s1) * k10
+    s36 = -s35
+    s37 = -(sin(theta) * k9 + s35)
+    s38 = cos(s1) * k10
+    s29 = cos(theta) * k9 + s38
+    s31 = cos_phi * k12 + k13
     return (
         mass_A,
         0.0,
-        s38,
         s37,
+        s36,
         0.0,
         mass_A,
-        s30,
-        s39,
+        s29,
         s38,
-        s30,
-        cos_phi * k14 + k15,
-        s32,
         s37,
-        s39,
-        s32,
+        s29,
+        cos_phi * k14 + k15,
+        s31,
+        s36,
+        s38,
+        s31,
         k13,
     )
 
@@ -498,16 +495,15 @@ def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_phi = sin(phi)
     s1 = theta + phi
     theta_dot_squared = theta_dot * theta_dot
-    s27 = sin_phi * theta_dot_squared
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s40 = k9 * (theta_dot_squared * cos(theta)) + k10 * (cos(s1) * omega_B_squared)
-    s41 = k9 * (theta_dot_squared * sin(theta)) + k10 * (sin(s1) * omega_B_squared)
+    s39 = k9 * (theta_dot_squared * cos(theta)) + k10 * (cos(s1) * omega_B_squared)
+    s40 = k9 * (theta_dot_squared * sin(theta)) + k10 * (sin(s1) * omega_B_squared)
     return (
+        -s39,
         -s40,
-        -s41,
-        k12 * (s27 - sin_phi * omega_B_squared),
-        s27 * k12,
+        k12 * (sin_phi * (theta_dot_squared - omega_B_squared)),
+        sin_phi * theta_dot_squared * k12,
     )
 
 
@@ -515,12 +511,12 @@ def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
     k11, k16, k17 = k
     _, _, theta, phi, _, _, _, _ = y
-    s34 = cos(theta + phi) * k17
+    s33 = cos(theta + phi) * k17
     return (
         0.0,
         k11,
-        cos(theta) * k16 + s34,
-        s34,
+        cos(theta) * k16 + s33,
+        s33,
     )
 
 
@@ -532,17 +528,16 @@ def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     s1 = theta + phi
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s27 = sin_phi * theta_dot_squared
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s34 = cos_theta_phi * k17
-    s40 = k9 * (theta_dot_squared * cos_theta) + k10 * (cos_theta_phi * omega_B_squared)
+    s33 = cos_theta_phi * k17
+    s39 = k9 * (theta_dot_squared * cos_theta) + k10 * (cos_theta_phi * omega_B_squared)
     return (
-        -s40,
+        -s39,
         k11 - k9 * (theta_dot_squared * sin(theta)) - k10 * (sin(s1) * omega_B_squared),
-        k12 * (s27 - sin_phi * omega_B_squared) + (cos_theta * k16 + s34),
-        s34 + s27 * k12,
+        k12 * (sin_phi * (theta_dot_squared - omega_B_squared)) + (cos_theta * k16 + s33),
+        s33 + sin_phi * theta_dot_squared * k12,
     )
 
 
@@ -564,9 +559,9 @@ def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
     omega_B = theta_dot + phi_dot
     xd_B = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
     yd_B = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
-    s42 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k20 + (theta_dot * theta_dot * k18 + omega_B * omega_B * k19)
+    s41 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k20 + (theta_dot * theta_dot * k18 + omega_B * omega_B * k19)
     return (
-        (xd_B * xd_B + yd_B * yd_B) * k21 + s42,
+        (xd_B * xd_B + yd_B * yd_B) * k21 + s41,
     )
 
 
@@ -601,12 +596,12 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     omega_B = theta_dot + phi_dot
     xd_B = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
     yd_B = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
-    s43 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
-    s44 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
+    s42 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
+    s43 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
         m_A * x_A_dot + m_B * xd_B,
         m_A * y_A_dot + m_B * yd_B,
-        m_B * s43 + s44,
+        m_B * s42 + s43,
     )
 
 
@@ -681,16 +676,16 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     k1, k2, k3, k4, k5, k6, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
-    s45 = sin_phi * sin_phi
-    pivot_A = k1 + s45 * k2
+    s44 = sin_phi * sin_phi
+    pivot_A = k1 + s44 * k2
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k3
     s1 = theta + phi
     sin_theta_phi = sin(s1)
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s27 = sin_phi * theta_dot_squared
-    s2 = k3 * s27
+    s45 = sin_phi * theta_dot_squared
+    s2 = k3 * s45
     s46 = coupling_B_A * s2
     sin_theta = sin(theta)
     cos_theta = cos(theta)
@@ -705,27 +700,27 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     s51 = theta_dot_squared * sin_theta - cos_theta * alpha_A
     s52 = sin_theta_phi * omega_B_squared + cos_theta_phi * s3
     s53 = cos_phi * k28
-    s54 = s27 * k28
-    s55 = k4 * (s2 * s53 + coupling_B_A * s54) - s46 * k29 + s47 * k28 - alpha_A * (k26 + s45 * k27)
+    s54 = s45 * k28
+    s55 = k4 * (s2 * s53 + coupling_B_A * s54) - s46 * k29 + s47 * k28 - alpha_A * (k26 + s44 * k27)
     s56 = s55 / pivot_A
     s57 = k4 * (s54 + (alpha_A * s53 + coupling_B_A * s56)) - s48 * k29
     s58 = alpha_A * k32 / pivot_A
     s59 = k4 * (coupling_B_A * s58)
     s60 = cos_phi * k35
-    s61 = s27 * k35
-    s62 = k4 * (s2 * s60 + coupling_B_A * s61) - s46 * k36 + s47 * k35 - alpha_A * (k33 + s45 * k34)
+    s61 = s45 * k35
+    s62 = k4 * (s2 * s60 + coupling_B_A * s61) - s46 * k36 + s47 * k35 - alpha_A * (k33 + s44 * k34)
     s63 = s62 / pivot_A
     s64 = k4 * (s61 + (alpha_A * s60 + coupling_B_A * s63)) - s48 * k36
-    s65 = (s46 * k41 + alpha_A * (k39 - s45 * k40)) / pivot_A
+    s65 = (s46 * k41 + alpha_A * (k39 - s44 * k40)) / pivot_A
     s66 = s48 * k41 + k4 * (coupling_B_A * s65)
     s67 = cos_phi * k25
-    s68 = s27 * k25
-    s69 = k4 * (s2 * s67 + coupling_B_A * s68) + s47 * k25 - alpha_A * (k42 + s45 * k43)
+    s68 = s45 * k25
+    s69 = k4 * (s2 * s67 + coupling_B_A * s68) + s47 * k25 - alpha_A * (k42 + s44 * k43)
     s70 = s69 / pivot_A
     s71 = k4 * (s68 + (alpha_A * s67 + coupling_B_A * s70))
     s72 = cos_phi * k24
-    s73 = s27 * k24
-    s74 = k4 * (s2 * s72 + coupling_B_A * s73) - s46 * k47 + s47 * k24 - alpha_A * (k45 + s45 * k46)
+    s73 = s45 * k24
+    s74 = k4 * (s2 * s72 + coupling_B_A * s73) - s46 * k47 + s47 * k24 - alpha_A * (k45 + s44 * k46)
     s75 = s74 / pivot_A
     s76 = k4 * (s73 + (alpha_A * s72 + coupling_B_A * s75)) - s48 * k47
     return (

@@ -31,7 +31,7 @@ Parameters p, with the scene's values:
     g = 9.81    m/s^2   gravitational acceleration
 
 Effects: gravity, external_force, external_force, motor.
-One call of `derivative` takes 74 operations: 16 add, 11 sub, 40 mul, 1 div, 3 sin, 3 cos; 49 more
+One call of `derivative` takes 74 operations: 16 add, 11 sub, 40 mul, 1 div, 3 sin, 3 cos; 47 more
 on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -112,13 +112,13 @@ JOINTS = ('hinge',)
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 16, "sub": 11, "mul": 40, "div": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 49},
-    "jacobian": {"add": 27, "sub": 34, "mul": 113, "div": 5, "neg": 2, "sin": 3, "cos": 3, "total": 187, "parameters": 49},
-    "forward_dynamics": {"add": 22, "sub": 13, "mul": 45, "div": 1, "sin": 3, "cos": 3, "total": 87, "parameters": 49},
+    "derivative": {"add": 16, "sub": 11, "mul": 40, "div": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 47},
+    "jacobian": {"add": 27, "sub": 34, "mul": 111, "div": 5, "neg": 2, "sin": 3, "cos": 3, "total": 185, "parameters": 47},
+    "forward_dynamics": {"add": 23, "sub": 12, "mul": 43, "div": 1, "sin": 3, "cos": 3, "total": 85, "parameters": 47},
     "inverse_dynamics": {"add": 27, "sub": 14, "mul": 47, "sin": 3, "cos": 3, "total": 94, "parameters": 20},
     "mass_matrix": {"add": 5, "mul": 6, "neg": 2, "sin": 2, "cos": 3, "total": 18, "parameters": 15},
     "velocity_force": {"add": 4, "sub": 1, "mul": 14, "neg": 2, "sin": 3, "cos": 2, "total": 26, "parameters": 3},
-    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 7},
+    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 6},
     "bias_force": {"add": 6, "sub": 3, "mul": 16, "neg": 1, "sin": 3, "cos": 2, "total": 31, "parameters": 8},
     "applied_force": {"add": 8, "sub": 3, "mul": 10, "sin": 2, "cos": 2, "total": 25, "parameters": 0},
     "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
@@ -126,10 +126,10 @@ COST = {
     "effect_powers": {"add": 9, "sub": 5, "mul": 19, "neg": 1, "sin": 2, "cos": 2, "total": 38, "parameters": 2},
     "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
-    "joint_forces": {"add": 14, "sub": 11, "mul": 42, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 75, "parameters": 52},
+    "joint_forces": {"add": 14, "sub": 11, "mul": 42, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 75, "parameters": 50},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 0},
     "body_velocities": {"add": 4, "sub": 2, "mul": 8, "sin": 2, "cos": 2, "total": 18, "parameters": 0},
-    "input_jacobian": {"add": 15, "sub": 16, "mul": 70, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 116, "parameters": 49},
+    "input_jacobian": {"add": 15, "sub": 16, "mul": 70, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 116, "parameters": 47},
     "parameter_jacobian": {"add": 52, "sub": 59, "mul": 193, "div": 9, "neg": 6, "sin": 3, "cos": 3, "total": 325, "parameters": 161},
 }
 
@@ -150,92 +150,90 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, d_A, d_B, g):
     k64 = l_B_squared * k63
     k65 = k64 / mass_A
     pivot_B = I_B + k65
-    k66 = m_A * I_B
-    k67 = m_B * I_B
-    k68 = k64 + (k66 + k67)
-    k69 = m_A * I_A
-    k70 = I_A * m_B
-    k71 = m_B * k69
+    k66 = k64 + I_B * mass_A
+    k67 = m_A * I_A
+    k68 = I_A * m_B
+    k69 = m_B * k67
     l_A_squared = l_A * l_A
-    k72 = I_B * k63
-    k73 = k69 + k70
-    k1 = (l_A_squared * k72 + (l_B_squared * k71 + I_B * k73)) / k68
+    k70 = I_B * k63
+    k71 = k67 + k68
+    k1 = (l_A_squared * k70 + (l_B_squared * k69 + I_B * k71)) / k66
     m_A_squared = m_A * m_A
     m_B_squared = m_B * m_B
-    k74 = l_B_squared * l_A_squared
-    k75 = m_A_squared * k74
-    k76 = mass_A * k68
-    k2 = m_B_squared * k75 / k76
+    k72 = l_B_squared * l_A_squared
+    k73 = m_A_squared * k72
+    k74 = mass_A * k66
+    k2 = m_B_squared * k73 / k74
     k3 = 1.0 / mass_A
-    k77 = l_A * k63
-    k4 = l_B * k77 / mass_A
+    k75 = l_A * k63
+    k4 = l_B * k75 / mass_A
     k5 = (m_A * l_B + d_B * mass_A) / mass_A
     k13 = m_B * l_B
     k6 = k13 / mass_A
     k7 = 1.0 / pivot_B
     k14 = m_B * l_A
-    k78 = d_A * mass_A
-    k8 = (k78 - k14) / mass_A
-    k9 = (k14 - k78) / mass_A
-    k79 = m_A * l_A
-    k10 = k79 / mass_A
+    k76 = d_A * mass_A
+    k8 = (k76 - k14) / mass_A
+    k9 = (k14 - k76) / mass_A
+    k77 = m_A * l_A
+    k10 = k77 / mass_A
     k11 = k14 / mass_A
     k12 = k2 * 2.0
     k26 = m_A * g
     k27 = m_B * g
     k15 = k26 + k27
-    k80 = m_B * l_B_squared
+    k78 = m_B * l_B_squared
     k16 = l_B * k14
-    k17 = I_B + k80
-    k81 = m_B * 2.0
-    k18 = k81 * (l_A * l_B)
-    k19 = I_B + (I_A + (k80 + m_B * l_A_squared))
+    k17 = I_B + k78
+    k79 = m_B * 2.0
+    k18 = k79 * (l_A * l_B)
+    k19 = I_B + (I_A + (k78 + m_B * l_A_squared))
     k20 = g * k14
-    k21 = g * k13
+    k21 = l_B * k27
     k22 = I_A / 2.0
     k23 = I_B / 2.0
     k24 = m_A / 2.0
     k25 = m_B / 2.0
     k28 = m_A / mass_A
     k29 = m_B / mass_A
-    k30 = k77 / mass_A
+    k30 = k75 / mass_A
     k31 = l_B * k63 / mass_A
-    k82 = I_A * I_B
-    k32 = (k67 * l_A_squared + (k82 + l_B_squared * k70) - k1 * k17) / k68
-    k33 = (m_B_squared * (k74 * (m_A * 2.0)) - k2 * (k68 + mass_A * k17)) / k76
+    k80 = I_A * I_B
+    k32 = (m_B * I_B * l_A_squared + (k80 + l_B_squared * k68) - k1 * k17) / k66
+    k33 = (m_B_squared * (k72 * (m_A * 2.0)) - k2 * (k66 + mass_A * k17)) / k74
     k34 = k3 / mass_A
     k35 = (k16 - k4) / mass_A
     k36 = (l_B + d_B - k5) / mass_A
     k37 = k6 / mass_A
-    k38 = k7 * ((k80 - k65) / mass_A) / pivot_B
+    k38 = k7 * ((k78 - k65) / mass_A) / pivot_B
     k39 = (d_A - k8) / mass_A
     k40 = (d_A + k9) / mass_A
     k41 = (l_A - k10) / mass_A
     k42 = k11 / mass_A
-    k43 = k68 / k68
-    k83 = m_A * l_B_squared
-    k84 = I_B + k83
-    k44 = (k66 * l_A_squared + (k82 + l_B_squared * k69) - k1 * k84) / k68
-    k45 = (k75 * k81 - k2 * (k68 + mass_A * k84)) / k76
-    k46 = (l_B * k79 - k4) / mass_A
+    k43 = k66 / k66
+    k81 = m_A * l_B_squared
+    k82 = I_B + k81
+    k44 = (m_A * I_B * l_A_squared + (k80 + l_B_squared * k67) - k1 * k82) / k66
+    k45 = (k73 * k79 - k2 * (k66 + mass_A * k82)) / k74
+    k46 = (l_B * k77 - k4) / mass_A
     k47 = (d_B - k5) / mass_A
     k48 = (l_B - k6) / mass_A
-    k49 = k7 * ((k83 - k65) / mass_A) / pivot_B
+    k49 = k7 * ((k81 - k65) / mass_A) / pivot_B
     k50 = (d_A - l_A - k8) / mass_A
     k51 = (l_A - d_A - k9) / mass_A
     k52 = k10 / mass_A
     k53 = (l_A - k11) / mass_A
-    k54 = (k73 + k63 * l_A_squared - mass_A * k1) / k68
-    k55 = k2 * (mass_A * mass_A) / k76
+    k54 = (k71 + k63 * l_A_squared - mass_A * k1) / k66
+    k55 = k2 * (mass_A * mass_A) / k74
     k56 = k7 / pivot_B
-    k85 = l_A * 2.0
-    k57 = k72 * k85 / k68
-    k58 = m_B_squared * (m_A_squared * (l_B_squared * k85)) / k76
-    k86 = l_B * 2.0
-    k87 = k63 * k86
-    k59 = (k71 * k86 - k1 * k87) / k68
-    k60 = (m_B_squared * (m_A_squared * (l_A_squared * k86)) - k2 * (mass_A * k87)) / k76
-    k61 = k7 * (k87 / mass_A) / pivot_B
+    k83 = l_A * 2.0
+    k57 = k70 * k83 / k66
+    k58 = m_B_squared * (m_A_squared * (l_B_squared * k83)) / k74
+    k84 = l_B * 2.0
+    k85 = k63 * k84
+    k59 = (k69 * k84 - k1 * k85) / k66
+    k60 = (m_B_squared * (m_A_squared * (l_A_squared * k84)) - k2 * (mass_A * k85)) / k74
+    k61 = k7 * (k85 / mass_A) / pivot_B
     k62 = mass_A / mass_A
     return {
         "initial_state": (),
@@ -340,7 +338,7 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """187 operations: 27 add, 34 sub, 113 mul, 5 div, 2 neg, 3 sin, 3 cos."""
+    """185 operations: 27 add, 34 sub, 111 mul, 5 div, 2 neg, 3 sin, 3 cos."""
     k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k12 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
@@ -364,29 +362,27 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
     s6 = sin_theta_phi * alpha_B
     s7 = cos_theta_phi * omega_B_squared
-    s8 = sin_theta_phi * omega_B_squared
-    s9 = cos_theta_phi * alpha_B
-    s10 = k6 * (f_A_x * cos_theta_phi + f_A_y * sin_theta_phi) - k5 * (f_B_y * sin_theta_phi + f_B_x * cos_theta_phi)
-    s11 = k9 * (f_A_x * cos_theta) - k8 * (f_A_y * sin_theta) - k10 * (f_B_y * sin_theta + f_B_x * cos_theta)
-    s12 = (s11 - k7 * (coupling_B_A * s10)) / pivot_A
-    s13 = k7 * (s10 - coupling_B_A * s12)
-    s14 = k11 * (cos_theta * alpha_A + sin_theta * s12 - theta_dot_squared * sin_theta)
-    s15 = k11 * (theta_dot_squared * cos_theta - (cos_theta * s12 - sin_theta * alpha_A))
-    s16 = sin_phi * k4
-    s17 = s10 - k4 * (cos_phi * theta_dot_squared)
-    s18 = k4 * (cos_phi * omega_B_squared) - k7 * (coupling_B_A * s17 - load_B * s16)
-    s19 = (s18 - alpha_A * (sin_phi * cos_phi * k12)) / pivot_A
-    s20 = k7 * (s17 - (coupling_B_A * s19 - alpha_A * s16))
-    s21 = theta_dot * 2.0
+    s8 = cos_theta_phi * alpha_B
+    s9 = k6 * (f_A_x * cos_theta_phi + f_A_y * sin_theta_phi) - k5 * (f_B_y * sin_theta_phi + f_B_x * cos_theta_phi)
+    s10 = k9 * (f_A_x * cos_theta) - k8 * (f_A_y * sin_theta) - k10 * (f_B_y * sin_theta + f_B_x * cos_theta)
+    s11 = (s10 - k7 * (coupling_B_A * s9)) / pivot_A
+    s12 = k7 * (s9 - coupling_B_A * s11)
+    s13 = k11 * (theta_dot_squared * cos_theta - (cos_theta * s11 - sin_theta * alpha_A))
+    s14 = sin_phi * k4
+    s15 = s9 - k4 * (cos_phi * theta_dot_squared)
+    s16 = k4 * (cos_phi * omega_B_squared) - k7 * (coupling_B_A * s15 - load_B * s14)
+    s17 = (s16 - alpha_A * (sin_phi * cos_phi * k12)) / pivot_A
+    s18 = k7 * (s15 - (coupling_B_A * s17 - alpha_A * s14))
+    s19 = theta_dot * 2.0
+    s20 = k4 * (sin_phi * s19)
+    s21 = omega_B * 2.0
     s22 = k4 * (sin_phi * s21)
-    s23 = omega_B * 2.0
-    s24 = k4 * (sin_phi * s23)
-    s25 = (k7 * (coupling_B_A * s22) + s24) / pivot_A
-    s26 = k7 * (s22 + coupling_B_A * s25)
-    s27 = cos_theta_phi * s23
-    s28 = sin_theta_phi * s23
-    s29 = s24 / pivot_A
-    s30 = k7 * (coupling_B_A * s29)
+    s23 = (k7 * (coupling_B_A * s20) + s22) / pivot_A
+    s24 = k7 * (s20 + coupling_B_A * s23)
+    s25 = cos_theta_phi * s21
+    s26 = sin_theta_phi * s21
+    s27 = s22 / pivot_A
+    s28 = k7 * (coupling_B_A * s27)
     return (
         0.0,
         0.0,
@@ -422,41 +418,41 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         1.0,
         0.0,
         0.0,
-        s14 + k6 * (s9 + sin_theta_phi * s13 - s8),
-        k11 * (sin_theta * s19) + k6 * (s9 + sin_theta_phi * s20 - s8),
+        k11 * (cos_theta * alpha_A + sin_theta * (s11 - theta_dot_squared)) + k6 * (s8 + sin_theta_phi * (s12 - omega_B_squared)),
+        k11 * (sin_theta * s17) + k6 * (s8 + sin_theta_phi * (s18 - omega_B_squared)),
         0.0,
         0.0,
-        k11 * (sin_theta * s25 + cos_theta * s21) + k6 * (s27 - sin_theta_phi * s26),
-        k11 * (sin_theta * s29) + k6 * (s27 - sin_theta_phi * s30),
+        k11 * (sin_theta * s23 + cos_theta * s19) + k6 * (s25 - sin_theta_phi * s24),
+        k11 * (sin_theta * s27) + k6 * (s25 - sin_theta_phi * s28),
         0.0,
         0.0,
-        s15 + k6 * (s7 - (cos_theta_phi * s13 - s6)),
-        k6 * (s7 - (cos_theta_phi * s20 - s6)) - k11 * (cos_theta * s19),
+        s13 + k6 * (s7 - (cos_theta_phi * s12 - s6)),
+        k6 * (s7 - (cos_theta_phi * s18 - s6)) - k11 * (cos_theta * s17),
         0.0,
         0.0,
-        k11 * (sin_theta * s21 - cos_theta * s25) + k6 * (s28 + cos_theta_phi * s26),
-        k6 * (s28 + cos_theta_phi * s30) - k11 * (cos_theta * s29),
+        k11 * (sin_theta * s19 - cos_theta * s23) + k6 * (s26 + cos_theta_phi * s24),
+        k6 * (s26 + cos_theta_phi * s28) - k11 * (cos_theta * s27),
         0.0,
         0.0,
-        s12,
-        s19,
+        s11,
+        s17,
         0.0,
         0.0,
-        s25,
-        s29,
+        s23,
+        s27,
         0.0,
         0.0,
-        s13 - s12,
-        s20 - s19,
+        s12 - s11,
+        s18 - s17,
         0.0,
         0.0,
-        -(s25 + s26),
-        -(s29 + s30),
+        -(s23 + s24),
+        -(s27 + s28),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """87 operations: 22 add, 13 sub, 45 mul, 1 div, 3 sin, 3 cos."""
+    """85 operations: 23 add, 12 sub, 43 mul, 1 div, 3 sin, 3 cos."""
     g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
@@ -471,18 +467,18 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s31 = tau + tau__phi
-    s32 = f_A_x * sin_theta_phi + tau__x_A * sin_theta_phi - f_A_y * cos_theta_phi - tau__y_A * cos_theta_phi
-    load_B_2 = k6 * s32 + (k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi) + s31) - k4 * (sin_phi * theta_dot_squared)
-    s33 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k9 * (f_A_x * sin_theta) + (tau__theta + k8 * (f_A_y * cos_theta)))
-    s34 = k4 * (sin_phi * omega_B_squared) + (k11 * (tau__x_A * sin_theta - tau__y_A * cos_theta) + s33)
-    alpha_A_2 = (s34 - s31 - k7 * (coupling_B_A * load_B_2)) / (k1 + sin_phi * sin_phi * k2)
+    s29 = tau + tau__phi
+    s30 = k6 * (sin_theta_phi * (f_A_x + tau__x_A) - cos_theta_phi * (f_A_y + tau__y_A))
+    load_B_2 = s30 + (k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi) + s29) - k4 * (sin_phi * theta_dot_squared)
+    s31 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k9 * (f_A_x * sin_theta) + (tau__theta + k8 * (f_A_y * cos_theta)))
+    s32 = k4 * (sin_phi * omega_B_squared) + (k11 * (tau__x_A * sin_theta - tau__y_A * cos_theta) + s31)
+    alpha_A_2 = (s32 - s29 - k7 * (coupling_B_A * load_B_2)) / (k1 + sin_phi * sin_phi * k2)
     alpha_B_2 = k7 * (load_B_2 - coupling_B_A * alpha_A_2)
-    s35 = k3 * (tau__x_A + (f_A_x + f_B_x)) + k11 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_2)
-    s36 = k3 * (tau__y_A + (f_A_y + f_B_y)) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_2)
+    s33 = k3 * (tau__x_A + (f_A_x + f_B_x)) + k11 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_2)
+    s34 = k3 * (tau__y_A + (f_A_y + f_B_y)) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_2)
     return (
-        k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B_2) + s35,
-        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B_2) + s36 - g,
+        k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B_2) + s33,
+        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B_2) + s34 - g,
         alpha_A_2,
         alpha_B_2 - alpha_A_2,
     )
@@ -500,28 +496,27 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta_phi = cos(s1)
     sin_theta_phi = sin(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s37 = sin_phi * theta_dot_squared
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s38 = k14 * sin_theta + sin_theta_phi * k13
-    s39 = x_A_ddot * mass_A - (f_A_x + f_B_x) - theta_ddot * s38 - k14 * (theta_dot_squared * cos_theta)
-    s40 = k14 * cos_theta + cos_theta_phi * k13
-    s41 = k13 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s40 + k15))
-    s42 = cos_phi * k16 + k17
-    s43 = y_A_ddot * s40 + (phi_ddot * s42 + theta_ddot * (cos_phi * k18 + k19)) - x_A_ddot * s38
-    s44 = f_B_x * sin_theta_phi - f_B_y * cos_theta_phi
-    s45 = d_B * s44
-    s46 = l_B * s44
-    s47 = cos_theta_phi * k21
-    s48 = l_A * (f_B_x * sin_theta - f_B_y * cos_theta) + (s45 + (s43 + d_A * (f_A_x * sin_theta - f_A_y * cos_theta)))
-    s49 = k13 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s47 + (s46 + (s45 + (theta_ddot * s42 + phi_ddot * k17))))
+    s35 = k14 * sin_theta + sin_theta_phi * k13
+    s36 = x_A_ddot * mass_A - (f_A_x + f_B_x) - theta_ddot * s35 - k14 * (theta_dot_squared * cos_theta)
+    s37 = k14 * cos_theta + cos_theta_phi * k13
+    s38 = k13 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s37 + k15))
+    s39 = cos_phi * k16 + k17
+    s40 = y_A_ddot * s37 + (phi_ddot * s39 + theta_ddot * (cos_phi * k18 + k19)) - x_A_ddot * s35
+    s41 = f_B_x * sin_theta_phi - f_B_y * cos_theta_phi
+    s42 = d_B * s41
+    s43 = l_B * s41
+    s44 = cos_theta_phi * k21
+    s45 = l_A * (f_B_x * sin_theta - f_B_y * cos_theta) + (s42 + (s40 + d_A * (f_A_x * sin_theta - f_A_y * cos_theta)))
+    s46 = k13 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s44 + (s43 + (s42 + (theta_ddot * s39 + phi_ddot * k17))))
     return (
-        s39 - k13 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
-        s41 - (f_A_y + f_B_y) - k14 * (theta_dot_squared * sin_theta),
-        k16 * (s37 - sin_phi * omega_B_squared) + (s47 + (cos_theta * k20 + (s46 + s48))),
-        s37 * k16 + s49 - tau,
+        s36 - k13 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
+        s38 - (f_A_y + f_B_y) - k14 * (theta_dot_squared * sin_theta),
+        k16 * (sin_phi * (theta_dot_squared - omega_B_squared)) + (s44 + (cos_theta * k20 + (s43 + s45))),
+        sin_phi * theta_dot_squared * k16 + s46 - tau,
     )
 
 
@@ -531,28 +526,28 @@ def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
     _, _, theta, phi, _, _, _, _ = y
     cos_phi = cos(phi)
     s1 = theta + phi
-    s50 = sin(s1) * k13
-    s51 = -s50
-    s52 = -(k14 * sin(theta) + s50)
-    s53 = cos(s1) * k13
-    s40 = k14 * cos(theta) + s53
-    s42 = cos_phi * k16 + k17
+    s47 = sin(s1) * k13
+    s48 = -s47
+    s49 = -(k14 * sin(theta) + s47)
+    s50 = cos(s1) * k13
+    s37 = k14 * cos(theta) + s50
+    s39 = cos_phi * k16 + k17
     return (
         mass_A,
         0.0,
-        s52,
-        s51,
+        s49,
+        s48,
         0.0,
         mass_A,
-        s40,
-        s53,
-        s52,
-        s40,
+        s37,
+        s50,
+        s49,
+        s37,
         cos_phi * k18 + k19,
-        s42,
-        s51,
-        s53,
-        s42,
+        s39,
+        s48,
+        s50,
+        s39,
         k17,
     )
 
@@ -564,16 +559,15 @@ def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_phi = sin(phi)
     s1 = theta + phi
     theta_dot_squared = theta_dot * theta_dot
-    s37 = sin_phi * theta_dot_squared
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s54 = k14 * (theta_dot_squared * cos(theta)) + k13 * (cos(s1) * omega_B_squared)
-    s55 = k14 * (theta_dot_squared * sin(theta)) + k13 * (sin(s1) * omega_B_squared)
+    s51 = k14 * (theta_dot_squared * cos(theta)) + k13 * (cos(s1) * omega_B_squared)
+    s52 = k14 * (theta_dot_squared * sin(theta)) + k13 * (sin(s1) * omega_B_squared)
     return (
-        -s54,
-        -s55,
-        k16 * (s37 - sin_phi * omega_B_squared),
-        s37 * k16,
+        -s51,
+        -s52,
+        k16 * (sin_phi * (theta_dot_squared - omega_B_squared)),
+        sin_phi * theta_dot_squared * k16,
     )
 
 
@@ -581,12 +575,12 @@ def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
     k15, k20, k21 = k
     _, _, theta, phi, _, _, _, _ = y
-    s47 = cos(theta + phi) * k21
+    s44 = cos(theta + phi) * k21
     return (
         0.0,
         k15,
-        cos(theta) * k20 + s47,
-        s47,
+        cos(theta) * k20 + s44,
+        s44,
     )
 
 
@@ -598,17 +592,16 @@ def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     s1 = theta + phi
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s37 = sin_phi * theta_dot_squared
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s47 = cos_theta_phi * k21
-    s54 = k14 * (theta_dot_squared * cos_theta) + k13 * (cos_theta_phi * omega_B_squared)
+    s44 = cos_theta_phi * k21
+    s51 = k14 * (theta_dot_squared * cos_theta) + k13 * (cos_theta_phi * omega_B_squared)
     return (
-        -s54,
+        -s51,
         k15 - k14 * (theta_dot_squared * sin(theta)) - k13 * (sin(s1) * omega_B_squared),
-        k16 * (s37 - sin_phi * omega_B_squared) + (cos_theta * k20 + s47),
-        s47 + s37 * k16,
+        k16 * (sin_phi * (theta_dot_squared - omega_B_squared)) + (cos_theta * k20 + s44),
+        s44 + sin_phi * theta_dot_squared * k16,
     )
 
 
@@ -618,17 +611,17 @@ def _applied_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     _, _, theta, phi, _, _, _, _ = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     s1 = theta + phi
-    s56 = f_B_y * cos(s1) - f_B_x * sin(s1)
+    s53 = f_B_y * cos(s1) - f_B_x * sin(s1)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s57 = d_B * s56
-    s58 = l_B * s56
-    s59 = l_A * (f_B_y * cos_theta - f_B_x * sin_theta) + (d_A * (f_A_y * cos_theta - f_A_x * sin_theta) + s57)
+    s54 = d_B * s53
+    s55 = l_B * s53
+    s56 = l_A * (f_B_y * cos_theta - f_B_x * sin_theta) + (d_A * (f_A_y * cos_theta - f_A_x * sin_theta) + s54)
     return (
         f_A_x + f_B_x,
         f_A_y + f_B_y,
-        s58 + s59,
-        s58 + (tau + s57),
+        s55 + s56,
+        s55 + (tau + s54),
     )
 
 
@@ -640,9 +633,9 @@ def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
     omega_B = theta_dot + phi_dot
     xd_B = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
     yd_B = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
-    s60 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k24 + (theta_dot * theta_dot * k22 + omega_B * omega_B * k23)
+    s57 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k24 + (theta_dot * theta_dot * k22 + omega_B * omega_B * k23)
     return (
-        (xd_B * xd_B + yd_B * yd_B) * k25 + s60,
+        (xd_B * xd_B + yd_B * yd_B) * k25 + s57,
     )
 
 
@@ -662,15 +655,15 @@ def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
-    s61 = theta_dot * sin(theta)
-    s62 = sin(s1) * omega_B
-    s63 = theta_dot * cos(theta)
-    s64 = cos(s1) * omega_B
-    yd_B = l_B * s64 + (y_A_dot + l_A * s63)
+    s58 = theta_dot * sin(theta)
+    s59 = sin(s1) * omega_B
+    s60 = theta_dot * cos(theta)
+    s61 = cos(s1) * omega_B
+    yd_B = l_B * s61 + (y_A_dot + l_A * s60)
     return (
         -(y_A_dot * k26 + k27 * yd_B),
-        f_A_x * (x_A_dot - d_A * s61) + f_A_y * (y_A_dot + d_A * s63),
-        f_B_x * (x_A_dot - l_A * s61 - l_B * s62 - d_B * s62) + f_B_y * (yd_B + d_B * s64),
+        f_A_x * (x_A_dot - d_A * s58) + f_A_y * (y_A_dot + d_A * s60),
+        f_B_x * (x_A_dot - l_A * s58 - l_B * s59 - d_B * s59) + f_B_y * (yd_B + d_B * s61),
         tau * (omega_B - theta_dot),
     )
 
@@ -687,12 +680,12 @@ def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     omega_B = theta_dot + phi_dot
     xd_B = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
     yd_B = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
-    s65 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
-    s66 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
+    s62 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
+    s63 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
         m_A * x_A_dot + m_B * xd_B,
         m_A * y_A_dot + m_B * yd_B,
-        m_B * s65 + s66,
+        m_B * s62 + s63,
     )
 
 
@@ -728,11 +721,11 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     load_A = k4 * (sin_phi * omega_B_squared) + s3 - tau - k7 * (coupling_B_A * load_B)
     alpha_A = load_A / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s67 = f_B_x * k28 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k30
-    s68 = f_B_y * k28 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k30
+    s64 = f_B_x * k28 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k30
+    s65 = f_B_y * k28 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k30
     return (
-        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k31 + s67 - f_A_x * k29,
-        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k31 + s68 - f_A_y * k29,
+        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k31 + s64 - f_A_x * k29,
+        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k31 + s65 - f_A_y * k29,
         -tau,
     )
 
@@ -780,20 +773,20 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta_phi = sin(s1)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s69 = sin_theta_phi * k6
-    s70 = (sin_theta * k9 - k7 * (coupling_B_A * s69)) / pivot_A
-    s71 = k7 * (s69 - coupling_B_A * s70)
-    s72 = cos_theta_phi * k6
-    s73 = (k7 * (coupling_B_A * s72) + cos_theta * k8) / pivot_A
+    s66 = sin_theta_phi * k6
+    s67 = (sin_theta * k9 - k7 * (coupling_B_A * s66)) / pivot_A
+    s68 = k7 * (s66 - coupling_B_A * s67)
+    s69 = cos_theta_phi * k6
+    s70 = (k7 * (coupling_B_A * s69) + cos_theta * k8) / pivot_A
+    s71 = k7 * (s69 + coupling_B_A * s70)
+    s72 = k5 * sin_theta_phi
+    s73 = (k7 * (coupling_B_A * s72) - sin_theta * k10) / pivot_A
     s74 = k7 * (s72 + coupling_B_A * s73)
-    s75 = k5 * sin_theta_phi
-    s76 = (k7 * (coupling_B_A * s75) - sin_theta * k10) / pivot_A
-    s77 = k7 * (s75 + coupling_B_A * s76)
-    s78 = cos_theta_phi * k5
-    s79 = (cos_theta * k10 - k7 * (coupling_B_A * s78)) / pivot_A
-    s80 = k7 * (s78 - coupling_B_A * s79)
-    s81 = (-1.0 - coupling_B_A * k7) / pivot_A
-    s82 = k7 * (1.0 - coupling_B_A * s81)
+    s75 = cos_theta_phi * k5
+    s76 = (cos_theta * k10 - k7 * (coupling_B_A * s75)) / pivot_A
+    s77 = k7 * (s75 - coupling_B_A * s76)
+    s78 = (-1.0 - coupling_B_A * k7) / pivot_A
+    s79 = k7 * (1.0 - coupling_B_A * s78)
     return (
         0.0,
         0.0,
@@ -815,26 +808,26 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        k6 * (sin_theta_phi * s71) + (k3 + k11 * (sin_theta * s70)),
-        k11 * (sin_theta * s73) - k6 * (sin_theta_phi * s74),
-        k3 + k11 * (sin_theta * s76) - k6 * (sin_theta_phi * s77),
-        k11 * (sin_theta * s79) + k6 * (sin_theta_phi * s80),
-        k11 * (sin_theta * s81) + k6 * (sin_theta_phi * s82),
-        -(k11 * (cos_theta * s70) + k6 * (cos_theta_phi * s71)),
-        k6 * (cos_theta_phi * s74) + (k3 - k11 * (cos_theta * s73)),
-        k6 * (cos_theta_phi * s77) - k11 * (cos_theta * s76),
-        k3 - k11 * (cos_theta * s79) - k6 * (cos_theta_phi * s80),
-        -(k11 * (cos_theta * s81) + k6 * (cos_theta_phi * s82)),
+        k6 * (sin_theta_phi * s68) + (k3 + k11 * (sin_theta * s67)),
+        k11 * (sin_theta * s70) - k6 * (sin_theta_phi * s71),
+        k3 + k11 * (sin_theta * s73) - k6 * (sin_theta_phi * s74),
+        k11 * (sin_theta * s76) + k6 * (sin_theta_phi * s77),
+        k11 * (sin_theta * s78) + k6 * (sin_theta_phi * s79),
+        -(k11 * (cos_theta * s67) + k6 * (cos_theta_phi * s68)),
+        k6 * (cos_theta_phi * s71) + (k3 - k11 * (cos_theta * s70)),
+        k6 * (cos_theta_phi * s74) - k11 * (cos_theta * s73),
+        k3 - k11 * (cos_theta * s76) - k6 * (cos_theta_phi * s77),
+        -(k11 * (cos_theta * s78) + k6 * (cos_theta_phi * s79)),
+        s67,
         s70,
         s73,
         s76,
-        s79,
-        s81,
-        s71 - s70,
+        s78,
+        s68 - s67,
+        -(s70 + s71),
         -(s73 + s74),
-        -(s76 + s77),
-        s80 - s79,
-        s82 - s81,
+        s77 - s76,
+        s79 - s78,
     )
 
 
@@ -844,66 +837,66 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
-    s83 = sin_phi * sin_phi
-    pivot_A = k1 + s83 * k2
+    s80 = sin_phi * sin_phi
+    pivot_A = k1 + s80 * k2
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k4
     s1 = theta + phi
     cos_theta_phi = cos(s1)
     sin_theta_phi = sin(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s37 = sin_phi * theta_dot_squared
-    s56 = f_B_y * cos_theta_phi - f_B_x * sin_theta_phi
-    s84 = f_A_x * sin_theta_phi - f_A_y * cos_theta_phi
-    load_B = k6 * s84 + (tau + k5 * s56) - k4 * s37
-    s85 = coupling_B_A * load_B
+    s81 = sin_phi * theta_dot_squared
+    s53 = f_B_y * cos_theta_phi - f_B_x * sin_theta_phi
+    s82 = f_A_x * sin_theta_phi - f_A_y * cos_theta_phi
+    load_B = k6 * s82 + (tau + k5 * s53) - k4 * s81
+    s83 = coupling_B_A * load_B
     cos_theta = cos(theta)
-    s86 = f_A_y * cos_theta
+    s84 = f_A_y * cos_theta
     sin_theta = sin(theta)
-    s87 = f_A_x * sin_theta
+    s85 = f_A_x * sin_theta
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s88 = sin_phi * omega_B_squared
-    s89 = f_B_y * cos_theta - f_B_x * sin_theta
-    alpha_A = (k4 * s88 + (k10 * s89 + (k8 * s86 + k9 * s87)) - tau - k7 * s85) / pivot_A
-    s90 = load_B - coupling_B_A * alpha_A
-    alpha_B = k7 * s90
-    s91 = sin_theta * alpha_A + theta_dot_squared * cos_theta
-    s92 = sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared
-    s93 = theta_dot_squared * sin_theta - cos_theta * alpha_A
-    s94 = sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B
-    s95 = cos_phi * k35
-    s96 = s56 * k36 - s84 * k37 - s37 * k35
-    s97 = s88 * k35 + (s89 * k41 + (s86 * k39 - s87 * k40)) - (k7 * (load_B * s95 + coupling_B_A * s96) - s85 * k38)
-    s98 = (s97 - alpha_A * (k32 + s83 * k33)) / pivot_A
-    s99 = k7 * (s96 - (alpha_A * s95 + coupling_B_A * s98)) - s90 * k38
-    s100 = (f_A_x + f_B_x) * k34
-    s101 = (f_A_y + f_B_y) * k34
-    s102 = s94 * k37 + k6 * (cos_theta_phi * s99) + (s101 + (s93 * k42 + k11 * (cos_theta * s98)))
-    s103 = alpha_A * k43 / pivot_A
-    s104 = k7 * (coupling_B_A * s103)
-    s105 = cos_phi * k46
-    s106 = s56 * k47 + s84 * k48 - s37 * k46
-    s107 = s88 * k46 + (s86 * k50 + s87 * k51 - s89 * k52) - (k7 * (load_B * s105 + coupling_B_A * s106) - s85 * k49)
-    s108 = (s107 - alpha_A * (k44 + s83 * k45)) / pivot_A
-    s109 = k7 * (s106 - (alpha_A * s105 + coupling_B_A * s108)) - s90 * k49
-    s110 = (s85 * k56 - alpha_A * (k54 - s83 * k55)) / pivot_A
-    s111 = s90 * k56 + k7 * (coupling_B_A * s110)
-    s112 = cos_phi * k31
-    s113 = s37 * k31
-    s114 = s88 * k31 + (s89 * k28 + (s87 - s86) * k29) - k7 * (load_B * s112 - coupling_B_A * s113)
-    s115 = (s114 - alpha_A * (k57 + s83 * k58)) / pivot_A
-    s116 = k7 * (s113 + (alpha_A * s112 + coupling_B_A * s115))
-    s117 = cos_phi * k30
-    s118 = s56 * k28 + s84 * k29 - s37 * k30
-    s119 = s88 * k30 - (k7 * (load_B * s117 + coupling_B_A * s118) - s85 * k61) - alpha_A * (k59 + s83 * k60)
-    s120 = s119 / pivot_A
-    s121 = k7 * (s118 - (alpha_A * s117 + coupling_B_A * s120)) - s90 * k61
-    s122 = (s86 - s87) * k62 / pivot_A
-    s123 = k7 * (coupling_B_A * s122)
-    s124 = s56 * k62
-    s125 = k7 * (coupling_B_A * s124) / pivot_A
-    s126 = k7 * (s124 + coupling_B_A * s125)
+    s86 = sin_phi * omega_B_squared
+    s87 = f_B_y * cos_theta - f_B_x * sin_theta
+    alpha_A = (k4 * s86 + (k10 * s87 + (k8 * s84 + k9 * s85)) - tau - k7 * s83) / pivot_A
+    s88 = load_B - coupling_B_A * alpha_A
+    alpha_B = k7 * s88
+    s89 = sin_theta * alpha_A + theta_dot_squared * cos_theta
+    s90 = sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared
+    s91 = theta_dot_squared * sin_theta - cos_theta * alpha_A
+    s92 = sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B
+    s93 = cos_phi * k35
+    s94 = s53 * k36 - s82 * k37 - s81 * k35
+    s95 = s86 * k35 + (s87 * k41 + (s84 * k39 - s85 * k40)) - (k7 * (load_B * s93 + coupling_B_A * s94) - s83 * k38)
+    s96 = (s95 - alpha_A * (k32 + s80 * k33)) / pivot_A
+    s97 = k7 * (s94 - (alpha_A * s93 + coupling_B_A * s96)) - s88 * k38
+    s98 = (f_A_x + f_B_x) * k34
+    s99 = (f_A_y + f_B_y) * k34
+    s100 = s92 * k37 + k6 * (cos_theta_phi * s97) + (s99 + (s91 * k42 + k11 * (cos_theta * s96)))
+    s101 = alpha_A * k43 / pivot_A
+    s102 = k7 * (coupling_B_A * s101)
+    s103 = cos_phi * k46
+    s104 = s53 * k47 + s82 * k48 - s81 * k46
+    s105 = s86 * k46 + (s84 * k50 + s85 * k51 - s87 * k52) - (k7 * (load_B * s103 + coupling_B_A * s104) - s83 * k49)
+    s106 = (s105 - alpha_A * (k44 + s80 * k45)) / pivot_A
+    s107 = k7 * (s104 - (alpha_A * s103 + coupling_B_A * s106)) - s88 * k49
+    s108 = (s83 * k56 - alpha_A * (k54 - s80 * k55)) / pivot_A
+    s109 = s88 * k56 + k7 * (coupling_B_A * s108)
+    s110 = cos_phi * k31
+    s111 = s81 * k31
+    s112 = s86 * k31 + (s87 * k28 + (s85 - s84) * k29) - k7 * (load_B * s110 - coupling_B_A * s111)
+    s113 = (s112 - alpha_A * (k57 + s80 * k58)) / pivot_A
+    s114 = k7 * (s111 + (alpha_A * s110 + coupling_B_A * s113))
+    s115 = cos_phi * k30
+    s116 = s53 * k28 + s82 * k29 - s81 * k30
+    s117 = s86 * k30 - (k7 * (load_B * s115 + coupling_B_A * s116) - s83 * k61) - alpha_A * (k59 + s80 * k60)
+    s118 = s117 / pivot_A
+    s119 = k7 * (s116 - (alpha_A * s115 + coupling_B_A * s118)) - s88 * k61
+    s120 = (s84 - s85) * k62 / pivot_A
+    s121 = k7 * (coupling_B_A * s120)
+    s122 = s53 * k62
+    s123 = k7 * (coupling_B_A * s122) / pivot_A
+    s124 = k7 * (s122 + coupling_B_A * s123)
     return (
         0.0,
         0.0,
@@ -941,41 +934,41 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        k6 * (sin_theta_phi * s99) - s92 * k37 + (k11 * (sin_theta * s98) - s91 * k42 - s100),
-        k6 * (sin_theta_phi * s104) - k11 * (sin_theta * s103),
-        s92 * k48 + k6 * (sin_theta_phi * s109) + (s91 * k53 + k11 * (sin_theta * s108) - s100),
-        k11 * (sin_theta * s110) - k6 * (sin_theta_phi * s111),
-        s91 * k29 + k11 * (sin_theta * s115) - k6 * (sin_theta_phi * s116),
-        k11 * (sin_theta * s120) + (s92 * k29 + k6 * (sin_theta_phi * s121)),
-        k11 * (sin_theta * s122) - k6 * (sin_theta_phi * s123),
-        k6 * (sin_theta_phi * s126) - k11 * (sin_theta * s125),
+        k6 * (sin_theta_phi * s97) - s90 * k37 + (k11 * (sin_theta * s96) - s89 * k42 - s98),
+        k6 * (sin_theta_phi * s102) - k11 * (sin_theta * s101),
+        s90 * k48 + k6 * (sin_theta_phi * s107) + (s89 * k53 + k11 * (sin_theta * s106) - s98),
+        k11 * (sin_theta * s108) - k6 * (sin_theta_phi * s109),
+        s89 * k29 + k11 * (sin_theta * s113) - k6 * (sin_theta_phi * s114),
+        k11 * (sin_theta * s118) + (s90 * k29 + k6 * (sin_theta_phi * s119)),
+        k11 * (sin_theta * s120) - k6 * (sin_theta_phi * s121),
+        k6 * (sin_theta_phi * s124) - k11 * (sin_theta * s123),
         0.0,
-        -s102,
-        k11 * (cos_theta * s103) - k6 * (cos_theta_phi * s104),
-        s94 * k48 - k6 * (cos_theta_phi * s109) + (s93 * k53 - k11 * (cos_theta * s108) - s101),
-        k6 * (cos_theta_phi * s111) - k11 * (cos_theta * s110),
-        s93 * k29 - k11 * (cos_theta * s115) + k6 * (cos_theta_phi * s116),
-        s94 * k29 - k6 * (cos_theta_phi * s121) - k11 * (cos_theta * s120),
-        k6 * (cos_theta_phi * s123) - k11 * (cos_theta * s122),
-        k11 * (cos_theta * s125) - k6 * (cos_theta_phi * s126),
+        -s100,
+        k11 * (cos_theta * s101) - k6 * (cos_theta_phi * s102),
+        s92 * k48 - k6 * (cos_theta_phi * s107) + (s91 * k53 - k11 * (cos_theta * s106) - s99),
+        k6 * (cos_theta_phi * s109) - k11 * (cos_theta * s108),
+        s91 * k29 - k11 * (cos_theta * s113) + k6 * (cos_theta_phi * s114),
+        s92 * k29 - k6 * (cos_theta_phi * s119) - k11 * (cos_theta * s118),
+        k6 * (cos_theta_phi * s121) - k11 * (cos_theta * s120),
+        k11 * (cos_theta * s123) - k6 * (cos_theta_phi * s124),
         -1.0,
-        s98,
-        -s103,
+        s96,
+        -s101,
+        s106,
         s108,
-        s110,
-        s115,
+        s113,
+        s118,
         s120,
-        s122,
-        -s125,
+        -s123,
         0.0,
-        s99 - s98,
-        s103 + s104,
-        s109 - s108,
-        -(s110 + s111),
-        -(s115 + s116),
-        s121 - s120,
-        -(s122 + s123),
-        s125 + s126,
+        s97 - s96,
+        s101 + s102,
+        s107 - s106,
+        -(s108 + s109),
+        -(s113 + s114),
+        s119 - s118,
+        -(s120 + s121),
+        s123 + s124,
         0.0,
     )
 
