@@ -248,7 +248,7 @@ def _simulation(parser: argparse.ArgumentParser) -> None:
         "--backend",
         metavar="NAME",
         default="auto",
-        help="auto (default): steps in compiled C code if that pays; numpy: never; c: always",
+        help="auto (default): compute in compiled C code if that pays; numpy: never; c: always",
     )
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="compute the work of each effect")
@@ -286,7 +286,7 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
         "--backend",
         metavar="NAME",
         default="auto",
-        help="auto (default): steps in compiled C code if that pays; numpy: never; c: always",
+        help="auto (default): compute in compiled C code if that pays; numpy: never; c: always",
     )
     parser.add_argument("--workers", metavar="N", type=int, help="processes (one a core)")
     parser.add_argument(

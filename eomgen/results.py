@@ -157,7 +157,7 @@ class Run:
     choice      the choice of method and tolerances, if `accuracy` or `budget` was given
     estimate    the estimate of the error by a second run, if asked for
     begun       how it continues an earlier run; "" if it does not
-    compiled    whether steps were made in compiled code
+    compiled    whether steps were made, or functions computed, in compiled code
     """
 
     model: Model

@@ -175,15 +175,6 @@ def test_without_a_compiler_long_runs_say_so(
         eomgen.simulate("two_body", t_end=0.1, backend="c")
 
 
-@compiler
-def test_steps_that_cannot_be_compiled_are_said() -> None:
-    """Those of other methods, and of scenes with contacts."""
-    for scene, method in (("two_body", "RK45"), ("bouncing_two_body", "DOP853")):
-        run = eomgen.simulate(scene, t_end=0.1, integrator=method, backend="c")
-        assert run.finished and not run.compiled
-        assert [line for line in run.warnings if "no step was made in C" in line]
-
-
 def test_an_unknown_backend_is_refused() -> None:
     with pytest.raises(RunError, match="backend: 'fortran' is none of auto, numpy, c"):
         eomgen.simulate("two_body", backend="fortran")  # type: ignore[arg-type]

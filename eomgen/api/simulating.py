@@ -111,10 +111,10 @@ def simulate(
     unstable    allow steps of an explicit fixed-step method that are too long for stability
     estimate    estimate the error by a second run
     resume      continue an earlier run: a `Run`, or its archive `.npz`
-    backend     "numpy": make all steps in Python; "c": make those of DOP853 and of rk4, euler
-                and semi_implicit_euler in compiled C code, with the same bits; "auto": do so if a
-                library is in the store, or if the run is longer than compiling takes and there is a
-                compiler
+    backend     "numpy": compute all in Python; "c": compute the derivative, the Jacobian and what
+                else the run evaluates in compiled C code, with the same bits, and make whole steps
+                of DOP853, rk4, euler and semi_implicit_euler there; "auto": do so if a library is
+                in the store, or if the run is longer than compiling takes and there is a compiler
     follow      called with time and state after each step; a true result stops the run
 
     A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
@@ -282,7 +282,7 @@ def _accelerator(
     values: tuple[Mapping[str, float] | None, ...],
     reporter: Reporter,
 ) -> "Accelerator | None":
-    """The compiled steps of a plan; None if it asks for steps in Python."""
+    """The compiled steps and functions of a plan; None if it asks for none."""
     if plan.backend == "numpy":
         return None
     from eomgen.native.accelerator import Accelerator
@@ -295,14 +295,13 @@ def _accelerator(
 
 
 def _why_not_compiled(plan: Plan, accelerator: "Accelerator | None") -> str:
-    """Why a run that is long, or was to be compiled, took no compiled steps; "" if it need not."""
+    """Why a run that is long, or was to be compiled, took nothing compiled; "" if it need not."""
     if accelerator and accelerator.notice:
         return f"the run was not compiled: {accelerator.notice}"
     if accelerator and plan.backend == "c" and not accelerator.used:
         return (
-            "no step was made in C: compiled are those of DOP853, rk4, euler and "
-            "semi_implicit_euler, in scenes without contacts, stops and other one-sided forces, "
-            "without guard and works"
+            "nothing was computed in C: a parameter, or a constant computed from them, is too "
+            "small or too large for that"
         )
     return ""
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.run.module import given_values
 from eomgen.run.problem import FloatArray
 
 MOST_KNOWN = 64
@@ -39,13 +40,13 @@ def compiled_module(module: Any, library: ctypes.CDLL) -> Any:
     made = ModuleType(f"{module.NAME}_compiled", module.__doc__)
     made.__dict__.update({k: v for k, v in vars(module).items() if not k.startswith("__")})
     kernels = Kernels(module, library)
-    for name, shape in _outputs(library).items():
+    for name, shape in outputs_of(library).items():
         if name not in OTHERS:
             setattr(made, name, kernels.output(name, shape))
     return made
 
 
-def _outputs(library: ctypes.CDLL) -> dict[str, tuple[int, ...]]:
+def outputs_of(library: ctypes.CDLL) -> dict[str, tuple[int, ...]]:
     """The outputs of a library with their shapes."""
     text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, "outputs"))).decode()
     lines = (line.split() for line in text.splitlines())
@@ -143,6 +144,17 @@ class Kernels:
             return result.reshape(*shape, count)
 
         return columns
+
+
+def usual_constants(module: Any, name: str, p: Any) -> Any:
+    """The constants of one function of a module at parameters `p`, a C array; None if its kernel
+    cannot compute with them.
+    """
+    constants = (module._DEFAULT if p is None else module._parameters(p))[name]
+    values = {**module.PARAMETERS, **given_values(module, p)[0]}
+    if not are_usual(values.values(), constants):
+        return None
+    return (_REAL * max(1, len(constants)))(*constants)
 
 
 def are_usual(parameters: Iterable[float], constants: Iterable[float]) -> bool:

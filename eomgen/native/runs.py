@@ -2,7 +2,6 @@
 
 import ctypes
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,12 +10,12 @@ import numpy as np
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.native import equal_steps
-from eomgen.native.module import Kernels, are_usual
+from eomgen.native.functions import restricted
+from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
 from eomgen.run.compiled import Array, EqualSteps, Steps, Stride
 from eomgen.run.integrators import dormand_prince_8 as dop853
 from eomgen.run.integrators.dop853_coefficients import NODES, Row
-from eomgen.run.module import given_values
 from eomgen.run.problem import USUAL_LENGTH
 from eomgen.templating import render
 
@@ -28,9 +27,7 @@ _UNUSUAL = 2
 
 def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C sources of the derivative and of the methods that step with it."""
-    program = replace(program, outputs={"derivative": program.outputs["derivative"]})
-    functions = tuple(f for f in interface.functions if f.name == "derivative")
-    interface = replace(interface, functions=functions)
+    program, interface = restricted(program, interface, ("derivative",))
     low, high = USUAL_LENGTH
     context = {
         "prefix": interface.name,
@@ -87,11 +84,7 @@ class CompiledSteps:
 
     def __init__(self, module: Any, library: ctypes.CDLL, p: Any, u: Any) -> None:
         kernels = Kernels(module, library)
-        constants = (module._DEFAULT if p is None else module._parameters(p))["derivative"]
-        assert len(constants) == kernels.constants
-        values = {**module.PARAMETERS, **given_values(module, p)[0]}
-        usual = are_usual(values.values(), constants)
-        self._constants = (_REAL * max(1, len(constants)))(*constants) if usual else None
+        self._constants = usual_constants(module, "derivative", p)
         self._inputs = kernels.given(u)
         self._states = kernels.states
         self._library, self._call = library, library.dop853

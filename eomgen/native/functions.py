@@ -1,0 +1,161 @@
+"""Single functions of a module in compiled code, for runs whose steps are made in Python.
+
+They return the bits of the module's own functions, so that a run may change over to them at any
+call. What they do not compute, such as a value that overflows, the module does.
+"""
+
+import ctypes
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from eomgen.codegen.backends import c
+from eomgen.codegen.interface import Interface
+from eomgen.native.module import Kernels, outputs_of, usual_constants
+from eomgen.program.program import Program
+from eomgen.run.problem import FloatArray, Problem
+
+Value = Callable[..., FloatArray]
+"""A function of time, state and further arguments, such as the derivative."""
+Look = Callable[[float], ctypes.CDLL | None]
+"""Returns the library of a function if it is there, or if calls in Python have taken so long, s,
+that it is compiled now."""
+
+INTERVAL = 5e-3
+"""Time in Python, s, after which a library is asked for again."""
+
+_POINTER, _REAL = ctypes.c_void_p, ctypes.c_double
+
+
+def restricted(
+    program: Program, interface: Interface, names: Iterable[str]
+) -> tuple[Program, Interface]:
+    """A program and its interface with some of the outputs only."""
+    outputs = {name: program.outputs[name] for name in names}
+    functions = tuple(f for f in interface.functions if f.name in outputs)
+    return replace(program, outputs=outputs), replace(interface, functions=functions)
+
+
+def sources(program: Program, interface: Interface, name: str) -> Mapping[str, str]:
+    """The C sources of the library of one function."""
+    return c.library(*restricted(program, interface, (name,)))
+
+
+def compiled_function(
+    module: Any, library: ctypes.CDLL, name: str, p: Any, u: Any, *, perturbed: bool = False
+) -> Callable[..., FloatArray | None] | None:
+    """A function (t, y, extra) at given parameters and inputs, which returns None for what the
+    module must compute. None if that is all.
+
+    perturbed  whether the module has other constants than those of its parameters
+
+    The library must have no other function.
+    """
+    kernels = Kernels(module, library)
+    constants, inputs = usual_constants(module, name, p), kernels.given(u)
+    if constants is not None and len(constants) != max(1, kernels.constants):
+        # The module computes it in two parts, as Jacobians along directions.
+        constants = None if perturbed else kernels.held(p)
+    if constants is None or inputs is None:
+        return None
+    shape = outputs_of(library)[name]
+    call, given, buffer = library[f"checked_{name}"], inputs.tobytes(), _REAL * math.prod(shape)
+    call.argtypes = [_REAL, *[_POINTER] * 5]
+
+    def value(t: float, y: FloatArray, extra: FloatArray | None = None) -> FloatArray | None:
+        out = buffer()
+        beside = None if extra is None else extra.tobytes()
+        if not call(t, y.tobytes(), constants, given, beside, out):
+            return None
+        return np.frombuffer(memoryview(out)).reshape(shape)
+
+    return value
+
+
+@dataclass(frozen=True)
+class Compilable:
+    """What compiles single functions of a module, at given parameters and inputs.
+
+    perturbed  whether the module has other constants than those of its parameters
+    look       for the name of a function: see `Look`
+    started    called when a compiled function is used for the first time
+    """
+
+    module: Any
+    values: tuple[Any, Any]
+    perturbed: bool
+    look: Callable[[str], Look]
+    started: Callable[[], None]
+
+    def problem(self, problem: Problem) -> Problem:
+        """The same problem; its functions are compiled once that pays."""
+        contacts, switching = problem.contacts, problem.switching
+        if contacts is not None:
+            contacts = replace(
+                contacts,
+                gaps=self.function("gaps", contacts.gaps),
+                rates=self.function("gap_rates", contacts.rates),
+                held=self.function("held", contacts.held, np.asarray),
+                impact=self.function("impact", contacts.impact, _impact_of(len(contacts.names))),
+            )
+        if switching is not None and switching.of_state is not None:
+            of_state = self.function("switching_functions", switching.of_state)
+            switching = replace(switching, of_state=of_state)
+        jacobian = problem.jacobian
+        if hasattr(self.module, "jacobian"):
+            jacobian = self.function("jacobian", jacobian)
+        return replace(
+            problem,
+            derivative=self.function("derivative", problem.derivative),
+            jacobian=jacobian,
+            contacts=contacts,
+            switching=switching,
+        )
+
+    def function(
+        self, name: str, python: Value, extra: Callable[..., FloatArray] | None = None
+    ) -> Value:
+        """A function that Python computes until its library is there.
+
+        `extra` makes the kernel's further numbers from the arguments after time and state.
+        """
+        look, spent, due = self.look(name), 0.0, 0.0
+        compiled: Callable[..., FloatArray | None] | None = None
+
+        def value(t: float, y: FloatArray, *more: Any) -> FloatArray:
+            nonlocal compiled, due, spent
+            if compiled is not None:
+                found = compiled(t, y, *((extra(*more),) if extra else ()))
+                return python(t, y, *more) if found is None else found
+            if spent >= due:
+                due = spent + INTERVAL
+                library = look(spent)
+                if library is not None:
+                    compiled = compiled_function(
+                        self.module, library, name, *self.values, perturbed=self.perturbed
+                    )
+                    if compiled is not None:
+                        self.started()
+                        return value(t, y, *more)
+                    due = math.inf
+            begun = time.perf_counter()
+            result = python(t, y, *more)
+            spent += time.perf_counter() - begun
+            return result
+
+        return value
+
+
+def _impact_of(contacts: int) -> Callable[[int, float], FloatArray]:
+    """The further numbers of the kernel of impacts: which contact strikes, and its bounce."""
+
+    def extra(contact: int, bounce: float) -> FloatArray:
+        numbers = np.zeros(contacts + 1)
+        numbers[contact], numbers[-1] = 1.0, bounce
+        return numbers
+
+    return extra
