@@ -9,12 +9,14 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.native.beside import impact_numbers
 from eomgen.native.module import Kernels, outputs_of, usual_constants
 from eomgen.program.program import Program
 from eomgen.run.problem import FloatArray, Problem
@@ -100,7 +102,9 @@ class Compilable:
                 gaps=self.function("gaps", contacts.gaps),
                 rates=self.function("gap_rates", contacts.rates),
                 held=self.function("held", contacts.held, np.asarray),
-                impact=self.function("impact", contacts.impact, _impact_of(len(contacts.names))),
+                impact=self.function(
+                    "impact", contacts.impact, partial(impact_numbers, len(contacts.names))
+                ),
             )
         if switching is not None and switching.of_state is not None:
             of_state = self.function("switching_functions", switching.of_state)
@@ -148,14 +152,3 @@ class Compilable:
             return result
 
         return value
-
-
-def _impact_of(contacts: int) -> Callable[[int, float], FloatArray]:
-    """The further numbers of the kernel of impacts: which contact strikes, and its bounce."""
-
-    def extra(contact: int, bounce: float) -> FloatArray:
-        numbers = np.zeros(contacts + 1)
-        numbers[contact], numbers[-1] = 1.0, bounce
-        return numbers
-
-    return extra

@@ -3,7 +3,7 @@
 A kernel reports whether the floating-point unit raised an overflow, a division by zero or an
 invalid operation. If not, its result has the bits that the Python module would return. In all other
 cases the Python module computes the result or raises its error. It also checks parameters that are
-new, and computes the outputs that take further arguments.
+new.
 """
 
 import ctypes
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.native.beside import BESIDE, function, reader_of
 from eomgen.run.module import given_values
 from eomgen.run.problem import FloatArray
 
@@ -27,8 +28,6 @@ these do not underflow by accident.
 """
 EXACT = 2**53
 """Largest time that kernels take: a whole number up to it is a float; nan and inf are beyond."""
-OTHERS = ("initial_state", "forward_dynamics", "inverse_dynamics", "impact", "held")
-"""Outputs with other arguments, which the Python module computes."""
 _FLOAT, _POINTER, _LONG, _REAL = np.dtype(float), ctypes.c_void_p, ctypes.c_long, ctypes.c_double
 
 
@@ -41,7 +40,9 @@ def compiled_module(module: Any, library: ctypes.CDLL) -> Any:
     made.__dict__.update({k: v for k, v in vars(module).items() if not k.startswith("__")})
     kernels = Kernels(module, library)
     for name, shape in outputs_of(library).items():
-        if name not in OTHERS:
+        if name in BESIDE:
+            setattr(made, name, kernels.beside(name, shape))
+        elif name != "initial_state":  # which the Python module has at hand
             setattr(made, name, kernels.output(name, shape))
     return made
 
@@ -120,6 +121,23 @@ class Kernels:
 
         function.__name__, function.__doc__ = name, python.__doc__
         return function
+
+    def beside(self, name: str, shape: tuple[int, ...]) -> Callable[..., Any]:
+        """The function of an output that takes further numbers: see `eomgen.native.beside`."""
+        python = getattr(self.module, name)
+        call, buffer = self.library[f"checked_{name}"], _REAL * math.prod(shape)
+        call.argtypes = [_REAL, *[_POINTER] * 5]
+
+        def one(t: float, y: FloatArray, p: Any, u: Any, extra: FloatArray) -> FloatArray | None:
+            k, given = self.held(p), self.given(u)
+            if k is None or given is None or not abs(t) <= EXACT:
+                return None
+            out = buffer()
+            if not call(t, y.tobytes(), k, given.tobytes(), extra.tobytes(), out):
+                return None
+            return np.frombuffer(memoryview(out)).reshape(shape)
+
+        return function(python, one, reader_of(self.module, name, math.prod(shape)))
 
     def _columns(self, name: str, shape: tuple[int, ...]) -> Callable[..., FloatArray]:
         """The function of an output for columns of states."""
