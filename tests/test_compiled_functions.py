@@ -12,7 +12,7 @@ from eomgen.api.generating import compiled as generated
 from eomgen.api.given import check, read
 from eomgen.api.simulating import plan_run
 from eomgen.model.model import Model
-from eomgen.native import accelerator
+from eomgen.native import accelerator, functions
 from eomgen.native.accelerator import Accelerator
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Problem
@@ -86,8 +86,9 @@ def test_a_long_run_is_compiled_on_its_way(monkeypatch: pytest.MonkeyPatch, tmp_
     monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
     options: dict[str, Any] = {"integrator": "RK45", "t_end": 5.0}
     assert not eomgen.simulate("two_body", **{**options, "t_end": 0.1}).compiled
-    monkeypatch.setattr(accelerator, "STARTING", 0.02)
+    monkeypatch.setattr(accelerator, "STARTING", 1e-3)
     monkeypatch.setattr(accelerator, "AN_OPERATION", 0.0)
+    monkeypatch.setattr(functions, "INTERVAL", 1e-3)
     run = eomgen.simulate("two_body", **options)
     assert run.compiled
     assert_same(run, eomgen.simulate("two_body", backend="numpy", **options))

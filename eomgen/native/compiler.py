@@ -1,6 +1,7 @@
 """Finding and running a C compiler."""
 
 import importlib.util
+import itertools
 import os
 import platform
 import shlex
@@ -18,6 +19,12 @@ from eomgen.errors import RunError
 
 FLAGS = ("-std=c99", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-w")
 """No fast mathematics and no contraction: they would change the last bits of results."""
+TUNING = ("-march=native",)
+"""Further flags for code that runs on this processor only."""
+TUNING_GCC = (*TUNING, "-fschedule-insns", "-fsched-pressure", "-fno-tree-slp-vectorize")
+"""The same for GCC, whose default on x86 is not to order instructions before registers are
+allocated. Long straight-line code gains 5 to 30 percent, and no bit changes. Where statements are
+joined into vectors, GCC 12 contracts a*b ± c in spite of `FLAGS`, so they are not joined."""
 KNOWN = ("cc", "gcc", "clang")
 ABSENT = (
     "no C compiler is found; install gcc or clang, name one in CC, or run: "
@@ -29,10 +36,13 @@ LONGEST = 600.0
 
 @dataclass(frozen=True)
 class Compiler:
-    """A C compiler: its command, and what it prints as its version and target."""
+    """A C compiler: its command, what it prints as its version and target with the processor that
+    it compiles for, and flags for that one.
+    """
 
     command: tuple[str, ...]
     version: str
+    tuning: tuple[str, ...] = ()
 
     def shared_library(self, sources: Mapping[str, str], main: str, *flags: str) -> bytes:
         """Compile the file `main` of `sources` (name to text) into a shared library; return its
@@ -96,7 +106,25 @@ def _asked(command: tuple[str, ...]) -> Compiler:
     done = subprocess.run(
         [*command, "--version"], capture_output=True, text=True, timeout=60, check=True
     )
-    return Compiler(command, f"{done.stdout.strip()} {platform.machine()} {sys.platform}")
+    version, processor = done.stdout.strip(), _processor()
+    tuning: tuple[str, ...] = ()
+    if processor and "ziglang" not in command:  # zig compiles for this processor by default
+        if "Free Software Foundation" in version:
+            tuning = TUNING_GCC
+        elif "clang" in version:
+            tuning = TUNING
+    return Compiler(command, f"{version} {platform.machine()} {sys.platform} {processor}", tuning)
+
+
+def _processor() -> str:
+    """What tells processors apart that need code of their own; "" if that is not known."""
+    kept = ("model name", "flags", "Features", "CPU part")
+    try:
+        with Path("/proc/cpuinfo").open(encoding="utf-8") as file:
+            lines = itertools.takewhile(str.strip, file)  # the first processor
+            return "".join(line for line in lines if line.startswith(kept))
+    except (OSError, ValueError):
+        return ""
 
 
 def suffix() -> str:

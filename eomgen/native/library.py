@@ -31,18 +31,20 @@ def built(sources: Mapping[str, str]) -> ctypes.CDLL:
 def compiled_library(
     about: str, sources: Callable[[], Mapping[str, str]], main: str, *flags: str
 ) -> ctypes.CDLL:
-    """The library of C sources, of which `main` includes the others.
+    """The library of C sources, of which `main` includes the others. Without `flags` it is compiled
+    for this processor.
 
     It is stored under a digest of `about`, which must determine the sources and `flags`, of the
-    compiler's version and of the flags of all libraries. Raises `RunError` if there is no compiler,
-    or if it fails.
+    compiler's version, the processor, and the flags of all libraries. Raises `RunError` if there is
+    no compiler, or if it fails.
     """
     kept = kept_library(about)
     if kept is not None:
         return kept
     texts = sources()
     level = LEVELS[sum(map(len, texts.values())) > LARGE]
-    content = find_compiler().shared_library(texts, main, level, *flags)
+    compiler = find_compiler()
+    content = compiler.shared_library(texts, main, level, *(flags or compiler.tuning))
     if place := folder("native"):
         Entries(place).put(_key(about), content)
     return _loaded(content)
