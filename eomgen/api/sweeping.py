@@ -1,6 +1,7 @@
 """Many runs of one scene: `ensemble`."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -26,9 +27,10 @@ from eomgen.study.accuracy.trial import Setting
 from eomgen.sweep.design import Design, Law, grid, listed, sampled
 from eomgen.sweep.ensemble import Ensemble
 from eomgen.sweep.execute import chunk_size, execute
+from eomgen.sweep.layout import Memory, bytes_each, layout_of, worded
 from eomgen.sweep.members import Task
-from eomgen.sweep.storage import opened
-from eomgen.sweep.together import METHOD, build
+from eomgen.sweep.storage import Storage, opened
+from eomgen.sweep.together import METHODS, build
 
 __all__ = ["Design", "Ensemble", "Law", "ensemble", "grid", "plan_sweep", "run_sweep", "sampled"]
 
@@ -202,14 +204,22 @@ def run_sweep(
     )
     if (kernels or vectors) and not scheduler:
         task = _built(task, plan, reporter)
-    storage = None
-    if folder is not None:
-        size = chunk_size(len(plan.design.values), bool(task.vectors))
-        storage = opened(folder, task, plan.design, size)
-    with reporter.progress(f"sweeping {model.name}") as progress:
-        found = execute(
-            task, plan.design, storage, workers=workers, scheduler=scheduler, progress=progress
+    layout, members = layout_of(task), len(plan.design.values)
+    size = chunk_size(members, bool(task.vectors), bytes_each(layout))
+    with ExitStack() as open_ones:
+        kept: Memory | Storage = (
+            Memory(layout, members, size)
+            if folder is None
+            else open_ones.enter_context(opened(folder, task, plan.design, layout, size))
         )
+        progress = open_ones.enter_context(reporter.progress(f"sweeping {model.name}"))
+        execute(
+            *(task, plan.design, kept, size),
+            workers=workers,
+            scheduler=scheduler,
+            progress=progress,
+        )
+        found, messages = kept.results()
     return Ensemble(
         model.name,
         plan.design,
@@ -217,7 +227,7 @@ def run_sweep(
         found["final"],
         found["t"],
         found["status"],
-        found["message"],
+        worded(messages, members),
         np.array(times),
         found.get("rows"),
         {name: found[name] for name in plan.outputs},
@@ -254,7 +264,7 @@ def _kernels(
     """The key and the C sources of compiled steps, and those of kernels for several members at
     once; none if they would not pay.
     """
-    from eomgen.native import lanes
+    from eomgen.native import adaptive_lanes, lanes
     from eomgen.native.accelerator import library_key
     from eomgen.native.compiler import find_compiler
     from eomgen.native.library import kept_library
@@ -262,15 +272,12 @@ def _kernels(
     from eomgen.store import interfaced_program_of
 
     key = library_key(plan.model)
-    together = plan.setting.integrator == METHOD and not getattr(functions, "CONTACTS", ())
-    alone: Any = getattr(find_integrator(plan.setting.integrator), "compiled", "")
+    method = find_integrator(plan.setting.integrator)
     if plan.backend == "numpy":
         return key, {}, {}
-    if not (together or alone):
+    if not method.compiled:
         if plan.backend == "c":
-            reporter.note(
-                "the sweep is not compiled: only steps of DOP853 are, and of rk4 without contacts"
-            )
+            reporter.note(f"the sweep is not compiled: {plan.setting.integrator} has no steps in C")
         return key, {}, {}
     try:
         find_compiler()
@@ -280,12 +287,24 @@ def _kernels(
         reporter.note(f"the sweep is not compiled: {error}")
         return key, {}, {}
     few = plan.backend == "auto" and len(plan.design.values) < MANY
-    if few and (together or kept_library(key) is None):
+    if few and kept_library(key) is None:
         return key, {}, {}
     program = interfaced_program_of(plan.model)
-    if together:
-        return key, {}, lanes.sources(*program, plan.outputs)
-    return key, sources(*program), {}
+    vectors: Mapping[str, str] = {}
+    if not few and _run_together(plan.setting.integrator, functions):
+        several = lanes if isinstance(method, FixedStep) else adaptive_lanes
+        vectors = several.sources(*program, plan.outputs)
+    return key, sources(*program), vectors
+
+
+def _run_together(integrator: str, functions: Any) -> bool:
+    """Whether members run together: by a method that can do that, of a module without contacts,
+    and for adaptive methods without other one-sided forces.
+    """
+    if integrator not in METHODS or not functions.STATES or getattr(functions, "CONTACTS", ()):
+        return False
+    switching = ("switching_functions", "_switching_functions_of_time")
+    return integrator == "rk4" or not any(hasattr(functions, name) for name in switching)
 
 
 def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:

@@ -60,7 +60,7 @@ def width() -> int:
     return int(probe.width())
 
 
-class _Columns(ctypes.Structure):
+class Columns(ctypes.Structure):
     _fields_ = (("values", _POINTER), ("many", _LONG))
 
 
@@ -78,11 +78,14 @@ class Lanes:
     all. Raises `RunError` if there is no compiler, or if it fails.
     """
 
+    main = c_lanes.MAIN
+    """The source that includes the others."""
+
     def __init__(self, texts: Mapping[str, str], lanes: int | None = None) -> None:
         lanes = lanes or width()
         about = f"lanes {lanes} {sorted(texts.items())!r}"
         flags = (f"-DWIDTH={lanes}", *FLAGS[lanes])
-        self.library = compiled_library(about, lambda: texts, c_lanes.MAIN, *flags)
+        self.library = compiled_library(about, lambda: texts, self.main, *flags)
         sizes = (_LONG * 5).in_dll(self.library, "sizes")
         self.states, self.inputs, self.parameters, self.constants, self.lanes = sizes
         text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(self.library, "outputs")))
@@ -105,7 +108,7 @@ class Lanes:
     def function(self, name: str) -> Any:
         """The compiled function of an output, see `templates/c/lanes.c.jinja`."""
         call = self.library[f"columns_{name}"]
-        call.argtypes, call.restype = [_LONG, _REAL, *[_Columns] * 3, *[_POINTER] * 2], None
+        call.argtypes, call.restype = [_LONG, _REAL, *[Columns] * 3, *[_POINTER] * 2], None
         return call
 
     def output(
@@ -133,7 +136,7 @@ class Lanes:
         sound = np.zeros(n, dtype=np.int8)
         times = _Times(0.0, t_end, dt, last, steps, every)
         call = self.library.rk4
-        call.argtypes, call.restype = [_POINTER, _LONG, *[_Columns] * 3, *[_POINTER] * 2], None
+        call.argtypes, call.restype = [_POINTER, _LONG, *[Columns] * 3, *[_POINTER] * 2], None
         call(
             ctypes.byref(times),
             n,
@@ -144,12 +147,12 @@ class Lanes:
         return rows, sound != 0
 
 
-def columns_of(*arrays: FloatArray) -> list[_Columns]:
+def columns_of(*arrays: FloatArray) -> list[Columns]:
     """Arrays of one column, or of one for each state, as arguments of the library's functions; they
     must outlive the call.
     """
     assert all(array.flags.c_contiguous and array.dtype == np.float64 for array in arrays)
-    return [_Columns(array.ctypes.data, array.shape[1] > 1) for array in arrays]
+    return [Columns(array.ctypes.data, array.shape[1] > 1) for array in arrays]
 
 
 def _usual(p: FloatArray, k: FloatArray) -> NDArray[np.bool_]:

@@ -118,7 +118,7 @@ def as_problem(
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
     values = {**module.PARAMETERS, **given_values(module, parameters)[0]}
     start = dict(zip(module.STATES, initial.tolist(), strict=True))
-    size = mechanism_size(module.UNITS, values, start)
+    size = float(mechanism_size(module.UNITS, values, start))
     switching = _switching(module, parameters, inputs)
     return Problem(
         name=module.NAME,
@@ -132,7 +132,7 @@ def as_problem(
         explain=explain,
         corners=switching is not None,
         switching=switching,
-        sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
+        sizes=tuple(state_sizes(module.STATES, module.UNITS, initial, slope, size).tolist()),
         origin=origin,
         noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},

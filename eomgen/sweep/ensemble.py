@@ -15,7 +15,8 @@ from eomgen.sweep.members import FINISHED, WORDS
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """The runs of n members.
+    """The runs of n members. If they are kept in a folder, arrays are memory maps of its files:
+    what is not used stays on disk.
 
     scene      the scene's name
     design     what is varied: names, values (n, k), axes of a grid

@@ -18,6 +18,7 @@ from eomgen.run.module import as_problem, given_values, load_module
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Trajectory
 from eomgen.study.diagnosis import explained
+from eomgen.sweep.counter import Counter
 
 Arrays = dict[str, NDArray[Any]]
 FINISHED, STOPPED, REFUSED = 0, 1, 2
@@ -61,8 +62,8 @@ class Task:
     every: int = 1
 
 
-def run_members(task: Task, values: FloatArray) -> Arrays:
-    """Run members with these values (m, k). Returns arrays of m rows:
+def run_members(task: Task, values: FloatArray, counter: Counter | None = None) -> Arrays:
+    """Run members with these values (m, k), counted as they end. Returns arrays of m rows:
 
     final    the state at the end, or where a member stopped; nan if it was refused
     t        the time of that, s
@@ -71,7 +72,10 @@ def run_members(task: Task, values: FloatArray) -> Arrays:
     rows     (m, n, ny), the states at the kept times, nan after a stop; if there are more than two
     NAME     each of the outputs, (m, n, …) at these times, or (m, …) at the end
     """
-    runs = [_run(task, row) for row in values.tolist()]
+    counter, runs = counter or Counter(), []
+    for row in values.tolist():
+        runs.append(_run(task, row))
+        counter.add()
     module = module_of(task.source)
     ny, many = len(module.STATES), len(task.times) > 2
     nothing = np.full(ny, np.nan)
@@ -97,9 +101,12 @@ def _run(task: Task, row: Sequence[float]) -> Trajectory | str:
     """The run of a member, or why it was refused."""
     try:
         problem = _problem(task, row)
-        return integrate(problem, t_end=task.t_end, samples=len(task.times), **task.settings)
+        run = integrate(problem, t_end=task.t_end, samples=len(task.times), **task.settings)
     except EomgenError as error:
         return " ".join(error.lines)
+    if run.outcome.kind == "interrupted":  # which is no result of the member's
+        raise KeyboardInterrupt
+    return run
 
 
 def _given(task: Task, row: Sequence[float]) -> dict[str, dict[str, float]]:
@@ -160,12 +167,12 @@ def _output(
             found.append(getattr(module, name)(t, y, given["parameter"] or None, given["input"]))
         except (ArithmeticError, ValueError):
             found.append(np.nan)
-    shape = np.broadcast_shapes(*(np.shape(value) for value in found), _shape(task.source, name))
+    shape = np.broadcast_shapes(*(np.shape(value) for value in found), output_shape(task.source, name))
     return np.array([np.broadcast_to(value, shape) for value in found])
 
 
 @lru_cache(64)
-def _shape(source: str, name: str) -> tuple[int, ...]:
+def output_shape(source: str, name: str) -> tuple[int, ...]:
     """The shape of an output."""
     module = module_of(source)
     return np.shape(getattr(module, name)(0.0, module.initial_state()))
