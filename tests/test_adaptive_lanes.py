@@ -146,3 +146,51 @@ def test_default_tolerances_are_those_of_a_single_run(
         expected = allowed_errors(as_problem(module, p, u), "DOP853", 1e-9, None, 0.1)
         found = taken[0][:, min(j, taken[0].shape[1] - 1)]
         assert np.allclose(found, expected, rtol=1e-12, atol=0)
+
+
+STEEP = """
+name = "steep"
+
+[[bodies]]
+name = "bob"
+mass = 1.0
+inertia_com = 0
+
+[[joints]]
+name = "pivot"
+type = "revolute"
+parent = "world"
+child = "bob"
+r_child = [-1.0, 0]
+coordinate = "theta"
+
+[[effects]]
+type = "gravity"
+g = 9.81
+
+[[effects]]
+type = "field"
+name = "push"
+kind = "formula"
+body = "bob"
+force = ["1/(1 + exp(900*x))", 0]
+
+[initial]
+q = { theta = -1.4 }
+"""
+"""A pendulum with a force that overflows beyond x = 0.79 m, although it is finite there."""
+
+
+def test_a_hidden_overflow_is_that_of_its_member_alone() -> None:
+    """It stops there as in Python, and its neighbours have the bits that they have without it."""
+    asked: dict[str, Any] = {"t_end": 2.0, "integrator": "DOP853", "samples": 5}
+    angles = np.array([-1.4, -1.3, -2.9, -1.5, -1.6])
+    one, other = (
+        eomgen.ensemble(STEEP, {"theta": angles}, backend=backend, **asked)
+        for backend in ("c", "numpy")
+    )
+    assert one.status == other.status == [*["finished"] * 2, "stopped", *["finished"] * 2]
+    assert one.messages.tolist() == other.messages.tolist() and "no finite value" in one.messages[2]
+    good = [0, 1, 3, 4]
+    without = eomgen.ensemble(STEEP, {"theta": angles[good]}, backend="c", **asked)
+    assert one.rows[good].tobytes() == without.rows.tobytes()
