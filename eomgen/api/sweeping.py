@@ -14,10 +14,12 @@ from eomgen.api.given import Source, Values, check, check_name, check_time, read
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
 from eomgen.api.simulating import Backend
+from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
+from eomgen.program.program import Program
 from eomgen.run.checks import check_samples, check_steps
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.fixed_step import count_steps
@@ -178,12 +180,15 @@ def run_sweep(
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     state_names: tuple[str, ...] = functions.STATES
     times, dt, every = _times(plan)
-    key, kernels, vectors = _kernels(plan, functions, reporter)
+    program = _program(plan, reporter)
+    many = plan.backend == "c" or len(plan.design.values) >= MANY
+    together = program is not None and many and _run_together(plan.setting.integrator, functions)
     task = Task(
         model=model,
         source=module.source,
-        key=key,
-        kernels=kernels,
+        program=program,
+        at_once=program is not None and many,
+        together=together,
         names=plan.design.names,
         kinds=tuple(_kind(name, model, state_names, reporter) for name in plan.design.names),
         parameters=plan.parameters,
@@ -198,14 +203,13 @@ def run_sweep(
             "max_step": plan.max_step,
             "rest_speed": plan.scene.simulation.rest_speed,
         },
-        vectors=vectors,
         dt=dt,
         every=every,
     )
-    if (kernels or vectors) and not scheduler:
+    if not scheduler:
         task = _built(task, plan, reporter)
     layout, members = layout_of(task), len(plan.design.values)
-    size = chunk_size(members, bool(task.vectors), bytes_each(layout))
+    size = chunk_size(members, task.together, bytes_each(layout))
     with ExitStack() as open_ones:
         kept: Memory | Storage = (
             Memory(layout, members, size)
@@ -258,50 +262,31 @@ def _kind(name: str, model: Model, states: Sequence[str], reporter: Reporter) ->
     raise AssertionError(name)
 
 
-def _kernels(
-    plan: SweepPlan, functions: Any, reporter: Reporter
-) -> tuple[str, Mapping[str, str], Mapping[str, str]]:
-    """The key and the C sources of compiled steps, and those of kernels for several members at
-    once; none if they would not pay.
-    """
-    from eomgen.native import adaptive_lanes, lanes
-    from eomgen.native.accelerator import library_key
+def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] | None:
+    """The program from which members are compiled; None if they run in Python."""
     from eomgen.native.compiler import find_compiler
-    from eomgen.native.library import kept_library
-    from eomgen.native.runs import sources
     from eomgen.store import interfaced_program_of
 
-    key = library_key(plan.model)
-    method = find_integrator(plan.setting.integrator)
     if plan.backend == "numpy":
-        return key, {}, {}
-    if not method.compiled:
-        if plan.backend == "c":
-            reporter.note(f"the sweep is not compiled: {plan.setting.integrator} has no steps in C")
-        return key, {}, {}
+        return None
+    if plan.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
+        reporter.note(f"steps of {plan.setting.integrator} are not compiled, but their derivatives")
     try:
         find_compiler()
     except RunError as error:
         if plan.backend == "c":
             raise
         reporter.note(f"the sweep is not compiled: {error}")
-        return key, {}, {}
-    few = plan.backend == "auto" and len(plan.design.values) < MANY
-    if few and kept_library(key) is None:
-        return key, {}, {}
-    program = interfaced_program_of(plan.model)
-    vectors: Mapping[str, str] = {}
-    if not few and _run_together(plan.setting.integrator, functions):
-        several = lanes if isinstance(method, FixedStep) else adaptive_lanes
-        vectors = several.sources(*program, plan.outputs)
-    return key, sources(*program), vectors
+        return None
+    return interfaced_program_of(plan.model)
 
 
 def _run_together(integrator: str, functions: Any) -> bool:
     """Whether members run together: by a method that can do that, of a module without contacts,
     and for adaptive methods without other one-sided forces.
     """
-    if integrator not in METHODS or not functions.STATES or getattr(functions, "CONTACTS", ()):
+    contacts = bool(getattr(functions, "CONTACTS", False))
+    if integrator not in METHODS or not functions.STATES or contacts:
         return False
     switching = ("switching_functions", "_switching_functions_of_time")
     return integrator == "rk4" or not any(hasattr(functions, name) for name in switching)
@@ -317,5 +302,5 @@ def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:
         if plan.backend == "c":
             raise
         reporter.note(f"the sweep is not compiled: {error}")
-        return replace(task, kernels={}, vectors={})
+        return replace(task, program=None, at_once=False, together=False)
     return task

@@ -12,16 +12,19 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from copy import copy
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from eomgen.codegen.backends import c
+from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.native import functions, runs
 from eomgen.native.library import compiled_library, kept_library
+from eomgen.program.program import Program
 from eomgen.run.compiled import Compiled, EqualSteps, Steps
 from eomgen.run.problem import Problem
 from eomgen.store import interfaced_program_of, key_of
@@ -75,16 +78,42 @@ class _Library:
 class Accelerator:
     """The compiled steps and functions of a model's module, at given parameters and inputs.
 
+    `program` is that of the model with its interface; None takes it from the store, or derives it.
     `used` tells whether a run has taken some. `notice` is why there are none although a run was
     long enough for them, or "".
     """
 
-    def __init__(self, model: Model, module: Any, parameters: Any, inputs: Any) -> None:
+    def __init__(
+        self,
+        model: Model,
+        module: Any,
+        parameters: Any,
+        inputs: Any,
+        *,
+        program: tuple[Program, Interface] | None = None,
+    ) -> None:
         self._model, self._module, self._values = model, module, (parameters, inputs)
+        self._program = program
         self._begun: float | None = None
         self._at_once = False
         self._libraries: dict[str, _Library] = {}
         self.used, self.notice = False, ""
+
+    def at(self, parameters: Any, inputs: Any) -> "Accelerator":
+        """The same at other values. Both have the same libraries, and the time that runs take is
+        that of both.
+        """
+        self._begun = self._begun or time.perf_counter()
+        made = copy(self)
+        made._values = (parameters, inputs)
+        return made
+
+    def function(self, name: str, python: functions.Value) -> functions.Value:
+        """An output as a function of time and state, which is compiled once that pays."""
+        compilable = functions.Compilable(
+            self._module, self._values, False, self._look, self._start
+        )
+        return compilable.function(name, python)
 
     def of(self, problem: Problem, module: Any = None) -> Problem:
         """The problem of the module, or of one with other constants, with its compiled steps and
@@ -143,23 +172,22 @@ class Accelerator:
         if name not in self._libraries:
             self._libraries[name] = _Library(
                 library_key(self._model, name),
-                partial(_sources, self._model, name),
+                partial(self._sources, name),
                 runs.MAIN if name == "derivative" else c.MAIN,
                 STARTING + AN_OPERATION * self._module.COST[name]["total"],
                 self._fail,
             )
         return self._libraries[name]
 
+    def _sources(self, name: str) -> Mapping[str, str]:
+        """The sources of a function's library; with the derivative are the steps."""
+        program, interface = self._program or interfaced_program_of(self._model)
+        if name == "derivative":
+            return runs.sources(program, interface)
+        return functions.sources(program, interface, name)
+
     def _fail(self, why: str) -> None:
         self.notice = why
-
-
-def _sources(model: Model, name: str) -> Mapping[str, str]:
-    """The sources of a function's library; with the derivative are the steps."""
-    program, interface = interfaced_program_of(model)
-    if name == "derivative":
-        return runs.sources(program, interface)
-    return functions.sources(program, interface, name)
 
 
 def library_key(model: Model, name: str = "derivative") -> str:

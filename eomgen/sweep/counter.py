@@ -20,9 +20,7 @@ class Counter:
     memory, lock  of other processes; None for those of this one
     """
 
-    def __init__(
-        self, memory: Any = None, lock: AbstractContextManager[Any] | None = None
-    ) -> None:
+    def __init__(self, memory: Any = None, lock: AbstractContextManager[Any] | None = None) -> None:
         self._numbers = np.frombuffer(memory or bytearray(8 * SIZE), np.int64)
         self._lock: AbstractContextManager[Any] = lock or threading.Lock()
 

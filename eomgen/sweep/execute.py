@@ -103,7 +103,7 @@ def _results(
     """The chunks as they come."""
     if scheduler:
         yield from _by_dask(task, jobs, scheduler)
-    elif task.vectors or (workers > 1 and len(jobs) > 1):
+    elif task.together or (workers > 1 and len(jobs) > 1):
         yield from _by_workers(task, jobs, max(1, min(workers, len(jobs))), running)
     else:
         for number, values in jobs:
@@ -155,7 +155,7 @@ Run = Callable[[Task, Any], Arrays]
 
 def _pool(task: Task, workers: int) -> tuple[Executor, Counter, Run]:
     """Threads if compiled code makes the runs, which lets other threads go on; else processes."""
-    if task.vectors:
+    if task.together:
         counter = Counter()
         return ThreadPoolExecutor(workers), counter, lambda t, values: run_chunk(t, values, counter)
     memory = multiprocessing.Array("q", SIZE)

@@ -19,11 +19,9 @@ from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
-from numpy.typing import NDArray
 
 from eomgen.errors import RunError
 from eomgen.files import check_folder, read_plain, write_whole
-from eomgen.store import key_of
 from eomgen.sweep.design import Design
 from eomgen.sweep.layout import Column, Layout, said
 from eomgen.sweep.members import Arrays, Task
@@ -231,20 +229,9 @@ def _header_size(header: Mapping[str, Any]) -> int:
 
 def digest_of(task: Task, design: Design, size: int) -> str:
     """A digest of all that determines the results."""
-    parts: tuple[Any, ...] = (
-        *(FORMAT, key_of(task.model), task.source, design.names, _sum_of(design.values), size),
-        *(task.kinds, _sorted(task.parameters), _sorted(task.inputs), task.outputs, task.t_end),
-        *(task.times, _sorted(task.settings), bool(task.vectors)),
-    )
+    values = hashlib.sha256(np.ascontiguousarray(design.values).tobytes()).hexdigest()
+    parts = (FORMAT, task.digest, design.names, values, size)
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
-
-
-def _sum_of(values: NDArray[np.float64]) -> str:
-    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
-
-
-def _sorted(values: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    return sorted(values.items())
 
 
 def _digest(path: Path) -> str:

@@ -5,17 +5,16 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eomgen.errors import RunError
-from eomgen.native.adaptive_lanes import MAIN, AdaptiveLanes
+from eomgen.native import adaptive_lanes, lanes
+from eomgen.native.adaptive_lanes import AdaptiveLanes
 from eomgen.native.lanes import Lanes
 from eomgen.run.checks import errors_of_sizes
 from eomgen.run.module import as_problem, given_values
 from eomgen.run.problem import USUAL_LENGTH, FloatArray, Problem
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.sweep.counter import Counter
-from eomgen.sweep.members import FINISHED, Arrays, Task, compiled_steps, module_of, run_members
+from eomgen.sweep.members import FINISHED, Arrays, Task, compile_steps, module_of, run_members
 
 METHODS = ("rk4", "DOP853")
 """The methods that run members together."""
@@ -27,11 +26,11 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
     Members that overflow, or whose steps seem too long for stability or too many, are run one by
     one: so their messages are the same. Raises `RunError` if there is no compiler.
     """
-    counter, lanes = counter or Counter(), _library(tuple(task.vectors.items()))
-    starts = _Starts(task, values, lanes)
+    counter, kernels = counter or Counter(), _library(task)
+    starts = _Starts(task, values, kernels)
     k, u, y, sound = starts.k, starts.u, starts.y, starts.sound
-    if isinstance(lanes, AdaptiveLanes):
-        rows, valid = lanes.dop853(
+    if isinstance(kernels, AdaptiveLanes):
+        rows, valid = kernels.dop853(
             y,
             k,
             u,
@@ -42,7 +41,7 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
             addresses=counter.addresses,
         )
     else:
-        rows, valid = lanes.rk4(y, k, u, t_end=task.t_end, dt=task.dt, every=task.every)
+        rows, valid = kernels.rk4(y, k, u, t_end=task.t_end, dt=task.dt, every=task.every)
         counter.add(len(values))
     counter.check()
     rows = np.concatenate([y[None], rows])
@@ -61,7 +60,7 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
         chosen = zip(task.times, rows, strict=True) if many else [(task.t_end, rows[-1])]
         each = []
         for t, states in chosen:
-            value, valid = lanes.output(name, t, states, k, u)
+            value, valid = kernels.output(name, t, states, k, u)
             sound &= valid
             each.append(np.moveaxis(value, -1, 0))
         found[name] = np.stack(each, axis=1) if many else each[0]
@@ -79,22 +78,24 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
 
 def run_chunk(task: Task, values: FloatArray, counter: Counter | None = None) -> Arrays:
     """Run members together if the task has kernels for that, else one by one."""
-    run = run_together if task.vectors else run_members
+    run = run_together if task.together else run_members
     return run(task, values, counter)
 
 
 def build(task: Task) -> None:
     """Compile the kernels of a task now. Raises `RunError` if there is no compiler, or it fails."""
-    if task.vectors:
-        _library(tuple(task.vectors.items()))
-    else:
-        compiled_steps(task)
+    if task.together:
+        _library(task)
+    elif task.at_once:
+        compile_steps(task)
 
 
 @lru_cache(4)
-def _library(texts: tuple[tuple[str, str], ...]) -> Lanes:
-    sources = dict(texts)
-    return AdaptiveLanes(sources) if MAIN in sources else Lanes(sources)
+def _library(task: Task) -> Lanes:
+    assert task.program is not None
+    if task.settings["integrator"] == "rk4":
+        return Lanes(lanes.sources(*task.program, task.outputs))
+    return AdaptiveLanes(adaptive_lanes.sources(*task.program, task.outputs))
 
 
 class _Starts:
@@ -102,18 +103,22 @@ class _Starts:
     can be run together, `sound`.
     """
 
-    def __init__(self, task: Task, values: FloatArray, lanes: Lanes) -> None:
+    def __init__(self, task: Task, values: FloatArray, kernels: Lanes) -> None:
         module, count = module_of(task.source), len(values)
-        self._task, self._lanes, self._module = task, lanes, module
+        self._task, self._kernels, self._module = task, kernels, module
         columns = {name: values[:, i] for i, name in enumerate(task.names)}
         kinds = dict(zip(task.names, task.kinds, strict=True))
         own, _ = given_values(module, dict(task.parameters) or None)
         varied = {name: columns[name] for name in columns if kinds[name] == "parameter"}
-        self._parameters = {**module.PARAMETERS, **own, **varied}
+        self._parameters: dict[str, float | FloatArray] = {**module.PARAMETERS, **own, **varied}
         p = _filled(self._parameters, count if varied else 1)
-        self.k, self._own, sound = lanes.prepare(np.ascontiguousarray(p.T))
+        self.k, self._own, sound = kernels.prepare(np.ascontiguousarray(p.T))
         pushes = {name: columns[name] for name in columns if kinds[name] == "input"}
-        inputs = {**dict.fromkeys(module.INPUTS, 0.0), **task.inputs, **pushes}
+        inputs: dict[str, float | FloatArray] = {
+            **dict.fromkeys(module.INPUTS, 0.0),
+            **task.inputs,
+            **pushes,
+        }
         self.u = _filled(inputs, count if pushes else 1)
         self.y = self._own.copy() if varied else np.repeat(self._own, count, axis=1)
         for name in columns:
@@ -136,7 +141,7 @@ class _Starts:
             return np.full((len(module.STATES), 1), settings["atol"])
         count = max(self.k.shape[1], self.u.shape[1])
         y = self._own if self._own.shape[1] == count else np.repeat(self._own, count, axis=1)
-        slope, _ = self._lanes.output("derivative", 0.0, y, self.k, self.u)
+        slope, _ = self._kernels.output("derivative", 0.0, y, self.k, self.u)
         start = dict(zip(module.STATES, y, strict=True))
         size = mechanism_size(module.UNITS, self._parameters, start)
         with np.errstate(all="ignore"):  # of members that are not sound
