@@ -272,6 +272,11 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sample", metavar="N", type=int, help="draw N members, instead of a grid")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of the sample")
     parser.add_argument("--of", metavar="NAME", help="state or output in the figure (the first)")
+    parser.add_argument(
+        "--statistics",
+        action="store_true",
+        help="also write mean, deviation and quantiles over the members, at each kept time",
+    )
     parser.add_argument("--outputs", metavar="A,B,…", help="functions of the module to compute")
     parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
     parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")

@@ -2,13 +2,14 @@
 
 import csv
 import io
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.files import check_folder, check_writable, remove_ours, write_whole
+from eomgen.files import check_folder, check_writable, remove_ours, write_pieces, write_whole
 from eomgen.results import Run
 from eomgen.run.trajectory import is_own_table, save_csv, save_npz
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 KINDS = ("py", "npz", "csv", "png", "html")
 PICTURES = ("png", "html")
+TABLE_PART = 4096
+"""Number of lines of a table that are in memory at once."""
 
 
 def output_paths(
@@ -88,15 +91,55 @@ def save_sweep(
     """
     from eomgen.show.sweep import save_sweep_figure
 
+    write_pieces(table, _member_lines(found), force=force)
+    save_sweep_figure(found, of, figure, force=force)
+
+
+def _member_lines(found: "Ensemble") -> Iterator[str]:
+    """The table of a sweep, in pieces."""
+    from eomgen.sweep.members import WORDS
+
     single = [name for name in found.outputs if found.of(name).ndim == 1]
     names = [*found.design.names, *(f"{name} (end)" for name in (*found.states, *single))]
+    yield _csv([["member", "status", "t", *names, "message"]])
+    ends = [found.design.values, found.final, *(found.of(name)[:, None] for name in single)]
+    for start in range(0, len(found), TABLE_PART):
+        part = slice(start, start + TABLE_PART)
+        numbers = np.concatenate([columns[part] for columns in ends], axis=1).tolist()
+        status, times, messages = (
+            column[part].tolist() for column in (found.codes, found.t, found.messages)
+        )
+        yield _csv(
+            [start + i, WORDS[code], repr(t), *map(repr, values), message]
+            for i, (code, t, values, message) in enumerate(
+                zip(status, times, numbers, messages, strict=True)
+            )
+        )
+
+
+def save_statistics(found: "Ensemble", path: Path, *, force: bool = False) -> None:
+    """Write a table with a line for each state or output with one number, and each time that is
+    kept: number of members, mean, standard deviation and quantiles of them.
+
+    Raises `RunError` if the file cannot be written.
+    """
+    from eomgen.sweep.ensemble import SHARES
+
+    single = [name for name in found.outputs if found.of(name).ndim == 1]
+    lines: list[Sequence[object]] = [
+        ["name", "unit", "t", "members", "mean", "deviation", *(f"{s:.0%}" for s in SHARES)]
+    ]
+    for name in (*found.states, *single):
+        each = found.statistics(name)
+        numbers = np.array([each.mean, each.deviation, *each.quantiles]).T.tolist()
+        for t, count, values in zip(
+            each.times.tolist(), each.members.tolist(), numbers, strict=True
+        ):
+            lines.append([name, found.units.get(name, ""), repr(t), count, *map(repr, values)])
+    write_whole(path, _csv(lines), force=force)
+
+
+def _csv(rows: Iterable[Sequence[object]]) -> str:
     stream = io.StringIO(newline="")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["member", "status", "t", *names, "message"])
-    ends = [found.final, *(found.of(name)[:, None] for name in single)]
-    numbers = np.concatenate([found.design.values, *ends], axis=1).tolist()
-    rows = zip(found.status, found.t.tolist(), numbers, found.messages.tolist(), strict=True)
-    for i, (status, t, values, message) in enumerate(rows):
-        writer.writerow([i, status, repr(t), *map(repr, values), message])
-    write_whole(table, stream.getvalue(), force=force)
-    save_sweep_figure(found, of, figure, force=force)
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()

@@ -40,6 +40,8 @@ MANY = 20
 """Least number of members for which C steps are compiled that are not in the store."""
 DYNAMICS = ("forward_dynamics", "inverse_dynamics")
 """Outputs that take more than a time and a state."""
+UNITS = {"kinetic_energy": "J", "potential_energy": "J"}
+"""Units of the outputs with one number."""
 MOST_STEPS = 10_000_000
 
 
@@ -235,6 +237,7 @@ def run_sweep(
         np.array(times),
         found.get("rows"),
         {name: found[name] for name in plan.outputs},
+        {**functions.UNITS, **UNITS},
     )
 
 

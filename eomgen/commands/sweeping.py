@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from eomgen.api.saving import save_sweep
+from eomgen.api.saving import save_statistics, save_sweep
 from eomgen.api.sweeping import Design, Ensemble, Law, grid, plan_sweep, run_sweep, sampled
 from eomgen.commands.shared import (
     Arguments,
@@ -22,6 +22,7 @@ from eomgen.files import check_folder, check_writable
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import terminal_progress
 from eomgen.sweep.design import MOST
+from eomgen.sweep.storage import kept_members
 
 FEW = 5
 """Number of members that did not finish of which the reason is printed."""
@@ -55,7 +56,8 @@ def sweep(given: Arguments) -> int:
     )
     table, figure = (given.output / f"{name}_sweep.{kind}" for kind in ("csv", "png"))
     check_folder(given.output)
-    for path in (table, figure):
+    statistics = given.output / f"{name}_sweep_statistics.csv"
+    for path in (table, figure, *([statistics] if given.statistics else [])):
         check_writable(path, force=given.force)
     folder = given.output / f"{name}_sweep"
     counting = replace(reporter, progress=partial(terminal_progress, countdown=True))
@@ -66,7 +68,8 @@ def sweep(given: Arguments) -> int:
         )
     except KeyboardInterrupt:
         raise InterruptedRunError(
-            f"{model.name}: interrupted; the same command goes on with what is in {folder}"
+            f"{model.name}: interrupted; {kept_members(folder)} of {len(plan.design.values)} "
+            f"members are kept in {folder}, and the same command goes on with the others"
         ) from None
     of = given.of or found.states[0]
     try:
@@ -74,8 +77,12 @@ def sweep(given: Arguments) -> int:
     except RunError as error:
         raise RunError(f"--{error}") from None
     save_sweep(found, of, table, figure, force=given.force)
+    written = [folder, table, figure]
+    if given.statistics:
+        save_statistics(found, statistics, force=given.force)
+        written.append(statistics)
     _report(found, of)
-    for path in (folder, table, figure):
+    for path in written:
         print(f"    wrote {path}")
     return 0
 

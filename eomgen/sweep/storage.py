@@ -100,15 +100,6 @@ class Storage:
                 needed = f"{whole / 1e6:.3g} MB are needed"
                 raise RunError(f"{path}: cannot be written: {error.strerror}; {needed}") from None
 
-    def kept(self) -> int:
-        """The number of members in chunks that are there."""
-        found = [
-            number
-            for number in range(math.ceil(self.members / self.size))
-            if self._chunk(number).is_file()
-        ]
-        return min(self.members, len(found) * self.size)
-
     def _sum(self, number: int) -> str:
         """The digest of a chunk's numbers."""
         found = hashlib.sha256()
@@ -149,6 +140,16 @@ class Storage:
 
     def _path(self, name: str) -> Path:
         return self.folder / f"{name}.npy"
+
+
+def kept_members(folder: Path) -> int:
+    """The number of members in the chunks that a folder holds."""
+    try:
+        about = json.loads(read_plain(folder / ABOUT, 2**20))
+        count = len(list(folder.glob("chunk_*.json")))
+        return min(int(about["members"]), count * int(about["chunk"]))
+    except (OSError, RunError, ValueError, TypeError, KeyError, RecursionError):
+        return 0
 
 
 @contextmanager
