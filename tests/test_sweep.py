@@ -16,10 +16,12 @@ import pytest
 from matplotlib.figure import Figure
 
 import eomgen
+from eomgen.api import saving
+from eomgen.api.saving import save_statistics, save_sweep
 from eomgen.cli import main
 from eomgen.errors import RunError
 from eomgen.show.sweep import draw_sweep
-from eomgen.sweep import execute, together
+from eomgen.sweep import ensemble, execute, together
 from eomgen.sweep.design import Law
 from eomgen.sweep.ensemble import Ensemble
 
@@ -260,8 +262,8 @@ def test_figures_fit_what_is_varied() -> None:
 
     two = drawn(eomgen.grid({"bob_mass": (1.0, 2.0), "theta": (0.1, 0.2, 0.3)}))
     assert [axes.get_ylabel() for axes in two.axes] == [
-        "$\\mathrm{bob}_{\\mathrm{mass}}$",
-        "$\\theta$ at t = 1 s",
+        "$\\mathrm{bob}_{\\mathrm{mass}}$ in kg",
+        "$\\theta$ in rad at t = 1 s",
     ]
     one = drawn(eomgen.grid({"bob_mass": (2.0, 1.0)}), samples=5)
     assert one.axes[0].get_lines()[0].get_xdata().tolist() == [1.0, 2.0]
@@ -270,3 +272,67 @@ def test_figures_fit_what_is_varied() -> None:
         eomgen.sampled({"bob_mass": ("uniform", 1.0, 2.0), "gravity_g": ("normal", 9.8, 0.1)}, 30)
     )
     assert sum(bar.get_height() for bar in some.axes[0].patches) == 30
+
+
+def test_members_that_did_not_finish_are_seen() -> None:
+    """As grey cells, crosses on the border of a curve, and at the last rows of trajectories."""
+    vary = eomgen.grid({"bob_mass": (-1.0, 1.0, 2.0), "theta": (0.1, 0.2)})
+    cells = draw_sweep(eomgen.ensemble("pendulum", vary, **QUICK), "theta")
+    assert cells.axes[0].collections[0].get_array().mask.tolist() == [
+        [True] * 2,
+        *[[False] * 2] * 2,
+    ]
+    assert cells.axes[0].get_legend().get_texts()[0].get_text() == "not finished"
+    fixed: dict[str, Any] = {"t_end": 4.0, "integrator": "rk4", "dt": 0.05, "samples": 9}
+    found = eomgen.ensemble("pendulum", eomgen.grid({"theta_dot": (0.0, 1.0, 1e308)}), **fixed)
+    curve, fan = draw_sweep(found, "theta").axes
+    assert curve.get_lines()[1].get_xdata().tolist() == [1e308]
+    assert 0 < fan.get_lines()[-1].get_xdata()[0] < 4
+
+
+def test_statistics_are_those_of_members_with_a_value(tmp_path: Path) -> None:
+    """Of states and outputs at each time, computed in parts or not, and in the file."""
+    asked: dict[str, Any] = {"t_end": 4.0, "integrator": "rk4", "dt": 0.05, "samples": 9}
+    speeds = [0.0, 1.0, 1e308, 2.0, 3.0]
+    outputs = ("kinetic_energy", "momentum")
+    found = eomgen.ensemble("pendulum", {"theta_dot": speeds}, outputs=outputs, **asked)
+    for name, values in (
+        ("theta", found.rows[:, :, 0] if found.rows is not None else None),
+        ("kinetic_energy", found.outputs["kinetic_energy"]),
+    ):
+        assert values is not None
+        each = found.statistics(name, (0.0, 0.5))
+        good = values[[0, 1, 3, 4], 4:]
+        assert each.members[4:].tolist() == [4] * 5 and each.times.tolist() == found.times.tolist()
+        assert np.allclose(each.mean[4:], good.mean(axis=0), rtol=1e-14, atol=0)
+        assert np.allclose(each.deviation[4:], np.std(good, axis=0, ddof=1), rtol=1e-13, atol=0)
+        assert np.allclose(each.quantiles[1, 4:], np.median(good, axis=0), rtol=1e-15, atol=0)
+        assert each.quantiles[0, 4:].tolist() == good.min(axis=0).tolist()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(ensemble, "MOST_NUMBERS", 2 * len(speeds))
+            parts = found.statistics(name, (0.0, 0.5))
+        for one, other in zip(each[1:], parts[1:], strict=True):
+            assert np.array_equal(one, other, equal_nan=True)
+    # Speeds of 0, 1, 2, 3 and 1e308 rad/s deviate by 1e308/sqrt(5).
+    start = found.statistics("theta_dot")
+    assert start.members[0] == 5 and start.mean[0] == pytest.approx(2e307)
+    assert start.deviation[0] == pytest.approx(1e308 / math.sqrt(5))
+    with pytest.raises(RunError, match="momentum is not a state or an output with one number"):
+        found.statistics("momentum")
+    ends = eomgen.ensemble("pendulum", {"theta": [0.1, 0.2]}, **QUICK).statistics("theta")
+    assert ends.times.tolist() == [1.0] and ends.members.tolist() == [2]
+    path = tmp_path / "statistics.csv"
+    save_statistics(found, path)
+    rows = list(csv.DictReader(path.read_text("utf-8").splitlines()))
+    assert len(rows) == 9 * 3 and rows[5]["unit"] == "rad"
+    assert float(rows[5]["mean"]) == found.statistics("theta").mean[5]
+
+
+def test_a_table_in_parts_is_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = eomgen.ensemble("pendulum", {"bob_mass": [1.0, -1.0, 2.0, 3.0, 4.0]}, **QUICK)
+    for size in (4096, 2):
+        monkeypatch.setattr(saving, "TABLE_PART", size)
+        save_sweep(found, "theta", tmp_path / f"{size}.csv", tmp_path / "a.png", force=True)
+    assert (tmp_path / "2.csv").read_bytes() == (tmp_path / "4096.csv").read_bytes()
+    rows = list(csv.DictReader((tmp_path / "2.csv").read_text("utf-8").splitlines()))
+    assert [row["member"] for row in rows] == list("01234") and rows[1]["message"]
