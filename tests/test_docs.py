@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import pages
 import pytest
 
 from eomgen.cli import main
@@ -83,6 +84,12 @@ def python(content: str) -> list[str]:
     done = subprocess.run([sys.executable, "-c", content], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
+
+
+@pytest.mark.parametrize("name", pages.PAGES)
+def test_pages_made_from_the_program_are_fresh(name: str) -> None:
+    """`python tests/pages.py` writes them."""
+    assert (DOCS / name).read_text("utf-8") == pages.PAGES[name]()
 
 
 def test_pages_are_linked() -> None:
