@@ -55,12 +55,16 @@ def read_scene(scene: str | Path) -> Scene:
     Raises `SceneError` with a line for each mistake: location, value, remedy.
     """
     path = find_scene(scene) if isinstance(scene, str) else scene
+    return parse_scene(scene_text(path), path.name)
+
+
+def scene_text(path: Path) -> str:
+    """The text of a scene's file. Raises `SceneError` if it cannot be read, or is not UTF-8."""
     data = read_plain(path, LARGEST_FILE, name=path.name, error=SceneError)
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SceneError(f"{path.name}: is not UTF-8 text (byte {error.start})") from None
-    return parse_scene(text, path.name)
 
 
 def parse_scene(text: str, source: str = "scene") -> Scene:
