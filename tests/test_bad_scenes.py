@@ -664,8 +664,15 @@ def test_one_mistake_one_line(
     assert main(["generate", str(scene), "-o", str(output)]) == 1
     assert time.process_time() - start < 60.0
     out, err = capsys.readouterr()
-    assert err == f"eomgen: swing.toml: {message}\n"
+    line = re.match(r"eomgen: swing\.toml:(\d+): ", err)
+    without = re.sub(r"^(eomgen: swing\.toml):\d+: ", r"\1: ", err)
+    assert without == f"eomgen: swing.toml: {message}\n"
     assert out == ""
+    location = re.match(r"[a-z_]+(?:\[\d+\]|\.\w+)+: ", message)
+    if location and "hundreds of digits" not in message:
+        assert line  # of its key, or of the table where it is missing
+        key = re.findall(r"[a-z]\w*", location[0])[-1]
+        assert re.search(rf"\b{key}\b|\[\[", scene.read_text().split("\n")[int(line[1]) - 1])
     if message.startswith(("body '", "route: '", "form: '")):  # found in a scene that reads well
         assert not output.exists() or not list(output.iterdir())
     else:
@@ -705,7 +712,8 @@ def test_what_is_put_right_is_said(
         assert math.hypot(*parts) == pytest.approx(1.0, rel=1e-15)
     scene.write_text(text)
     assert main(["check", str(scene)]) == 0
-    assert capsys.readouterr().err == f"eomgen: note: swing.toml: {notice}\n"
+    said = re.sub(r"swing\.toml:\d+: ", "swing.toml: ", capsys.readouterr().err)
+    assert said == f"eomgen: note: swing.toml: {notice}\n"
 
 
 @pytest.mark.parametrize("good", [GOOD, SPACE])
@@ -886,7 +894,7 @@ def test_a_refusal_stops_no_other_scene(scene: Path, capsys: pytest.CaptureFixtu
         assert main([*command, *option]) == 1
         out, err = capsys.readouterr()
         refusals = err.splitlines()
-        assert refusals[0].startswith("eomgen: bad.toml: bodies[1].mass: ")
+        assert refusals[0].startswith("eomgen: bad.toml:10: bodies[1].mass: ")
         assert refusals[1].startswith("eomgen: no_such: no such file")
         assert len(refusals) == 2 + (state == "missing")
         assert [line.partition(",")[0] for line in out.splitlines()] == [
@@ -906,11 +914,11 @@ def test_all_unknown_keys_are_reported(scene: Path, capsys: pytest.CaptureFixtur
     scene.write_text(text.replace('type = "gravity"', 'type = "gravity"\ngg = 1'))
     assert main(["check", str(scene)]) == 1
     assert capsys.readouterr().err.splitlines() == [
-        "eomgen: swing.toml: bodies[1].mas: unknown key (did you mean 'mass'?)",
-        "eomgen: swing.toml: bodies[1].colour: unknown key; known here: name, mass, inertia_com, "
-        "shapes",
-        "eomgen: swing.toml: bodies[1].inertia: unknown key (did you mean 'inertia_com'?)",
-        "eomgen: swing.toml: effects[0].gg: unknown key (did you mean 'g'?)",
+        "eomgen: swing.toml:11: bodies[1].mas: unknown key (did you mean 'mass'?)",
+        "eomgen: swing.toml:12: bodies[1].colour: unknown key; known here: name, mass, "
+        "inertia_com, shapes",
+        "eomgen: swing.toml:13: bodies[1].inertia: unknown key (did you mean 'inertia_com'?)",
+        "eomgen: swing.toml:30: effects[0].gg: unknown key (did you mean 'g'?)",
     ]
     many = "".join(f"key_{k} = {k}\n" for k in range(5000))
     scene.write_text(GOOD.replace("mass = 0.5\n", f"mass = 0.5\n{many}"))
@@ -928,7 +936,7 @@ def test_a_tree_too_large_for_the_closed_form(
     scene.write_text('name = "swing"\nroute = "closed"\n' + CHAIN.replace("= 3", "= 13"))
     assert main(["generate", str(scene), "-o", str(scene.parent / "made")]) == 1
     assert capsys.readouterr().err == (
-        "eomgen: swing.toml: route: 'closed' needs the closed form, and it is for 6 bodies at "
+        "eomgen: swing.toml:2: route: 'closed' needs the closed form, and it is for 6 bodies at "
         "most, or 12 in a tree of pins and free bodies in the plane; leave it out\n"
     )
 

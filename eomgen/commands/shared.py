@@ -13,7 +13,7 @@ from eomgen.api.reporter import Reporter
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_notice, terminal_progress
-from eomgen.scene.reader import find_scene, read_scene
+from eomgen.scene.reader import find_scene, read_scene, scene_text
 from eomgen.scene.schema import Scene
 from eomgen.text import one_line
 
@@ -70,8 +70,10 @@ def required(given: Arguments, model: Model) -> Sequence[str]:
 
 def reporter_of(given: Arguments, scene: str) -> Reporter:
     """The reporter of the command line for a scene."""
+    path = find_scene(scene)
     return Reporter(
-        scene=find_scene(scene).name,
+        scene=path.name,
+        text=lambda: scene_text(path),
         argument=lambda name: OPTIONS.get(name, f"--{name.replace('_', '-')}"),
         note=lambda notice: note(given, notice),
         trial=lambda text: print(f"    trying {text}", flush=True),
@@ -89,7 +91,8 @@ def note(given: Arguments, notice: str) -> None:
 
 def located(scene: str) -> AbstractContextManager[None]:
     """A context that starts the messages of errors with the name of the scene's file."""
-    return Reporter(scene=find_scene(scene).name).located()
+    path = find_scene(scene)
+    return Reporter(scene=path.name, text=lambda: scene_text(path)).located()
 
 
 def assignments(
