@@ -84,7 +84,24 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument("--works", action="store_true", help="compute the work of each effect")
-    add_values(parser)
+    parser.add_argument(
+        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
+    )
+    parser.add_argument(
+        "--state",
+        metavar="NAME=X",
+        action="append",
+        default=[],
+        help="value of a state at the start; NAME_deg in degrees (the scene's initial state)",
+    )
+    parser.add_argument(
+        "--input",
+        metavar="NAME=X",
+        action="append",
+        default=[],
+        help="an input: a number or a formula of t, 'push=3*sin(t)'; or FILE.csv with columns t "
+        "and names, between whose times inputs are linear",
+    )
     add_folder(parser)
     parser.add_argument("--plot", metavar="FILE", type=path, help="figure (DIR/NAME.png)")
     parser.add_argument("--no-pictures", action="store_true", help="write no figure and no page")

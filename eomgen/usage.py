@@ -18,7 +18,7 @@ EXAMPLES = {
     "check": "eomgen check two_body",
     "derive": "eomgen derive two_body --format html -o two_body.html",
     "generate": "eomgen generate two_body pendulum -o modules",
-    "simulate": "eomgen simulate cart_pole --t-end 5 --set m_pole=0.2 --input push=1.5",
+    "simulate": "eomgen simulate cart_pole --set l=0.4 --state theta=0.3 --input push=3*sin(t)",
     "view": "eomgen view double_pendulum",
     "sweep": "eomgen sweep cart_pole --vary m_pole=0.1:0.5:20 --of theta",
     "verify": "eomgen verify two_body --states 20",

@@ -2,19 +2,22 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, overridden, read, values_of
+from eomgen.api.inputs import Inputs, applied
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
+from eomgen.api.states import initial_with, origin_from, split, values_by_index
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.results import Run
+from eomgen.run.inputs import InputsOfTime, ModuleWithInputs, with_corners
 from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.problem import Problem
 from eomgen.scene.appearance import appearance_of
@@ -43,6 +46,8 @@ class Plan:
     model    with the outputs that the run and its pictures need
     setting  method and tolerances or step; None if `accuracy` or `budget` choose them
     outputs  those that the caller named
+    state    values of the initial state, by index in [q, v, x]
+    varying  all inputs, if some of them are tables or functions of time
 
     The other fields are arguments of `simulate`.
     """
@@ -54,6 +59,8 @@ class Plan:
     parameters: Mapping[str, float]
     inputs: Mapping[str, float]
     outputs: Sequence[str] = ()
+    state: Mapping[int, float] = field(default_factory=dict)
+    varying: InputsOfTime | None = None
     accuracy: float | None = None
     budget: float | None = None
     integrator: str | None = None
@@ -78,7 +85,8 @@ def simulate(
     accuracy: float | None = None,
     budget: float | None = None,
     parameters: Values | None = None,
-    inputs: Values | None = None,
+    state: Values | None = None,
+    inputs: Inputs | None = None,
     form: Form | None = None,
     route: Route | None = None,
     samples: int = 1001,
@@ -101,7 +109,12 @@ def simulate(
                 scale of the motion, is below this; they are found by trial runs of this scene
     budget      choose the most accurate run that takes about this time, s
     parameters  values that replace those of the scene, by name
-    inputs      constant values, by name; others are 0
+    state       values that replace those of the scene's initial state, by name; `<name>_deg` in
+                degrees
+    inputs      by name constant values; formulas of t, the motion and parameters, as "3*sin(t)",
+                which become part of the module; or functions of t. Or the path of a table with a
+                line t and names, then a line for each time; between them inputs are linear. With
+                tables and functions nothing is compiled. Others have their defaults
     form        state form; None: the scene's own
     route       to the equations; None: the scene's own
     samples     number of rows that are kept, about
@@ -120,7 +133,7 @@ def simulate(
     A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
     says why and what to change. Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene = read(source)
+    scene, constants, varying = applied(read(source), inputs)
     plan = plan_run(
         scene,
         overridden(check(scene), form=form, route=route),
@@ -132,7 +145,9 @@ def simulate(
         accuracy=accuracy,
         budget=budget,
         parameters=parameters,
-        inputs=inputs,
+        state=state,
+        inputs=constants,
+        varying=varying,
         samples=samples,
         max_step=max_step,
         works=works,
@@ -158,7 +173,9 @@ def plan_run(
     accuracy: float | None = None,
     budget: float | None = None,
     parameters: Values | None = None,
+    state: Values | None = None,
     inputs: Values | None = None,
+    varying: InputsOfTime | None = None,
     samples: int = 1001,
     max_step: float | None = None,
     works: bool = False,
@@ -171,6 +188,7 @@ def plan_run(
 ) -> Plan:
     """Check the arguments of `simulate`, which describes them, for a scene's model.
 
+    `inputs` are constants; `varying` are all of them if some are not, see `inputs.applied`.
     `outputs` must be in the module. Raises `RunError` for an invalid argument.
     """
     bounds = {"rtol": rtol, "atol": atol, "dt": dt}
@@ -181,6 +199,14 @@ def plan_run(
         raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
     if backend not in ("auto", "numpy", "c"):
         raise RunError(f"{reporter.argument('backend')}: '{backend}' is none of auto, numpy, c")
+    if varying is not None:
+        plain = backend in ("auto", "numpy") and guard is None and resume is None
+        if aims or estimate or not plain:
+            raise RunError(
+                f"{reporter.argument('inputs')}: with tables and functions of time there is no "
+                "choice of method, estimate, guard, earlier run or compiled code; give a formula "
+                "of t, or leave the other out"
+            )
     setting = None
     if not aims:
         setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
@@ -195,6 +221,8 @@ def plan_run(
         parameters,
         inputs,
         outputs,
+        values_by_index(model, state, reporter),
+        varying,
         accuracy=accuracy,
         budget=budget,
         integrator=integrator,
@@ -217,6 +245,8 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
     model = plan.model
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
+    if plan.varying:
+        functions = cast(GeneratedModule, ModuleWithInputs(functions, plan.varying))
     values = (plan.parameters or None, plan.inputs or None)
     options: dict[str, Any] = {
         "samples": plan.samples,
@@ -225,11 +255,11 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         "guard": _guard(plan, functions, values),
         "unstable": plan.unstable,
     }
-    problem = problem_of(functions, *values, model)
+    problem, model = _problem(plan, model, functions, values, reporter)
     accelerator = _accelerator(plan, functions, values, reporter)
     if accelerator:
         problem = accelerator.of(problem)
-    start = _start(plan, problem)
+    began, start = problem.initial, _start(plan, problem)
     if start is not None:
         problem = start.problem
         options |= start.options
@@ -238,7 +268,11 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         from eomgen.study.accuracy.moved import moved_problem
 
         moved = moved_problem(
-            functions, model, *values, compiled=accelerator.of if accelerator else None
+            functions,
+            model,
+            *values,
+            start=began,
+            compiled=accelerator.of if accelerator else None,
         )
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
@@ -261,11 +295,13 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         warnings.append(told)
         reporter.note(told)
     model = model.with_parameters(plan.parameters)
+    # What varies is not 0.
+    pushing = dict.fromkeys(plan.varying.given, 1.0) if plan.varying else plan.inputs
     return Run(
         model,
         module,
         trajectory,
-        observe(model, functions, trajectory, appearance_of(plan.scene), plan.inputs),
+        observe(model, functions, trajectory, appearance_of(plan.scene), pushing),
         trial.setting.options,
         error,
         tuple(warnings),
@@ -276,6 +312,32 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     )
 
 
+def _problem(
+    plan: Plan,
+    model: Model,
+    module: GeneratedModule,
+    values: tuple[Mapping[str, float] | None, Mapping[str, float] | None],
+    reporter: Reporter,
+) -> tuple[Problem, Model]:
+    """The problem of a plan, and its model with the initial state of the plan."""
+    if not plan.state:
+        problem = problem_of(module, *values, model)
+    else:
+        with reporter.located():
+            problem = problem_of(
+                module, *values, model, lambda y: initial_with(model, y, plan.state, reporter)
+            )
+        problem = replace(problem, origin=origin_from(problem.origin, problem.initial))
+        q, v, x = split(model, problem.initial)
+        states = (
+            replace(state, initial=value) for state, value in zip(model.states, x, strict=True)
+        )
+        model = replace(model, initial_q=q, initial_v=v, states=tuple(states))
+    if plan.varying:
+        problem = with_corners(problem, module, values[0], plan.varying)
+    return problem, model
+
+
 def _accelerator(
     plan: Plan,
     module: GeneratedModule,
@@ -283,7 +345,7 @@ def _accelerator(
     reporter: Reporter,
 ) -> "Accelerator | None":
     """The compiled steps and functions of a plan; None if it asks for none."""
-    if plan.backend == "numpy":
+    if plan.backend == "numpy" or plan.varying:
         return None
     from eomgen.native.accelerator import Accelerator
 

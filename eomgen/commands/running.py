@@ -5,12 +5,15 @@ import sys
 import webbrowser
 from pathlib import Path
 
+from eomgen.api.inputs import applied
 from eomgen.api.saving import output_paths, save_run
 from eomgen.api.simulating import plan_run, run_plan
+from eomgen.api.states import state_names
 from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, warn_of_energy
 from eomgen.commands.shared import (
     Arguments,
-    given_values,
+    assignments,
+    given_inputs,
     overlap_lines,
     print_listed,
     print_wrapped,
@@ -22,6 +25,7 @@ from eomgen.commands.shared import (
 from eomgen.errors import InterruptedRunError, RunError
 from eomgen.results import Run
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.reader import read_scene
 
 
 def simulate(given: Arguments) -> int:
@@ -29,9 +33,12 @@ def simulate(given: Arguments) -> int:
     if given.no_pictures and (given.view or given.plot is not None):
         other = "--view" if given.view else "--plot"
         raise RunError(f"--no-pictures draws nothing, and {other} asks for a picture; drop one")
-    scene, model, name = read_whole(given.scene, given)
     reporter = reporter_of(given, given.scene)
-    parameters, inputs = given_values(given, model)
+    applied_to = applied(read_scene(given.scene), given_inputs(given.input), reporter)
+    scene, model, name = read_whole(given.scene, given, applied_to[0])
+    parameters = assignments(given.set, model.defaults, "--set")
+    with reporter.located():
+        state = assignments(given.state, state_names(model), "--state")
     plan = plan_run(
         scene,
         model,
@@ -44,7 +51,9 @@ def simulate(given: Arguments) -> int:
         accuracy=given.accuracy,
         budget=None if given.budget is None else seconds_of(given.budget),
         parameters=parameters,
-        inputs=inputs,
+        state=state,
+        inputs=applied_to[1],
+        varying=applied_to[2],
         samples=given.samples,
         max_step=given.max_step,
         works=given.works,

@@ -8,6 +8,7 @@ from eomgen.errors import SceneError, check_known
 from eomgen.language.conditions import require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import about_slides, of_joint, with_components
+from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, dofs_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
@@ -32,10 +33,13 @@ def sliding_in(bodies: Sequence[Body], dimensions: int) -> frozenset[str]:
 
 
 def inputs_and_states(
-    effects: Iterable[Effect], scope: Scope, dimensions: int
+    scene: Scene, effects: Iterable[Effect], scope: Scope
 ) -> tuple[tuple[Input, ...], tuple[ExtraState, ...]]:
-    """The inputs and extra states of effects, in the units of the joints at which they act."""
-    inputs, states = [], []
+    """The inputs of a scene and its effects, and their extra states, in the units of the joints at
+    which they act.
+    """
+    dimensions = scene.dimensions
+    inputs, states = [*own_inputs(scene)], list[ExtraState]()
     for effect in effects:
         inputs += [_at_joint(x, effect, scope.sliding) for x in effect.inputs(dimensions)]
         states += [_at_joint(x, effect, scope.sliding) for x in effect.states(dimensions)]

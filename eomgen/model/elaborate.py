@@ -12,6 +12,7 @@ from eomgen.model.definitions import with_definitions
 from eomgen.model.effects import check_contacts, effects_in_force, inputs_and_states, sliding_in
 from eomgen.model.geometry import axis_notices, entries_of_inertia, normalised_joint
 from eomgen.model.initial import initial_state
+from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, Model, Point, prescribed_of, velocities_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import locked_values
@@ -38,10 +39,10 @@ def elaborate(scene: Scene) -> Model:
     effects, of_effects = effects_in_force(scene, bodies, scope)
     points, of_points = _points(scene, bodies, scope)
     found = joined([Bindings(own), of_bodies, of_effects, of_points])
-    inputs, states = inputs_and_states(effects, scope, n)
+    inputs, states = inputs_and_states(scene, effects, scope)
     if not any(body.velocities for body in bodies):
         raise SceneError("joints: nothing can move; give at least one that is no weld")
-    _check_symbols(n, found.parameters, links, bodies, effects)
+    _check_symbols(n, found.parameters, links, bodies, effects, scene)
     check_contacts(effects, [body.name for body in bodies])
     locked = locked_values(scene.locked, bodies, effects)
     appearance_of(scene)  # raises SceneError if the mechanism cannot be drawn
@@ -135,6 +136,7 @@ def _moving(scene: Scene) -> tuple[str, ...]:
     for joint, _ in written_out(scene)[1]:
         both = (*joint.positions(scene.dimensions), *joint.velocities(scene.dimensions))
         names += [coordinate.name for coordinate in both]
+    names += [i.name for i in own_inputs(scene)]
     for effect in scene.effects:
         names += [i.name for i in effect.inputs(scene.dimensions)]
         names += [x.name for x in effect.states(scene.dimensions)]
@@ -193,6 +195,7 @@ def _check_symbols(
     links: Sequence[Link],
     bodies: Sequence[Body],
     effects: Sequence[Effect],
+    scene: Scene,
 ) -> None:
     """Raise `SceneError`, with both locations, if a symbol of the equations would be ambiguous.
 
@@ -204,6 +207,8 @@ def _check_symbols(
     uses += [(c.name, "a coordinate", at) for body, at in joints for c in body.positions]
     uses += [(c.name, "a velocity", at) for body, at in joints for c in body.velocities]
     uses += [(c.acceleration, "an acceleration", at) for b, at in joints for c in b.velocities]
+    own = own_inputs(scene)
+    uses += [(own[k].name, "an input", f"inputs[{k}]") for k in range(len(own))]
     uses += [(i.name, "an input", at) for effect, at in located for i in effect.inputs(n)]
     uses += [(x.name, "a state", at) for effect, at in located for x in effect.states(n)]
     taken = {"t": ("time", ""), "pi": ("the number π", "")}

@@ -157,6 +157,7 @@ _UNION_MEMBERS = (
     "tuple-",
     "float",
     "ParameterTable",
+    "InputTable",
 )
 _TAGGED = {"joints", "effects", "shapes"}
 

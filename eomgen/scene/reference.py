@@ -14,7 +14,15 @@ from eomgen.language.quantity import of_any_joint
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
-from eomgen.scene.schema import BodyTable, ChainTable, Initial, PointTable, Scene, Simulation
+from eomgen.scene.schema import (
+    BodyTable,
+    ChainTable,
+    Initial,
+    InputTable,
+    PointTable,
+    Scene,
+    Simulation,
+)
 
 HEAD = """\
 # Scenes: their tables, joints and effects
@@ -29,6 +37,7 @@ stands for the time `t` and all coordinates, velocities, inputs and states of ef
 
 TABLES: Mapping[str, type[Table]] = {
     "the scene itself": Scene,
+    "inputs": InputTable,
     "bodies": BodyTable,
     "chains": ChainTable,
     "points": PointTable,

@@ -46,11 +46,15 @@ LeftOut = Literal["velocity_forces"]
 """Terms of the equations that a scene may leave out."""
 
 
+UNIT = r"^[A-Za-z0-9 /^*.()-]*$"
+"""What the unit of a parameter or an input may be written with."""
+
+
 class ParameterTable(Table):
     """A parameter with its unit and meaning: `{ value = 1.0, unit = "kg", about = "…" }`."""
 
     value: Number
-    unit: Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z0-9 /^*.()-]*$")] = ""
+    unit: Annotated[str, Field(max_length=40, pattern=UNIT)] = ""
     about: Text = ""
 
 
@@ -62,6 +66,15 @@ def inertia() -> Any:
     """A field for the inertia of a body."""
     about = "moment of inertia about the centre of mass"
     return quantity("kg m^2", about, "nonnegative", union_mode="left_to_right")
+
+
+class InputTable(Table):
+    """An input of the module for formulas of the scene: `{ name = "thrust", unit = "N" }`."""
+
+    name: Identifier
+    unit: Annotated[str, Field(max_length=40, pattern=UNIT)] = Field(default="", description="unit")
+    about: Text = Field(default="", description="one line of text")
+    default: Number = Field(default=0.0, description="its value unless given")
 
 
 class BodyTable(Table):
@@ -159,6 +172,10 @@ class Scene(Table):
     form: Form = Field(default="velocity", description="state form")
     parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
         Field(default={}, description="named numbers, or tables of value, unit and about")
+    )
+    inputs: Annotated[tuple[Identifier | InputTable, ...], Field(max_length=MOST)] = Field(
+        default=(),
+        description="inputs that formulas use: names, or tables of name, unit, about and default",
     )
     definitions: Annotated[dict[Identifier, Quantity], Field(max_length=MOST)] = Field(
         default={}, description="names for formulas of parameters, the motion and one another"

@@ -20,6 +20,7 @@ class ExternalForce(EffectTable):
 
     body_fields = ("body",)
     vector_fields = ("at", "force")
+    input_field = "force"
 
     type: Literal["external_force"]
     body: Identifier = Field(description="body it acts on")

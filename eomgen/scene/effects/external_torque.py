@@ -19,6 +19,7 @@ class ExternalTorque(EffectTable):
     """
 
     body_fields = ("body",)
+    input_field = "torque"
 
     type: Literal["external_torque"]
     name: Identifier

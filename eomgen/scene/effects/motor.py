@@ -1,7 +1,7 @@
 """A motor at a joint."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from eomgen.language.formula import names_in
 from eomgen.language.quantity import Quantity, quantity
@@ -14,6 +14,8 @@ class Motor(OnCoordinate):
 
     At a prismatic joint it is a force. With `torque = "input"` it is the input `<name>`.
     """
+
+    input_field: ClassVar[str] = "torque"
 
     type: Literal["motor"]
     torque: Literal["input"] | Quantity = quantity(
