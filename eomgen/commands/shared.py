@@ -13,6 +13,7 @@ from eomgen.api.inputs import Given, read_table
 from eomgen.api.overlaps import overlaps_at_start
 from eomgen.api.reporter import Reporter
 from eomgen.errors import RunError
+from eomgen.language.angles import number_with_unit
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_notice, terminal_progress
 from eomgen.scene.reader import find_scene, read_scene, scene_text
@@ -112,6 +113,9 @@ def assignments(
     values = {}
     for text in texts:
         name, sign, number = text.partition("=")
+        angle = number_with_unit(number) if option == "--state" else None
+        if angle:
+            number, name = str(angle[0]), f"{name}_deg" if angle[1] else name
         check_name(name, known, option, what)
         try:
             value = float(number)

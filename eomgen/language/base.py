@@ -5,10 +5,20 @@ import re
 from itertools import zip_longest
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    Strict,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from eomgen.errors import nearest
+from eomgen.language.angles import by_unit, radians_of
 
 LONGEST_NAME = 40
 MOST_HINTS = 10
@@ -74,5 +84,22 @@ def _line(text: str) -> str:
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False), AfterValidator(_size)]
 """A finite number. Integers are accepted; text and booleans are not. Zero has no sign."""
 
+AngleOrNumber = Annotated[
+    Number,
+    BeforeValidator(radians_of),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
+]
+"""A number, or an angle with its unit, "90 deg", which becomes a number of rad."""
+ByName = Annotated[
+    dict[str, Number],
+    BeforeValidator(by_unit),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "string"}]},
+        }
+    ),
+]
+"""Numbers by coordinate; an angle with its unit becomes a number of rad, or `<name>_deg`."""
 Positive = Annotated[Number, Field(gt=0)]
 Text = Annotated[str, Field(max_length=400), AfterValidator(_line)]

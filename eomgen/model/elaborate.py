@@ -15,6 +15,7 @@ from eomgen.model.initial import initial_state
 from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, Model, Point, prescribed_of, velocities_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
+from eomgen.model.orientation import oriented
 from eomgen.model.prescribed import locked_values
 from eomgen.model.tree import Link, links_of
 from eomgen.outputs import OUTPUTS
@@ -152,7 +153,8 @@ def _bodies(
 
 
 def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
-    joint = normalised_joint(link.joint, link.joint_location, dimensions)
+    turned, kept = oriented(link.joint, link.joint_location, dimensions, scope)
+    joint = normalised_joint(turned, link.joint_location, dimensions)
     table, of_body = bind(link.body, link.body.name, link.location, scope)
     inertia_com = entries_of_inertia(table, link.location, dimensions)
     values = of_body.values(scope)
@@ -169,7 +171,7 @@ def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
         positions=joint.positions(dimensions),
         velocities=joint.velocities(dimensions),
     )
-    return body, joined([of_body, Bindings(conditions=conditions), of_joint])
+    return body, joined([of_body, Bindings(conditions=(*conditions, *kept)), of_joint])
 
 
 def _points(

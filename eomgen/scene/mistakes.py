@@ -154,6 +154,7 @@ _UNION_MEMBERS = (
     "dict[",
     "function-plain",
     "function-after[",
+    "function-before[",
     "tuple-",
     "float",
     "ParameterTable",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
 from eomgen.integrators import INTEGRATORS
-from eomgen.language.base import Identifier, Number, Positive, Table, Text
+from eomgen.language.base import ByName, Identifier, Number, Positive, Table, Text
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
 from eomgen.routes import ROUTES
@@ -120,14 +120,14 @@ class PointTable(Table):
 class Initial(Table):
     """The initial state: lists in the order of `eomgen check`, or tables by name.
 
-    In a table, values that are not named are 0, and an angle may be given in degrees as
-    `<name>_deg`.
+    In a table, values that are not named are 0, and an angle may be given in degrees, as
+    `<name>_deg = 90` or `<name> = "90 deg"`.
     """
 
-    q: tuple[Number, ...] | dict[str, Number] = Field(
+    q: tuple[Number, ...] | ByName = Field(
         default={}, union_mode="left_to_right", description="coordinates"
     )
-    v: tuple[Number, ...] | dict[str, Number] = Field(
+    v: tuple[Number, ...] | ByName = Field(
         default={}, union_mode="left_to_right", description="velocities"
     )
 
@@ -197,8 +197,9 @@ class Scene(Table):
     effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = Field(
         default=(), description="effects: forces, contacts, controllers, drives"
     )
-    locked: Annotated[dict[Identifier, Number], Field(max_length=MOST)] = Field(
-        default={}, description="coordinates held constant, by name (<name>_deg for an angle)"
+    locked: Annotated[ByName, Field(max_length=MOST)] = Field(
+        default={},
+        description="coordinates held constant, by name (<name>_deg or '90 deg' for an angle)",
     )
     leave_out: Annotated[tuple[LeftOut, ...], Field(max_length=1)] = Field(
         default=(),
