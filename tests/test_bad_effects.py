@@ -242,7 +242,7 @@ def test_names_and_vectors(kind: str) -> None:
         )
         assert refusal(crane(kind, **{field: "3"})) == f"{place}: 3 is not a text; give one"
         assert refusal(crane(kind, **{field: '"my boom"'})) == (
-            f"{place}: 'my boom' is not an identifier; use letters a-z, digits and _, "
+            f"{place}: 'my boom' is not an identifier; use letters a-z, digits, _ and -, "
             "a letter first"
         )
         if member.model_fields[field].default == "world":

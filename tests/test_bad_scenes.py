@@ -183,7 +183,7 @@ MISTAKES = [
         'name = "hand"',
         'name = "my hand"',
         "bodies[1].name: 'my hand' is not an identifier; "
-        "use letters a-z, digits and _, a letter first",
+        "use letters a-z, digits, _ and -, a letter first",
     ),
     (
         'name = "hand"',
@@ -391,8 +391,8 @@ MISTAKES = [
      "chains[0].mass: -0.1 is negative; give a number >= 0 in kg"),
     (None, CHAIN + 'parent = "arn"\n',
      "chains[0].parent: no body is named 'arn' (did you mean 'arm'?)"),
-    (None, CHAIN.replace("links", "l" * 33),
-     f"chains[0].name: makes the name '{'l' * 33}_joint_3', which is longer than 40 characters; "
+    (None, CHAIN.replace("links", "l" * 93),
+     f"chains[0].name: makes the name '{'l' * 93}_joint_3', which is longer than 100 characters; "
      "choose a shorter name"),
     (None, CHAIN + CHAIN, "chains[1].name: 'links_1' is the name of chains[0] too; "
      "give each its own"),

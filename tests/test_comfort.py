@@ -77,3 +77,42 @@ def test_completion_is_a_script_of_the_shell(capsys: pytest.CaptureFixture[str])
                 ["bash", "-c", f"{script}\n{call}"], capture_output=True, text=True, check=True
             )
             assert done.stdout.split() == ["two_body_forced"]
+
+
+LONG = "l" * 93
+NAMED = f"""\
+name = "two-body"
+parameters = {{ upper-mass = 2.0 }}
+bodies = [
+    {{ name = "upper-arm", mass = "upper_mass", inertia_com = 0.1 }},
+    {{ name = "{LONG}", mass = 1, inertia_com = 0.1 }},
+]
+joints = [
+    {{ name = "s-1", type = "revolute", parent = "world", child = "upper-arm" }},
+    {{ name = "e", type = "revolute", parent = "upper_arm", child = "{LONG}", r_child = [1, 0] }},
+]
+effects = [{{ type = "motor", name = "push-it", joint = "s-1", torque = "input" }}]
+initial = {{ q = {{ s-1_angle = "60 deg" }} }}
+"""
+
+
+def test_names_may_have_dashes_and_a_hundred_letters(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They are identifiers in code, options take them, and no two become the same one."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(NAMED)
+    run = ["simulate", str(scene), "--set", "upper-mass=3", "--input", "push-it=0.1"]
+    assert main([*run, "--t-end", "0.1", "--no-pictures", "-o", str(tmp_path)]) == 0
+    source = (tmp_path / "two_body.py").read_text()
+    assert "'upper_arm'" in source and LONG in source and '"s_1_angle"' in source
+    for old, new, message in (
+        (LONG, LONG + "l" * 8, "is longer than 100 characters"),
+        (f'"{LONG}", mass', '"upper_arm", mass', "bodies[1].name: 'upper_arm' is the name of bodi"),
+        ("= 2.0", "= 2.0, upper_mass = 1", "parameters.upper_mass: is the same name as 'upper-ma"),
+        ("s-1_angle =", "s-1_angle = 1, s_1_angle =", "initial.q"),
+    ):
+        scene.write_text(NAMED.replace(old, new))
+        capsys.readouterr()
+        assert main(["check", str(scene)]) == 1
+        assert message in capsys.readouterr().err

@@ -12,6 +12,7 @@ from eomgen.api.given import check_name
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.files import read_plain
+from eomgen.language.base import identifier
 from eomgen.language.conditions import value_of
 from eomgen.language.formula import Formula, FormulaError, names_in, parse
 from eomgen.model.inputs import all_inputs, with_formulas
@@ -43,6 +44,7 @@ def applied(
     formulas: dict[str, Formula] = {}
     varying: dict[str, Table | Callable[[float], float]] = {}
     for name, value in inputs.items():
+        name = identifier(name)
         check_name(name, known, argument, "input")
         if callable(value):
             varying[name] = value

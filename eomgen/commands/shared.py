@@ -14,6 +14,7 @@ from eomgen.api.overlaps import overlaps_at_start
 from eomgen.api.reporter import Reporter
 from eomgen.errors import RunError
 from eomgen.language.angles import number_with_unit
+from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_notice, terminal_progress
 from eomgen.scene.reader import find_scene, read_scene, scene_text
@@ -113,6 +114,7 @@ def assignments(
     values = {}
     for text in texts:
         name, sign, number = text.partition("=")
+        name = identifier(name)
         angle = number_with_unit(number) if option == "--state" else None
         if angle:
             number, name = str(angle[0]), f"{name}_deg" if angle[1] else name

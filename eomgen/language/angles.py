@@ -34,7 +34,8 @@ def by_unit(table: Any) -> Any:
     if not isinstance(table, Mapping):
         return table
     found = {}
-    for key, value in table.items():
+    for name, value in table.items():
+        key = str(name).replace("-", "_")  # as in identifiers
         angle = number_with_unit(value)
         if angle is None or (angle[1] and f"{key}_deg" in table):
             found[key] = value

@@ -20,7 +20,7 @@ from pydantic_core import PydanticCustomError
 from eomgen.errors import nearest
 from eomgen.language.angles import by_unit, radians_of
 
-LONGEST_NAME = 40
+LONGEST_NAME = 100
 MOST_HINTS = 10
 """Greatest number of unknown keys with a hint; a table may have thousands."""
 
@@ -42,6 +42,8 @@ class Table(BaseModel):
             if unknown:
                 pairs = list(zip_longest(unknown, hints, fillvalue=""))
                 raise PydanticCustomError("unknown_keys", "unknown keys", {"keys": pairs})
+            for key, table in data.items():
+                _check_clashes(key, table)
         return data
 
     def replaced(self, **values: Any) -> Self:
@@ -49,9 +51,26 @@ class Table(BaseModel):
         return self.model_copy(update=values)
 
 
+def identifier(name: str) -> str:
+    """A name as it stands in formulas and in code: with _ for each -."""
+    return name.replace("-", "_")
+
+
+def _check_clashes(key: str, table: Any) -> None:
+    """Raise an error for two names in a table that are the same identifier."""
+    seen: dict[str, str] = {}
+    for name in table if isinstance(table, dict) else ():
+        other = seen.setdefault(identifier(str(name)), str(name))
+        if other != name:
+            raise PydanticCustomError(
+                "keys", "is the same name as '{other}'", {"key": f"{key}.{name}", "other": other}
+            )
+
+
 def _identifier(name: str) -> str:
+    name = identifier(name)
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise ValueError("is not an identifier; use letters a-z, digits and _, a letter first")
+        raise ValueError("is not an identifier; use letters a-z, digits, _ and -, a letter first")
     if keyword.iskeyword(name) or keyword.issoftkeyword(name):
         raise ValueError("is a Python keyword; choose another name")
     if len(name) > LONGEST_NAME:
@@ -62,7 +81,7 @@ def _identifier(name: str) -> str:
 
 
 Identifier = Annotated[str, AfterValidator(_identifier)]
-"""A name that is valid in Python, JavaScript and LaTeX."""
+"""A name that is valid in Python, JavaScript and LaTeX; a - in it is read as _."""
 
 LARGEST = 1e100
 """Largest absolute value of a number in a scene: its square does not overflow."""
