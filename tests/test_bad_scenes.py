@@ -916,7 +916,7 @@ def test_all_unknown_keys_are_reported(scene: Path, capsys: pytest.CaptureFixtur
     assert capsys.readouterr().err.splitlines() == [
         "eomgen: swing.toml:11: bodies[1].mas: unknown key (did you mean 'mass'?)",
         "eomgen: swing.toml:12: bodies[1].colour: unknown key; known here: name, mass, "
-        "inertia_com, shapes",
+        "inertia_com, com, inertia_check, shapes",
         "eomgen: swing.toml:13: bodies[1].inertia: unknown key (did you mean 'inertia_com'?)",
         "eomgen: swing.toml:30: effects[0].gg: unknown key (did you mean 'g'?)",
     ]

@@ -8,6 +8,7 @@ from eomgen.errors import SceneError, check_known
 from eomgen.language.conditions import require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import about_slides, of_joint, with_components
+from eomgen.model.frames import effect_from_centres
 from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, dofs_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
@@ -67,6 +68,8 @@ def effects_in_force(
     dofs = dofs_of(bodies, scene.dimensions)
     names_of_dofs = {b.joint.name: [c.name for c in b.positions] for b in bodies}
     known = _known_names(scene, bodies, dofs)
+    names = [body.name for body in bodies]
+    centres = {body.name: body.com for body in bodies if body.com}
     types = {b.joint.name: b.joint.type for b in bodies}
     effects: list[Effect] = []
     found: list[Bindings] = []
@@ -74,6 +77,7 @@ def effects_in_force(
         location = f"effects[{i}]"
         if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
             raise SceneError(f"{location}.type: a second 'gravity'; give one")
+        given = effect.model_fields_set
         _check_names_in(effect, location, known, types)
         effect.check_dofs(dofs, names_of_dofs, location)
         vectors = {
@@ -85,6 +89,7 @@ def effects_in_force(
         if isinstance(effect, Driven):
             check_drive(effect, location, bodies, effects, scope)
         effect, bindings = bind(effect, effect.name, location, scope)
+        effect = effect_from_centres(effect, given, names, centres, location)
         conditions = tuple(effect.conditions(location))
         require(conditions, bindings.values(scope))
         found += [bindings, Bindings(conditions=conditions)]

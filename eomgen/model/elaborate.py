@@ -1,15 +1,16 @@
 """Elaboration of a scene to a model: names are resolved, values checked, bodies put in a tree."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
 from eomgen.errors import SceneError, check_known
-from eomgen.language.conditions import of_inertia, require
-from eomgen.language.formula import ZERO
+from eomgen.language.conditions import PRINTED, ROUNDING, Condition, of_inertia, require
+from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model.definitions import with_definitions
 from eomgen.model.effects import check_contacts, effects_in_force, inputs_and_states, sliding_in
+from eomgen.model.frames import Centres, from_centre, joint_from_centres
 from eomgen.model.geometry import axis_notices, entries_of_inertia, normalised_joint
 from eomgen.model.initial import initial_state
 from eomgen.model.inputs import own_inputs
@@ -22,7 +23,7 @@ from eomgen.outputs import OUTPUTS
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.chains import written_out
 from eomgen.scene.effects import Effect
-from eomgen.scene.schema import Scene
+from eomgen.scene.schema import BodyTable, Scene
 
 
 def elaborate(scene: Scene) -> Model:
@@ -78,7 +79,11 @@ def elaborate(scene: Scene) -> Model:
             (name, scene.locked[f"{name}_deg"]) for name in locked if name not in scene.locked
         ),
         leave_out=scene.leave_out,
-        notices=(*dict.fromkeys(lengths), *start.notices),
+        notices=(
+            *dict.fromkeys(lengths),
+            *dict.fromkeys(notice for body in bodies for notice in body.notices),
+            *start.notices,
+        ),
     )
 
 
@@ -148,20 +153,29 @@ def _bodies(
     links: Sequence[Link], scope: Scope, dimensions: int
 ) -> tuple[tuple[Body, ...], Bindings]:
     """The bodies of links, in their order, with their joints; and the bindings of both."""
-    pairs = [_body(link, scope, dimensions) for link in links]
-    return tuple(body for body, _ in pairs), joined(bindings for _, bindings in pairs)
+    bodies, found = list[Body](), list[Bindings]()
+    for link in links:
+        body, bindings = _body(link, scope, dimensions, {b.name: b.com for b in bodies if b.com})
+        bodies.append(body)
+        found.append(bindings)
+    return tuple(bodies), joined(found)
 
 
-def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
+def _body(link: Link, scope: Scope, dimensions: int, centres: Centres) -> tuple[Body, Bindings]:
+    """A body with its joint; `centres` are those of the bodies before it."""
     turned, kept = oriented(link.joint, link.joint_location, dimensions, scope)
     joint = normalised_joint(turned, link.joint_location, dimensions)
-    table, of_body = bind(link.body, link.body.name, link.location, scope)
+    given = link.body
+    if given.com:
+        at = f"{link.location}.com"
+        given = given.replaced(com=with_components(given.com, ZERO, dimensions, at))
+    table, of_body = bind(given, given.name, link.location, scope)
     inertia_com = entries_of_inertia(table, link.location, dimensions)
     values = of_body.values(scope)
     at = f"{link.location}.inertia_com"
-    conditions = tuple(of_inertia(at, table.name, table.mass, inertia_com, values))
-    require(conditions, values)
+    conditions, notice = _checked_inertia(table, inertia_com, at, values)
     joint, of_joint = bind(joint, joint.name, link.joint_location, scope)
+    joint = joint_from_centres(joint, {**centres, **({table.name: table.com} if table.com else {})})
     body = Body(
         name=table.name,
         mass=table.mass,
@@ -170,8 +184,35 @@ def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
         parent=link.parent,
         positions=joint.positions(dimensions),
         velocities=joint.velocities(dimensions),
+        com=table.com,
+        notices=notice,
     )
     return body, joined([of_body, Bindings(conditions=(*conditions, *kept)), of_joint])
+
+
+def _checked_inertia(
+    body: BodyTable, entries: tuple[Formula, ...], location: str, values: Mapping[str, float]
+) -> tuple[tuple[Condition, ...], tuple[str, ...]]:
+    """The conditions on an inertia, and a notice if it meets them only within printed digits.
+
+    Raises `SceneError` if it does not, unless the body says that it need not.
+    """
+
+    def conditions(rounding: float | None) -> tuple[Condition, ...]:
+        return tuple(of_inertia(location, body.name, body.mass, entries, values, rounding))
+
+    if body.inertia_check == "off":
+        return conditions(None), ()
+    found = conditions(ROUNDING)
+    if not any(condition.problem(values) for condition in found):
+        return found, ()
+    loose = conditions(PRINTED)
+    if any(condition.problem(values) for condition in loose):
+        require(found, values)
+    return loose, (
+        f"{location}: a principal moment of body '{body.name}' is larger than the other two "
+        "together, by less than 0.1 %; taken as rounding of printed digits",
+    )
 
 
 def _points(
@@ -180,13 +221,16 @@ def _points(
     """The named points and their bindings."""
     check_names([(point.name, f"points[{i}]") for i, point in enumerate(scene.points)])
     index = {body.name: k for k, body in enumerate(bodies)}
+    given = {point.name for point in scene.points if point.at}
     points, found = [], []
     for i, point in enumerate(scene.points):
         location = f"points[{i}]"
         check_known(point.body, f"{location}.body", index, "body")
         at = with_components(point.at, ZERO, scene.dimensions, f"{location}.at")
         point, bindings = bind(point.replaced(at=at), point.name, location, scope)
-        points.append(Point(point.name, index[point.body], point.at))
+        body = bodies[index[point.body]]
+        place = from_centre(point.at, body.com) if point.name in given else point.at
+        points.append(Point(point.name, index[point.body], place))
         found.append(bindings)
     return tuple(points), joined(found)
 

@@ -82,11 +82,24 @@ class BodyTable(Table):
 
     In the plane the inertia is a number; in space [xx, yy, zz], or [xx, yy, zz, xy, xz, yz], the
     entries of the matrix about the centre of mass in body axes.
+
+    Points of a body are given from its centre of mass; with `com` in a frame of its own, in which
+    the centre of mass is at `com`. Then joints without `r_parent` or `r_child` are at its origin.
+    Other points that are absent are the centre of mass, and so are the coordinates of a free joint
+    and the outputs of poses.
     """
 
     name: Identifier
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
+    com: Vector = quantity(
+        "m", "centre of mass in the body's frame", default=(), validate_default=False
+    )
+    inertia_check: Literal["on", "off"] = Field(
+        default="on",
+        description="whether to refuse an inertia that no body has, with a principal moment larger "
+        "than the other two together by more than 0.1 %",
+    )
     shapes: tuple[Shape, ...] = Field(default=(), description="shapes in pictures")
 
 

@@ -241,6 +241,8 @@ class EffectTable(Table):
     """Fields that name one joint or several, neither free nor weld, or are "all"."""
     vector_fields: ClassVar[tuple[str, ...]] = ()
     """Fields with a vector that has one component for each dimension, or is absent."""
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """For each field with a point of a body the fields that name the body or bodies."""
     input_field: ClassVar[str] = ""
     """The field that may be "input"."""
 

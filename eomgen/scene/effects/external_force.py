@@ -1,7 +1,7 @@
 """An external force at a point of a body."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -20,6 +20,7 @@ class ExternalForce(EffectTable):
 
     body_fields = ("body",)
     vector_fields = ("at", "force")
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {"at": ("body",)}
     input_field = "force"
 
     type: Literal["external_force"]

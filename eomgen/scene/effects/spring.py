@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -32,6 +32,7 @@ class Spring(EffectTable):
 
     anchor_fields = ("body_1", "body_2")
     vector_fields = ("at_1", "at_2")
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {"at_1": ("body_1",), "at_2": ("body_2",)}
 
     type: Literal["spring"]
     body_1: Identifier = Field(description="body of its first end, or 'world'")
