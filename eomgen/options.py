@@ -83,6 +83,16 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
         help="auto: compute in compiled C code if that pays; numpy: never; c: always",
     )
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
+    parser.add_argument(
+        "--save",
+        metavar="A,B,…",
+        default="",
+        help="what results hold beside states: energy, points, poses, works, inputs, or outputs by "
+        "name, joint_forces for example",
+    )
+    parser.add_argument(
+        "--parquet", action="store_true", help="also write the table as a Parquet file"
+    )
     parser.add_argument("--works", action="store_true", help="compute the work of each effect")
     parser.add_argument(
         "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"

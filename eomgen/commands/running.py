@@ -6,8 +6,9 @@ import webbrowser
 from pathlib import Path
 
 from eomgen.api.inputs import applied
+from eomgen.api.planning import plan_run
 from eomgen.api.saving import output_paths, save_run
-from eomgen.api.simulating import plan_run, run_plan
+from eomgen.api.simulating import run_plan
 from eomgen.api.states import state_names
 from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, warn_of_energy
 from eomgen.commands.shared import (
@@ -24,6 +25,7 @@ from eomgen.commands.shared import (
 )
 from eomgen.errors import InterruptedRunError, RunError
 from eomgen.results import Run
+from eomgen.run.parquet import check_parquet
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.reader import read_scene
 
@@ -57,6 +59,7 @@ def simulate(given: Arguments) -> int:
         samples=given.samples,
         max_step=given.max_step,
         works=given.works,
+        save=tuple(filter(None, (word.strip() for word in given.save.split(",")))),
         guard=given.guard,
         unstable=given.unstable,
         estimate=given.estimate,
@@ -64,7 +67,11 @@ def simulate(given: Arguments) -> int:
         backend=given.backend,
         reporter=reporter,
     )
-    paths = output_paths(given.output, name, figure=given.plot, force=given.force)
+    if given.parquet:
+        check_parquet("--parquet")
+    paths = output_paths(
+        given.output, name, figure=given.plot, parquet=given.parquet, force=given.force
+    )
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
     run = run_plan(plan, reporter=reporter)

@@ -76,7 +76,7 @@ class ModuleWithInputs:
     """A generated module whose functions of time take inputs of time instead of constant ones."""
 
     def __init__(self, module: Any, inputs: InputsOfTime) -> None:
-        self._module, self._of_time = module, inputs
+        self._module, self.inputs_of_time = module, inputs
 
     def __getattr__(self, name: str) -> Any:
         found = getattr(self._module, name)
@@ -85,7 +85,7 @@ class ModuleWithInputs:
         wanted = list(inspect.signature(found).parameters)
         if wanted[:1] != ["t"] or "u" not in wanted:
             return found
-        at, inputs = wanted.index("u"), self._of_time
+        at, inputs = wanted.index("u"), self.inputs_of_time
 
         def with_inputs(t: float, *rest: Any, **named: Any) -> Any:
             return found(t, *rest[: at - 1], **{**named, "u": inputs(t)})
