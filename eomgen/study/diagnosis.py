@@ -74,7 +74,7 @@ def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str
     return Origin(
         {name: hashlib.sha256(repr(part).encode()).hexdigest() for name, part in parts.items()},
         {**model.defaults, **parameters},
-        {**dict.fromkeys([i.name for i in model.inputs], 0.0), **inputs},
+        {**{i.name: i.default for i in model.inputs}, **inputs},
     )
 
 

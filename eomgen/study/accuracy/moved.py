@@ -120,5 +120,5 @@ def _over(module: GeneratedModule, constants: Mapping[str, Any]) -> GeneratedMod
                 value.__code__, names, name, value.__defaults__, value.__closure__
             )
     names["_DEFAULT"], names["_DERIVATIVE"] = constants, constants["derivative"]
-    names["_parameters"] = lambda _: constants
+    names["_parameters"] = lambda *_: constants
     return cast(GeneratedModule, twin)
