@@ -18,6 +18,13 @@ from eomgen.usage import Parser, Version, example_of, path
 
 Arguments = argparse.Namespace
 INTERRUPTED = 130
+DERIVED = "what was derived is kept for the next call"
+KEPT = {
+    "accuracy": "the runs made so far are in the table, and the same command continues",
+    **dict.fromkeys(("derive", "verify", "effects", "linearise"), DERIVED),
+    **dict.fromkeys(("simulate", "view"), DERIVED),
+}
+"""What an interrupt leaves, for commands that do not say so themselves."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    given: Arguments | None = None
     try:
         parser = _parser()
         given = parser.parse_args(arguments)
@@ -54,7 +62,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"eomgen: {why}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("eomgen: interrupted", file=sys.stderr)
+        kept = KEPT.get(given.command, "") if given else ""
+        print(f"eomgen: interrupted{kept and '; '}{kept}", file=sys.stderr)
         return INTERRUPTED
     return code
 
@@ -72,7 +81,7 @@ def _parser() -> argparse.ArgumentParser:
         name: str, run: Callable[[Arguments], int], about: str, scenes: str | None = "scene"
     ) -> argparse.ArgumentParser:
         added = sub.add_parser(name, help=about, description=about, epilog=example_of(name))
-        added.set_defaults(run=run)
+        added.set_defaults(run=run, command=name)
         if scenes == "scene":
             added.add_argument("scene", metavar="SCENE", help="file or built-in name")
         elif scenes == "scenes":

@@ -1,12 +1,18 @@
 """What makes the command line comfortable: scenes to begin with, help, completion."""
 
+import io
+import json
 import re
 import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from eomgen.cli import main
+from eomgen.commands import durations, generating
+from eomgen.run import progress
 from eomgen.scene.built_in import BUILT_IN
 from eomgen.scene.reader import read_scene
 from eomgen.usage import EXAMPLES
@@ -116,3 +122,69 @@ def test_names_may_have_dashes_and_a_hundred_letters(
         capsys.readouterr()
         assert main(["check", str(scene)]) == 1
         assert message in capsys.readouterr().err
+
+
+class Screen(io.StringIO):
+    """A terminal that keeps what is written to it."""
+
+    def isatty(self) -> bool:
+        return True
+
+    def frames(self) -> list[str]:
+        """What the line showed, one after another."""
+        return [text.strip() for text in self.getvalue().split("\r") if text.strip()]
+
+
+def test_long_work_shows_the_time_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of known length by its fraction; of unknown length as long as it took the last time."""
+    screen, clock = Screen(), [0.0]
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    with progress.terminal_progress("running") as report:
+        report(0.1)
+        for clock[0], fraction in ((1.0, 0.2), (600.0, 0.7)):
+            report(fraction)
+    assert screen.frames()[1].endswith("20%, about 8 s left")
+    assert screen.frames()[2].endswith("70%, about 5 min left")
+    monkeypatch.undo()
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
+    monkeypatch.setattr(progress, "TICK", 0.05)
+    monkeypatch.setattr(durations, "SHORTEST", 0.01)
+    shown = []
+    for _ in range(2):
+        screen = Screen()
+        monkeypatch.setattr(sys, "stderr", screen)
+        with durations.timed_notice("deriving it …"):
+            time.sleep(0.2)
+        shown.append(screen.frames())
+    assert shown[0][0] == "deriving it …" and shown[0][-1] == "deriving it … 0 s"
+    assert any(frame.endswith("about 0 s left") for frame in shown[1])
+    (tmp_path / "durations.json").write_text("[broken")
+    monkeypatch.setattr(sys, "stderr", io.StringIO())  # a pipe
+    with durations.timed_notice("deriving it …"):
+        time.sleep(0.02)
+    assert sys.stderr.getvalue() == ""
+    assert json.loads((tmp_path / "durations.json").read_text()).keys() == {"deriving it …"}
+
+
+def test_an_interrupt_says_what_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of several modules those that are written; of others that nothing is."""
+    made = generating._generate
+
+    def interrupted(scene: str, *rest: object) -> bool:
+        if scene == "two_body":
+            raise KeyboardInterrupt
+        return made(scene, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(generating, "_generate", interrupted)
+    assert main(["generate", "pendulum", "two_body", "acrobot", "-o", str(tmp_path)]) == 130
+    said = "eomgen: interrupted at two_body; 1 of 3 modules are written\n"
+    assert capsys.readouterr().err == said
+    assert [path.name for path in tmp_path.iterdir()] == ["pendulum.py"]
+    monkeypatch.setattr(
+        "eomgen.commands.deriving.derivation_of", lambda *_: interrupted("two_body")
+    )
+    assert main(["derive", "pendulum"]) == 130
+    assert "interrupted; what was derived is kept" in capsys.readouterr().err

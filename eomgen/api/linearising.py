@@ -102,7 +102,10 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
         u: Mapping[str, float] | FloatArray = inputs
         if at != "initial":
             settle = at == "rest"
-            y, u = equilibrium(module, y, inputs, parameters, hold=hold, trim=trim, settle=settle)
+            with reporter.waiting(f"searching an equilibrium of {model.name} …"):
+                y, u = equilibrium(
+                    module, y, inputs, parameters, hold=hold, trim=trim, settle=settle
+                )
         elif hold or trim:
             raise RunError(
                 f"{reporter.argument('hold')}, {reporter.argument('trim')}: are for finding an "

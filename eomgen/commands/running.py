@@ -75,7 +75,8 @@ def simulate(given: Arguments) -> int:
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
     run = run_plan(plan, reporter=reporter)
-    drawing = save_run(run, paths, pictures=not given.no_pictures, force=given.force)
+    with reporter.waiting(f"writing {name} …"):
+        drawing = save_run(run, paths, pictures=not given.no_pictures, force=given.force)
     missed = _report(given, run)
     for path in paths.values():
         print(f"    wrote {path}")

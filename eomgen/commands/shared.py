@@ -12,11 +12,12 @@ from eomgen.api.given import Outputs, check_name, check_outputs, modelled
 from eomgen.api.inputs import Given, read_table
 from eomgen.api.overlaps import overlaps_at_start
 from eomgen.api.reporter import Reporter
+from eomgen.commands.durations import timed_notice
 from eomgen.errors import RunError
 from eomgen.language.angles import number_with_unit
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
-from eomgen.run.progress import terminal_notice, terminal_progress
+from eomgen.run.progress import terminal_progress
 from eomgen.scene.reader import find_scene, read_scene, scene_text
 from eomgen.scene.schema import Scene
 from eomgen.text import one_line
@@ -85,7 +86,7 @@ def reporter_of(given: Arguments, scene: str) -> Reporter:
         argument=_option,
         note=lambda notice: note(given, notice),
         trial=lambda text: print(f"    trying {text}", flush=True),
-        waiting=terminal_notice,
+        waiting=timed_notice,
         progress=terminal_progress,
     )
 
