@@ -10,7 +10,7 @@ from test_compiled_steps import FALL, assert_same, both, compiler
 import eomgen
 from eomgen.api.generating import compiled as generated
 from eomgen.api.given import check, read
-from eomgen.api.simulating import plan_run
+from eomgen.api.planning import plan_run
 from eomgen.model.model import Model
 from eomgen.native import accelerator, functions
 from eomgen.native.accelerator import Accelerator
