@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.run.compiled import Watched
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.schedule import Schedule
 
@@ -54,6 +55,10 @@ _TO_BERNSTEIN = np.linalg.inv(
     np.array([[math.comb(_LAST, i) * x**i * (1 - x) ** (_LAST - i) for i in range(5)] for x in _AT])
 )
 _TO_CHEBYSHEV = np.linalg.inv(np.polynomial.chebyshev.chebvander(2 * _AT - 1, _LAST))
+INNER = _AT[1:-1]
+"""The inner ones of these points, (3,)."""
+FACTORS = np.vstack((_TO_BERNSTEIN, _TO_CHEBYSHEV[-2:]))
+"""(7, 5): from values at the points, the Bernstein and the last two Chebyshev coefficients."""
 
 States = Callable[[Any], FloatArray]
 """The states (n, ny) at times (n,) within a step, or the state (ny,) at a single time."""
@@ -124,6 +129,18 @@ class BranchMonitor:
         """Continue from what `memory` gave."""
         self.switched = float(memory["turned"])
         self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["checked"]]
+
+    def watched(self, t: float, length: float, most: int) -> Watched | None:
+        """What compiled steps from t on are checked with; None if the next step must be checked
+        here. Up to so many steps of about this length, s, are to be made.
+        """
+        functions = self.switching
+        if functions.of_state and (len(self._ends) < 2 or self._ends[-1][0] != t):
+            return None
+        clear = self._schedule.clear(t, length, most) if self._schedule else math.inf
+        if not t + length <= clear:
+            return None
+        return Watched(self._ends, self.switched, clear, functions.timed, functions.angles)
 
     def check(self, step: Step) -> Retry | None:
         """How a step must be repeated; None if it is accepted.
@@ -303,7 +320,7 @@ class _Search:
         self, a: float, b: float, start: FloatArray, end: FloatArray, asked: Indices
     ) -> FloatArray:
         """Values (5, n) of some functions over a part, from those at its ends."""
-        within = self._at(a + (b - a) * _AT[1:-1])
+        within = self._at(a + (b - a) * INNER)
         return np.vstack((start, within[:, asked], end))
 
     def root(self, bracket: _Bracket) -> float:
@@ -344,8 +361,11 @@ def _classified(values: FloatArray) -> tuple[Flags, Flags]:
     The error of the interpolating polynomial is taken to be less than `rest`, twice the magnitude
     of its last two Chebyshev coefficients.
     """
-    inner = _TO_BERNSTEIN @ values
-    rest = 2 * np.abs((_TO_CHEBYSHEV @ values)[-2:]).sum(axis=0)
+    sums = FACTORS[:, :1] * values[0]
+    for j in range(1, _LAST + 1):  # in this order also in compiled steps, for the same bits
+        sums += FACTORS[:, j : j + 1] * values[j]
+    inner, ends = sums[:-2], np.abs(sums[-2:])
+    rest = 2 * (ends[0] + ends[1])
     free = (inner > rest).all(axis=0) | (inner <= -rest).all(axis=0)
     steps = np.diff(inner, axis=0)
     monotone = (steps > rest).all(axis=0) | (steps < -rest).all(axis=0)

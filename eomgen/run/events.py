@@ -36,6 +36,10 @@ from eomgen.run.integrators.interface import Advance, Begin, Resume, StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import Event
 
+GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Points of an adaptive step at which the gaps of contacts are checked; for equal steps, the ends.
+"""
+
 MOST_EVENTS = 10_000
 """Greatest number of events within 1e-9 of a run's length."""
 
@@ -141,14 +145,17 @@ def advances(
         holding = Holding(contacts, now.held, begun, alpha) if now.held else None
         smooth = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
-        steps = stepper.begin(smooth, now.t, made, resume)
+        steps = stepper.begin(smooth, now.t, made, resume, lambda: not now.slack.any())
         resume = None
         for advance in steps:
-            made += 1
+            made += advance.steps
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             step = replace(advance, contact_powers=powers)
-            closing, closed = _closing(contacts, now, step, stepper.checked)
+            if advance.checked:
+                closing, closed = np.inf, list[int]()
+            else:
+                closing, closed = _closing(contacts, now, step, stepper.checked)
             opening, opened = _opening(holding, now, step)
             if closing <= opening and closed:
                 now.slack = np.zeros(len(contacts.names))
