@@ -197,7 +197,7 @@ def _digest() -> str:
     here = Path(__file__).resolve().parent
     run = here.parent / "run"
     found = hashlib.sha256()
-    checks = (run / "branches.py", run / "events.py")
+    checks = [run / f"{name}.py" for name in ("branches", "events", "roots")]
     for path in (*sorted(here.glob("*.py")), *sorted((run / "integrators").glob("*.py")), *checks):
         found.update(path.name.encode() + b"\0" + path.read_bytes())
     return found.hexdigest()

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from eomgen.native.module import outputs_of, usual_constants
-from eomgen.run import branches
+from eomgen.run import branches, roots
 from eomgen.run.compiled import Array, Watched
 from eomgen.run.events import GAP_CHECKS
 
@@ -61,6 +61,9 @@ def context() -> dict[str, Any]:
         "most_parts": _MOST_PARTS,
         "largest_angle": repr(branches.LARGEST_ANGLE),
         "together": repr(branches.TOGETHER),
+        "located": repr(branches.LOCATED),
+        "root_rtol": repr(roots.RTOL),
+        "most_iterations": roots.MOST,
         "gap_checks": [repr(share) for share in GAP_CHECKS],
     }
 

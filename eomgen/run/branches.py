@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from eomgen.run.compiled import Watched
 from eomgen.run.problem import FloatArray, Problem, Switching
+from eomgen.run.roots import root
 from eomgen.run.schedule import Schedule
 
 MOST_EVALUATIONS = 200
@@ -43,6 +44,8 @@ IRREGULAR = (0.3819660112501051, 0.7548776662466927)
 fraction of it, has other values there than at the ends."""
 TOGETHER = 1e-9
 """Fraction of a step within which switches count as one."""
+LOCATED = 1e-12
+"""Fraction of a step to which a switch is located."""
 INSIDE = 1 / 8
 """A step that ends at least this fraction of the time between two switches after the first one has
 evaluated the branch between them."""
@@ -178,7 +181,7 @@ class BranchMonitor:
         if brackets:
             last = max(bracket.end for bracket in brackets)
             alone = len(brackets) + len(times) == 1 and _is_seen(self.switched, step.start, last)
-            times = sorted([*times, *(b.middle if alone else search.root(b) for b in brackets)])
+            times = sorted([*times, *(b.middle if alone else search.located(b) for b in brackets)])
         return times, whole and followed
 
     def _cut(self, step: Step, before: float, after: float) -> float | None:
@@ -323,7 +326,7 @@ class _Search:
         within = self._at(a + (b - a) * INNER)
         return np.vstack((start, within[:, asked], end))
 
-    def root(self, bracket: _Bracket) -> float:
+    def located(self, bracket: _Bracket) -> float:
         """The time at which a function crosses 0 in a bracket, s."""
         step = self.step
 
@@ -333,9 +336,8 @@ class _Search:
         first, last = value(bracket.start), value(bracket.end)
         if not first * last < 0:  # 0 at an end, or not finite
             return bracket.start if first == 0 else bracket.end
-        from scipy.optimize import brentq  # here: few runs need it, and it loads slowly
-
-        return float(brentq(value, bracket.start, bracket.end, xtol=1e-12 * step.length))
+        ends = (first, last)
+        return root(value, bracket.start, bracket.end, ends, xtol=LOCATED * step.length)
 
     def _at(self, shares: FloatArray) -> FloatArray:
         """Values (n, ns) of the functions at fractions (n,) of the step."""

@@ -34,6 +34,7 @@ from eomgen.run.contacts import (
 )
 from eomgen.run.integrators.interface import Advance, Begin, Resume, StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
+from eomgen.run.roots import root
 from eomgen.run.trajectory import Event
 
 GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -339,9 +340,8 @@ def _first_zero(
 
 
 def _root(function: Callable[[float], float], a: float, b: float) -> float:
-    from scipy.optimize import brentq  # here: few runs need it, and it loads slowly
-
-    return float(brentq(function, a, b, xtol=max(1e-14 * (b - a), 1e-300), rtol=1e-15))
+    xtol = max(1e-14 * (b - a), 1e-300)
+    return root(function, a, b, (function(a), function(b)), xtol=xtol, rtol=1e-15)
 
 
 def _opening(holding: Holding | None, now: _Status, step: Advance) -> tuple[float, list[int]]:
