@@ -54,16 +54,17 @@ class Schedule:
         """A time up to which no function changes sign after `start`, s: up to so many steps of this
         length ahead. `start` if none is found so.
         """
-        if self._no_change[0] <= start < self._no_change[1]:
-            return self._no_change[1]
+        known = self._no_change[1] if self._no_change[0] <= start else start
         ahead = float(most)
         while ahead >= AHEAD:
             far = start + ahead * length
+            if far <= known:
+                break
             if None not in self._signs(start, far):
                 self._no_change = (start, far)
                 return far
             ahead /= FARTHER
-        return start
+        return max(start, known)
 
     def _parts(
         self, start: float, end: float
