@@ -8,7 +8,8 @@ every machine on which its derivative has them, and also when C makes its steps:
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from itertools import cycle
+from typing import Any, Literal
 
 import numpy as np
 
@@ -181,12 +182,15 @@ class DormandPrince8:
         terms[2] = 2 * change - h * (self.f + first)
         terms[3:] = h * sums[IN_DENSE:]
 
+        rows = list(terms[::-1])
+
         def states(times: FloatArray | float) -> FloatArray:
-            x = (np.asarray(times)[..., None] - start) / h
-            found = np.zeros((*np.shape(times), len(y)))
-            for i in range(6, -1, -1):
-                found += terms[i]
-                found *= x if i % 2 == 0 else 1 - x
+            one = isinstance(times, float)
+            x: Any = (times - start) / h if one else (np.asarray(times)[..., None] - start) / h
+            found = np.zeros((len(y),) if one else (*np.shape(times), len(y)))
+            for row, factor in zip(rows, cycle((x, 1 - x)), strict=False):
+                found += row
+                found *= factor
             return (found + y).T
 
         return states
