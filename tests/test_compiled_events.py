@@ -168,6 +168,20 @@ def test_a_run_goes_on_in_either(scene: str) -> None:
             assert run.y[-1].tobytes() == whole.y[-1].tobytes()
 
 
+@pytest.mark.parametrize("scene", [WHEEL, HELD, *some((), built_in_names())])
+def test_works_are_the_same(scene: str, made: list[int]) -> None:
+    """They need states within steps. Powers are computed in C, too."""
+    end = min(ENDS.get(scene, 2.0), 0.5 if scene in built_in_names() else 2.0)
+    compiled, python = both(scene, integrator="DOP853", works=True, t_end=end)
+    assert_same(compiled, python)
+    ours, theirs = compiled.trajectory.works, python.trajectory.works
+    if theirs is None:
+        assert ours is None
+    else:
+        assert ours is not None and ours.tobytes() == theirs.tobytes()
+    assert sum(made) > 0.3 * compiled.trajectory.counts["steps"]
+
+
 @pytest.mark.parametrize("scene", [WHEEL, HELD])
 def test_each_step_is_followed(scene: str) -> None:
     seen = []

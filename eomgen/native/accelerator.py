@@ -24,6 +24,7 @@ from eomgen.native import functions, runs
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.run.compiled import Compiled, EqualSteps, Steps
 from eomgen.run.problem import Problem
+from eomgen.run.works import Powers
 from eomgen.store import interfaced_program_of, key_of
 
 STARTING, AN_OPERATION = 0.2, 0.25e-3
@@ -95,8 +96,7 @@ class Accelerator:
         """
         perturbed, module = module is not None, module or self._module
         made: dict[tuple[str, ...], runs.CompiledSteps] = {}
-        compilable = functions.Compilable(module, self._values, perturbed, self._look, self._start)
-        problem = compilable.problem(problem)
+        problem = self._compilable(module, perturbed).problem(problem)
 
         def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
             if needed not in made:
@@ -119,6 +119,11 @@ class Accelerator:
 
         return replace(problem, compiled=Compiled(problem.derivative, steps, equal))
 
+    def powers(self, powers: Powers) -> Powers:
+        """The same powers, which are compiled once that pays."""
+        compilable = self._compilable(self._module, False)
+        return replace(powers, powers=compilable.function("effect_powers", powers.powers))
+
     def compile(self) -> None:
         """Compile the steps now, unless they are in the store, and each function at its first call.
 
@@ -126,6 +131,9 @@ class Accelerator:
         """
         self._at_once = True
         self._library("derivative").compile()
+
+    def _compilable(self, module: Any, perturbed: bool) -> functions.Compilable:
+        return functions.Compilable(module, self._values, perturbed, self._look, self._start)
 
     def _start(self) -> None:
         self.used = True

@@ -28,6 +28,7 @@ class Stride:
     switches, gap_checks
                  (m,), calls of switching functions, and of gaps and their rates, so far
     usual        whether the next step may be made so, too
+    within       gives the state at a time in the step of a number; None if that was not asked for
     """
 
     ends: Array
@@ -41,6 +42,7 @@ class Stride:
     switches: NDArray[np.int64]
     gap_checks: NDArray[np.int64]
     usual: bool
+    within: Callable[[int, float], Array] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,7 @@ class Steps(Protocol):
     watched     given to make no step that may pass over a branch of the derivative
     sizes       given (nc,) to make no step in which a rigid contact, none of which is held, may
                 close; its gap is relative to its size
+    dense       whether states within the steps are wanted
     """
 
     def __call__(
@@ -88,6 +91,7 @@ class Steps(Protocol):
         most: int,
         watched: Watched | None = None,
         sizes: Array | None = None,
+        dense: bool = False,
     ) -> Stride: ...
 
 
