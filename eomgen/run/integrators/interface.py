@@ -106,8 +106,10 @@ class Advance:
     problem  whose derivative was integrated
     within   gives the state at any time in the step; valid until the next step is made
     steps    number of steps; 0 if no time passes: an impact, or `events` only
-    derivatives
-             calls of the derivative that compiled code made, which are not counted otherwise
+    derivatives, switches, gap_checks
+             calls that compiled code made of the derivative, of the switching functions, and of
+             gaps and their rates, which are not counted otherwise
+    checked  whether compiled code has checked that no rigid contact closes
     struck   number of the contact of an impact
     events   changes of contacts at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts and of the drives during the step,
@@ -126,6 +128,9 @@ class Advance:
     within: Callable[[float], FloatArray]
     steps: int = 1
     derivatives: int = 0
+    switches: int = 0
+    gap_checks: int = 0
+    checked: bool = False
     struck: int | None = None
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, FloatArray], FloatArray] | None = None
@@ -135,9 +140,22 @@ class Advance:
     cut: int = 0
 
 
+def always() -> bool:
+    """Whether steps may be made in compiled code: yes."""
+    return True
+
+
 class Begin(Protocol):
-    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run."""
+    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run.
+
+    `compiles` is asked before steps are made in compiled code, where gaps below 0 end them.
+    """
 
     def __call__(
-        self, problem: Problem, t: float, made: int, resume: Resume | None = None
+        self,
+        problem: Problem,
+        t: float,
+        made: int,
+        resume: Resume | None = None,
+        compiles: Callable[[], bool] = always,
     ) -> Iterator[Advance]: ...
