@@ -226,6 +226,7 @@ def _problem(
         model = replace(model, initial_q=q, initial_v=v, states=tuple(states))
     if plan.varying:
         problem = with_corners(problem, module, values[0], plan.varying)
+        problem = replace(problem, origin=None)  # a file does not hold functions
     return problem, model
 
 
