@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, overridden, read
+from eomgen.api.given import Source, Values, model_of, overridden, read
 from eomgen.api.inputs import Inputs, applied
 from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
 from eomgen.api.recording import recorded, unknown_forces
@@ -97,7 +97,7 @@ def simulate(
     scene, constants, varying = applied(read(source), inputs)
     plan = plan_run(
         scene,
-        overridden(check(scene), form=form, route=route),
+        overridden(model_of(scene, source), form=form, route=route),
         t_end=t_end,
         integrator=integrator,
         dt=dt,
