@@ -1,5 +1,6 @@
 """Batches of parameters and inputs beside batches of states."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 import eomgen
 from eomgen.cli import main
 
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 SCENE = """\
 name = "batched"
 outputs = "all"
@@ -36,6 +38,8 @@ torque = "input"
 @pytest.fixture(scope="module", params=["python", "compiled"])
 def module(request: pytest.FixtureRequest) -> Any:
     """The module of the scene, in Python and with compiled kernels."""
+    if request.param == "compiled" and CC is None:
+        pytest.skip("there is no C compiler")
     backend = "c" if request.param == "compiled" else "numpy"
     return eomgen.load(eomgen.generate(SCENE, backend=backend))
 
