@@ -17,6 +17,8 @@ from eomgen.text import one_line
 from eomgen.usage import Parser, Version, example_of, path
 
 Arguments = argparse.Namespace
+Command = Callable[..., argparse.ArgumentParser]
+"""Adds a command: its name, function, what it does, and what it takes as SCENE."""
 INTERRUPTED = 130
 DERIVED = "what was derived is kept for the next call"
 KEPT = {
@@ -100,16 +102,7 @@ def _parser(
             added.add_argument("scenes", metavar="SCENE", nargs="*", help="file or built-in name")
         return added
 
-    command("list", commands.list_scenes, "list the built-in scenes", None)
-    command("show", commands.show, "print the file of a scene")
-    new = command("new", commands.new, "write a small scene with comments, to begin with", None)
-    new.add_argument("name", metavar="NAME", type=path, help="the scene is written to NAME.toml")
-    add_force(new)
-    copy = command("copy", commands.copy, "copy a scene to a file of your own")
-    copy.add_argument(
-        "name", metavar="NAME", type=path, nargs="?", help="the copy is NAME.toml (the scene's)"
-    )
-    add_force(copy)
+    _scene_files(command)
     completion = command(
         "completion", commands.completion, "print the completion of commands for a shell", None
     )
@@ -133,26 +126,7 @@ def _parser(
     )
     derive.add_argument("-o", "--output", metavar="FILE", type=path, help="write it to a file")
     add_force(derive)
-    generate = command("generate", commands.generate, "write the module of a scene", "scenes")
-    _code(_form(generate))
-    generate.add_argument(
-        "--backend", metavar="NAME", default="numpy", help="numpy, c or javascript"
-    )
-    generate.add_argument(
-        "-o",
-        "--output",
-        metavar="DIR",
-        type=path,
-        default=Path("generated"),
-        help="folder of the modules",
-    )
-    generate.add_argument("--all", action="store_true", help="all built-in scenes")
-    generate.add_argument(
-        "--check", action="store_true", help="report which are stale, write nothing"
-    )
-    generate.add_argument("--explain", action="store_true", help="say why its route was chosen")
-    generate.add_argument("--report", action="store_true", help="say what each pass saved")
-    add_force(generate)
+    _generation(command("generate", commands.generate, "write the module of a scene", "scenes"))
     for name, run, about in (
         ("simulate", commands.simulate, "integrate, and write trajectory, figure and page"),
         ("view", commands.view, "integrate, and open the animated page"),
@@ -183,6 +157,40 @@ def _parser(
         command("linearise", commands.linearise, "compute A, B and modes about an equilibrium")
     )
     return parser
+
+
+def _generation(parser: argparse.ArgumentParser) -> None:
+    _code(_form(parser))
+    parser.add_argument("--backend", metavar="NAME", default="numpy", help="numpy, c or javascript")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        type=path,
+        default=Path("generated"),
+        help="folder of the modules",
+    )
+    parser.add_argument("--all", action="store_true", help="all built-in scenes")
+    parser.add_argument(
+        "--check", action="store_true", help="report which are stale, write nothing"
+    )
+    parser.add_argument("--explain", action="store_true", help="say why its route was chosen")
+    parser.add_argument("--report", action="store_true", help="say what each pass saved")
+    add_force(parser)
+
+
+def _scene_files(command: Command) -> None:
+    """The commands on files of scenes."""
+    command("list", commands.list_scenes, "list the built-in scenes", None)
+    command("show", commands.show, "print the file of a scene")
+    new = command("new", commands.new, "write a small scene with comments, to begin with", None)
+    new.add_argument("name", metavar="NAME", type=path, help="the scene is written to NAME.toml")
+    add_force(new)
+    copy = command("copy", commands.copy, "copy a scene to a file of your own")
+    copy.add_argument(
+        "name", metavar="NAME", type=path, nargs="?", help="the copy is NAME.toml (the scene's)"
+    )
+    add_force(copy)
 
 
 def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:

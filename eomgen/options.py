@@ -82,6 +82,11 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="auto: compute in compiled C code if that pays; numpy: never; c: always",
     )
+    _add_start(parser)
+    _add_results(parser)
+
+
+def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
     parser.add_argument(
         "--save",
@@ -94,6 +99,14 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
         "--parquet", action="store_true", help="also write the table as a Parquet file"
     )
     parser.add_argument("--works", action="store_true", help="compute the work of each effect")
+    add_folder(parser)
+    parser.add_argument("--plot", metavar="FILE", type=path, help="figure (DIR/NAME.png)")
+    parser.add_argument("--no-pictures", action="store_true", help="write no figure and no page")
+    parser.add_argument("--view", action="store_true", help="open the page when done")
+    add_force(parser)
+
+
+def _add_start(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
     )
@@ -112,8 +125,3 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
         help="an input: a number or a formula of t, 'push=3*sin(t)'; or FILE.csv with columns t "
         "and names, between whose times inputs are linear",
     )
-    add_folder(parser)
-    parser.add_argument("--plot", metavar="FILE", type=path, help="figure (DIR/NAME.png)")
-    parser.add_argument("--no-pictures", action="store_true", help="write no figure and no page")
-    parser.add_argument("--view", action="store_true", help="open the page when done")
-    add_force(parser)

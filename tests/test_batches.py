@@ -1,12 +1,16 @@
 """Batches of parameters and inputs beside batches of states."""
 
+import shutil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import eomgen
+from eomgen.cli import main
 
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 SCENE = """\
 name = "batched"
 outputs = "all"
@@ -34,6 +38,8 @@ torque = "input"
 @pytest.fixture(scope="module", params=["python", "compiled"])
 def module(request: pytest.FixtureRequest) -> Any:
     """The module of the scene, in Python and with compiled kernels."""
+    if request.param == "compiled" and CC is None:
+        pytest.skip("there is no C compiler")
     backend = "c" if request.param == "compiled" else "numpy"
     return eomgen.load(eomgen.generate(SCENE, backend=backend))
 
@@ -79,6 +85,23 @@ def test_defaults_of_inputs_are_taken(module: Any) -> None:
     same = eomgen.simulate(SCENE, t_end=0.5, inputs={"thrust": 1.5})
     other = eomgen.simulate(SCENE, t_end=0.5, inputs={"thrust": 0.0})
     assert np.array_equal(run.y, same.y) and not np.array_equal(run.y, other.y)
+
+
+def test_defaults_of_inputs_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By `check`, and in every language; 0 is not mentioned."""
+    scene = tmp_path / "batched.toml"
+    scene.write_text(SCENE)
+    assert main(["check", str(scene)]) == 0
+    assert "inputs      thrust = 1.5, push\n" in capsys.readouterr().out
+    module = eomgen.generate(SCENE)
+    assert "thrust = 1.5" in module.source and '"push": 0.0' in module.source
+    assert "u = [1.5, 0.0]" in eomgen.generate(SCENE, backend="javascript").source
+    (header,) = (
+        text
+        for name, text in eomgen.generate(SCENE, backend="c").others.items()
+        if name.endswith(".h")
+    )
+    assert "1.5 by default" in header and "0.0 by default" not in header
 
 
 def test_wrong_columns_are_refused(module: Any) -> None:

@@ -1,6 +1,7 @@
 """Inputs of a run that are formulas, tables or functions of time; states given by name."""
 
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from eomgen.cli import main
 from eomgen.run.inputs import Table
 from eomgen.run.intervals import Interval
 
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 CART = """\
 name = "cart"
 inputs = ["thrust", { name = "wind", unit = "N", about = "side wind" }]
@@ -142,3 +144,17 @@ def test_a_run_from_another_state_is_not_continued_as_if_it_were_the_scenes(
     whole = eomgen.simulate(CART, state={"x": 1.0}, **options)
     assert again.y[-1].tobytes() == whole.y[-1].tobytes()
     assert "another initial state" in eomgen.simulate(CART, resume=first, **options).begun
+
+
+@pytest.mark.skipif(CC is None, reason="there is no C compiler")
+def test_formulas_are_compiled_and_functions_are_not_forgotten() -> None:
+    """A formula gives the same bits in C; a later run cannot take a function for constants."""
+    options = {"inputs": {"push": "sin(t) - x"}, "t_end": 5.0}
+    run, compiled = (eomgen.simulate(CART, **options, backend=way) for way in ("numpy", "c"))
+    assert compiled.compiled and run.y.tobytes() == compiled.y.tobytes()
+    text = CART.replace('name = "wind"', 'name = "wind", default = 3.0')
+    run, compiled = (eomgen.simulate(text, t_end=5.0, backend=way) for way in ("numpy", "c"))
+    assert compiled.compiled and run.y.tobytes() == compiled.y.tobytes()
+    assert run.y[-1, 1] == pytest.approx(3.0 / 2 * 5, rel=1e-9)
+    varied = eomgen.simulate(CART, inputs={"push": math.sin}, t_end=1)
+    assert "starts anew" in eomgen.simulate(CART, resume=varied, t_end=2).begun

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+import eomgen
 from eomgen.cli import main
 from eomgen.scene.built_in import BUILT_IN
 from eomgen.scene.lines import line_of, lines_of, with_lines
@@ -114,3 +115,19 @@ def test_a_broken_text_has_lines_up_to_its_mistake(
     scene.write_text('name = "broken"\n\nmass 3\n')
     assert main(["check", str(scene)]) == 1
     assert capsys.readouterr().err.startswith("eomgen: broken.toml:3: is not TOML: ")
+
+
+def test_functions_name_the_file_and_the_line(tmp_path: Path) -> None:
+    """Of what is wrong with the tables, and of what is wrong with the mechanism."""
+    scene = tmp_path / "two.toml"
+    good = (BUILT_IN / "pendulum.toml").read_text("utf-8")
+    for old, new, location in (
+        ('type = "revolute"', 'type = "revolut"', r"joints\[0\]\.type"),
+        ('parent = "world"', 'parent = "earth"', r"joints\[0\]\.parent"),
+    ):
+        text = good.replace(old, new, 1)
+        line = text[: text.index(new)].count("\n") + 1
+        scene.write_text(text)
+        for function in (eomgen.check, eomgen.simulate, eomgen.verify, eomgen.generate):
+            with pytest.raises(eomgen.SceneError, match=rf"^two\.toml:{line}: {location}: "):
+                function(scene)

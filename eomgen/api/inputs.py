@@ -23,7 +23,7 @@ Given = float | str | Callable[[float], float]
 """A constant, a formula, or a function of time."""
 Inputs = Mapping[str, Given] | str | PathLike[str]
 """Inputs by name, or the path of a table."""
-LARGEST_TABLE = 2**30
+LARGEST_TABLE = 10**8
 """Size of the largest table that is read, bytes."""
 
 

@@ -102,14 +102,14 @@ def plan_run(
         raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
     if backend not in ("auto", "numpy", "c"):
         raise RunError(f"{reporter.argument('backend')}: '{backend}' is none of auto, numpy, c")
-    if varying is not None:
-        plain = backend in ("auto", "numpy") and guard is None and resume is None
-        if aims or estimate or not plain:
-            raise RunError(
-                f"{reporter.argument('inputs')}: with tables and functions of time there is no "
-                "choice of method, estimate, guard, earlier run or compiled code; give a formula "
-                "of t, or leave the other out"
-            )
+    if varying is not None and (
+        aims or estimate or guard is not None or resume is not None or backend == "c"
+    ):
+        raise RunError(
+            f"{reporter.argument('inputs')}: with tables and functions of time there is no choice "
+            "of method, estimate, guard, earlier run or compiled code; give a formula of t, or "
+            "leave the other out"
+        )
     setting = None
     if not aims:
         setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)

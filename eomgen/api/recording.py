@@ -83,6 +83,13 @@ def recorded(
     return found
 
 
+def unknown_forces(trajectory: Trajectory) -> str:
+    """A note if some of what is saved is nan; else ""."""
+    if not any(np.isnan(saved.values).any() for saved in trajectory.saved.values()):
+        return ""
+    return "forces are nan where a rigid contact is held, because its own force is not kept"
+
+
 def _inputs(module: Any, trajectory: Trajectory, constants: Mapping[str, float] | None) -> Saved:
     """The inputs at each row."""
     of_time = getattr(module, "inputs_of_time", None)

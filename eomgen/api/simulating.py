@@ -6,13 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, overridden, read
+from eomgen.api.given import Source, Values, model_of, overridden, read
 from eomgen.api.inputs import Inputs, applied
 from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
-from eomgen.api.recording import recorded
+from eomgen.api.recording import recorded, unknown_forces
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, origin_from, split
 from eomgen.model.model import Model
@@ -99,7 +97,7 @@ def simulate(
     scene, constants, varying = applied(read(source), inputs)
     plan = plan_run(
         scene,
-        overridden(check(scene), form=form, route=route),
+        overridden(model_of(scene, source), form=form, route=route),
         t_end=t_end,
         integrator=integrator,
         dt=dt,
@@ -165,17 +163,12 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     powers = as_powers(functions, *values) if plan.works else None
     if powers and accelerator:
         powers = accelerator.powers(powers)
-    warnings, error = [*model.notices, *module.notices], math.nan
+    warnings = [*model.notices, *module.notices]
     trial, choice = _run_case(plan, case, powers, follow, reporter)
     trajectory, estimate = trial.trajectory, None
-    if choice is not None:
-        from eomgen.study.accuracy.aimed import UNKNOWN
-
-        error = choice.error
-        if not choice.met:
-            why = choice.reason or UNKNOWN
-            warnings.append(f"accuracy: not reached, the estimate is {error:.1g}: {why}")
-    elif plan.estimate and trajectory.finished:
+    error, why = _error_of_choice(choice)
+    warnings += why
+    if choice is None and plan.estimate and trajectory.finished:
         from eomgen.study.accuracy.estimate import by_second_run
 
         estimate = by_second_run(case, trial)
@@ -183,10 +176,12 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     if told := _why_not_compiled(plan, accelerator):
         warnings.append(told)
         reporter.note(told)
-    saved = recorded(plan.save, model, functions, trajectory, values)
-    trajectory = replace(trajectory, saved=saved)
-    if any(np.isnan(each.values).any() for each in saved.values()):
-        warnings.append("forces are nan where a rigid contact is held: see docs/api.md")
+    trajectory = replace(
+        trajectory, saved=recorded(plan.save, model, functions, trajectory, values)
+    )
+    if told := unknown_forces(trajectory):
+        warnings.append(told)
+        reporter.note(told)
     model = model.with_parameters(plan.parameters)
     # What varies is not 0.
     pushing = dict.fromkeys(plan.varying.given, 1.0) if plan.varying else plan.inputs
@@ -203,6 +198,18 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         begun=start.reported(trajectory) if start else "",
         compiled=accelerator is not None and accelerator.used,
     )
+
+
+def _error_of_choice(choice: "Choice | None") -> tuple[float, list[str]]:
+    """The estimated error of a run with a chosen method, and a warning if the aim was not met."""
+    if choice is None:
+        return math.nan, []
+    from eomgen.study.accuracy.aimed import UNKNOWN
+
+    if choice.met:
+        return choice.error, []
+    why = choice.reason or UNKNOWN
+    return choice.error, [f"accuracy: not reached, the estimate is {choice.error:.1g}: {why}"]
 
 
 def _problem(
@@ -228,6 +235,7 @@ def _problem(
         model = replace(model, initial_q=q, initial_v=v, states=tuple(states))
     if plan.varying:
         problem = with_corners(problem, module, values[0], plan.varying)
+        problem = replace(problem, origin=None)  # a file does not hold functions
     return problem, model
 
 

@@ -3,7 +3,7 @@
 The bounds are in `study.verification.bounds`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -141,10 +141,8 @@ def verify(
         firsts = [one for one in there if one.state.number == 0]
         laws = [broken(bare, module, one.state) for one in firsts if _has(one, taken)]
         progress(0.85)
-        # Effects that act only for a time, as contacts do, are found by the run alone.
-        reported = [one.state for one in firsts if one.state.kind in ("random", "still")]
-        reported += [one.state for one in there if one.state.kind == OWN]
-        ran = drift(model, wanted, module, full, reported, lambda x: progress(0.88 + 0.12 * x))
+        shown = _of_conservation(there, firsts)
+        ran = drift(model, wanted, module, full, shown, lambda x: progress(0.88 + 0.12 * x))
         lawful = [*law_checks(bare, laws), *drift_checks(ran)]
     ulps = {route: forward_ulps(there, route, bare) for route in modules}
     data = in_ulps(np.array([one.data for one in there]), there, bare)
@@ -172,6 +170,14 @@ def verify(
         data=data,
         stopped=stopped,
     )
+
+
+def _of_conservation(there: Sequence[Judged], firsts: Sequence[Judged]) -> list[State]:
+    """The states at which what motion conserves is determined. Effects that act only for a time, as
+    contacts do, are found by the run alone.
+    """
+    found = [one.state for one in firsts if one.state.kind in ("random", "still")]
+    return found + [one.state for one in there if one.state.kind == OWN]
 
 
 def _modules(
