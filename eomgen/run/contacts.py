@@ -203,9 +203,8 @@ def restrained(
         return problem
     derivative = counted(holding.derivative)
     sizes = np.array(problem.sizes or (1.0,))
-    return replace(
-        problem, derivative=derivative, jacobian=partial(_differences, derivative, sizes)
-    )
+    jacobian = partial(_differences, derivative, sizes)
+    return replace(problem, derivative=derivative, jacobian=jacobian, timed=True)
 
 
 def _differences(derivative: Rate, sizes: FloatArray, t: float, y: FloatArray) -> FloatArray:

@@ -137,6 +137,7 @@ def as_problem(
         noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
         columns=hasattr(module, "_along"),
+        timed=_depends_on_time(module),
     )
 
 
@@ -167,6 +168,12 @@ def _switching(module: Any, parameters: Any, inputs: Any) -> Switching | None:
         tuple(i for i, name in enumerate(positions) if module.UNITS[name] == "rad"),
         of_time and _over_intervals(module, of_time, parameters, inputs),
     )
+
+
+def _depends_on_time(module: Any) -> bool:
+    """Whether a module's derivative depends on time, as far as known."""
+    kernel = getattr(module, "_derivative", None)
+    return kernel is None or "t" in inspect.signature(kernel).parameters
 
 
 def _over_intervals(

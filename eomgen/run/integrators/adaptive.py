@@ -163,6 +163,8 @@ class _Stepper:
         options: dict[str, Any] = {"rtol": self._bounds.rtol, "atol": self._bounds.atol}
         if self.method.uses_jacobian:
             options["jac"] = self._problem.jacobian
+        if self.method.asks_more:
+            options |= {"timed": self._problem.timed, "positions": self._problem.leading_positions}
         # y is copied because LSODA's compiled code modifies state arrays in place. If a later run
         # can continue from this one, the choice of the first step must not depend on the end.
         bound = np.inf if self.method.memory else until

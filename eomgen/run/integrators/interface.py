@@ -76,6 +76,8 @@ class Adaptive:
 
     solver         SciPy's `OdeSolver` of the method, or a class with the same interface
     uses_jacobian  whether it is given the problem's Jacobian
+    asks_more      whether it is told whether the derivative depends on `timed`, and how many states
+                   are `positions` that come first
     one_step       whether a step depends on the state alone, not on earlier steps; then the state
                    may be corrected between steps
     remedy         what to change when a run fails
@@ -89,6 +91,7 @@ class Adaptive:
 
     solver: Callable[..., Any]
     uses_jacobian: bool = False
+    asks_more: bool = False
     one_step: bool = True
     remedy: str = LOOSER
     memory: tuple[str, ...] = ()
