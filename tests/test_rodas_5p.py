@@ -58,7 +58,8 @@ def standard() -> tuple[Array, Array, Array]:
 
 def residuals() -> list[float]:
     """What each condition on the coefficients misses: for order 5 of the step, order 4 of the one
-    that gives the error estimate and of the dense output in its middle, for c and for d.
+    that gives the error estimate and of the dense output in its middle, for c and for d; and for
+    what is infinitely stiff (Hairer, Wanner, Solving ODEs II, section VI.4).
     """
     alpha, beta, b = standard()
     gamma = beta - alpha
@@ -69,7 +70,7 @@ def residuals() -> list[float]:
             found = found * ((beta if len(tree) == 1 else alpha) @ weights(above))
         return found
 
-    inverse = np.linalg.inv(gamma)
+    stiff, nodes = np.linalg.inv(beta), np.array(own.NODES)
     end, last = np.array(own.END), np.eye(len(b))[-1]
     first, second, third = np.array(own.DENSE)
     half = (end + (first + (second + third / 2) / 2) / 2) / 2 @ gamma
@@ -80,7 +81,8 @@ def residuals() -> list[float]:
             if order < 5:
                 found.append((end - last) @ gamma @ weights(tree) - 1 / density(tree))
                 found.append(half @ weights(tree) - 0.5**order / density(tree))
-    assert np.isfinite(inverse).all()
+    found += [b @ stiff @ nodes**power - 1.0 for power in range(5)]
+    found += [half @ stiff @ nodes**power - 0.5**power for power in (2, 3)]
     return [abs(float(x)) for x in found]
 
 
@@ -95,15 +97,104 @@ def test_the_coefficients_have_their_order() -> None:
 
 @pytest.mark.parametrize("name", ["PLACES", "COUPLINGS", "NODES", "IN_TIME", "END", "DENSE"])
 def test_a_mistyped_coefficient_is_caught(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One wrong digit in any of them, the 8th after the first."""
-    true = getattr(own, name)
-    for at in [(i,) for i in range(len(true))] if isinstance(true[0], float) else [
-        (i, j) for i in range(len(true)) for j in range(len(true[i]))
-    ]:
-        value = true[at[0]] if len(at) == 1 else true[at[0]][at[1]]
-        changed: Any = list(map(list, true)) if len(at) == 2 else list(true)
-        target = changed[at[0]] if len(at) == 2 else changed
-        target[at[-1]] = value * (1 + 1e-8) if value else 1e-8
-        monkeypatch.setattr(own, name, changed)
-        assert max(residuals()) > 1e-11, at
-        monkeypatch.undo()
+    """Each of them in turn is wrong by 1e-8 of itself."""
+    true: tuple[Any, ...] = getattr(own, name)
+    table = true if isinstance(true[0], tuple) else (true,)
+    for i, row in enumerate(table):
+        for j, value in enumerate(row):
+            wrong = [list(each) for each in table]
+            wrong[i][j] = value * (1 + 1e-8) if value else 1e-8
+            monkeypatch.setattr(own, name, wrong if table is true else wrong[0])
+            assert max(residuals()) > 2e-11, (i, j)
+
+
+def problem(
+    slope: Any, jacobian: Any, start: list[float], positions: tuple[int, ...] = ()
+) -> Problem:
+    return Problem(
+        name="test",
+        states=tuple(f"y{i}" for i in range(len(start))),
+        positions=positions,
+        derivative=slope,
+        jacobian=lambda t, y: np.array(jacobian(t, y), dtype=float),
+        initial=np.array(start),
+    )
+
+
+def driven(rate: float) -> Problem:
+    """y' = rate (y - cos t) - sin t, with the solution cos t from y = 1 on."""
+    return problem(
+        lambda t, y: rate * (y - math.cos(t)) - math.sin(t), lambda t, y: [[rate]], [1.0]
+    )
+
+
+@pytest.mark.parametrize("rate", [-1e6, -1e3, -1.0])
+def test_what_is_stiff_takes_few_steps(rate: float) -> None:
+    """The error follows the tolerance, in the rows within steps, too, and the steps grow with its
+    fifth root.
+    """
+    errors, steps = [], []
+    for rtol in (1e-5, 1e-8):
+        run = integrate(driven(rate), "Rodas5P", 10.0, rtol=rtol, atol=rtol)
+        assert run.finished
+        errors.append(float(np.abs(run.y[:, 0] - np.cos(run.t)).max()))
+        steps.append(run.counts["steps"])
+    assert errors[0] < 1e-4 and errors[1] < 1e-7
+    assert steps[1] < 5.5 * steps[0] < 5.5 * 40
+
+
+def test_a_fast_mode_vanishes() -> None:
+    """L-stability: far from the slow solution, the first long step leads to it."""
+    fast = problem(lambda t, y: -1e9 * y, lambda t, y: [[-1e9]], [1.0])
+    solver = rodas_5p.Rodas5P(
+        fun=fast.derivative, t0=0.0, y0=fast.initial, t_bound=1.0, jac=fast.jacobian, rtol=1e3,
+        atol=1e3,
+    )  # fmt: skip
+    solver.h_abs = 1.0
+    solver.step()
+    assert solver.t == 1.0 and abs(solver.y[0]) < 1e-7
+
+
+def test_the_order_is_five() -> None:
+    """On a problem that depends on time and is not linear, with equal steps."""
+
+    def slope(t: float, y: Array) -> Array:
+        return np.array([y[1], -(y[0] ** 3) + math.cos(t) ** 3 - math.cos(t)])
+
+    def jacobian(t: float, y: Array) -> list[list[float]]:
+        return [[0.0, 1.0], [-3 * y[0] ** 2, 0.0]]
+
+    wave = problem(slope, jacobian, [1.0, 0.0], (0,))
+    errors = []
+    for count in (16, 32, 64):
+        solver = rodas_5p.Rodas5P(
+            wave.derivative, 0.0, wave.initial, 4.0, jac=wave.jacobian, rtol=1e9, atol=1e9,
+            positions=1,
+        )  # fmt: skip
+        for _ in range(count):
+            solver.h_abs = solver.max_step = 4.0 / count
+            solver.step()
+        errors.append(float(np.abs(solver.y - (math.cos(4), -math.sin(4))).max()))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (np.abs(orders - 5) < 0.4).all(), (errors, orders)
+
+
+@pytest.mark.parametrize("positions", [0, 3])
+def test_systems_are_solved(positions: int) -> None:
+    """With rows to be exchanged, and with positions eliminated first; a singular one is found."""
+    random = np.random.default_rng(3)
+    jacobian = random.normal(size=(7, 7)) * 10.0 ** random.integers(-3, 3, size=(7, 1))
+    jacobian[:positions, :positions] = 0.0
+    values = random.normal(size=7)
+    factors = factored(jacobian, 0.01, positions)
+    assert factors is not None and len(factors.right) == positions
+    assert len(factors.order) and (factors.order != np.arange(7 - positions)).any()
+    true = np.linalg.solve(0.01 * np.eye(7) - jacobian, values)
+    assert np.allclose(factors.solve(values), true, rtol=1e-9, atol=0)
+    assert factored(np.diag([0.0] * 6 + [0.25]), 0.25, positions) is None
+
+
+def test_positions_that_depend_on_positions_are_not_eliminated_first() -> None:
+    jacobian = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 2.0], [3.0, 0.0, 1.0]])
+    factors = factored(jacobian, 0.5, 2)
+    assert factors is not None and not len(factors.right)

@@ -13,14 +13,14 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
 from eomgen.codegen.backends import c
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import functions, runs
+from eomgen.native import functions, implicit, runs
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.run.compiled import Compiled, EqualSteps, Steps
 from eomgen.run.problem import Problem
@@ -66,6 +66,12 @@ class _Library:
                 self._fail(str(error))
         return self._found
 
+    @property
+    def missing(self) -> float:
+        """Time to compile it, s; 0 if it is there."""
+        self.after(0.0)
+        return 0.0 if self._over else self._price
+
     def compile(self) -> None:
         """Compile it now, unless it is in the store. Raises `RunError`."""
         self._over = True
@@ -92,6 +98,7 @@ class Accelerator:
         """
         perturbed, module = module is not None, module or self._module
         made: list[runs.CompiledSteps] = []
+        stiff: list[implicit.CompiledImplicit] = []
         compilable = functions.Compilable(module, self._values, perturbed, self._look, self._start)
         problem = compilable.problem(problem)
 
@@ -102,7 +109,13 @@ class Accelerator:
             return made[0] if made else None
 
         def steps(name: str) -> Steps | None:
-            found = held.named(name) if (held := compiled()) else None
+            if name in implicit.METHODS:
+                if not stiff and (libraries := self._of_implicit_steps()):
+                    given = (module, libraries, *self._values, perturbed)
+                    stiff.append(implicit.CompiledImplicit(problem, *given))
+                found = stiff[0].named(name) if stiff else None
+            else:
+                found = held.named(name) if (held := compiled()) else None
             self.used = self.used or found is not None
             return found
 
@@ -138,6 +151,27 @@ class Accelerator:
         if self._begun is None:
             self._begun = now
         return self._library("derivative").after(now - self._begun)
+
+    def _of_implicit_steps(self) -> implicit.Libraries | None:
+        """The libraries of implicit steps, together: with fewer, Python makes all steps."""
+        now = time.perf_counter()
+        if self._begun is None:
+            self._begun = now
+        needed = [self._library(name) for name in implicit.NEEDED]
+        needed.append(self._methods)
+        pays = self._at_once or now - self._begun > sum(each.missing for each in needed)
+        found = [each.after(math.inf if pays else 0.0) for each in needed]
+        derivative, jacobian, methods = found
+        if derivative is None or jacobian is None or methods is None:
+            return None
+        return implicit.Libraries(derivative, jacobian, methods)
+
+    @cached_property
+    def _methods(self) -> _Library:
+        """The library of implicit methods, the same for all models."""
+        price = STARTING + AN_OPERATION * implicit.OPERATIONS
+        about = f"implicit methods {_digest()}"
+        return _Library(about, implicit.sources, implicit.MAIN, price, self._fail)
 
     def _library(self, name: str) -> _Library:
         if name not in self._libraries:

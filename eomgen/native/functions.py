@@ -58,10 +58,7 @@ def compiled_function(
     The library must have no other function.
     """
     kernels = Kernels(module, library)
-    constants, inputs = usual_constants(module, name, p), kernels.given(u)
-    if constants is not None and len(constants) != max(1, kernels.constants):
-        # The module computes it in two parts, as Jacobians along directions.
-        constants = None if perturbed else kernels.held(p)
+    constants, inputs = constants_of(kernels, name, p, perturbed), kernels.given(u)
     if constants is None or inputs is None:
         return None
     shape = outputs_of(library)[name]
@@ -76,6 +73,18 @@ def compiled_function(
         return np.frombuffer(memoryview(out)).reshape(shape)
 
     return value
+
+
+def constants_of(kernels: Kernels, name: str, p: Any, perturbed: bool) -> Any:
+    """The constants of the only function of a library, a C array; None if it cannot be used.
+
+    perturbed  whether the module has other constants than those of its parameters
+    """
+    constants = usual_constants(kernels.module, name, p)
+    if constants is not None and len(constants) != max(1, kernels.constants):
+        # The module computes it in two parts, as Jacobians along directions.
+        constants = None if perturbed else kernels.held(p)
+    return constants
 
 
 @dataclass(frozen=True)

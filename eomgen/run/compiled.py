@@ -24,6 +24,8 @@ class Stride:
     sampled      (m,), number of rows passed so far
     rows         (r, ny), the states at the times of these rows
     usual        whether the next step may be made so, too
+    jacobians, factorisations
+                 (m,), numbers of these so far; None if there are none
     """
 
     ends: Array
@@ -33,6 +35,8 @@ class Stride:
     sampled: NDArray[np.int64]
     rows: Array
     usual: bool
+    jacobians: NDArray[np.int64] | None = None
+    factorisations: NDArray[np.int64] | None = None
 
 
 class Steps(Protocol):

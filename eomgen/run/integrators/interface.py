@@ -109,8 +109,8 @@ class Advance:
     problem  whose derivative was integrated
     within   gives the state at any time in the step; valid until the next step is made
     steps    number of steps; 0 if no time passes: an impact, or `events` only
-    derivatives
-             calls of the derivative that compiled code made, which are not counted otherwise
+    derivatives, jacobians
+             calls of these that compiled code made, which are not counted otherwise
     struck   number of the contact of an impact
     events   changes of contacts at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts and of the drives during the step,
@@ -129,6 +129,7 @@ class Advance:
     within: Callable[[float], FloatArray]
     steps: int = 1
     derivatives: int = 0
+    jacobians: int = 0
     struck: int | None = None
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, FloatArray], FloatArray] | None = None

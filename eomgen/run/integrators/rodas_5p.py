@@ -47,6 +47,8 @@ SAFETY, SMALLEST, GREATEST = 0.9, 0.2, 6.0
 POWER = -1 / 5
 LEAST_ERROR = 0.01
 """An error below this counts as this, where the next step's length depends on two steps."""
+NEGLIGIBLE = 1e-30
+"""Errors up to this count as none."""
 ASIDE = 2.0**-10
 """The derivative with respect to time is a difference quotient over twice this part of the step,
 within the step, with an error of order 2."""
@@ -123,11 +125,14 @@ class Rodas5P:
             factors = factored(matrix, 1 / (h * GAMMA), self._positions)
             error = math.nan
             if factors is not None:
-                last_solution = self._attempt(t, y, h, slope, in_time, factors)
+                missing = self._attempt(t, y, h, slope, in_time, factors)
                 change = self._sums[AT_END] + self.lost
                 last = y + change
                 scale = self.atol + np.maximum(np.abs(y), np.abs(last)) * self.rtol
-                error = norm(last_solution / scale)
+                error = norm(missing / scale)
+                if error < 1:
+                    within = norm(self._within(t, y, last, h, factors) / scale)
+                    error = error if within <= error else within
             if error < 1:
                 break
             length *= max(SMALLEST, SAFETY * error**POWER) if error < math.inf else SMALLEST
@@ -144,9 +149,8 @@ class Rodas5P:
 
     def _factor(self, h: float, error: float, rejected: bool) -> float:
         """The next step's length by that of this one, h, which has the given error."""
-        if error == 0:
-            factor = GREATEST
-        else:
+        factor = GREATEST
+        if error > NEGLIGIBLE:
             factor = SAFETY * error**POWER
             if self.h_last:
                 ratio = error * error / self.error
@@ -185,6 +189,19 @@ class Rodas5P:
             np.multiply(_ADDED[i], solution, products)
             np.add(added, products, added)
         return solution
+
+    def _within(
+        self, t: float, y: FloatArray, last: FloatArray, h: float, factors: Factors
+    ) -> FloatArray:
+        """An estimate of the error of the dense output in the middle of a step, (ny,).
+
+        It is a step of Newton's method from there. Where a stiff motion follows a slow one, steps
+        may be so long that their ends are right and what lies between is not.
+        """
+        first, second, third = self._sums[IN_DENSE:]
+        rise = (last - y) + (second + third) / 4
+        middle = (y + last) / 2 + (first + (second + third / 2) / 2) / 4
+        return factors.solve(self.fun(t + h / 2, middle) - rise / h)
 
     def dense_output(self) -> Callable[[FloatArray | float], FloatArray]:
         """The states within the last step, as a function of times: (m,) -> (ny, m), or one."""

@@ -86,11 +86,14 @@ class Strides:
         ends = stride.ends.tolist()
         lengths = np.diff(stride.ends, prepend=self._start)
         capped = np.cumsum(lengths >= self._bounds.longest * (1 - 1e-9)).tolist()
-        derivatives, passed = stride.derivatives.tolist(), stride.sampled.tolist()
+        passed, counts = stride.sampled.tolist(), _counts(stride)
         times = self._times[sampled : sampled + passed[-1]].tolist()
-        steps, rows, called, shortened = 0, 0, 0, 0
+        steps, rows, called, shortened = 0, 0, [0, 0, 0], 0
         for i in range(len(ends)) if each else (len(ends) - 1,):
             at = slice(rows, passed[i])
+            derivatives, jacobians, factorisations = (
+                now - before for now, before in zip(counts[i], called, strict=True)
+            )
             yield Advance(
                 ends[i],
                 stride.states[i],
@@ -98,11 +101,21 @@ class Strides:
                 self._problem,
                 _unknown,
                 steps=i + 1 - steps,
-                derivatives=derivatives[i] - called,
+                derivatives=derivatives,
+                jacobians=jacobians,
+                factorisations=factorisations,
                 resume=partial(_after, stride, i) if resumes else None,
                 capped=capped[i] - shortened,
             )
-            steps, rows, called, shortened = i + 1, passed[i], derivatives[i], capped[i]
+            steps, rows, called, shortened = i + 1, passed[i], counts[i], capped[i]
+
+
+def _counts(stride: Stride) -> list[list[int]]:
+    """The numbers of derivatives, Jacobians and factorisations up to the end of each step."""
+    none = np.zeros_like(stride.derivatives)
+    others = (none if x is None else x for x in (stride.jacobians, stride.factorisations))
+    counts: list[list[int]] = np.column_stack((stride.derivatives, *others)).tolist()
+    return counts
 
 
 def _after(stride: Stride, i: int) -> Resume:
