@@ -92,12 +92,14 @@ def test_there_are_as_many_trees_as_known() -> None:
 
 def test_the_coefficients_have_their_order() -> None:
     """All conditions for order 5, and those of the estimate and the dense output for order 4."""
-    assert max(residuals()) < 2e-12
+    assert max(residuals()) < 2e-13
 
 
 @pytest.mark.parametrize("name", ["PLACES", "COUPLINGS", "NODES", "IN_TIME", "END", "DENSE"])
 def test_a_mistyped_coefficient_is_caught(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each of them in turn is wrong by 1e-8 of itself."""
+    """Each of them in turn is wrong by 1e-8 of itself. The last column of the dense output enters
+    no condition up to order 4, so it is compared with the published numbers.
+    """
     true: tuple[Any, ...] = getattr(own, name)
     table = true if isinstance(true[0], tuple) else (true,)
     for i, row in enumerate(table):
@@ -105,7 +107,10 @@ def test_a_mistyped_coefficient_is_caught(name: str, monkeypatch: pytest.MonkeyP
             wrong = [list(each) for each in table]
             wrong[i][j] = value * (1 + 1e-8) if value else 1e-8
             monkeypatch.setattr(own, name, wrong if table is true else wrong[0])
-            assert max(residuals()) > 2e-11, (i, j)
+            free = name == "DENSE" and j == 7
+            assert free or max(residuals()) > 2e-12, (i, j)
+    published = (-0.17202221070155493, -6.710236069923372, 4.883087185713722)
+    assert name != "DENSE" or tuple(row[7] for row in true) == published
 
 
 def problem(
