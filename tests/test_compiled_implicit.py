@@ -59,6 +59,48 @@ q = [1.0, 0.001]
 """
 """A double pendulum with a stiff, damped elbow and a drive that depends on time."""
 
+GAUSS = ("implicit_midpoint", "gauss_4", "gauss_6")
+PLANE = """
+name = "plane_orbit"
+dimensions = 2
+[[bodies]]
+name = "cart"
+mass = 1.0
+inertia_com = 0
+[[bodies]]
+name = "bead"
+mass = 2.0
+inertia_com = 0
+[[joints]]
+name = "along"
+type = "prismatic"
+parent = "world"
+child = "cart"
+axis = [1, 0]
+coordinate = "x"
+[[joints]]
+name = "across"
+type = "prismatic"
+parent = "cart"
+child = "bead"
+axis = [0.6, 0.8]
+coordinate = "s"
+[[effects]]
+type = "motor"
+name = "pull"
+joint = "along"
+torque = "sin(3*t) - 40*x**3"
+[[effects]]
+type = "motor"
+name = "hold"
+joint = "across"
+torque = "-30*s + x"
+[initial]
+q = [1.0, 0.5]
+v = [0.2, -1.0]
+"""
+"""Two masses on straight wires: forces depend on positions and time."""
+
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-7])
 @pytest.mark.parametrize(
@@ -117,6 +159,48 @@ def test_aims_are_met_by_the_same_runs() -> None:
     assert "Rodas5P" in compiled.options
     assert compiled.options == python.options and compiled.error == python.error
     assert_same(compiled, python)
+
+
+@pytest.mark.parametrize("method", GAUSS)
+@pytest.mark.parametrize(
+    "scene", some((STIFF, "spinning_top", "pendulum"), (STIFF, *built_in_names()))
+)
+def test_equal_steps_have_the_bits_of_python(scene: str, method: str) -> None:
+    """Newton's iterations are as many; quaternions are normalised; some of the steps are rows."""
+    options: dict[str, Any] = {"integrator": method, "dt": 1e-3, "samples": 7}
+    compiled, python = both(scene, t_end=0.0507, **options)
+    assert_same(compiled, python)
+    assert compiled.trajectory.counts["steps"] == 51 or not compiled.finished
+
+
+@pytest.mark.parametrize("method", [*GAUSS, "leapfrog"])
+def test_equal_steps_go_on_in_either(method: str) -> None:
+    """Also from the middle of a step of the whole run."""
+    options: dict[str, Any] = {"integrator": method, "dt": 1e-2}
+    whole = eomgen.simulate("pendulum", t_end=1.0, backend="numpy", **options)
+    for first, second in (("c", "numpy"), ("numpy", "c"), ("c", "c")):
+        begun = eomgen.simulate("pendulum", t_end=0.495, backend=first, **options)
+        run = eomgen.simulate("pendulum", t_end=1.0, resume=begun, backend=second, **options)
+        assert run.y[-1].tobytes() == whole.y[-1].tobytes()
+        assert run.compiled == (second == "c")
+
+
+@pytest.mark.parametrize("method", [*GAUSS, "leapfrog"])
+def test_equal_steps_fail_alike(method: str) -> None:
+    """In the fall into a centre, and where Newton's iteration does not converge."""
+    for dt in (1e-3, 0.3):
+        compiled, python = both(FALL, t_end=3.0, integrator=method, dt=dt)
+        assert_same(compiled, python)
+
+
+@pytest.mark.parametrize("scene", [PLANE, FALL, "pendulum"])
+@pytest.mark.parametrize("unstable", [False, True])
+def test_leapfrog_has_the_bits_of_python(scene: str, unstable: bool) -> None:
+    """The stability of its steps is judged alike, too."""
+    for dt in (1e-3, 0.2):
+        options: dict[str, Any] = {"integrator": "leapfrog", "dt": dt, "unstable": unstable}
+        compiled, python = both(scene, t_end=1.03, **options)
+        assert_same(compiled, python)
 
 
 def test_what_fails_fails_alike() -> None:

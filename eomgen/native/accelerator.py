@@ -108,19 +108,25 @@ class Accelerator:
                 made.append(runs.CompiledSteps(module, library, *self._values))
             return made[0] if made else None
 
+        def implicit_steps() -> implicit.CompiledImplicit | None:
+            if not stiff and (libraries := self._of_implicit_steps()):
+                given = (module, libraries, *self._values, perturbed)
+                stiff.append(implicit.CompiledImplicit(problem, *given))
+            return stiff[0] if stiff else None
+
         def steps(name: str) -> Steps | None:
             if name in implicit.METHODS:
-                if not stiff and (libraries := self._of_implicit_steps()):
-                    given = (module, libraries, *self._values, perturbed)
-                    stiff.append(implicit.CompiledImplicit(problem, *given))
-                found = stiff[0].named(name) if stiff else None
+                found = other.named(name) if (other := implicit_steps()) else None
             else:
                 found = held.named(name) if (held := compiled()) else None
             self.used = self.used or found is not None
             return found
 
         def equal(name: str) -> EqualSteps | None:
-            found = held.equal(name) if (held := compiled()) else None
+            if name in implicit.GAUSS:
+                found = other.equal(name) if (other := implicit_steps()) else None
+            else:
+                found = held.equal(name, problem) if (held := compiled()) else None
             self.used = self.used or found is not None
             return found
 

@@ -5,18 +5,21 @@ scene, which are libraries of their own.
 """
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
+from eomgen.native import equal_steps
 from eomgen.native.functions import constants_of
 from eomgen.native.module import Kernels
-from eomgen.run.compiled import Array, Steps, Stride
-from eomgen.run.integrators import rodas_5p
+from eomgen.run.compiled import Array, EqualSteps, Steps, Stride
+from eomgen.run.integrators import gauss_4, gauss_6, implicit_midpoint, implicit_stages, rodas_5p
+from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.integrators.rodas_5p_coefficients import GAMMA, IN_TIME, NODES, Row
 from eomgen.run.problem import USUAL_LENGTH, Problem
 from eomgen.templating import render
@@ -25,6 +28,10 @@ MAIN = "implicit.c"
 NEEDED = ("derivative", "jacobian")
 """The functions that the methods call."""
 METHODS = ("rodas_5p",)
+GAUSS: Mapping[str, ImplicitMethod] = {
+    method.METHOD.compiled: method.METHOD for method in (implicit_midpoint, gauss_4, gauss_6)
+}
+"""The methods of adaptive and of equal steps, by the names of their compiled steps."""
 OPERATIONS = 2000
 """The methods take as long to compile as a function of about so many operations."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -54,8 +61,22 @@ def sources() -> Mapping[str, str]:
         "greatest": repr(rodas_5p.GREATEST),
         "negligible": repr(rodas_5p.NEGLIGIBLE),
         "least_error": repr(rodas_5p.LEAST_ERROR),
+        "unit": "unit(((const iteration *)run->more)->of, ",
+        "max_iterations": implicit_stages.MAX_ITERATIONS,
+        "roundoff": repr(implicit_stages.ROUNDOFF),
+        "noise": repr(implicit_stages.NOISE),
+        "nothing": repr(implicit_stages.NOTHING),
+        "small": repr(implicit_stages.SMALL),
+        "gauss": [
+            (name, len(of.b), *(_listed(x) for x in (sum(of.shares, ()), of.b, of.c)))
+            for name, of in GAUSS.items()
+        ],
     }
     return {MAIN: render(c.TEMPLATES, "implicit.c.jinja", context)}
+
+
+def _listed(values: Iterable[float]) -> str:
+    return ", ".join(repr(float(value)) for value in values)
 
 
 def _sum(row: Row) -> str:
@@ -84,6 +105,10 @@ class _Records(ctypes.Structure):
         *((name, _POINTER) for name in ("times", "rows")),
         ("count", _WHOLE),
     )
+
+
+class _Iteration(ctypes.Structure):
+    _fields_ = tuple((name, _POINTER) for name in ("system", "reals", "wholes"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +162,25 @@ class CompiledImplicit:
         call.argtypes = [_POINTER, _POINTER, _WHOLE, *[_REAL] * 4, *[_POINTER] * 6]
         return partial(_rodas_5p, call, self._system)
 
+    def equal(self, name: str) -> EqualSteps | None:
+        """The same for methods with equal steps."""
+        if self._system is None or name not in GAUSS:
+            return None
+        stages = len(GAUSS[name].b)
+        reals, wholes = _space(stages * self._system.states)
+        with_them = _Iteration(
+            ctypes.addressof(self._system), reals.ctypes.data, wholes.ctypes.data
+        )
+        with_them.kept = self, reals, wholes
+        call = self._methods[f"steps_{name}"]
+        return partial(equal_steps.made, call, stages, None, None, with_them, iterates=True)
+
+
+def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:
+    """Space for numbers and for whole numbers in which methods solve for so many unknowns."""
+    square = unknowns * unknowns
+    return np.empty(5 * square + 24 * unknowns), np.empty(square + 2 * unknowns, np.int64)
+
 
 def _rodas_5p(
     call: Any,
@@ -164,7 +208,7 @@ def _rodas_5p(
     records = _Records(*(array.ctypes.data for array in arrays), len(times))
     settings = _Settings(atol.ctypes.data, rtol, longest, t_end)
     start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
-    reals, wholes = np.empty(4 * ny * ny + 24 * ny), np.empty(2 * ny + ny * ny, np.int64)
+    reals, wholes = _space(ny)
     why = call(
         ctypes.byref(system),
         ctypes.byref(settings),

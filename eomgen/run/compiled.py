@@ -70,10 +70,12 @@ class EqualStride:
     ends         (m,), their times, s
     states       (m, ny), the states there
     losses       (m, ny), the rounding errors of the sums there, which the next step adds
-    calls        derivatives in each step
+    calls        derivatives in each step, or in each iteration
     rate         (ny,), change of the state in the last step, by its length
     place, slope (ny,), the last derivative evaluated, and the state where
     usual        whether the next step may be made so, too
+    iterations   (m,), those in each step, with as many Jacobians as derivatives; None if the method
+                 does not iterate
     """
 
     ends: Array
@@ -84,6 +86,7 @@ class EqualStride:
     place: Array
     slope: Array
     usual: bool
+    iterations: NDArray[np.int64] | None = None
 
 
 class EqualSteps(Protocol):

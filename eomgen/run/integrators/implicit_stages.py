@@ -46,8 +46,8 @@ class ImplicitMethod:
     Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes
     (Numerical Algorithms 76, 2017).
 
-    `compiled` is the name of its compiled steps. Raises `ValueError` if the method does not have the
-    given order.
+    `compiled` is the name of its compiled steps. Raises `ValueError` if the method does not have
+    the given order.
     """
 
     shares: tuple[tuple[float, ...], ...]
