@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.codegen.backends import c
+from eomgen.codegen.backends import c_directions
 from eomgen.codegen.interface import Interface
 from eomgen.native.beside import impact_numbers
 from eomgen.native.module import Kernels, outputs_of, usual_constants
@@ -44,7 +44,7 @@ def restricted(
 
 def sources(program: Program, interface: Interface, name: str) -> Mapping[str, str]:
     """The C sources of the library of one function."""
-    return c.library(*restricted(program, interface, (name,)))
+    return c_directions.library(*restricted(program, interface, (name,)))
 
 
 def compiled_function(
