@@ -49,7 +49,7 @@ damping = 1e4
 q = [1.0, 0.01]
 """,
 }
-"""A chain with up to 1000 Hz, and a double pendulum with a joint spring that is stiff and damped."""
+"""A chain with up to 1000 Hz, and a double pendulum with a stiff, damped joint spring."""
 ERROR = 1e-6
 """The greatest error of any state at the end that stiff runs may have, rad or rad/s."""
 LENGTHS = {"beam of 40 links": 1.0, "stiff elbow": 10.0}
