@@ -84,7 +84,17 @@ class _Parser(argparse.ArgumentParser):
         super().error(one_line(message))
 
 
-def _parser() -> argparse.ArgumentParser:
+def command_parsers() -> list[tuple[str, argparse.ArgumentParser]]:
+    """The name of each command, and the parser of its arguments, in the order of the help."""
+    found: list[tuple[str, argparse.ArgumentParser]] = []
+    _parser(found)
+    return found
+
+
+def _parser(
+    found: list[tuple[str, argparse.ArgumentParser]] | None = None,
+) -> argparse.ArgumentParser:
+    """The parser of the command line; those of the commands are appended to `found`."""
     parser = _Parser(
         prog="eomgen",
         description="Equations of motion from a scene: derived, solved once, written as code.",
@@ -98,6 +108,8 @@ def _parser() -> argparse.ArgumentParser:
     ) -> argparse.ArgumentParser:
         added = sub.add_parser(name, help=about, description=about)
         added.set_defaults(run=run)
+        if found is not None:
+            found.append((name, added))
         if scenes == "scene":
             added.add_argument("scene", metavar="SCENE", help="file or built-in name")
         elif scenes == "scenes":

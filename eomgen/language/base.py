@@ -3,7 +3,7 @@
 import keyword
 import re
 from itertools import zip_longest
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
 from pydantic_core import PydanticCustomError
@@ -16,7 +16,12 @@ MOST_HINTS = 10
 
 
 class Table(BaseModel):
-    """A table of the scene. Unknown keys are errors; values are frozen."""
+    """A table of the scene. Unknown keys are errors; values are frozen.
+
+    example  an example in TOML, which the reference shows
+    """
+
+    example: ClassVar[str] = ""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, defer_build=True)
 

@@ -1,7 +1,7 @@
 """The scene: all tables and keys of the language."""
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
@@ -49,9 +49,16 @@ LeftOut = Literal["velocity_forces"]
 class ParameterTable(Table):
     """A parameter with its unit and meaning: `{ value = 1.0, unit = "kg", about = "…" }`."""
 
-    value: Number
-    unit: Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z0-9 /^*.()-]*$")] = ""
-    about: Text = ""
+    example: ClassVar[str] = """
+[parameters]
+l = 0.8
+m = { value = 2.0, unit = "kg", about = "mass of the arm" }
+"""
+    value: Number = Field(description="its value")
+    unit: Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z0-9 /^*.()-]*$")] = Field(
+        default="", description="its unit, which documentation shows"
+    )
+    about: Text = Field(default="", description="what it is, in one line")
 
 
 Inertia = Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=6)]
@@ -71,6 +78,12 @@ class BodyTable(Table):
     entries of the matrix about the centre of mass in body axes.
     """
 
+    example: ClassVar[str] = """
+[[bodies]]
+name = "arm"
+mass = "m"
+inertia_com = "m*l**2/12"
+"""
     name: Identifier
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
@@ -84,6 +97,15 @@ class ChainTable(Table):
     the centre of mass of its link; `start` is the first pin on `parent`.
     """
 
+    example: ClassVar[str] = """
+[[chains]]
+name = "link"
+count = 20
+mass = 0.05
+inertia_com = 2e-5
+r_parent = [0.05, 0]
+r_child = [-0.05, 0]
+"""
     name: Identifier
     count: Annotated[int, Strict(), Field(ge=1, le=MOST, description="number of links")]
     parent: Identifier = Field(default="world", description="parent of the first link")
@@ -99,6 +121,12 @@ class ChainTable(Table):
 class PointTable(Table):
     """A named point of a body."""
 
+    example: ClassVar[str] = """
+[[points]]
+name = "tip"
+body = "hand"
+at = [0.1, 0]
+"""
     name: Identifier
     body: Identifier = Field(description="body it is fixed to")
     at: Vector = quantity("m", "point from the centre of mass", default=(), validate_default=False)
@@ -111,6 +139,11 @@ class Initial(Table):
     `<name>_deg`.
     """
 
+    example: ClassVar[str] = """
+[initial]
+q = { shoulder_angle_deg = 30 }
+v = { elbow_angle_dot = -2.0 }
+"""
     q: tuple[Number, ...] | dict[str, Number] = Field(
         default={}, union_mode="left_to_right", description="coordinates"
     )
@@ -129,6 +162,12 @@ class Simulation(Table):
     less than its rounding error.
     """
 
+    example: ClassVar[str] = """
+[simulation]
+t_end = 5.0
+integrator = "DOP853"
+rtol = 1e-10
+"""
     t_end: Positive = Field(default=10.0, description="end time, s")
     integrator: Integrator = Field(default="DOP853", description="method")
     dt: Positive = Field(default=0.001, description="step of a fixed-step method, s")

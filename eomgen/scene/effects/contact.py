@@ -74,6 +74,17 @@ class BodyContact(OnBodies):
     v >> s a block slides v²/(2 μ g) (1 + (s/v)² (½ + ln(2 v/s))).
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "contact"
+name = "floor"
+law = "hunt_crossley"
+body = "hand"
+radius = 0.05
+offset = -1.0
+stiffness = 5e4
+dissipation = 0.2
+"""
     body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies", "radii")
     anchor_fields: ClassVar[tuple[str, ...]] = ("other",)
     vector_fields: ClassVar[tuple[str, ...]] = ("at", "corners", "other_at")

@@ -1,7 +1,7 @@
 """A controller whose states and torques are formulas of the scene."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -31,6 +31,13 @@ class Controller(EffectTable):
     torques, so none depends on itself.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "controller"
+name = "hold"
+states = { z = { initial = 0.0, rate = "elbow_angle" } }
+torques = { elbow = "-5*elbow_angle - 2*z" }
+"""
     joint_fields = ("torques",)
 
     type: Literal["controller"]

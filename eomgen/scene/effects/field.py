@@ -1,7 +1,7 @@
 """Force fields: formulas of position, velocity and time, and some predefined ones."""
 
 from collections.abc import Iterator, Mapping
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -50,6 +50,13 @@ class ForceField(OnBodies):
     there; a run with fixed steps may jump across the centre and continue with a large error.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "field"
+name = "stream"
+body = "hand"
+force = ["-2*(vx - 1)", "-2*vy"]
+"""
     vector_fields = ("at", "center", "force")
 
     type: Literal["field"]

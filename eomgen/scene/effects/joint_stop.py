@@ -1,7 +1,7 @@
 """Soft or rigid stops at the limits of a joint's coordinate."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -25,6 +25,16 @@ class JointStop(OnJoints):
     `<effect>_low` and `<effect>_high`.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "joint_stop"
+name = "limit"
+joint = "elbow"
+low = 0.0
+high = 2.5
+stiffness = 200.0
+damping = 1.0
+"""
     type: Literal["joint_stop"]
     low: Quantity | None = quantity("rad | m", "lower limit", default=None)
     high: Quantity | None = quantity("rad | m", "upper limit", default=None)

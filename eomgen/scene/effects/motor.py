@@ -1,7 +1,7 @@
 """A motor at a joint."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from eomgen.language.formula import names_in
 from eomgen.language.quantity import Quantity, quantity
@@ -15,6 +15,13 @@ class Motor(OnCoordinate):
     At a prismatic joint it is a force. With `torque = "input"` it is the input `<name>`.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "motor"
+name = "drive"
+joint = "elbow"
+torque = "input"
+"""
     type: Literal["motor"]
     torque: Literal["input"] | Quantity = quantity(
         "N m | N", "torque | force", sees=("motion",), union_mode="left_to_right"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -30,6 +30,16 @@ class Spring(EffectTable):
     consistent; with rest length 0 the force is k d everywhere.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "spring"
+name = "elastic"
+body_1 = "world"
+at_1 = [1, 0]
+body_2 = "hand"
+stiffness = 40.0
+rest_length = 0.5
+"""
     anchor_fields = ("body_1", "body_2")
     vector_fields = ("at_1", "at_2")
 

@@ -1,6 +1,6 @@
 """The prismatic joint."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -11,6 +11,15 @@ from eomgen.scene.joints.base import WORLD, Coordinate, Geared, Primitive, spati
 class Prismatic(Geared):
     """The child translates along `axis` and does not rotate relative to the parent."""
 
+    example: ClassVar[str] = """
+[[joints]]
+name = "elbow"
+type = "prismatic"
+parent = "arm"
+child = "hand"
+axis = [1, 0]
+coordinate = "reach"
+"""
     type: Literal["prismatic"]
     axis: Numbers = Field(description="direction in the child's axes")
 
