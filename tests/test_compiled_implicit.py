@@ -224,8 +224,18 @@ def test_a_long_run_is_compiled_on_its_way(
     assert eomgen.simulate(STIFF, t_end=0.01, **options).compiled
 
 
-def test_corners_are_seen() -> None:
-    """A force that begins and ends within a moment is met in Python's steps."""
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6])
+def test_corners_in_time_are_seen(rtol: float) -> None:
+    """A force that begins and ends within a moment. Steps are cut there, by the same bits."""
     pushed = FALL.replace("-1/x**2", "1000 if max(0.7 - t, t - 0.701) < 0 else 0")
+    compiled, python = both(pushed, t_end=2.0, integrator="Rodas5P", rtol=rtol)
+    assert_same(compiled, python)
+    assert compiled.compiled
+    assert compiled.trajectory.y[-1][1] == pytest.approx(0.5, rel=max(rtol, 1e-6))
+
+
+def test_corners_in_space_are_seen() -> None:
+    """Python makes these steps."""
+    pushed = FALL.replace("-1/x**2", "-2*max(x, 0)")
     run = eomgen.simulate(pushed, t_end=2.0, integrator="Rodas5P", backend="c")
-    assert run.trajectory.y[-1][1] == pytest.approx(0.5, rel=1e-6)
+    assert run.trajectory.y[-1][1] == pytest.approx(-1.0, rel=1e-6)

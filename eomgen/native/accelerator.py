@@ -10,7 +10,7 @@ import ctypes
 import hashlib
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache, cached_property, partial
@@ -40,6 +40,8 @@ class _Library:
     sources, main its sources, and the one that includes the others
     price         time to compile, s
     fail          called with the error of a compiler
+
+    `paid` is the time that Python took until it was compiled, and that of compiling, s.
     """
 
     def __init__(
@@ -47,7 +49,7 @@ class _Library:
     ) -> None:
         self._about, self._sources, self._main, self._price = about, sources, main, price
         self._fail = fail
-        self._looked, self._over = False, False
+        self._looked, self._over, self.paid = False, False, 0.0
         self._found: ctypes.CDLL | None = None
 
     def after(self, spent: float) -> ctypes.CDLL | None:
@@ -74,8 +76,9 @@ class _Library:
 
     def compile(self) -> None:
         """Compile it now, unless it is in the store. Raises `RunError`."""
-        self._over = True
+        self._over, begun = True, time.perf_counter()
         self._found = compiled_library(self._about, self._sources, self._main)
+        self.paid = self._price + time.perf_counter() - begun
 
 
 class Accelerator:
@@ -97,16 +100,19 @@ class Accelerator:
         functions.
         """
         perturbed, module = module is not None, module or self._module
-        made: list[runs.CompiledSteps] = []
+        made: dict[tuple[str, ...], runs.CompiledSteps] = {}
         stiff: list[implicit.CompiledImplicit] = []
         compilable = functions.Compilable(module, self._values, perturbed, self._look, self._start)
         problem = compilable.problem(problem)
 
-        def compiled() -> runs.CompiledSteps | None:
-            library = self._of_steps(0.0)
-            if library is not None and not made:
-                made.append(runs.CompiledSteps(module, library, *self._values))
-            return made[0] if made else None
+        def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
+            if needed not in made:
+                libraries = self._all(("derivative", *needed))
+                if libraries is None:
+                    return None
+                own, beside = libraries["derivative"], {name: libraries[name] for name in needed}
+                made[needed] = runs.CompiledSteps(module, own, *self._values, beside)
+            return made[needed]
 
         def implicit_steps() -> implicit.CompiledImplicit | None:
             if not stiff and (libraries := self._of_implicit_steps()):
@@ -114,11 +120,12 @@ class Accelerator:
                 stiff.append(implicit.CompiledImplicit(problem, *given))
             return stiff[0] if stiff else None
 
-        def steps(name: str) -> Steps | None:
+        def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
             if name in implicit.METHODS:
-                found = other.named(name) if (other := implicit_steps()) else None
+                other = None if needed else implicit_steps()
+                found = other.named(name) if other else None
             else:
-                found = held.named(name) if (held := compiled()) else None
+                found = held.named(name, needed) if (held := compiled(needed)) else None
             self.used = self.used or found is not None
             return found
 
@@ -153,10 +160,28 @@ class Accelerator:
 
     def _of_steps(self, spent: float) -> ctypes.CDLL | None:
         """The library of the steps; they take as long as the run."""
+        return self._library("derivative").after(self._elapsed())
+
+    def _all(self, names: Sequence[str]) -> dict[str, ctypes.CDLL] | None:
+        """The libraries of steps and of the functions that check them. They are compiled one after
+        another, each once Python has taken as long as that takes.
+        """
+        left, found = math.inf if self._at_once else self._elapsed(), dict[str, ctypes.CDLL]()
+        for name in names:
+            of = self._library(name)
+            library = of.after(left)
+            if library is None:
+                return None
+            found[name] = library
+            left -= of.paid
+        return found
+
+    def _elapsed(self) -> float:
+        """The time since the first call, s."""
         now = time.perf_counter()
         if self._begun is None:
             self._begun = now
-        return self._library("derivative").after(now - self._begun)
+        return now - self._begun
 
     def _of_implicit_steps(self) -> implicit.Libraries | None:
         """The libraries of implicit steps, together: with fewer, Python makes all steps."""
@@ -211,8 +236,9 @@ def library_key(model: Model, name: str = "derivative") -> str:
 def _digest() -> str:
     """A digest of the files that, beside the model, determine the sources of a library."""
     here = Path(__file__).resolve().parent
-    methods = here.parent / "run" / "integrators"
+    run = here.parent / "run"
     found = hashlib.sha256()
-    for path in (*sorted(here.glob("*.py")), *sorted(methods.glob("*.py"))):
+    checks = [run / f"{name}.py" for name in ("branches", "events", "roots")]
+    for path in (*sorted(here.glob("*.py")), *sorted((run / "integrators").glob("*.py")), *checks):
         found.update(path.name.encode() + b"\0" + path.read_bytes())
     return found.hexdigest()

@@ -5,6 +5,7 @@ scene, which are libraries of their own.
 """
 
 import ctypes
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -17,7 +18,7 @@ from eomgen.codegen.backends import c
 from eomgen.native import equal_steps
 from eomgen.native.functions import constants_of
 from eomgen.native.module import Kernels
-from eomgen.run.compiled import Array, EqualSteps, Steps, Stride
+from eomgen.run.compiled import Array, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators import gauss_4, gauss_6, implicit_midpoint, implicit_stages, rodas_5p
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.integrators.rodas_5p_coefficients import GAMMA, IN_TIME, NODES, Row
@@ -94,7 +95,10 @@ class _System(ctypes.Structure):
 
 
 class _Settings(ctypes.Structure):
-    _fields_ = (("atol", _POINTER), *((name, _REAL) for name in ("rtol", "longest", "t_end")))
+    _fields_ = (
+        ("atol", _POINTER),
+        *((name, _REAL) for name in ("rtol", "longest", "t_end", "clear")),
+    )
 
 
 class _Records(ctypes.Structure):
@@ -195,8 +199,13 @@ def _rodas_5p(
     longest: float,
     times: Array,
     most: int,
+    watched: Watched | None = None,
+    sizes: Array | None = None,
 ) -> Stride:
-    """Steps of Rodas5P, with the arguments of `run.compiled.Steps`."""
+    """Steps of Rodas5P, with the arguments of `run.compiled.Steps`, of which `watched` may have
+    switching functions of time alone only, and there are no `sizes`.
+    """
+    assert sizes is None and not (watched and watched.ends)
     ny = system.states
     ends, lengths, last_lengths, errors = np.empty((4, most))
     states, losses = np.empty((2, most, ny))
@@ -206,7 +215,8 @@ def _rodas_5p(
     counts = derivatives, jacobians, factorisations, sampled
     arrays = ends, lengths, last_lengths, errors, states, losses, *counts, times, rows
     records = _Records(*(array.ctypes.data for array in arrays), len(times))
-    settings = _Settings(atol.ctypes.data, rtol, longest, t_end)
+    clear = watched.clear if watched else math.inf
+    settings = _Settings(atol.ctypes.data, rtol, longest, t_end, clear)
     start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
     reals, wholes = _space(ny)
     why = call(
@@ -230,6 +240,10 @@ def _rodas_5p(
         derivatives[:n],
         sampled[:n],
         rows[:passed].copy(),  # the array for all rows to come is not kept with them
+        np.full(n, watched.switched if watched else -math.inf),
+        np.empty((n, 0)),
+        np.zeros(n, np.int64),
+        np.zeros(n, np.int64),
         usual=why != _UNUSUAL,
         jacobians=jacobians[:n],
         factorisations=factorisations[:n],

@@ -1,7 +1,7 @@
 """Whole steps of a method in compiled code, with the bits of the same steps made in Python."""
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
-from eomgen.native import equal_steps
+from eomgen.native import checked, equal_steps
 from eomgen.native.functions import restricted
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
-from eomgen.run.compiled import Array, EqualSteps, Steps, Stride
+from eomgen.run.compiled import Array, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators import dormand_prince_8 as dop853
 from eomgen.run.integrators.dop853_coefficients import NODES, Row
 from eomgen.run.problem import USUAL_LENGTH, Problem
@@ -53,6 +53,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "smallest": repr(dop853.SMALLEST),
         "greatest": repr(dop853.GREATEST),
         "short_weight": repr(dop853.SHORT_WEIGHT),
+        **checked.context(),
     }
     main = render(c.TEMPLATES, "runs.c.jinja", context) + equal_steps.source(interface)
     return {**c.library(program, interface), MAIN: main}
@@ -73,7 +74,8 @@ class _Settings(ctypes.Structure):
 class _Records(ctypes.Structure):
     _fields_ = (
         *((name, _POINTER) for name in ("ends", "lengths", "states", "slopes", "losses")),
-        *((name, _POINTER) for name in ("derivatives", "sampled", "times", "rows")),
+        *((name, _POINTER) for name in ("switched", "values", "derivatives", "sampled")),
+        *((name, _POINTER) for name in ("switches", "gap_checks", "times", "rows")),
         ("count", _WHOLE),
     )
 
@@ -81,21 +83,34 @@ class _Records(ctypes.Structure):
 class CompiledSteps:
     """The compiled steps of a module at given parameters and inputs.
 
-    The constants are those that the module computes, also where it is a perturbed one.
+    The constants are those that the module computes, also where it is a perturbed one. `beside` are
+    the libraries of the functions that steps are checked with, by name.
     """
 
-    def __init__(self, module: Any, library: ctypes.CDLL, p: Any, u: Any) -> None:
+    def __init__(
+        self,
+        module: Any,
+        library: ctypes.CDLL,
+        p: Any,
+        u: Any,
+        beside: Mapping[str, ctypes.CDLL] | None = None,
+    ) -> None:
         kernels = Kernels(module, library)
+        self._checks = checked.functions(module, beside or {}, p)
         self._constants = usual_constants(module, "derivative", p)
         self._inputs = kernels.given(u)
         self._states = kernels.states
         self._library, self._call = library, library.dop853
         self._call.restype = ctypes.c_int
-        self._call.argtypes = [_POINTER, _WHOLE, _REAL, _REAL, *[_POINTER] * 5]
+        self._call.argtypes = [_POINTER, _POINTER, _WHOLE, _REAL, _REAL, *[_POINTER] * 5]
 
-    def named(self, name: str) -> Steps | None:
-        """The steps of a method; None if there are none for it, these parameters or inputs."""
+    def named(self, name: str, needed: Sequence[str] = ()) -> Steps | None:
+        """The steps of a method that are checked with some functions; None if there are none for
+        it, for these functions, parameters or inputs.
+        """
         if self._constants is None or self._inputs is None or name != "dop853":
+            return None
+        if not set(needed) <= self._checks.keys():
             return None
         held = ctypes.cast(self._constants, _POINTER), self._inputs.ctypes.data
         return partial(self._dop853, held)
@@ -119,19 +134,25 @@ class CompiledSteps:
         longest: float,
         times: Array,
         most: int,
+        watched: Watched | None = None,
+        sizes: Array | None = None,
     ) -> Stride:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
         ends, lengths = np.empty((2, most))
         states, slopes, losses = np.empty((3, most, ny))
-        derivatives, sampled = np.empty((2, most), np.int64)
+        derivatives, sampled, switches, gap_checks = np.empty((4, most), np.int64)
+        watch, pointed = checked.watch(self._checks, watched, sizes)
+        switched, values = np.empty(most), np.empty((most, watch.switching.count))
         rows, made = np.empty((len(times), ny)), ctypes.c_int64()
-        arrays = (ends, lengths, states, slopes, losses, derivatives, sampled, times, rows)
+        arrays: list[Any] = [ends, lengths, states, slopes, losses, switched, values]
+        arrays += [derivatives, sampled, switches, gap_checks, times, rows]
         records = _Records(*(array.ctypes.data for array in arrays), len(times))
         settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end)
         start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
         why = self._call(
             ctypes.byref(settings),
+            ctypes.byref(watch),
             most,
             t,
             float(memory["h_abs"]),
@@ -139,6 +160,7 @@ class CompiledSteps:
             ctypes.byref(records),
             ctypes.byref(made),
         )
+        del pointed
         n = made.value
         passed = int(sampled[n - 1]) if n else 0
         return Stride(
@@ -148,5 +170,9 @@ class CompiledSteps:
             derivatives[:n],
             sampled[:n],
             rows[:passed].copy(),  # the array for all rows to come is not kept with them
+            switched[:n],
+            values[:n],
+            switches[:n],
+            gap_checks[:n],
             usual=why != _UNUSUAL,
         )

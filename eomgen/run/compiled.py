@@ -3,7 +3,7 @@
 `eomgen.native.runs` implements it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,6 +23,10 @@ class Stride:
     derivatives  (m,), calls of the derivative so far
     sampled      (m,), number of rows passed so far
     rows         (r, ny), the states at the times of these rows
+    switched     (m,), the time of the last switch so far, s
+    values       (m, ns), the switching functions at their ends
+    switches, gap_checks
+                 (m,), calls of switching functions, and of gaps and their rates, so far
     usual        whether the next step may be made so, too
     jacobians, factorisations
                  (m,), numbers of these so far; None if there are none
@@ -34,9 +38,32 @@ class Stride:
     derivatives: NDArray[np.int64]
     sampled: NDArray[np.int64]
     rows: Array
+    switched: Array
+    values: Array
+    switches: NDArray[np.int64]
+    gap_checks: NDArray[np.int64]
     usual: bool
     jacobians: NDArray[np.int64] | None = None
     factorisations: NDArray[np.int64] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """What steps from a time on are checked for branches with: see `run.branches`.
+
+    ends      the ends of the last two steps and the switching functions (ns,) there; empty if none
+              depends on the state
+    switched  the time of the last switch, s
+    clear     the time, s, up to which no switching function of time alone changes its sign
+    timed     whether those of the state depend on time, too
+    angles    indices of the states that are angles
+    """
+
+    ends: Sequence[tuple[float, Array]]
+    switched: float
+    clear: float
+    timed: bool
+    angles: tuple[int, ...]
 
 
 class Steps(Protocol):
@@ -46,6 +73,9 @@ class Steps(Protocol):
     rtol, atol  tolerances, atol (ny,)
     longest     the longest step, s
     times       ascending times of the rows wanted, after t
+    watched     given to make no step that may pass over a branch of the derivative
+    sizes       given (nc,) to make no step in which a rigid contact, none of which is held, may
+                close; its gap is relative to its size
     """
 
     def __call__(
@@ -60,6 +90,8 @@ class Steps(Protocol):
         longest: float,
         times: Array,
         most: int,
+        watched: Watched | None = None,
+        sizes: Array | None = None,
     ) -> Stride: ...
 
 
@@ -116,11 +148,12 @@ class Compiled:
     """Compiled steps of a problem.
 
     derivative  the function whose steps they are: they serve no problem with another one
-    steps       the steps of a method, by its name; None if there are none, or not yet. It is asked
-                again and again during a run, and may begin to compile when the run is a long one
-    equal       the same for methods with equal steps
+    steps       the steps of a method, by its name and those of further functions that they call;
+                None if there are none, or not yet. It is asked again and again during a run, and
+                may begin to compile when the run is a long one
+    equal       the same for methods with equal steps, without further functions
     """
 
     derivative: Callable[[float, Array], Array]
-    steps: Callable[[str], Steps | None]
+    steps: Callable[[str, tuple[str, ...]], Steps | None]
     equal: Callable[[str], EqualSteps | None]

@@ -109,8 +109,10 @@ class Advance:
     problem  whose derivative was integrated
     within   gives the state at any time in the step; valid until the next step is made
     steps    number of steps; 0 if no time passes: an impact, or `events` only
-    derivatives, jacobians
-             calls of these that compiled code made, which are not counted otherwise
+    derivatives, jacobians, switches, gap_checks
+             calls that compiled code made of these, of switching functions, and of gaps and their
+             rates, which are not counted otherwise
+    checked  whether compiled code has checked that no rigid contact closes
     struck   number of the contact of an impact
     events   changes of contacts at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts and of the drives during the step,
@@ -130,6 +132,9 @@ class Advance:
     steps: int = 1
     derivatives: int = 0
     jacobians: int = 0
+    switches: int = 0
+    gap_checks: int = 0
+    checked: bool = False
     struck: int | None = None
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, FloatArray], FloatArray] | None = None
@@ -139,9 +144,22 @@ class Advance:
     cut: int = 0
 
 
+def always() -> bool:
+    """Whether steps may be made in compiled code: yes."""
+    return True
+
+
 class Begin(Protocol):
-    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run."""
+    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run.
+
+    `compiles` is asked before steps are made in compiled code, where gaps below 0 end them.
+    """
 
     def __call__(
-        self, problem: Problem, t: float, made: int, resume: Resume | None = None
+        self,
+        problem: Problem,
+        t: float,
+        made: int,
+        resume: Resume | None = None,
+        compiles: Callable[[], bool] = always,
     ) -> Iterator[Advance]: ...
