@@ -7,7 +7,6 @@ A run keeps two rows. Each pair stands in a group of its own; its ratio is the f
 """
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,10 +21,8 @@ from eomgen.run.module import as_problem
 from eomgen.run.problem import Problem
 
 SCENES = ("two_body", "double_pendulum", "chain", "human_figure")
-BEAM = (Path(eomgen.__file__).parent / "scenes" / "stiff_beam.toml").read_text("utf-8")
 STIFF = {
-    # The load does not end, which would leave the steps to Python.
-    "beam of 40 links": BEAM.replace("load*sin(t)**2 if t <= pi else 0", "load*sin(t)**2"),
+    "stiff_beam": "stiff_beam",
     "stiff elbow": """
 name = "stiff_elbow"
 dimensions = 2
@@ -52,7 +49,7 @@ q = [1.0, 0.01]
 """A chain with up to 1000 Hz, and a double pendulum with a stiff, damped joint spring."""
 ERROR = 1e-6
 """The greatest error of any state at the end that stiff runs may have, rad or rad/s."""
-LENGTHS = {"beam of 40 links": 1.0, "stiff elbow": 10.0}
+LENGTHS = {"stiff_beam": 1.0, "stiff elbow": 10.0}
 
 
 def prepared(scene: str, backend: str) -> Problem:
