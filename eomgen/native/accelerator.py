@@ -99,10 +99,10 @@ class Accelerator:
         """The problem of the module, or of one with other constants, with its compiled steps and
         functions.
         """
-        perturbed, module = module is not None, module or self._module
+        origin, module = module and self._module, module or self._module
         made: dict[tuple[str, ...], runs.CompiledSteps] = {}
         stiff: list[implicit.CompiledImplicit] = []
-        compilable = functions.Compilable(module, self._values, perturbed, self._look, self._start)
+        compilable = functions.Compilable(module, self._values, origin, self._look, self._start)
         problem = compilable.problem(problem)
 
         def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
@@ -116,7 +116,7 @@ class Accelerator:
 
         def implicit_steps() -> implicit.CompiledImplicit | None:
             if not stiff and (libraries := self._of_implicit_steps()):
-                given = (module, libraries, *self._values, perturbed)
+                given = (module, libraries, *self._values, origin)
                 stiff.append(implicit.CompiledImplicit(problem, *given))
             return stiff[0] if stiff else None
 

@@ -127,15 +127,15 @@ class Libraries:
 class CompiledImplicit:
     """The compiled steps of a problem of a module at given parameters and inputs.
 
-    perturbed  whether the module has other constants than those of its parameters
+    origin  the module that had the constants of its parameters, if this one has perturbed ones
     """
 
     def __init__(
-        self, problem: Problem, module: Any, libraries: Libraries, p: Any, u: Any, perturbed: bool
+        self, problem: Problem, module: Any, libraries: Libraries, p: Any, u: Any, origin: Any
     ) -> None:
         kernels = Kernels(module, libraries.derivative)
-        constants = constants_of(kernels, "derivative", p, perturbed)
-        others = constants_of(Kernels(module, libraries.jacobian), "jacobian", p, perturbed)
+        constants = constants_of(kernels, "derivative", p, origin)
+        others = constants_of(Kernels(module, libraries.jacobian), "jacobian", p, origin)
         inputs = kernels.given(u)
         self._methods, self._system = libraries.methods, None
         if constants is None or others is None or inputs is None:
