@@ -228,10 +228,10 @@ def test_a_long_run_is_compiled_on_its_way(
 def test_corners_in_time_are_seen(rtol: float) -> None:
     """A force that begins and ends within a moment. Steps are cut there, by the same bits."""
     pushed = FALL.replace("-1/x**2", "1000 if max(0.7 - t, t - 0.701) < 0 else 0")
-    compiled, python = both(pushed, t_end=2.0, integrator="Rodas5P", rtol=rtol)
+    compiled, python = both(pushed, t_end=40.0, integrator="Rodas5P", rtol=rtol)
     assert_same(compiled, python)
     assert compiled.compiled
-    assert compiled.trajectory.y[-1][1] == pytest.approx(0.5, rel=max(rtol, 1e-6))
+    assert compiled.trajectory.y[-1][1] == pytest.approx(0.5, rel=5 * rtol)
 
 
 def test_corners_in_space_are_seen() -> None:

@@ -25,6 +25,7 @@ from eomgen.native.library import compiled_library, kept_library
 from eomgen.run.compiled import Compiled, EqualSteps, Steps
 from eomgen.run.problem import Problem
 from eomgen.store import interfaced_program_of, key_of
+from eomgen.templating import templates_folder
 
 STARTING, AN_OPERATION = 0.2, 0.25e-3
 """Time to compile, s: a part for all, and a part for each operation. Measured from 11 to 24,500
@@ -239,6 +240,8 @@ def _digest() -> str:
     run = here.parent / "run"
     found = hashlib.sha256()
     checks = [run / f"{name}.py" for name in ("branches", "events", "roots")]
-    for path in (*sorted(here.glob("*.py")), *sorted((run / "integrators").glob("*.py")), *checks):
+    folders = (here, "*.py"), (run / "integrators", "*.py"), (templates_folder() / "c", "*.jinja")
+    listed = [path for folder, names in folders for path in sorted(folder.glob(names))]
+    for path in (*listed, *checks):
         found.update(path.name.encode() + b"\0" + path.read_bytes())
     return found.hexdigest()
