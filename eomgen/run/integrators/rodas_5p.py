@@ -223,4 +223,5 @@ INTEGRATOR = Adaptive(
     asks_more=True,
     memory=("h_abs", "h_last", "error", "lost"),
     compiled="rodas_5p",
+    smallest_rtol=1e-15,
 )
