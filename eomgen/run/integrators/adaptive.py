@@ -1,7 +1,8 @@
 """The steps of SciPy's adaptive methods, and of our own with the same interface.
 
 RK45 and our DOP853 are explicit (Dormand, Prince), our Rodas5P is a Rosenbrock method, Radau is
-Radau IIA of order 5, BDF and LSODA are multistep methods; LSODA switches between stiff and nonstiff methods by itself (Hindmarsh, Petzold).
+Radau IIA of order 5, BDF and LSODA are multistep methods; LSODA switches between stiff and nonstiff
+methods by itself (Hindmarsh, Petzold).
 The implicit ones are given the problem's exact Jacobian, except `Radau_differences` and
 `BDF_differences`, which approximate it by differences of derivatives that count as derivatives.
 """
