@@ -208,6 +208,11 @@ class Run:
         return self.motion.kinetic_energy + self.motion.potential_energy
 
     @property
+    def saved(self) -> Mapping[str, FloatArray]:
+        """What `save` asked for, (n, …) each, by output."""
+        return {name: each.values for name, each in self.trajectory.saved.items()}
+
+    @property
     def imbalance(self) -> "Imbalance | None":
         """The error of the energy balance; None where it is not defined."""
         from eomgen.show.balance import imbalance
@@ -255,8 +260,11 @@ class Run:
 
         return draw_motion(self.motion)
 
-    def save(self, folder: str | Path, *, force: bool = False) -> tuple[Path, ...]:
-        """Write module, table, archive and page into a folder; return their paths.
+    def save(
+        self, folder: str | Path, *, parquet: bool = False, force: bool = False
+    ) -> tuple[Path, ...]:
+        """Write module, table, archive and page into a folder, with `parquet` also the table as a
+        Parquet file; return their paths.
 
         Raises `RunError` if a file cannot be written, or exists and this program did not write it.
         """
@@ -271,6 +279,11 @@ class Run:
         save_npz(self.trajectory, archive, force=force)
         parameters = tuple(self.model.defaults.values())
         save_page(self.motion, self.module.poses, parameters, page, force=force)
+        if parquet:
+            from eomgen.run.parquet import save_parquet
+
+            save_parquet(self.trajectory, base.with_suffix(".parquet"), force=force)
+            return (*paths, base.with_suffix(".parquet"))
         return paths
 
     def _repr_html_(self) -> str:

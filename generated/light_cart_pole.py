@@ -19,8 +19,9 @@ One call of `derivative` takes 17 operations: 3 add, 10 mul, 1 div, 1 neg, 1 sin
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (4, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (4, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (4, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -459,17 +460,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -478,19 +498,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -505,7 +534,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 2
 _COLUMNS = {
     "sin": np.sin,
@@ -611,17 +640,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)

@@ -48,6 +48,8 @@ FLOORS = (
     "results",
     "api",
     "commands",
+    "usage",
+    "options",
     "cli",
     "__main__",
 )

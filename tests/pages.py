@@ -38,7 +38,7 @@ def commands_page() -> str:
 def _command(name: str, parser: argparse.ArgumentParser) -> Iterator[str]:
     yield from (f"## {name}", "", _sentence(parser.description or ""), "")
     if parser.epilog:
-        yield from ("```console", *parser.epilog.splitlines(), "```", "")
+        yield from ("```console", parser.epilog.removeprefix("example: "), "```", "")
     rows = [_option(action) for action in parser._actions if action.dest != "help"]
     if rows:
         yield from ("| option | what it is |", "|---|---|", *rows, "")

@@ -260,8 +260,9 @@ def test_notices_and_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     scene = tmp_path / "arm.toml"
     scene.write_text(ARM, "utf-8")
     notices = [
-        "eomgen: note: arm.toml: joints[0].axis: has length 2; taken as a direction of length 1",
-        "eomgen: note: arm.toml: initial.q: the quaternion from w_qw on has length 2; scaled to 1",
+        "eomgen: note: arm.toml:9: joints[0].axis: has length 2; taken as a direction of length 1",
+        "eomgen: note: arm.toml:13: initial.q: the quaternion from w_qw on has length 2; "
+        "scaled to 1",
     ]
     out = str(tmp_path / "out")
     for command in (

@@ -11,7 +11,7 @@ from test_compiled_steps import FALL, assert_same, both, compiler
 import eomgen
 from eomgen.api.generating import compiled as generated
 from eomgen.api.given import check, read
-from eomgen.api.simulating import plan_run
+from eomgen.api.planning import plan_run
 from eomgen.codegen import jacobians
 from eomgen.codegen.backends import c, c_directions
 from eomgen.codegen.interface import interface_of

@@ -134,7 +134,7 @@ def arm_with(
     if isinstance(example.get("bodies"), dict):
         scene["bodies"][0] |= example.pop("bodies")
     for key, content in example.items():
-        if not isinstance(content, list):
+        if not isinstance(content, list) or key not in scene:
             scene[key] = content
             continue
         child = "child" if key == "joints" else "name"

@@ -12,6 +12,7 @@ import numpy as np
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import RunError, SceneError, nearest
+from eomgen.language.base import identifier
 from eomgen.model.elaborate import elaborate, outputs_for
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
@@ -124,6 +125,7 @@ def named(
     """
     found = {}
     for name, value in (values or {}).items():
+        name = identifier(name)
         check_name(name, known, argument, what)
         try:
             number = float(value)

@@ -10,9 +10,9 @@ import numpy as np
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, check_name, check_time, read, values_of
+from eomgen.api.planning import Backend
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
-from eomgen.api.simulating import Backend
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model

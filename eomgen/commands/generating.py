@@ -5,7 +5,7 @@ from pathlib import Path
 
 from eomgen.api.generating import check_backend, compiled, freshness, translated
 from eomgen.commands.shared import Arguments, read_model, reporter_of, required
-from eomgen.errors import EomgenError, RunError, report_refusal
+from eomgen.errors import EomgenError, InterruptedRunError, RunError, report_refusal
 from eomgen.files import check_folder, check_writable
 from eomgen.results import Module
 from eomgen.scene.built_in import built_in_names
@@ -20,9 +20,14 @@ def generate(given: Arguments) -> int:
     paths: dict[Path, str] = {}
     stale: list[str] = []
     refused: dict[str, None] = {}
-    for scene in scenes:
+    for done, scene in enumerate(scenes):
         try:
             stale += [scene] if not _generate(scene, given, paths) else []
+        except KeyboardInterrupt:
+            what = "checked" if given.check else "written"
+            raise InterruptedRunError(
+                f"interrupted at {scene}; {done} of {len(scenes)} modules are {what}"
+            ) from None
         except EomgenError as error:
             # An error of the folder is reported once.
             new = [line for line in error.lines if line not in refused]

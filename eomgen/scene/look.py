@@ -161,6 +161,22 @@ Shape: TypeAlias = Annotated[
     Box | Cylinder | Disc | Ellipsoid | Polygon | Rod | Sphere, Field(discriminator="type")
 ]
 
+
+def from_centre(shape: Shape, com: Sequence[float]) -> Shape:
+    """A shape given in a body's frame, from its centre of mass `com`; () if that is the origin."""
+    fields: dict[str, object] = {}
+    for name in ("center", "start", "end") if com else ():
+        if (point := getattr(shape, name, None)) is not None:
+            fields[name] = _shifted(point, com)
+    if com and isinstance(shape, Polygon):
+        fields["points"] = tuple(_shifted(point, com) for point in shape.points)
+    return shape.replaced(**fields) if fields else shape
+
+
+def _shifted(point: Sequence[float], com: Sequence[float]) -> tuple[float, ...]:
+    return tuple(x - c for x, c in zip(point, com, strict=True))
+
+
 INSTEAD = {
     2: {"sphere": "disc", "cylinder": "box", "ellipsoid": "disc"},
     3: {"disc": "sphere", "polygon": "box"},

@@ -19,6 +19,7 @@ from eomgen.scene.schema import (
     BodyTable,
     ChainTable,
     Initial,
+    InputTable,
     ParameterTable,
     PointTable,
     Scene,
@@ -39,6 +40,7 @@ stands for the time `t` and all coordinates, velocities, inputs and states of ef
 TABLES: Mapping[str, type[Table]] = {
     "the scene itself": Scene,
     "parameters": ParameterTable,
+    "inputs": InputTable,
     "bodies": BodyTable,
     "chains": ChainTable,
     "points": PointTable,

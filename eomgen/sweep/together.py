@@ -85,7 +85,7 @@ def _starts(
     p = _filled({**module.PARAMETERS, **own}, {name: columns[name] for name in varied}, count)
     k, y, sound = lanes.prepare(np.ascontiguousarray(p.T))
     pushes = [name for name in columns if kinds[name] == "input"]
-    inputs = {**dict.fromkeys(module.INPUTS, 0.0), **task.inputs}
+    inputs = {**module.INPUTS, **task.inputs}
     given = {name: columns[name] for name in pushes}
     u = _filled(inputs, given, len(values) if pushes else 1)
     if not varied:

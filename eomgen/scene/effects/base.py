@@ -17,7 +17,7 @@ Vector = tuple[Scalar, ...]
 
 @dataclass(frozen=True)
 class Input:
-    """An input `u` of the generated module; it is 0 unless given.
+    """An input `u` of the generated module; it has its default, 0 in effects, unless given.
 
     At a joint `unit` and `about` may have alternatives: see `language.quantity.of_joint`.
     """
@@ -25,6 +25,7 @@ class Input:
     name: str
     unit: str
     about: str
+    default: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -240,6 +241,10 @@ class EffectTable(Table):
     """Fields that name one joint or several, neither free nor weld, or are "all"."""
     vector_fields: ClassVar[tuple[str, ...]] = ()
     """Fields with a vector that has one component for each dimension, or is absent."""
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """For each field with a point of a body the fields that name the body or bodies."""
+    input_field: ClassVar[str] = ""
+    """The field that may be "input"."""
 
     name: Identifier
 

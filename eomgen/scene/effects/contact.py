@@ -89,6 +89,11 @@ dissipation = 0.2
     anchor_fields: ClassVar[tuple[str, ...]] = ("other",)
     vector_fields: ClassVar[tuple[str, ...]] = ("at", "corners", "other_at")
 
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "at": ("body", "bodies"),
+        "other_at": ("other",),
+    }
+
     type: Literal["contact"]
     law: Literal["spring_damper", "hunt_crossley", "impact"]
     against: Literal["plane", "ball", "each_other"] = "plane"

@@ -28,6 +28,8 @@ force = ["2*sin(t)", 0]
 """
     body_fields = ("body",)
     vector_fields = ("at", "force")
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {"at": ("body",)}
+    input_field = "force"
 
     type: Literal["external_force"]
     body: Identifier = Field(description="body it acts on")

@@ -26,6 +26,7 @@ body = "hand"
 torque = "input"
 """
     body_fields = ("body",)
+    input_field = "torque"
 
     type: Literal["external_torque"]
     name: Identifier

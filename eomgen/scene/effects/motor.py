@@ -22,6 +22,8 @@ name = "drive"
 joint = "elbow"
 torque = "input"
 """
+    input_field: ClassVar[str] = "torque"
+
     type: Literal["motor"]
     torque: Literal["input"] | Quantity = quantity(
         "N m | N", "torque | force", sees=("motion",), union_mode="left_to_right"

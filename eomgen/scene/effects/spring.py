@@ -42,6 +42,7 @@ rest_length = 0.5
 """
     anchor_fields = ("body_1", "body_2")
     vector_fields = ("at_1", "at_2")
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {"at_1": ("body_1",), "at_2": ("body_2",)}
 
     type: Literal["spring"]
     body_1: Identifier = Field(description="body of its first end, or 'world'")

@@ -4,6 +4,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
+from eomgen.language.base import Number
 from eomgen.language.quantity import Numbers
 from eomgen.scene.joints.base import WORLD, Coordinate, Geared, Primitive, spatial
 
@@ -22,6 +23,10 @@ coordinate = "reach"
 """
     type: Literal["prismatic"]
     axis: Numbers = Field(description="direction in the child's axes")
+
+    limits: tuple[Number, Number] | None = Field(
+        default=None, description="range of the coordinate; reported, not enforced"
+    )
 
     def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
         """The displacement of the joint's point on the child from that on the parent, m."""
