@@ -1,5 +1,6 @@
 """Steps of implicit methods in compiled code: the bits of Python's, and when a run takes them."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -239,3 +240,23 @@ def test_corners_in_space_are_seen() -> None:
     pushed = FALL.replace("-1/x**2", "-2*max(x, 0)")
     run = eomgen.simulate(pushed, t_end=2.0, integrator="Rodas5P", backend="c")
     assert run.trajectory.y[-1][1] == pytest.approx(-1.0, rel=1e-6)
+
+
+def test_works_are_the_same() -> None:
+    """Their powers need states within steps: Python makes these steps, with functions in C."""
+    compiled, python = both(STIFF, integrator="Rodas5P", t_end=0.3, rtol=1e-5, works=True)
+    assert_same(compiled, python)
+    ours, theirs = compiled.trajectory.works, python.trajectory.works
+    assert ours is not None and theirs is not None and ours.tobytes() == theirs.tobytes()
+
+
+def test_inputs_of_time_count() -> None:
+    """The derivative depends on time, though its kernel does not."""
+    options = {"inputs": {"tau": lambda t: math.sin(5 * t)}, "t_end": 0.1, "samples": 11}
+    runs = [
+        eomgen.simulate("two_body_forced", integrator=name, rtol=1e-9, **options)  # type: ignore[arg-type]
+        for name in ("Rodas5P", "DOP853")
+    ]
+    assert np.abs(runs[0].y - runs[1].y).max() < 1e-8
+    counts = runs[0].trajectory.counts
+    assert counts["derivatives"] >= 11 * counts["steps"], "two for the derivative in time"

@@ -163,6 +163,8 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         )
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
+    if powers and accelerator:
+        powers = accelerator.powers(powers)
     warnings, error = [*model.notices, *module.notices], math.nan
     trial, choice = _run_case(plan, case, powers, follow, reporter)
     trajectory, estimate = trial.trajectory, None

@@ -24,6 +24,7 @@ from eomgen.native import functions, implicit, runs
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.run.compiled import Compiled, EqualSteps, Steps
 from eomgen.run.problem import Problem
+from eomgen.run.works import Powers
 from eomgen.store import interfaced_program_of, key_of
 from eomgen.templating import templates_folder
 
@@ -103,8 +104,7 @@ class Accelerator:
         origin, module = module and self._module, module or self._module
         made: dict[tuple[str, ...], runs.CompiledSteps] = {}
         stiff: list[implicit.CompiledImplicit] = []
-        compilable = functions.Compilable(module, self._values, origin, self._look, self._start)
-        problem = compilable.problem(problem)
+        problem = self._compilable(module, origin).problem(problem)
 
         def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
             if needed not in made:
@@ -140,6 +140,11 @@ class Accelerator:
 
         return replace(problem, compiled=Compiled(problem.derivative, steps, equal))
 
+    def powers(self, powers: Powers) -> Powers:
+        """The same powers, which are compiled once that pays."""
+        compilable = self._compilable(self._module, None)
+        return replace(powers, powers=compilable.function("effect_powers", powers.powers))
+
     def compile(self) -> None:
         """Compile the steps now, unless they are in the store, and each function at its first call.
 
@@ -147,6 +152,9 @@ class Accelerator:
         """
         self._at_once = True
         self._library("derivative").compile()
+
+    def _compilable(self, module: Any, origin: Any) -> functions.Compilable:
+        return functions.Compilable(module, self._values, origin, self._look, self._start)
 
     def _start(self) -> None:
         self.used = True

@@ -201,11 +201,14 @@ def _rodas_5p(
     most: int,
     watched: Watched | None = None,
     sizes: Array | None = None,
+    dense: bool = False,
 ) -> Stride:
     """Steps of Rodas5P, with the arguments of `run.compiled.Steps`, of which `watched` may have
-    switching functions of time alone only, and there are no `sizes`.
+    switching functions of time alone only, and there are no `sizes`; none if they are to be
+    `dense`.
     """
     assert sizes is None and not (watched and watched.ends)
+    most = 0 if dense else most
     ny = system.states
     ends, lengths, last_lengths, errors = np.empty((4, most))
     states, losses = np.empty((2, most, ny))

@@ -68,13 +68,14 @@ class _Settings(ctypes.Structure):
     _fields_ = (
         *((name, _POINTER) for name in ("k", "u", "atol")),
         *((name, _REAL) for name in ("rtol", "longest", "t_end")),
+        ("dense", _WHOLE),
     )
 
 
 class _Records(ctypes.Structure):
     _fields_ = (
         *((name, _POINTER) for name in ("ends", "lengths", "states", "slopes", "losses")),
-        *((name, _POINTER) for name in ("switched", "values", "derivatives", "sampled")),
+        *((name, _POINTER) for name in ("switched", "values", "terms", "derivatives", "sampled")),
         *((name, _POINTER) for name in ("switches", "gap_checks", "times", "rows")),
         ("count", _WHOLE),
     )
@@ -136,6 +137,7 @@ class CompiledSteps:
         most: int,
         watched: Watched | None = None,
         sizes: Array | None = None,
+        dense: bool = False,
     ) -> Stride:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
@@ -145,10 +147,11 @@ class CompiledSteps:
         watch, pointed = checked.watch(self._checks, watched, sizes)
         switched, values = np.empty(most), np.empty((most, watch.switching.count))
         rows, made = np.empty((len(times), ny)), ctypes.c_int64()
-        arrays: list[Any] = [ends, lengths, states, slopes, losses, switched, values]
+        terms = np.empty((most if dense else 0, 7, ny))
+        arrays: list[Any] = [ends, lengths, states, slopes, losses, switched, values, terms]
         arrays += [derivatives, sampled, switches, gap_checks, times, rows]
         records = _Records(*(array.ctypes.data for array in arrays), len(times))
-        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end)
+        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end, dense)
         start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
         why = self._call(
             ctypes.byref(settings),
@@ -175,4 +178,13 @@ class CompiledSteps:
             switches[:n],
             gap_checks[:n],
             usual=why != _UNUSUAL,
+            within=partial(_within, t, y, ends, states, terms) if dense else None,
         )
+
+
+def _within(
+    t: float, y: Array, ends: Array, states: Array, terms: Array, i: int, time: float
+) -> Array:
+    """The state at a time in step number i of those that begin at t with the state y."""
+    start, first = (float(ends[i - 1]), states[i - 1]) if i else (t, y)
+    return dop853.interpolated(start, float(ends[i]) - start, first, terms[i], time)

@@ -30,6 +30,7 @@ class Stride:
     usual        whether the next step may be made so, too
     jacobians, factorisations
                  (m,), numbers of these so far; None if there are none
+    within       gives the state at a time in the step of a number; None if that was not asked for
     """
 
     ends: Array
@@ -45,6 +46,7 @@ class Stride:
     usual: bool
     jacobians: NDArray[np.int64] | None = None
     factorisations: NDArray[np.int64] | None = None
+    within: Callable[[int, float], Array] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +78,7 @@ class Steps(Protocol):
     watched     given to make no step that may pass over a branch of the derivative
     sizes       given (nc,) to make no step in which a rigid contact, none of which is held, may
                 close; its gap is relative to its size
+    dense       whether states within the steps are wanted
     """
 
     def __call__(
@@ -92,6 +95,7 @@ class Steps(Protocol):
         most: int,
         watched: Watched | None = None,
         sizes: Array | None = None,
+        dense: bool = False,
     ) -> Stride: ...
 
 

@@ -125,11 +125,10 @@ def integrate(
             asked, method, counted, checked, compiled=compiled, each=tally is not None
         )
     else:
-        # Compiled steps give no state within a step.
-        plain = not (monitor or powers)
-        compiled = compiled_steps(problem) if plain else None
+        compiled = None if monitor else compiled_steps(problem)
+        each, dense = bool(tally or powers), powers is not None
         begin, settings = adaptive_steps(
-            asked, method, problem, remarks.append, compiled=compiled, each=tally is not None
+            asked, method, problem, remarks.append, compiled=compiled, each=each, dense=dense
         )
 
     gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else events.GAP_CHECKS

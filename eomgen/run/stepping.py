@@ -115,12 +115,14 @@ def adaptive_steps(
     *,
     compiled: Compiled | None = None,
     each: bool = True,
+    dense: bool = True,
 ) -> tuple[Begin, Resume]:
     """A function that begins adaptive steps, and the settings that a later run compares.
 
     remark    called with the method's remarks
     compiled  compiled steps of the problem, if it has some
     each      whether each compiled step becomes an `Advance`
+    dense     whether these give the states within steps
 
     Raises `RunError` if `dt` is given, or `max_step` is invalid.
     """
@@ -152,6 +154,7 @@ def adaptive_steps(
             steps=compiled.steps if compiled and problem.compiled else None,
             compiles=compiles,
             each=each,
+            dense=dense,
         )
 
     return begin, {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}

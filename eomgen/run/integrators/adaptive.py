@@ -73,6 +73,7 @@ def advances(
     steps: Callable[[str, tuple[str, ...]], Steps | None] | None = None,
     compiles: Callable[[], bool] = always,
     each: bool = True,
+    dense: bool = True,
 ) -> Iterator[Advance]:
     """Yield the steps of `method`, each with samples at those of `times` (ascending) within it.
 
@@ -86,6 +87,7 @@ def advances(
     steps   see `run.compiled.Compiled`
     compiles  asked each time whether they may be used
     each    whether each compiled step is yielded, or many at once
+    dense   whether compiled steps give the states within them
 
     Raises `StepFailure` if the method fails, or after `bounds.most` steps.
     """
@@ -95,7 +97,7 @@ def advances(
     left, factored, here = bounds.most - made, 0, 0
     compiled = None
     if steps and method.compiled:
-        compiled = Strides(method, problem, bounds, times, steps)
+        compiled = Strides(method, problem, bounds, times, steps, dense=dense)
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
         until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)

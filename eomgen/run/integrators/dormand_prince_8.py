@@ -7,8 +7,10 @@ every machine on which its derivative has them, and also when C makes its steps:
 """
 
 import math
-from collections.abc import Callable
-from typing import Literal
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import cycle
+from typing import Any, Literal
 
 import numpy as np
 
@@ -174,15 +176,22 @@ class DormandPrince8:
         terms[2] = 2 * change - h * (self.f + first)
         terms[3:] = h * sums[IN_DENSE:]
 
-        def states(times: FloatArray | float) -> FloatArray:
-            x = (np.asarray(times)[..., None] - start) / h
-            found = np.zeros((*np.shape(times), len(y)))
-            for i in range(6, -1, -1):
-                found += terms[i]
-                found *= x if i % 2 == 0 else 1 - x
-            return (found + y).T
+        return partial(interpolated, start, h, y, list(terms))
 
-        return states
+
+def interpolated(
+    start: float, h: float, y: FloatArray, terms: Sequence[FloatArray], times: FloatArray | float
+) -> FloatArray:
+    """The states at times within a step of length h from `y` at `start`, from the terms (ny,) of
+    its interpolant.
+    """
+    one = isinstance(times, float)
+    x: Any = (times - start) / h if one else (np.asarray(times)[..., None] - start) / h
+    found = np.zeros((len(y),) if one else (*np.shape(times), len(y)))
+    for term, factor in zip(reversed(terms), cycle((x, 1 - x)), strict=False):
+        found += term
+        found *= factor
+    return (found + y).T
 
 
 INTEGRATOR = Adaptive(

@@ -39,7 +39,10 @@ class Stepper(Protocol):
 
 
 class Strides:
-    """The compiled steps of a run, with rows at `times`; `steps` is asked for them each time."""
+    """The compiled steps of a run, with rows at `times`, and states at any time if it is `dense`.
+
+    `steps` is asked for them each time.
+    """
 
     def __init__(
         self,
@@ -48,9 +51,11 @@ class Strides:
         bounds: Tolerances,
         times: FloatArray,
         steps: Callable[[str, tuple[str, ...]], Steps | None],
+        *,
+        dense: bool,
     ) -> None:
         switching, contacts = problem.switching, problem.contacts
-        self._steps = steps
+        self._steps, self._dense = steps, dense
         self._method, self._problem, self._bounds, self._times = method, problem, bounds, times
         self._atol = np.array(np.broadcast_to(bounds.atol, problem.initial.shape), dtype=float)
         self._needed = (
@@ -89,6 +94,7 @@ class Strides:
             most=most,
             watched=watched,
             sizes=self._sizes,
+            dense=self._dense,
         )
         count = len(stride.ends)
         if not count:
@@ -128,7 +134,7 @@ class Strides:
                 stride.states[i],
                 list(zip(times[at], stride.rows[at], strict=True)) if passed else [],
                 self._problem,
-                _unknown,
+                partial(_within, self._problem, stride.within, i) if stride.within else _unknown,
                 steps=steps,
                 **dict(zip(_COUNTED, calls, strict=True)),
                 checked=True,
@@ -162,5 +168,12 @@ def continuation(t: float, y: FloatArray, memory: Mapping[str, Any]) -> Resume:
     return {"t": np.array(t), "y": y, **arrays}
 
 
+def _within(
+    problem: Problem, states: Callable[[int, float], FloatArray], i: int, t: float
+) -> FloatArray:
+    """The state at a time in step i."""
+    return problem.unit(states(i, t))
+
+
 def _unknown(t: float) -> FloatArray:
-    raise AssertionError("compiled steps are not made where states within them are needed")
+    raise AssertionError("states within these compiled steps were not asked for")

@@ -152,15 +152,15 @@ def _missed(
 def _candidates(search: Search) -> list[str]:
     """The methods to try, in this order; each was the cheapest for some scene.
 
-    For smooth motion DOP853 comes first, whose steps are made in compiled code where that is
-    possible. With contacts, a multistep method restarts at each impact, so one-step methods replace
-    it. For stiff motion implicit methods come first: stability would force explicit ones to take
-    thousands of steps.
+    DOP853 comes first, whose steps are made in compiled code where that is possible. For stiff
+    motion implicit methods come before it: stability would force explicit ones to take thousands
+    of steps. With contacts, a multistep method restarts at each impact, so one-step methods replace
+    it.
     """
-    others = ["LSODA", "DOP853"] if search.case.problem.contacts is None else ["RK45", "DOP853"]
     if search.fast.stiff:
-        return [*_stiff(search.case), *others]
-    return ["DOP853"] if _smooth(search.case) else others
+        beside = "LSODA" if search.case.problem.contacts is None else "RK45"
+        return [*_stiff(search.case), beside, "DOP853"]
+    return ["DOP853"]
 
 
 def _stiff(case: Case) -> list[str]:
