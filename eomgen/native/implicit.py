@@ -33,7 +33,7 @@ GAUSS: Mapping[str, ImplicitMethod] = {
     method.METHOD.compiled: method.METHOD for method in (implicit_midpoint, gauss_4, gauss_6)
 }
 """The methods of adaptive and of equal steps, by the names of their compiled steps."""
-OPERATIONS = 2000
+OPERATIONS = 3600
 """The methods take as long to compile as a function of about so many operations."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _UNUSUAL = 2
