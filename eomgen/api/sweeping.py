@@ -254,16 +254,15 @@ def _kernels(
     """The key and the C sources of compiled steps, and those of kernels for several members at
     once; none if they would not pay.
     """
-    from eomgen.native import lanes
+    from eomgen.native import lanes, runs
     from eomgen.native.accelerator import library_key
     from eomgen.native.compiler import find_compiler
     from eomgen.native.library import kept_library
-    from eomgen.native.runs import sources
     from eomgen.store import interfaced_program_of
 
     key = library_key(plan.model)
     together = plan.setting.integrator == METHOD and not getattr(functions, "CONTACTS", ())
-    alone: Any = getattr(find_integrator(plan.setting.integrator), "compiled", "")
+    alone = getattr(find_integrator(plan.setting.integrator), "compiled", "") in runs.METHODS
     if plan.backend == "numpy":
         return key, {}, {}
     if not (together or alone):
@@ -285,7 +284,7 @@ def _kernels(
     program = interfaced_program_of(plan.model)
     if together:
         return key, {}, lanes.sources(*program, plan.outputs)
-    return key, sources(*program), {}
+    return key, runs.sources(*program), {}
 
 
 def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:

@@ -13,19 +13,20 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
 from eomgen.codegen.backends import c
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import functions, runs
+from eomgen.native import functions, implicit, runs
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.run.compiled import Compiled, EqualSteps, Steps
 from eomgen.run.problem import Problem
 from eomgen.run.works import Powers
 from eomgen.store import interfaced_program_of, key_of
+from eomgen.templating import templates_folder
 
 STARTING, AN_OPERATION = 0.2, 0.25e-3
 """Time to compile, s: a part for all, and a part for each operation. Measured from 11 to 24,500
@@ -69,6 +70,12 @@ class _Library:
                 self._fail(str(error))
         return self._found
 
+    @property
+    def missing(self) -> float:
+        """Time to compile it, s; 0 if it is there."""
+        self.after(0.0)
+        return 0.0 if self._over else self._price
+
     def compile(self) -> None:
         """Compile it now, unless it is in the store. Raises `RunError`."""
         self._over, begun = True, time.perf_counter()
@@ -94,9 +101,10 @@ class Accelerator:
         """The problem of the module, or of one with other constants, with its compiled steps and
         functions.
         """
-        perturbed, module = module is not None, module or self._module
+        origin, module = module and self._module, module or self._module
         made: dict[tuple[str, ...], runs.CompiledSteps] = {}
-        problem = self._compilable(module, perturbed).problem(problem)
+        stiff: list[implicit.CompiledImplicit] = []
+        problem = self._compilable(module, origin).problem(problem)
 
         def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
             if needed not in made:
@@ -107,13 +115,26 @@ class Accelerator:
                 made[needed] = runs.CompiledSteps(module, own, *self._values, beside)
             return made[needed]
 
+        def implicit_steps() -> implicit.CompiledImplicit | None:
+            if not stiff and (libraries := self._of_implicit_steps()):
+                given = (module, libraries, *self._values, origin)
+                stiff.append(implicit.CompiledImplicit(problem, *given))
+            return stiff[0] if stiff else None
+
         def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
-            found = held.named(name, needed) if (held := compiled(needed)) else None
+            if name in implicit.METHODS:
+                other = None if needed else implicit_steps()
+                found = other.named(name) if other else None
+            else:
+                found = held.named(name, needed) if (held := compiled(needed)) else None
             self.used = self.used or found is not None
             return found
 
         def equal(name: str) -> EqualSteps | None:
-            found = held.equal(name) if (held := compiled()) else None
+            if name in implicit.GAUSS:
+                found = other.equal(name) if (other := implicit_steps()) else None
+            else:
+                found = held.equal(name, problem) if (held := compiled()) else None
             self.used = self.used or found is not None
             return found
 
@@ -121,7 +142,7 @@ class Accelerator:
 
     def powers(self, powers: Powers) -> Powers:
         """The same powers, which are compiled once that pays."""
-        compilable = self._compilable(self._module, False)
+        compilable = self._compilable(self._module, None)
         return replace(powers, powers=compilable.function("effect_powers", powers.powers))
 
     def compile(self) -> None:
@@ -132,8 +153,8 @@ class Accelerator:
         self._at_once = True
         self._library("derivative").compile()
 
-    def _compilable(self, module: Any, perturbed: bool) -> functions.Compilable:
-        return functions.Compilable(module, self._values, perturbed, self._look, self._start)
+    def _compilable(self, module: Any, origin: Any) -> functions.Compilable:
+        return functions.Compilable(module, self._values, origin, self._look, self._start)
 
     def _start(self) -> None:
         self.used = True
@@ -171,6 +192,27 @@ class Accelerator:
             self._begun = now
         return now - self._begun
 
+    def _of_implicit_steps(self) -> implicit.Libraries | None:
+        """The libraries of implicit steps, together: with fewer, Python makes all steps."""
+        now = time.perf_counter()
+        if self._begun is None:
+            self._begun = now
+        needed = [self._library(name) for name in implicit.NEEDED]
+        needed.append(self._methods)
+        pays = self._at_once or now - self._begun > sum(each.missing for each in needed)
+        found = [each.after(math.inf if pays else 0.0) for each in needed]
+        derivative, jacobian, methods = found
+        if derivative is None or jacobian is None or methods is None:
+            return None
+        return implicit.Libraries(derivative, jacobian, methods)
+
+    @cached_property
+    def _methods(self) -> _Library:
+        """The library of implicit methods, the same for all models."""
+        price = STARTING + AN_OPERATION * implicit.OPERATIONS
+        about = f"implicit methods {_digest()}"
+        return _Library(about, implicit.sources, implicit.MAIN, price, self._fail)
+
     def _library(self, name: str) -> _Library:
         if name not in self._libraries:
             self._libraries[name] = _Library(
@@ -206,6 +248,8 @@ def _digest() -> str:
     run = here.parent / "run"
     found = hashlib.sha256()
     checks = [run / f"{name}.py" for name in ("branches", "events", "roots")]
-    for path in (*sorted(here.glob("*.py")), *sorted((run / "integrators").glob("*.py")), *checks):
+    folders = (here, "*.py"), (run / "integrators", "*.py"), (templates_folder() / "c", "*.jinja")
+    listed = [path for folder, names in folders for path in sorted(folder.glob(names))]
+    for path in (*listed, *checks):
         found.update(path.name.encode() + b"\0" + path.read_bytes())
     return found.hexdigest()

@@ -16,10 +16,12 @@ from eomgen.program.program import Program
 from eomgen.run.compiled import Array, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators import dormand_prince_8 as dop853
 from eomgen.run.integrators.dop853_coefficients import NODES, Row
-from eomgen.run.problem import USUAL_LENGTH
+from eomgen.run.problem import USUAL_LENGTH, Problem
 from eomgen.templating import render
 
 MAIN = "runs.c"
+METHODS = ("dop853", *equal_steps.METHODS)
+"""The methods whose steps this library makes."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _UNUSUAL = 2
 """What C returns before a step that Python must make."""
@@ -114,11 +116,11 @@ class CompiledSteps:
         held = ctypes.cast(self._constants, _POINTER), self._inputs.ctypes.data
         return partial(self._dop853, held)
 
-    def equal(self, name: str) -> EqualSteps | None:
+    def equal(self, name: str, problem: Problem) -> EqualSteps | None:
         """The same for methods with equal steps."""
         if self._constants is None or self._inputs is None or name not in equal_steps.METHODS:
             return None
-        return equal_steps.steps(self._library, name, self._constants, self._inputs)
+        return equal_steps.steps(self._library, name, self._constants, self._inputs, problem)
 
     def _dop853(
         self,

@@ -28,6 +28,8 @@ class Stride:
     switches, gap_checks
                  (m,), calls of switching functions, and of gaps and their rates, so far
     usual        whether the next step may be made so, too
+    jacobians, factorisations
+                 (m,), numbers of these so far; None if there are none
     within       gives the state at a time in the step of a number; None if that was not asked for
     """
 
@@ -42,6 +44,8 @@ class Stride:
     switches: NDArray[np.int64]
     gap_checks: NDArray[np.int64]
     usual: bool
+    jacobians: NDArray[np.int64] | None = None
+    factorisations: NDArray[np.int64] | None = None
     within: Callable[[int, float], Array] | None = None
 
 
@@ -102,10 +106,12 @@ class EqualStride:
     ends         (m,), their times, s
     states       (m, ny), the states there
     losses       (m, ny), the rounding errors of the sums there, which the next step adds
-    calls        derivatives in each step
+    calls        derivatives in each step, or in each iteration
     rate         (ny,), change of the state in the last step, by its length
     place, slope (ny,), the last derivative evaluated, and the state where
     usual        whether the next step may be made so, too
+    iterations   (m,), those in each step, with as many Jacobians as derivatives; None if the method
+                 does not iterate
     """
 
     ends: Array
@@ -116,6 +122,7 @@ class EqualStride:
     place: Array
     slope: Array
     usual: bool
+    iterations: NDArray[np.int64] | None = None
 
 
 class EqualSteps(Protocol):

@@ -298,6 +298,7 @@ def _follow(
                     raise StepFailure("the state overflows or is not a number", method.remedy)
                 run.take(advance)
                 calls.derivatives.calls += advance.derivatives
+                calls.jacobians.calls += advance.jacobians
                 if tally:
                     tally.take(advance, calls.derivatives.calls, calls.jacobians.calls)
                 report((run.t - t_start) / (t_end - t_start))

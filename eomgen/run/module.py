@@ -140,6 +140,7 @@ def as_problem(
         noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
         columns=hasattr(module, "_along"),
+        timed=_depends_on_time(module),
     )
 
 
@@ -171,6 +172,14 @@ def _switching(module: Any, parameters: Any, inputs: Any) -> Switching | None:
         tuple(i for i, name in enumerate(positions) if module.UNITS[name] == "rad"),
         of_time and over_intervals(module, of_time, parameters, lambda t: u),
     )
+
+
+def _depends_on_time(module: Any) -> bool:
+    """Whether a module's derivative depends on time, as far as known."""
+    kernel = getattr(module, "_derivative", None)
+    if kernel is None or hasattr(module, "inputs_of_time"):
+        return True
+    return "t" in inspect.signature(kernel).parameters
 
 
 def over_intervals(

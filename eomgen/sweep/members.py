@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -126,7 +126,8 @@ def _problem(task: Task, row: Sequence[float]) -> Problem:
     if library is None:
         return problem
     steps = CompiledSteps(module, library, *values)
-    return replace(problem, compiled=Compiled(problem.derivative, steps.named, steps.equal))
+    equal = partial(steps.equal, problem=problem)
+    return replace(problem, compiled=Compiled(problem.derivative, steps.named, equal))
 
 
 def _status(run: Trajectory | str) -> int:

@@ -32,7 +32,10 @@ MACROS = (
     "DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE MAXFLOAT"
 )
 """Macros of <math.h> or of compilers."""
-OURS = "y p u k out extra between real R failed"
+OURS = (
+    "y p u k out extra between real R failed several wide either before after shared column "
+    "first many"
+)
 C_NAMES = {"abs": "fabs"}
 """Names of functions of formulas that differ in C."""
 OWN = {

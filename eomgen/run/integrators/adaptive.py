@@ -1,7 +1,8 @@
 """The steps of SciPy's adaptive methods, and of our own with the same interface.
 
-RK45 and our DOP853 are explicit (Dormand, Prince), Radau is Radau IIA of order 5, BDF and LSODA are
-multistep methods; LSODA switches between stiff and nonstiff methods by itself (Hindmarsh, Petzold).
+RK45 and our DOP853 are explicit (Dormand, Prince), our Rodas5P is a Rosenbrock method, Radau is
+Radau IIA of order 5, BDF and LSODA are multistep methods; LSODA switches between stiff and nonstiff
+methods by itself (Hindmarsh, Petzold).
 The implicit ones are given the problem's exact Jacobian, except `Radau_differences` and
 `BDF_differences`, which approximate it by differences of derivatives that count as derivatives.
 """
@@ -176,6 +177,8 @@ class _Stepper:
         options: dict[str, Any] = {"rtol": self._bounds.rtol, "atol": self._bounds.atol}
         if self.method.uses_jacobian:
             options["jac"] = self._problem.jacobian
+        if self.method.asks_more:
+            options |= {"timed": self._problem.timed, "positions": self._problem.leading_positions}
         # y is copied because LSODA's compiled code modifies state arrays in place. If a later run
         # can continue from this one, the choice of the first step must not depend on the end.
         bound = np.inf if self.method.memory else until
@@ -290,7 +293,7 @@ def _check_stiff(problem: Problem, solver: Any, span: tuple[float, float], made:
         why = stiffness(problem, float(solver.t), solver.y, float(solver.t - solver.t_old))
         if why:
             reason = f"{made} steps reached only {solver.t:g} s: {why}"
-            raise UnstableStepError(reason, "take --integrator Radau, or BDF")
+            raise UnstableStepError(reason, "take --integrator Rodas5P, or Radau")
 
 
 def _restored(value: Any, kind: type) -> Any:

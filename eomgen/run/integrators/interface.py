@@ -76,6 +76,8 @@ class Adaptive:
 
     solver         SciPy's `OdeSolver` of the method, or a class with the same interface
     uses_jacobian  whether it is given the problem's Jacobian
+    asks_more      whether it is told whether the derivative depends on `timed`, and how many states
+                   are `positions` that come first
     one_step       whether a step depends on the state alone, not on earlier steps; then the state
                    may be corrected between steps
     remedy         what to change when a run fails
@@ -89,6 +91,7 @@ class Adaptive:
 
     solver: Callable[..., Any]
     uses_jacobian: bool = False
+    asks_more: bool = False
     one_step: bool = True
     remedy: str = LOOSER
     memory: tuple[str, ...] = ()
@@ -106,9 +109,9 @@ class Advance:
     problem  whose derivative was integrated
     within   gives the state at any time in the step; valid until the next step is made
     steps    number of steps; 0 if no time passes: an impact, or `events` only
-    derivatives, switches, gap_checks
-             calls that compiled code made of the derivative, of the switching functions, and of
-             gaps and their rates, which are not counted otherwise
+    derivatives, jacobians, switches, gap_checks
+             calls that compiled code made of these, of switching functions, and of gaps and their
+             rates, which are not counted otherwise
     checked  whether compiled code has checked that no rigid contact closes
     struck   number of the contact of an impact
     events   changes of contacts at its end
@@ -128,6 +131,7 @@ class Advance:
     within: Callable[[float], FloatArray]
     steps: int = 1
     derivatives: int = 0
+    jacobians: int = 0
     switches: int = 0
     gap_checks: int = 0
     checked: bool = False

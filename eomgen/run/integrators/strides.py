@@ -16,6 +16,8 @@ MOST = 1024
 OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates")
 """Functions of a module that steps are checked with."""
 
+_COUNTED = ("derivatives", "jacobians", "factorisations", "switches", "gap_checks")
+
 
 class Tolerances(Protocol):
     """What `adaptive.Bounds` says of the error of steps."""
@@ -118,14 +120,14 @@ class Strides:
         ends = stride.ends.tolist()
         lengths = np.diff(stride.ends, prepend=self._start)
         capped = np.cumsum(lengths >= self._longest * (1 - 1e-9))
-        counts = (stride.sampled, stride.derivatives, stride.switches, stride.gap_checks, capped)
-        sums = np.column_stack((np.arange(1, len(ends) + 1), *counts))
+        none = np.zeros_like(stride.derivatives)
+        solved = (none if x is None else x for x in (stride.jacobians, stride.factorisations))
+        called = (stride.derivatives, *solved, stride.switches, stride.gap_checks)
+        sums = np.column_stack((np.arange(1, len(ends) + 1), stride.sampled, capped, *called))
         kept = slice(None) if each else slice(-1, None)
         made = np.diff(sums[kept], axis=0, prepend=0).tolist()
         times, rows = self._times[sampled : sampled + sums[-1, 1]].tolist(), 0
-        for i, (steps, passed, derivatives, switches, gap_checks, shortened) in zip(
-            range(len(ends))[kept], made, strict=True
-        ):
+        for i, (steps, passed, shortened, *calls) in zip(range(len(ends))[kept], made, strict=True):
             at = slice(rows, rows + passed)
             yield Advance(
                 ends[i],
@@ -134,9 +136,7 @@ class Strides:
                 self._problem,
                 partial(_within, self._problem, stride.within, i) if stride.within else _unknown,
                 steps=steps,
-                derivatives=derivatives,
-                switches=switches,
-                gap_checks=gap_checks,
+                **dict(zip(_COUNTED, calls, strict=True)),
                 checked=True,
                 resume=partial(_after, stride, self._watched, self._until, i) if resumes else None,
                 capped=shortened,
