@@ -49,7 +49,7 @@ class Lowering:
             fixed, moving = self._factors(expression)
             return fixed * moving if fixed.step.stage <= Stage.PARAMETERS else moving
         name = type(expression).__name__
-        return self._tape.apply(name, self.lower(expression.args[0]))
+        return self._tape.apply(name, *[self.lower(part) for part in expression.args])
 
     def _factors(self, expression: Any) -> tuple[Node, Node]:
         """A product split in two: the factors that depend on parameters alone, and the rest."""
