@@ -195,7 +195,12 @@ def _eliminate_angles(
     for k in reversed(tree.bodies):
         name = model.bodies[k].name
         inertia = [_Row(symbols.inertia[k], {k: sp.Integer(1)})] if symbols.inertia[k] != 0 else []
-        own = [row for pair in pairs if k in pair.entries for row in pair.rotated(symbols.angle[k], symbols)]
+        own = [
+            row
+            for pair in pairs
+            if k in pair.entries
+            for row in pair.rotated(symbols.angle[k], symbols)
+        ]
         pairs = [pair for pair in pairs if k not in pair.entries]
         here = [row for row in (*inertia, *own, *rows) if k in row.entries]
         rows = [row for row in (*own, *rows) if k not in row.entries]
