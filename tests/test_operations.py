@@ -23,13 +23,15 @@ LOADS = (
     'type = "joint_stop"\nhigh = 0.2\nstiffness = 100.0\ndamping = 1.0',
     'type = "pd"\ntarget = "sin(t)"\nstiffness = 3.0\ndamping = 0.3\nlimit = 1.0',
     'type = "motor"\ntorque = "0.3*cos(t)*theta - phi_dot**2"',
+    'type = "controller"\ntorques = { hinge = "-0.3*phi_dot*exp(-t)*atan(1)" }',
 )
 
 
 def loaded(name: str, joint: str, load: str) -> str:
     """A built-in scene with one more effect at a joint."""
     text = (BUILT_IN / f"{name}.toml").read_text("utf-8")
-    return f'{text}\n[[effects]]\nname = "more"\njoint = "{joint}"\n{load}\n'
+    where = f'joint = "{joint}"\n' * ("torques" not in load)
+    return f'{text}\n[[effects]]\nname = "more"\n{where}{load}\n'
 
 
 def model_of(text: str) -> Model:

@@ -45,11 +45,14 @@ class JointSymbols(Protocol):
 
 
 class LoadScalars(SympyScalars):
-    """SymPy expressions as scalars for loads. Functions that SymPy would rewrite are opaque."""
+    """SymPy expressions as scalars for loads.
+
+    Functions that SymPy would rewrite are opaque, such as exp, with its powers, and atan(1).
+    """
 
     def call(self, function: str, *arguments: Expr) -> Expr:
         """A function of formulas."""
-        if function in ("sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh"):
+        if function in ("sin", "cos", "tan", "tanh"):
             return getattr(sp, function)(*arguments)
         return sp.Function(function, real=True)(*arguments)
 
