@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial, reduce
 from itertools import combinations
 from types import MappingProxyType
+from typing import Any
 
 from eomgen.program.program import Output, Program, finish, live_steps
 from eomgen.program.tape import Stage, Step, Tape
@@ -23,11 +24,12 @@ class Steps:
 
     def __init__(self) -> None:
         self.all: list[Step] = []
-        self._index: dict[Step, int] = {}
+        self._index: dict[tuple[Any, ...], int] = {}
 
     def put(self, step: Step) -> int:
         """The index of a step, which is added unless there is an equal one."""
-        found = self._index.setdefault(step, len(self.all))
+        operation, operands, _, value = step  # the stage follows from these, and is slow to hash
+        found = self._index.setdefault((operation, operands, value), len(self.all))
         if found == len(self.all):
             self.all.append(step)
         return found
