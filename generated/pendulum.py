@@ -60,23 +60,23 @@ POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"mul": 1, "cos": 1, "total": 2, "parameters": 6},
-    "jacobian": {"mul": 1, "neg": 1, "sin": 1, "total": 3, "parameters": 6},
+    "jacobian": {"mul": 1, "sin": 1, "total": 2, "parameters": 7},
     "forward_dynamics": {"add": 1, "mul": 2, "cos": 1, "total": 4, "parameters": 5},
     "inverse_dynamics": {"sub": 1, "mul": 2, "cos": 1, "total": 4, "parameters": 4},
     "mass_matrix": {"total": 0, "parameters": 2},
     "velocity_force": {"total": 0, "parameters": 0},
-    "gravity_force": {"mul": 1, "neg": 1, "cos": 1, "total": 3, "parameters": 2},
-    "bias_force": {"mul": 1, "neg": 1, "cos": 1, "total": 3, "parameters": 2},
+    "gravity_force": {"mul": 1, "cos": 1, "total": 2, "parameters": 3},
+    "bias_force": {"mul": 1, "cos": 1, "total": 2, "parameters": 3},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 1, "mul": 7, "sin": 1, "cos": 1, "total": 10, "parameters": 1},
-    "potential_energy": {"mul": 2, "neg": 1, "sin": 1, "total": 4, "parameters": 1},
-    "effect_powers": {"mul": 3, "cos": 1, "total": 4, "parameters": 1},
-    "momentum": {"add": 1, "mul": 11, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 0},
-    "centre_of_mass": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
-    "joint_forces": {"add": 1, "sub": 2, "mul": 8, "neg": 1, "sin": 1, "cos": 1, "total": 14, "parameters": 7},
-    "body_poses": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
-    "body_velocities": {"mul": 4, "neg": 1, "sin": 1, "cos": 1, "total": 7, "parameters": 0},
-    "parameter_jacobian": {"mul": 3, "cos": 1, "total": 4, "parameters": 20},
+    "kinetic_energy": {"add": 1, "mul": 6, "sin": 1, "cos": 1, "total": 9, "parameters": 1},
+    "potential_energy": {"mul": 1, "sin": 1, "total": 2, "parameters": 3},
+    "effect_powers": {"mul": 2, "cos": 1, "total": 3, "parameters": 2},
+    "momentum": {"add": 1, "mul": 10, "sin": 1, "cos": 1, "total": 13, "parameters": 1},
+    "centre_of_mass": {"mul": 2, "sin": 1, "cos": 1, "total": 4, "parameters": 1},
+    "joint_forces": {"add": 1, "sub": 2, "mul": 8, "sin": 1, "cos": 1, "total": 13, "parameters": 8},
+    "body_poses": {"mul": 2, "sin": 1, "cos": 1, "total": 4, "parameters": 1},
+    "body_velocities": {"mul": 3, "neg": 1, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
+    "parameter_jacobian": {"mul": 3, "cos": 1, "total": 4, "parameters": 18},
 }
 
 
@@ -86,36 +86,44 @@ def _fixed(bob_mass, pivot_r_child_x, gravity_g):
         return "mass of bob is not positive"
     pivot_r_child_x_squared = pivot_r_child_x * pivot_r_child_x
     pivot_bob = bob_mass * pivot_r_child_x_squared
-    k7 = bob_mass * pivot_r_child_x
-    k6 = bob_mass * gravity_g
-    k2 = pivot_r_child_x * k6
-    k3 = 1.0 / pivot_bob
-    k1 = k2 * k3
-    k4 = pivot_r_child_x * k7
-    k5 = bob_mass / 2.0
-    k8 = gravity_g * (pivot_r_child_x * k3) - k2 * (pivot_r_child_x_squared * k3 / pivot_bob)
-    k9 = k6 * k3 - k2 * (k3 * (bob_mass * (pivot_r_child_x * 2.0)) / pivot_bob)
-    k10 = pivot_r_child_x * (bob_mass * k3)
+    k12 = bob_mass * gravity_g
+    k3 = pivot_r_child_x * k12
+    k4 = 1.0 / pivot_bob
+    k1 = k3 * k4
+    k2 = -k4 * k3
+    k13 = bob_mass * pivot_r_child_x
+    k5 = pivot_r_child_x * k13
+    k6 = -k3
+    k7 = bob_mass / 2.0
+    k9 = gravity_g * k13
+    k8 = -k9
+    k10 = -bob_mass
+    k11 = -pivot_r_child_x
+    k14 = k9 * k4
+    k15 = -k13
+    k16 = gravity_g * (pivot_r_child_x * k4) - k9 * (pivot_r_child_x_squared * k4 / pivot_bob)
+    k17 = k13 * k4
+    k18 = gravity_g * (bob_mass * k4) - k9 * (2.0 * k17 / pivot_bob)
     return {
         "initial_state": (),
         "derivative": (k1,),
-        "jacobian": (k1,),
-        "forward_dynamics": (k2, k3),
-        "inverse_dynamics": (k2, k4),
+        "jacobian": (k2,),
+        "forward_dynamics": (k3, k4),
+        "inverse_dynamics": (k3, k5),
         "mass_matrix": (pivot_bob,),
         "velocity_force": (),
-        "gravity_force": (k2,),
-        "bias_force": (k2,),
+        "gravity_force": (k6,),
+        "bias_force": (k6,),
         "applied_force": (),
-        "kinetic_energy": (pivot_r_child_x, k5),
-        "potential_energy": (pivot_r_child_x, k6),
-        "effect_powers": (pivot_r_child_x, k6),
-        "momentum": (bob_mass, pivot_r_child_x),
-        "centre_of_mass": (pivot_r_child_x,),
-        "joint_forces": (k7, k6, k1),
-        "body_poses": (pivot_r_child_x,),
+        "kinetic_energy": (pivot_r_child_x, k7),
+        "potential_energy": (k8,),
+        "effect_powers": (k9,),
+        "momentum": (bob_mass, pivot_r_child_x, k10),
+        "centre_of_mass": (k11,),
+        "joint_forces": (k12, k13, k14, k15),
+        "body_poses": (k11,),
         "body_velocities": (pivot_r_child_x,),
-        "parameter_jacobian": (k8, k9, k10),
+        "parameter_jacobian": (k16, k17, k18),
     }
 
 
@@ -167,34 +175,34 @@ def _derivative(y, k, u=(), extra=(), cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin):
-    """3 operations: 1 mul, 1 neg, 1 sin."""
-    k1, = k
+    """2 operations: 1 mul, 1 sin."""
+    k2, = k
     theta, _ = y
     return (
         0.0,
         1.0,
-        -k1 * sin(theta),
+        sin(theta) * k2,
         0.0,
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), cos=cos):
     """4 operations: 1 add, 2 mul, 1 cos."""
-    k2, k3 = k
+    k3, k4 = k
     theta, _ = y
     tau__theta, = extra
     return (
-        k3 * (tau__theta + cos(theta) * k2),
+        k4 * (tau__theta + cos(theta) * k3),
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), cos=cos):
     """4 operations: 1 sub, 2 mul, 1 cos."""
-    k2, k4 = k
+    k3, k5 = k
     theta, _ = y
     theta_ddot, = extra
     return (
-        theta_ddot * k4 - cos(theta) * k2,
+        theta_ddot * k5 - cos(theta) * k3,
     )
 
 
@@ -214,20 +222,20 @@ def _velocity_force(y, k, u=(), extra=()):
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
-    """3 operations: 1 mul, 1 neg, 1 cos."""
-    k2, = k
+    """2 operations: 1 mul, 1 cos."""
+    k6, = k
     theta, _ = y
     return (
-        -cos(theta) * k2,
+        cos(theta) * k6,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), cos=cos):
-    """3 operations: 1 mul, 1 neg, 1 cos."""
-    k2, = k
+    """2 operations: 1 mul, 1 cos."""
+    k6, = k
     theta, _ = y
     return (
-        -cos(theta) * k2,
+        cos(theta) * k6,
     )
 
 
@@ -239,109 +247,112 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """10 operations: 1 add, 7 mul, 1 sin, 1 cos."""
-    pivot_r_child_x, k5 = k
+    """9 operations: 1 add, 6 mul, 1 sin, 1 cos."""
+    pivot_r_child_x, k7 = k
     theta, theta_dot = y
-    xd_bob = pivot_r_child_x * (theta_dot * sin(theta))
-    s1 = pivot_r_child_x * (theta_dot * cos(theta))
+    s1 = pivot_r_child_x * theta_dot
+    xd_bob = sin(theta) * s1
+    s2 = cos(theta) * s1
     return (
-        (xd_bob * xd_bob + s1 * s1) * k5,
+        (xd_bob * xd_bob + s2 * s2) * k7,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
-    """4 operations: 2 mul, 1 neg, 1 sin."""
-    pivot_r_child_x, k6 = k
+    """2 operations: 1 mul, 1 sin."""
+    k8, = k
     theta, _ = y
     return (
-        -k6 * (pivot_r_child_x * sin(theta)),
+        sin(theta) * k8,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos):
-    """4 operations: 3 mul, 1 cos."""
-    pivot_r_child_x, k6 = k
+    """3 operations: 2 mul, 1 cos."""
+    k9, = k
     theta, theta_dot = y
     return (
-        k6 * (pivot_r_child_x * (theta_dot * cos(theta))),
+        theta_dot * cos(theta) * k9,
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """15 operations: 1 add, 11 mul, 1 neg, 1 sin, 1 cos."""
-    bob_mass, pivot_r_child_x = k
+    """13 operations: 1 add, 10 mul, 1 sin, 1 cos."""
+    bob_mass, pivot_r_child_x, k10 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    xd_bob = pivot_r_child_x * (theta_dot * sin_theta)
-    s1 = pivot_r_child_x * (theta_dot * cos_theta)
-    s2 = s1 * (pivot_r_child_x * cos_theta) + xd_bob * (pivot_r_child_x * sin_theta)
+    s1 = pivot_r_child_x * theta_dot
+    xd_bob = sin_theta * s1
+    s2 = cos_theta * s1
+    s3 = s2 * (pivot_r_child_x * cos_theta) + xd_bob * (pivot_r_child_x * sin_theta)
     return (
         bob_mass * xd_bob,
-        -bob_mass * s1,
-        bob_mass * s2,
+        k10 * s2,
+        bob_mass * s3,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """6 operations: 2 mul, 2 neg, 1 sin, 1 cos."""
-    pivot_r_child_x, = k
+    """4 operations: 2 mul, 1 sin, 1 cos."""
+    k11, = k
     theta, _ = y
     return (
-        -pivot_r_child_x * cos(theta),
-        -pivot_r_child_x * sin(theta),
+        k11 * cos(theta),
+        k11 * sin(theta),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """14 operations: 1 add, 2 sub, 8 mul, 1 neg, 1 sin, 1 cos."""
-    k7, k6, k1 = k
+    """13 operations: 1 add, 2 sub, 8 mul, 1 sin, 1 cos."""
+    k12, k13, k14, k15 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
-    alpha_bob = cos_theta * k1
     sin_theta = sin(theta)
+    alpha_bob = cos_theta * k14
     theta_dot_squared = theta_dot * theta_dot
     return (
-        -k7 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
-        k7 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k6,
+        k15 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
+        k13 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k12,
         0.0,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """6 operations: 2 mul, 2 neg, 1 sin, 1 cos."""
-    pivot_r_child_x, = k
+    """4 operations: 2 mul, 1 sin, 1 cos."""
+    k11, = k
     theta, _ = y
     return (
-        -pivot_r_child_x * cos(theta),
-        -pivot_r_child_x * sin(theta),
+        k11 * cos(theta),
+        k11 * sin(theta),
         theta,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """7 operations: 4 mul, 1 neg, 1 sin, 1 cos."""
+    """6 operations: 3 mul, 1 neg, 1 sin, 1 cos."""
     pivot_r_child_x, = k
     theta, theta_dot = y
+    s1 = pivot_r_child_x * theta_dot
     return (
-        pivot_r_child_x * (theta_dot * sin(theta)),
-        -pivot_r_child_x * (theta_dot * cos(theta)),
+        sin(theta) * s1,
+        -cos(theta) * s1,
         theta_dot,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), cos=cos):
     """4 operations: 3 mul, 1 cos."""
-    k8, k9, k10 = k
+    k16, k17, k18 = k
     theta, _ = y
     cos_theta = cos(theta)
     return (
         0.0,
         0.0,
         0.0,
-        cos_theta * k8,
-        cos_theta * k9,
-        cos_theta * k10,
+        cos_theta * k16,
+        cos_theta * k18,
+        cos_theta * k17,
     )
 
 

@@ -101,7 +101,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 5, "sub": 3, "mul": 21, "neg": 1, "total": 30, "parameters": 9},
     "jacobian": {"mul": 13, "neg": 6, "total": 19, "parameters": 9},
-    "parameter_jacobian": {"mul": 9, "neg": 6, "total": 15, "parameters": 12},
+    "parameter_jacobian": {"mul": 9, "neg": 3, "total": 12, "parameters": 15},
     "forward_dynamics": {"add": 3, "mul": 12, "total": 15, "parameters": 7},
     "inverse_dynamics": {"add": 3, "mul": 12, "total": 15, "parameters": 3},
     "mass_matrix": {"total": 0, "parameters": 0},
@@ -117,7 +117,7 @@ COST = {
     "joint_forces": {"total": 0, "parameters": 0},
     "body_poses": {"add": 9, "sub": 6, "mul": 16, "div": 1, "total": 32, "parameters": 0},
     "body_velocities": {"add": 27, "sub": 6, "mul": 43, "div": 1, "total": 77, "parameters": 0},
-    "point_positions": {"add": 8, "sub": 2, "mul": 16, "div": 1, "total": 27, "parameters": 0},
+    "point_positions": {"add": 8, "sub": 2, "mul": 15, "div": 1, "total": 26, "parameters": 0},
     "point_velocities": {"add": 30, "sub": 9, "mul": 52, "div": 1, "total": 92, "parameters": 0},
     "point_jacobians": {"add": 12, "sub": 18, "mul": 37, "div": 1, "total": 68, "parameters": 0},
 }
@@ -151,9 +151,9 @@ def _fixed(m, I_1, I_2, I_3, stem_at_y):
     k12 = I_1 - I_2
     k6 = 1.0 / I_3
     k3 = k12 * k6
-    k7 = k10 * (k4 / I_1)
-    k8 = k11 * (k5 / I_2)
-    k9 = k12 * (k6 / I_3)
+    k7 = -k10 * (k4 / I_1)
+    k8 = -k11 * (k5 / I_2)
+    k9 = -k12 * (k6 / I_3)
     k13 = 1.0 / m
     k14 = I_3 - I_2
     k15 = I_1 - I_3
@@ -164,16 +164,16 @@ def _fixed(m, I_1, I_2, I_3, stem_at_y):
         "jacobian": (k1, k2, k3),
         "parameter_jacobian": (k4, k5, k6, k7, k8, k9),
         "forward_dynamics": (k10, k4, k11, k5, k12, k6, k13),
-        "inverse_dynamics": (m, I_1, I_2, I_3, k14, k15, k16),
-        "mass_matrix": (m, I_1, I_2, I_3),
+        "inverse_dynamics": (I_1, I_2, I_3, m, k14, k15, k16),
+        "mass_matrix": (I_1, I_2, I_3, m),
         "velocity_force": (k14, k15, k16),
         "gravity_force": (),
         "bias_force": (k14, k15, k16),
         "applied_force": (),
-        "kinetic_energy": (m, I_1, I_2, I_3),
+        "kinetic_energy": (I_1, I_2, I_3, m),
         "potential_energy": (),
         "effect_powers": (),
-        "momentum": (m, I_1, I_2, I_3),
+        "momentum": (I_1, I_2, I_3, m),
         "centre_of_mass": (m,),
         "joint_forces": (),
         "body_poses": (),
@@ -453,7 +453,7 @@ def _jacobian(y, k, u=(), extra=()):
 
 
 def _parameter_jacobian(y, k, u=(), extra=()):
-    """15 operations: 9 mul, 6 neg."""
+    """12 operations: 9 mul, 3 neg."""
     k4, k5, k6, k7, k8, k9 = k
     _, _, _, _, _, _, _, _, _, _, nut_wx, nut_wy, nut_wz = y
     s14 = nut_wy * nut_wz
@@ -514,19 +514,19 @@ def _parameter_jacobian(y, k, u=(), extra=()):
         0.0,
         0.0,
         0.0,
-        -s14 * k7,
+        s14 * k7,
         s19,
         -s19,
         0.0,
         0.0,
         -s17,
-        -s15 * k8,
+        s15 * k8,
         s17,
         0.0,
         0.0,
         s18,
         -s18,
-        -s16 * k9,
+        s16 * k9,
         0.0,
     )
 
@@ -548,7 +548,7 @@ def _forward_dynamics(y, k, u=(), extra=()):
 
 def _inverse_dynamics(y, k, u=(), extra=()):
     """15 operations: 3 add, 12 mul."""
-    m, I_1, I_2, I_3, k14, k15, k16 = k
+    I_1, I_2, I_3, m, k14, k15, k16 = k
     _, _, _, _, _, _, _, _, _, _, nut_wx, nut_wy, nut_wz = y
     vd__nut_x_dot, vd__nut_y_dot, vd__nut_z_dot, vd__nut_wx, vd__nut_wy, vd__nut_wz = extra
     return (
@@ -563,7 +563,7 @@ def _inverse_dynamics(y, k, u=(), extra=()):
 
 def _mass_matrix(y, k, u=(), extra=()):
     """0 operations."""
-    m, I_1, I_2, I_3 = k
+    I_1, I_2, I_3, m = k
     return (
         m,
         0.0,
@@ -658,7 +658,7 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=()):
     """63 operations: 20 add, 6 sub, 36 mul, 1 div."""
-    m, I_1, I_2, I_3 = k
+    I_1, I_2, I_3, m = k
     _, _, _, nut_qw, nut_qx, nut_qy, nut_qz, nut_x_dot, nut_y_dot, nut_z_dot, nut_wx, nut_wy, nut_wz = y
     s20 = 2.0 / (nut_qw * nut_qw + nut_qx * nut_qx + nut_qy * nut_qy + nut_qz * nut_qz)
     s21 = nut_qx * s20
@@ -698,7 +698,7 @@ def _effect_powers(y, k, u=(), extra=()):
 
 def _momentum(y, k, u=(), extra=()):
     """95 operations: 30 add, 9 sub, 55 mul, 1 div."""
-    m, I_1, I_2, I_3 = k
+    I_1, I_2, I_3, m = k
     nut_x, nut_y, nut_z, nut_qw, nut_qx, nut_qy, nut_qz, nut_x_dot, nut_y_dot, nut_z_dot, nut_wx, nut_wy, nut_wz = y
     s20 = 2.0 / (nut_qw * nut_qw + nut_qx * nut_qx + nut_qy * nut_qy + nut_qz * nut_qz)
     s21 = nut_qx * s20
@@ -829,7 +829,7 @@ def _body_velocities(y, k, u=(), extra=()):
 
 
 def _point_positions(y, k, u=(), extra=()):
-    """27 operations: 8 add, 2 sub, 16 mul, 1 div."""
+    """26 operations: 8 add, 2 sub, 15 mul, 1 div."""
     stem_at_y, = k
     nut_x, nut_y, nut_z, nut_qw, nut_qx, nut_qy, nut_qz, _, _, _, _, _, _ = y
     s20 = 2.0 / (nut_qw * nut_qw + nut_qx * nut_qx + nut_qy * nut_qy + nut_qz * nut_qz)
@@ -838,7 +838,7 @@ def _point_positions(y, k, u=(), extra=()):
     return (
         nut_x + stem_at_y * (nut_qy * s21 - nut_qw * s23),
         nut_y + stem_at_y * (1.0 - (nut_qx * s21 + nut_qz * s23)),
-        nut_z + stem_at_y * (nut_qw * s21 + nut_qz * (nut_qy * s20)),
+        nut_z + stem_at_y * (nut_qw * s21 + nut_qy * s23),
     )
 
 

@@ -437,7 +437,7 @@ def test_passes_report_what_they_save(tmp_path: Path, capsys: pytest.CaptureFixt
     """The report has a line for the program as lowered and one for each pass."""
     assert main(["generate", "two_body", "--report", "-o", str(tmp_path)]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert lines[2][:2] == ["as", "lowered"] and lines[3][0] == "drop"
+    assert lines[2][:2] == ["as", "lowered"] and lines[3][0] == "gather"
     assert int(lines[2][-3]) > int(lines[3][-3]) >= int(lines[4][-3])
 
 

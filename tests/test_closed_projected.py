@@ -404,7 +404,7 @@ def test_route_closed_and_auto() -> None:
         assert choice.system.route == "closed", name
     puma = elaborate(read_scene("puma560"))
     assert why_not_closed(puma) == "" and "velocities" not in why_not_tried(puma)
-    assert compile_program(puma).system.route == "aba"
+    assert compile_program(puma).system.route == "ldl"
     figure = elaborate(read_scene("quadruped"))
     assert why_not_closed(figure).startswith(f"it is for {MOST_GENERAL_BODIES} bodies at most")
     floating = tree(1, SPACE, 4)

@@ -21,7 +21,7 @@ from eomgen.codegen.system import optimised
 from eomgen.pipeline import compile_scene
 from eomgen.program.differentiate import jacobian
 from eomgen.program.extended import evaluator
-from eomgen.program.passes import PASSES, optimise_and_report
+from eomgen.program.passes import PASSES, optimise_and_report, parts_of
 from eomgen.program.program import Output, Program, cost, finish, interpret, live_steps
 from eomgen.program.tape import Node, Stage, Tape, power, total
 from eomgen.scene.reader import parse_scene
@@ -200,23 +200,26 @@ def test_passes_keep_values_and_save_work(case: str | int) -> None:
     """After each pass every output has its value to 45 digits, and no more to do than before."""
     program = lowered(case)
     reports = compiled(case if isinstance(case, str) else random_tree(case)).system.reports
-    assert [report.name for report in reports[1:]] == [p.__name__.replace("_", " ") for p in PASSES]
+    names = [run.__name__.replace("_", " ") for run in PASSES]
+    assert [report.name for report in reports] == ["as lowered", *names]
     rng = np.random.default_rng(52)
     inputs = some_inputs(program, rng)
     before = {o: evaluator(program, o)(inputs) for o in program.outputs}
+    parts = parts_of(program)
+    assert [o for part in parts for o in part.outputs] == list(before)
     for run, earlier, report in zip(PASSES, reports, reports[1:], strict=False):
-        costs = {output: cost(program, output)["total"] for output in program.outputs}
-        assert earlier.steps == len(program.steps)
-        program = run(program)
-        assert report.steps == len(program.steps)
-        assert report.derivative == cost(program, "derivative")["total"] <= earlier.derivative
-        assert report.jacobian == cost(program, "jacobian")["total"] <= earlier.jacobian
-        assert all(cost(program, o)["total"] <= costs[o] for o in program.outputs)
-        assert list(program.outputs) == list(before)
-        for output, expected in before.items():
-            values = evaluator(program, output)(inputs)
-            for value, wanted in zip(values, expected, strict=True):
-                assert abs(value - wanted) <= MP.mpf("1e-45") * (1 + abs(wanted))
+        costs = [dict(part.operations) for part in parts]
+        parts = [run(part) for part in parts]
+        assert report.steps == sum(len(part.steps) for part in parts)
+        for part, old in zip(parts, costs, strict=True):
+            for output, count in old.items():
+                assert cost(part, output)["total"] == part.operations[output] <= count
+                if output in ("derivative", "jacobian"):
+                    assert part.operations[output] == getattr(report, output)
+                    assert count == getattr(earlier, output)
+                values = evaluator(part, output)(inputs)
+                for value, wanted in zip(values, before[output], strict=True):
+                    assert abs(value - wanted) <= MP.mpf("1e-45") * (1 + abs(wanted))
     assert reports[-1].steps < reports[0].steps
 
 
@@ -269,6 +272,19 @@ def test_sums_that_go_on_are_factored() -> None:
         inputs = {"a": 3.0, "s": 2.0, "k": 5.0, "l": 7.0}
         (found,) = interpret(better, "derivative", inputs, DoubleScalars())
         assert found == 2.0 + first * 15.0 + second * 21.0
+
+
+def test_absorbed_minus_signs() -> None:
+    """-(x + k·y) becomes (-k)·y - x, with -k from parameters; not where k·y is needed elsewhere."""
+    for shared in (False, True):
+        tape, x, y = fresh()
+        k = tape.input("k", Stage.PARAMETERS)
+        entries = (-(x + k * y), -(x / k), *([k * y] * shared))
+        outputs = {"derivative": Output((len(entries),), tuple(n.index for n in entries))}
+        better, reports = optimise_and_report(finish(tape, outputs, ()))
+        assert (reports[0].derivative, reports[-1].derivative) == (5, 4 if shared else 3)
+        found = interpret(better, "derivative", {"k": 2.0, "x": 3.0, "y": 5.0}, DoubleScalars())
+        assert found == [-13.0, -1.5, 10.0][: len(entries)]
 
 
 def test_shared_factors() -> None:

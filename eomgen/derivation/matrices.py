@@ -65,7 +65,7 @@ def written_out(expression: Expr, definitions: Iterable[Definition]) -> Expr:
 def _of_pins(equations: Equations) -> Matrices:
     s, rows = equations.symbols, equations.symmetric
     still = dict.fromkeys(s.tau, sp.S.Zero)
-    poses = _poses(equations)
+    poses = [*_poses(equations), *equations.free_bodies.efforts.items()]
     solved = [(symbol, value.xreplace(still)) for symbol, value in equations.solution.definitions]
     M, V, G, F = (written_out(m, poses) for m in (rows.M, rows.V, rows.G, rows.F))
     return Matrices(

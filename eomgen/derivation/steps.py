@@ -140,7 +140,8 @@ def _equations_of_motion(equations: Equations) -> Iterator[tuple[str, str, str, 
     yield "(27)", "Velocity forces", "", [(sp.Symbol("V"), collected.V)]
     yield "(28)", "Gravity forces", "", [(sp.Symbol("G"), collected.G)]
     words = "External forces and joint torques, eliminated alike."
-    yield "(29)-(36)", "Applied forces", words, [(sp.Symbol("F"), collected.F)]
+    efforts = equations.free_bodies.efforts.items()
+    yield "(29)-(36)", "Applied forces", words, [(sp.Symbol("F"), collected.F), *efforts]
 
 
 def _solution(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
@@ -185,13 +186,14 @@ def _readable(equations: Equations) -> dict[Expr, Expr]:
         shown[fy] = sp.Symbol(f"f_{body.joint.name},y")
     for formula, symbol in s.formulas.items():
         shown[symbol] = sp.Symbol(written(formula))
-    short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j"}
+    short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j",
+             "effort": "tau"}  # fmt: skip
     for body in model.bodies:
         for field, letter in (("mass", "m"), ("inertia_com", "I")):
             named = s.parameters.get(f"{body.name}_{field}")
             if named is not None and f"{letter}_{body.name}" not in taken:
                 shown[named] = sp.Symbol(f"{letter}_{body.name}")
-    for symbol, _ in equations.solution.definitions:
+    for symbol in (*equations.free_bodies.efforts, *dict(equations.solution.definitions)):
         kind, _, rest = symbol.name.partition("__")
         if symbol not in shown and kind in short:
             rest = rest.replace("__", ",")

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.joint_loads import JointMechanism, joint_loads
 from eomgen.derivation.projected.constraints import Constraint, MotionSymbols, about
 from eomgen.derivation.projected.simplify import gathered
 from eomgen.derivation.projected.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
-from eomgen.language.formula import Formula
 from eomgen.model.model import Model
-from eomgen.scene.effects.base import JointLoad, Load, Unmoved
+from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import Geared
 
 ROTATIONS = ("R__", "k__", "W__")
@@ -74,32 +74,6 @@ class Balance:
     F: Expr
 
 
-class SymbolicTreeMechanism(Unmoved):
-    """The model as effects see it: masses, parameters and inputs as symbols."""
-
-    def __init__(self, model: Model, symbols: Symbols) -> None:
-        self._symbols = symbols
-        self._mass = {body.name: symbols.value(body.mass) for body in model.bodies}
-        self.dimensions = model.dimensions
-        self.bodies = tuple(self._mass)
-
-    def mass(self, body: str) -> Expr:
-        """Mass of a body."""
-        return self._mass[body]
-
-    def height(self, body: str) -> Expr:
-        """No load depends on where a body is."""
-        raise NotImplementedError
-
-    def value(self, formula: Formula, **names: Expr) -> Expr:
-        """A quantity over parameter symbols."""
-        return self._symbols.value(formula)
-
-    def input(self, name: str) -> Expr:
-        """Symbol of an input."""
-        return self._symbols.inputs[name]
-
-
 def inertias(model: Model, symbols: Symbols) -> tuple[Inertia, ...]:
     """Mass and inertia of every body; in the plane the moment about z alone is one."""
     found = []
@@ -113,16 +87,15 @@ def inertias(model: Model, symbols: Symbols) -> tuple[Inertia, ...]:
     return tuple(found)
 
 
-def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...]) -> Loads:
-    """The loads of all effects on bodies and joints."""
-    mechanism = SymbolicTreeMechanism(model, symbols)
+def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...], ledger: Ledger) -> Loads:
+    """The loads of all effects on bodies and joints; those at joints that depend on the motion get
+    definitions.
+    """
+    mechanism = JointMechanism(model, symbols)
     given = [load for effect in model.effects for load in effect.loads(mechanism)]
-    first = {body.joint.name: j for body, j in zip(model.bodies, model.first_velocity, strict=True)}
-    motors: dict[int, Expr] = {}
-    for load in given:
-        if isinstance(load, JointLoad):
-            j = first[load.joint]
-            motors[j] = motors.get(j, sp.Integer(0)) + load.force
+    at_joints = [load for load in given if isinstance(load, JointLoad)]
+    motors, definitions = joint_loads(model, symbols, at_joints)
+    ledger.definitions.update(definitions)
 
     def forces(kind: str) -> tuple[tuple[int, Expr, Expr], ...]:
         return tuple(

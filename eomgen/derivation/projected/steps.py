@@ -205,7 +205,7 @@ def _needed(
 KINDS = {
     "omega": "omega", "alpha": "alpha", "a": "a", "u": "u", "g": "g", "R": "R", "k": "k", "W": "W",
     "turn": "omega", "move": "u", "pivot": "d", "coupling": "c", "bias": "beta", "rest": "b",
-    "row": "j", "load": "Q", "drive": "f",
+    "row": "j", "load": "Q", "drive": "f", "effort": "tau",
     "mass": "M", "mean": "h", "apart": "j", "weight": "w", "ratio": "l",
 }  # fmt: skip
 """What the kinds of derived symbols are written with."""

@@ -197,34 +197,9 @@ class Unmoved:
         """Unused."""
         raise AssertionError(body)
 
-    @property
-    def joints(self) -> Mapping[str, tuple[str, ...]]:
-        """Unused."""
-        raise AssertionError
-
-    def coordinate(self, joint: str, index: int = 0) -> Scalar:
-        """Unused."""
-        raise AssertionError(joint)
-
-    def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """Unused."""
-        raise AssertionError(joint)
-
-    def rate(self, joint: str, index: int = 0) -> Scalar:
-        """Unused."""
-        raise AssertionError(joint)
-
     def state(self, name: str) -> Scalar:
         """Unused."""
         raise AssertionError(name)
-
-    def number(self, value: Real) -> Scalar:
-        """Unused."""
-        raise AssertionError(value)
-
-    def call(self, function: str, *arguments: Scalar) -> Scalar:
-        """Unused."""
-        raise AssertionError(function)
 
 
 class EffectTable(Table):
@@ -319,7 +294,8 @@ class EffectTable(Table):
         return bool(own) and not any(inputs.get(i.name) for i in own)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """Whether its loads depend only on parameters, inputs and poses of bodies.
+        """Whether its loads depend only on parameters, inputs and poses of bodies, or are at
+        joints and depend on no extra state. It has no rigid contacts.
 
         Route `closed` requires it.
         """
