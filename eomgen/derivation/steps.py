@@ -12,6 +12,10 @@ from eomgen.language.formula import written
 from eomgen.scene.joints import Free
 
 
+Definition = tuple[Expr, Expr]
+"""A symbol and what it stands for."""
+
+
 @dataclass(frozen=True)
 class Equation:
     """One line `left = right`; a matrix equation where `right` is a matrix."""
@@ -22,17 +26,22 @@ class Equation:
 
 @dataclass(frozen=True)
 class Step:
-    """One step: the handout's equation numbers, a title, an explanation, and its equations."""
+    """One step: the handout's equation numbers, a title, an explanation, and its equations.
+
+    In the words, blank lines divide paragraphs and backquotes enclose what is code. `figure` names
+    the sketch that belongs beside the words: "mechanism", "bodies", or none.
+    """
 
     number: str
     title: str
     words: str
     equations: tuple[Equation, ...]
+    figure: str = ""
 
 
 def handout_steps(equations: Equations) -> tuple[Step, ...]:
     """Every step from the state to the closed form, in symbols meant for reading."""
-    shown = _readable(equations)
+    shown = readable(equations)
     return tuple(
         Step(
             number,
@@ -165,7 +174,7 @@ def _solved(equations: Equations) -> list[tuple[Expr, Expr]]:
     ]
 
 
-def _readable(equations: Equations) -> dict[Expr, Expr]:
+def readable(equations: Equations) -> dict[Expr, Expr]:
     """Symbols by ones whose names SymPy's printers know how to write: `thetaddot` is θ̈."""
     s, model = equations.symbols, equations.model
     names = [body.name for body in model.bodies]

@@ -64,4 +64,5 @@ class PointGravity(EffectTable):
         zeros = (mechanism.value(ZERO),) * mechanism.dimensions
         centre = tuple(mechanism.value(part) for part in self.at)
         arm = sub(mechanism.position(body, zeros), centre)
+        arm = mechanism.called("r", *arm)
         return arm, dot(arm, arm)
