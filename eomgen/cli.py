@@ -117,6 +117,12 @@ def _parser() -> argparse.ArgumentParser:
     _form(check)
     derive = command("derive", commands.derive, "print the derivation, step by step")
     derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
+    derive.add_argument(
+        "--form",
+        dest="state_form",
+        choices=("velocity", "momentum", "redundant"),
+        help="state whose time derivative is written out: [q, v]; the handout's 8 numbers, or 12",
+    )
     derive.add_argument("-o", "--output", metavar="FILE", type=_path, help="write it to a file")
     _force(derive)
     generate = command("generate", commands.generate, "write the module of a scene", "scenes")

@@ -102,13 +102,13 @@ class Derivation:
         """All steps as one LaTeX document."""
         from eomgen.show.derivation import as_latex
 
-        return as_latex(self.model, self.steps)
+        return as_latex(self.model, self.steps, self.telling.effects)
 
     def html(self) -> str:
         """All steps as one HTML page."""
         from eomgen.show.derivation import as_html
 
-        return as_html(self.model, self.steps)
+        return as_html(self.model, self.steps, self.telling.effects)
 
     def _repr_latex_(self) -> str:
         import sympy as sp

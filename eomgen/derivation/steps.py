@@ -92,7 +92,7 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
         name = model.bodies[k].joint.name
         for word, arm in (("parent", kin.arm_parent[k]), ("child", kin.arm_child[k])):
             for axis, component in zip("xy", arm, strict=True):
-                arms.append((sp.Symbol(f"r{axis}_{name},{word}"), component))
+                arms.append((sp.Symbol(f"r_{name},{word},{axis}"), component))
     yield (
         "(18), (19)",
         "Arms",

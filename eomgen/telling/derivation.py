@@ -59,7 +59,7 @@ RECURSIVE = (
 SYMMETRIC = (
     "There are two ways to write (24). Its rows above are torques about the bodies' own centres of "
     "mass, so M of (26) is not symmetric. A Lagrangian derivation has generalised forces as rows, "
-    "and its M is symmetric: ½ v' M v is the kinetic energy. `mass_matrix()` of the generated module "
+    "and its M is symmetric: ½ vᵀ M v is the kinetic energy. `mass_matrix()` of the generated module "
     "returns that one, and `velocity_force()`, `gravity_force()`, `applied_force()` the V, G, F that "
     "belong to it. The matrix T leads from one to the other: to the torque of each body it adds the "
     "moment of the tree's total force, and then it sums the rows of all bodies that a joint "
@@ -114,7 +114,7 @@ def _of_pins(model: Model, bare: Model, effects: tuple[ToldEffect, ...], form: F
     place = next(i for i, step in enumerate(steps) if step.number == "(37)")
     written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
     last = form_step(form, written, effects)
-    ends = [_symmetry(equations), last, *impact_steps(model, effects)]
+    ends = [_symmetry(equations), *impact_steps(model, effects), last]
     inner = _numbered_within(_effect_steps(model, effects), "36")
     steps = [
         Step("", "The handout", HANDOUT, ()),
@@ -132,7 +132,7 @@ def _of_any(model: Model, bare: Model, effects: tuple[ToldEffect, ...]) -> Telli
     found = [step for step in projected_steps(equations)]
     place = next(i for i, step in enumerate(found) if step.title == "Closed form")
     form = plain_form(model, [real(c.acceleration) for c in model.velocities])
-    ends = [form_step("velocity", form, effects), *impact_steps(model, effects)]
+    ends = [*impact_steps(model, effects), form_step("velocity", form, effects)]
     words = "Each body by itself, with its weight, the forces of the effects, and those of its joints."
     state = replace(found[0], figure="mechanism")
     steps = [
@@ -166,8 +166,8 @@ def _recursive(model: Model, effects: tuple[ToldEffect, ...]) -> Telling:
         Step("", "Free bodies", _free_words(model), (), "bodies"),
         *_effect_steps(model, effects),
         *recursive_steps(model, frames, effects),
-        form_step("velocity", form, effects),
         *impact_steps(model, effects),
+        form_step("velocity", form, effects),
     ]
     told = (_renamed(step, names) for step in steps)
     intro = Step("", "Beside the handout", RECURSIVE, ())
@@ -196,7 +196,7 @@ def _effect_steps(model: Model, effects: Sequence[ToldEffect]) -> Iterator[Step]
         if told.kept:
             lines = _loads_as_they_are(told)
         lines += [Equation(symbol, rate) for symbol, rate in told.rates]
-        yield Step("", f"Effect {told.effect.name}: {told.effect.type}", told.words, tuple(lines))
+        yield Step("", f"Effect {told.effect.name} ({told.effect.type.replace('_', ' ')})", told.words, tuple(lines))
 
 
 def used_bodies(told: ToldEffect) -> Iterator[str]:
@@ -212,6 +212,9 @@ def _loads_as_they_are(told: ToldEffect) -> list[Equation]:
     """The loads of an effect that no motion changes, with the names of the scene."""
     lines = []
     for load in told.loads:
+        parts = load.force if isinstance(load, Load) else (load.force,)
+        if all(part == 0 or part.is_Symbol for part in parts):
+            continue  # inputs or parameters, which stand in F by their own names
         if isinstance(load, Load):
             lines.append(Equation(real(f"f_{told.effect.name},{load.body}"), sp.Matrix(load.force)))
         else:

@@ -27,8 +27,10 @@ def follow(equations: Iterable[Equation], known: Numbers) -> None:
     for equation in equations:
         value = array(equation.right, known)
         known[equation.left.name] = value
-        if value.shape == (1, 1):
-            known.setdefault(equation.left.name, value)
+        letter, _, rest = equation.left.name.partition("_")
+        if letter in ("r", "c") and value.shape == (3, 1):
+            (x,), (y,), (z,) = value
+            known[f"{letter}^×_{rest}"] = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
 def number(e: Expr, known: Numbers) -> float:
@@ -62,6 +64,8 @@ def array(e: Expr, known: Numbers) -> Any:
     """The value of a matrix expression."""
     if isinstance(e, sp.MatrixSymbol):
         return np.atleast_2d(known[e.name])
+    if isinstance(e, sp.Identity):
+        return np.eye(e.rows)
     if isinstance(e, sp.ZeroMatrix):
         return np.zeros(e.shape)
     if isinstance(e, sp.MatrixBase):

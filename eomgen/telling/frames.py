@@ -11,6 +11,7 @@ import sympy as sp
 
 from eomgen.derivation.projected.constraints import about, of_quaternion
 from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula
 from eomgen.model.model import Body, JointIndex, Model
@@ -39,6 +40,7 @@ class Frame:
     tau       names of its velocities, for the generalised forces on them
     armature  reflected inertia of a motor's rotor
     mass, centre, inertia  of its body: inertia about the centre of mass
+    defined   a symbol in the rotation by a quaternion, and what it stands for
     """
 
     name: str
@@ -58,6 +60,7 @@ class Frame:
     mass: Expr
     centre: Expr
     inertia: Expr
+    defined: tuple[Definition, ...] = ()
 
     @property
     def free(self) -> bool:
@@ -110,7 +113,7 @@ def _add(
         velocities = body.velocities[body.plain :] if ball else body.velocities[i : i + 1]
         held = [locked[c.name] for c in positions if c.name in locked]
         q = tuple(sp.Float(x) for x in held) or tuple(real(c.name) for c in positions)
-        turned, slid, axis = _motion(primitive, q, symbols)
+        turned, slid, axis = _motion(primitive, q, joint.name, symbols)
         v = index.spin if ball else index.v[i : i + 1]
         turns = primitive is not None and primitive.kind == "revolute"
         found.append(
@@ -132,6 +135,7 @@ def _add(
                 mass=symbols.value(body.mass) if final else sp.Integer(0),
                 centre=centre if final else ORIGIN,
                 inertia=_inertia(body, symbols) if final else sp.zeros(3, 3),
+                defined=((real(f"k_{joint.name}"), _scale(q)),) if ball else (),
             )
         )
         parent, rotation, offset, angle = len(found) - 1, sp.eye(3), ORIGIN, sp.Integer(0)
@@ -139,17 +143,22 @@ def _add(
 
 
 def _motion(
-    primitive: Primitive | None, q: Sequence[Expr], symbols: TellingMechanism
+    primitive: Primitive | None, q: Sequence[Expr], joint: str, symbols: TellingMechanism
 ) -> tuple[Expr, Expr, Expr]:
     """Rotation, displacement and axis of a joint primitive at its coordinates."""
     if primitive is None:
         return sp.eye(3), ORIGIN, ORIGIN
     if primitive.kind == "spherical":
-        return of_quaternion(q, 2 / sum(x**2 for x in q)), ORIGIN, ORIGIN
+        return of_quaternion(q, real(f"k_{joint}")), ORIGIN, ORIGIN
     axis = sp.Matrix([symbols.number(part) for part in direction(primitive.axis)])
     if primitive.kind == "prismatic":
         return sp.eye(3), axis * q[0], axis
     return about(axis, q[0]), ORIGIN, axis
+
+
+def _scale(q: Sequence[Expr]) -> Expr:
+    """2/|q|², by which a quaternion of any length gives a rotation."""
+    return 2 / sum(x**2 for x in q)
 
 
 def _vector(parts: tuple[Formula, ...], symbols: TellingMechanism) -> Expr:

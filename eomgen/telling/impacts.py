@@ -22,7 +22,7 @@ LAW = (
     "A rigid contact exerts no force while its gap g is positive. Where g becomes 0 with u_n < 0 an "
     "impact takes place, in no time: the coordinates stay, and an impulse P along the normal and the "
     "tangents changes the velocities. J holds the rows that give the speeds u of the contact from "
-    "the velocities, and J' times P are generalised impulses. A is the inverse mass that the "
+    "the velocities, and Jᵀ P are generalised impulses. A is the inverse mass that the "
     "contact point has in these directions. The law is that of A. Chatterjee and A. Ruina, A new "
     "algebraic rigid-body collision law based on impulse space considerations, J. Appl. Mech. 65 "
     "(1998) 939-951: P_I ends the approach without friction, P_II ends the slip as well, e is the "
@@ -77,7 +77,7 @@ def _contact_step(model: Model, contact: Contact) -> Step:
         lines.append(Equation(real(f"mu_{name}"), contact.friction))
     words = (
         f"Contact {name}: its gap, the speed at which it opens and the slip speeds, which are the "
-        "rows of J; by virtual work J' holds the generalised forces of unit impulses."
+        "rows of J; by virtual work Jᵀ holds the generalised forces of unit impulses."
     )
     kept = tuple(line for line in lines if line.left != line.right)
     return Step("", f"Contact {name}", words, kept)

@@ -18,7 +18,7 @@ from eomgen.model.model import Model, dofs_of
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
-from eomgen.telling.scalars import TellingScalars
+from eomgen.derivation.told_scalars import TellingScalars
 
 AXES = "xyz"
 SCALARS = TellingScalars()

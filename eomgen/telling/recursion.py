@@ -11,6 +11,7 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
@@ -87,24 +88,49 @@ def recursive_steps(model: Model, frames: tuple[Frame, ...], told: tuple[ToldEff
     yield Step("", "The algorithm", _algorithm(r), ())
     for k, frame in enumerate(frames):
         yield Step("", f"Frame {frame.name}: {_kind(r, k)}", "", tuple(_constants(r, frame)))
-    yield Step("", "Outwards: velocities and bias forces", _outward_words(r), ())
-    for k, frame in enumerate(frames):
-        yield Step("", f"Outwards, {frame.name}", "", tuple(_velocities(r, k)))
+    order = range(len(frames))
+    lines = [line for k in order for line in _velocities(r, k)]
+    yield Step("", "Outwards: velocities and bias forces", _outward_words(r), tuple(lines))
     words = (
         "From the leaves to the root. I^A is the inertia that a frame seems to have with all that "
         "hangs on it, p^A the force on it that would leave it without acceleration. What is left "
-        "of both after the frame's own joint has given way goes to the parent."
+        "of both after the frame's own joint has given way, I^a and p^a, goes to the parent."
     )
-    yield Step("", "Inwards: articulated-body inertias", words, ())
-    for k in reversed(range(len(frames))):
-        yield Step("", f"Inwards, {frames[k].name}", "", tuple(_articulated(r, k)))
+    lines = [line for k in reversed(order) for line in _articulated(r, k)]
+    yield Step("", "Inwards: articulated-body inertias", words, tuple(lines))
     words = (
         "From the root to the leaves: the joint takes what the forces leave over after the "
         "parent's acceleration a'. The world accelerates by minus g, which stands for gravity."
     )
-    yield Step("", "Outwards: accelerations", words, ())
-    for k, frame in enumerate(frames):
-        yield Step("", f"Accelerations, {frame.name}", "", tuple(_accelerations(r, k)))
+    lines = [line for k in order for line in _accelerations(r, k)]
+    yield Step("", "Outwards: accelerations", words, tuple(lines))
+    yield _applied(r)
+
+
+def _applied(r: Recursion) -> Step:
+    """F of M v̇ + V + G = F, term by term."""
+    lines: list[Equation] = []
+    loaded: set[int] = set()
+    for k in reversed(range(len(r.frames))):
+        frame = r.frames[k]
+        terms = [r.vector("f", frame)] if _wrench(r, frame) else []
+        for i, child in enumerate(r.frames):
+            if child.parent == k and i in loaded:
+                terms.append(sp.MatMul(r.matrix("X", child).T, r.vector("Phi", child)))
+        force: list[Expr] = [tau] if _moves(frame) and any(tau := _joint_force(r, frame)) else []
+        if terms:
+            loaded.add(k)
+            lines.append(Equation(r.vector("Phi", frame), _sum(terms, r.size)))
+            if _moves(frame):
+                force.append(sp.MatMul(_subspace(r, frame).T, r.vector("Phi", frame)))
+        if frame.free:
+            lines.append(Equation(r.joint("F", frame), _sum(force, len(frame.v))))
+    words = (
+        "The same F as in M dv/dt + V + G = F, joint by joint; M, V and G do not depend on it. Φ is "
+        "the sum of the loads f on a frame and on all that hangs on it, taken to its origin; the "
+        "joint feels what of it is along its motion, and its own loads."
+    )
+    return Step("", "Applied forces, term by term", words, tuple(lines))
 
 
 def _algorithm(r: Recursion) -> str:
@@ -119,8 +145,8 @@ def _algorithm(r: Recursion) -> str:
         "parent by one joint primitive, with the motion subspace S; a joint with several "
         "primitives is a chain of frames, all but the last without mass. R turns axes of the frame "
         "into the parent's, r runs from the parent's origin to its own, X takes motions from the "
-        "parent to the frame, and its transpose takes forces back. I is the inertia of the frame's "
-        "own body at the frame's origin, × the cross product of two motions, and ×* that of a "
+        "parent to the frame, and its transpose takes forces back. The matrix of r × is written r^×. I "
+        "is the inertia of the frame's own body at the frame's origin, × the cross product of two motions, and ×* that of a "
         "motion and a force. D is a number for one degree of freedom, and a matrix of three rows "
         "for a ball. It is positive for positive masses, so no division can fail."
     )
@@ -151,8 +177,8 @@ def _direction(axis: Expr) -> str:
 def _constants(r: Recursion, frame: Frame) -> Iterator[Equation]:
     plane, size = r.size == 3, r.model.dimensions
     transform = motion_transform(frame.rotation, frame.offset)
-    inertia = rigid_inertia(frame.mass, frame.centre, frame.inertia)
     if plane:
+        inertia = rigid_inertia(frame.mass, frame.centre, frame.inertia)
         yield Equation(r.matrix("X", frame), cut(transform, size))
         if frame.free or frame.given:
             subspace = cut(motion_subspace(frame.kind, frame.axis), size)
@@ -161,18 +187,42 @@ def _constants(r: Recursion, frame: Frame) -> Iterator[Equation]:
             yield Equation(r.matrix("I", frame), cut(inertia, size))
         return
     rotation = sp.MatrixSymbol(f"R_{frame.name}", 3, 3)
-    offset = sp.MatrixSymbol(f"r_{frame.name}", 3, 1)
-    yield Equation(rotation, frame.rotation)
-    yield Equation(offset, frame.offset)
-    blocks = [[rotation.T, sp.ZeroMatrix(3, 3)]]
-    moved = -rotation.T * sp.ImmutableMatrix(hat(frame.offset))
-    blocks.append([moved if any(frame.offset) else sp.ZeroMatrix(3, 3), rotation.T])
-    yield Equation(r.matrix("X", frame), sp.BlockMatrix(blocks))
-    if frame.free or frame.given:
+    yield from (Equation(symbol, value) for symbol, value in frame.defined)
+    turns = frame.rotation != sp.eye(3)
+    yield Equation(rotation, frame.rotation if turns else sp.Identity(3))
+    yield Equation(sp.MatrixSymbol(f"r_{frame.name}", 3, 1), _column(frame.offset))
+    lever = sp.MatrixSymbol(f"r^×_{frame.name}", 3, 3)
+    nothing = sp.ZeroMatrix(3, 3)
+    moved = sp.MatMul(-1, rotation.T, lever) if any(frame.offset) else nothing
+    transform = sp.BlockMatrix([[rotation.T, nothing], [moved, rotation.T]])
+    yield Equation(r.matrix("X", frame), transform)
+    if _moves(frame):
         subspace = motion_subspace(frame.kind, frame.axis)
-        yield Equation(sp.MatrixSymbol(f"S_{frame.name}", *subspace.shape), subspace)
+        name = sp.MatrixSymbol(f"S_{frame.name}", *subspace.shape)
+        blocks = sp.BlockMatrix([[sp.Identity(3)], [nothing]])
+        yield Equation(name, _column(subspace) if subspace.cols == 1 else blocks)
     if frame.body >= 0:
-        yield Equation(r.matrix("I", frame), inertia)
+        yield from _inertia(r, frame)
+
+
+def _inertia(r: Recursion, frame: Frame) -> Iterator[Equation]:
+    """Mass, centre of mass and inertia about it, and with them the spatial inertia."""
+    mass, about = real(f"m_{frame.name}"), sp.MatrixSymbol(f"J_{frame.name}", 3, 3)
+    yield Equation(mass, frame.mass)
+    yield Equation(about, frame.inertia)
+    upper, lower = about, sp.MatMul(mass, sp.Identity(3))
+    corner, other = sp.ZeroMatrix(3, 3), sp.ZeroMatrix(3, 3)
+    if any(frame.centre):
+        yield Equation(sp.MatrixSymbol(f"c_{frame.name}", 3, 1), _column(frame.centre))
+        lever = sp.MatrixSymbol(f"c^×_{frame.name}", 3, 3)
+        upper = sp.MatAdd(about, sp.MatMul(mass, lever, lever.T))
+        corner, other = sp.MatMul(mass, lever), sp.MatMul(mass, lever.T)
+    yield Equation(r.matrix("I", frame), sp.BlockMatrix([[upper, corner], [other, lower]]))
+
+
+def _column(vector: Expr) -> Expr:
+    """A column written as a row, transposed."""
+    return sp.Transpose(sp.ImmutableMatrix(vector.T))
 
 
 def _outward_words(r: Recursion) -> str:

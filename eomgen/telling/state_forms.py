@@ -111,10 +111,14 @@ def form_step(form: str, written: WrittenForm, extra: Iterable[ToldEffect]) -> S
         else " Its time derivative, one line for each number; below, what the lines are written "
         "with."
     )
-    equations = [Equation(sp.Symbol("Y"), sp.Matrix([states]))]
-    equations += [
-        Equation(rate_symbol(state), rate) for state, rate in zip(states, rates, strict=True)
+    dotted = [rate_symbol(state) for state in states]
+    own = {*states}
+    plain = [rate if rate in own else symbol for symbol, rate in zip(dotted, rates, strict=True)]
+    equations = [
+        Equation(sp.Symbol("Y"), sp.Matrix([states])),
+        Equation(sp.Symbol("Ydot"), sp.Matrix([plain])),
     ]
+    equations += [Equation(s, rate) for s, rate in zip(plain, rates, strict=True) if s != rate]
     equations += [Equation(symbol, e) for symbol, e in written.definitions]
     return Step("", f"State form {form}: Y and its derivative", words, tuple(equations))
 

@@ -1,0 +1,435 @@
+"""Sketches of a mechanism at its initial pose, and the free-body diagram of each body.
+
+In space they are oblique: y to the right, z up, x towards the lower left at half its length.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.model.model import Body, Model
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scene.effects import Gravity
+from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints import Free
+from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point
+from eomgen.telling.effects import ToldEffect
+
+Expr = Any
+OBLIQUE = 0.5
+ANGLE = math.radians(35.0)
+WIDE, HIGH, MARGIN = 520.0, 340.0, 46.0
+PANEL, PANEL_BODY = 230.0, 92.0
+"""The side of a free-body diagram, and the size of the body in it."""
+FORCE = 38.0
+"""Length of a force whose size is not drawn."""
+MOST_NAMED = 6
+"""The most bodies of a sketch whose arms are named."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A body in the plane of the paper, m: centre of mass, own joint, joints of its children."""
+
+    body: Body
+    centre: Point
+    own: Point | None
+    others: tuple[tuple[str, Point], ...]
+    axes: tuple[Point, ...]
+    loaded: tuple[Point, ...]
+    """Points off the centre of mass at which effects act."""
+
+    @property
+    def joints(self) -> list[Point]:
+        """Its own joint and those of its children."""
+        own = [] if self.own is None else [self.own]
+        return [*own, *(p for _, p in self.others)]
+
+    @property
+    def points(self) -> list[Point]:
+        """All of them."""
+        return [self.centre, *self.joints, *self.loaded]
+
+
+class Pose:
+    """The mechanism at its initial state, projected onto the paper."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        values = Values(
+            model.defaults,
+            {i.name: 1.0 for i in model.inputs},
+            model.initial_q,
+            model.initial_v,
+            {x.name: x.initial for x in model.states},
+            0.0,
+        )
+        self.state = MechanismState(model, values, FloatScalars())
+
+    def flat(self, x: Sequence[float]) -> Point:
+        """A vector of the world on the paper."""
+        if len(x) == 2:
+            return (float(x[0]), float(x[1]))
+        back = OBLIQUE * x[0]
+        return (float(x[1] - back * math.cos(ANGLE)), float(x[2] - back * math.sin(ANGLE)))
+
+    def point(self, body: str, at: Sequence[float]) -> Point:
+        """A point of a body on the paper."""
+        return self.flat(self.state.position(body, tuple(at)))
+
+    def shapes(self, effects: Sequence[ToldEffect]) -> tuple[Shape, ...]:
+        """All bodies."""
+        model, n = self.model, self.model.dimensions
+        found = []
+        for k, body in enumerate(model.bodies):
+            own = None
+            if not isinstance(body.joint, Free):
+                own = self.point(body.name, self._vector(body.joint.r_child))
+            others = tuple(
+                (child.joint.name, self.point(body.name, self._vector(child.joint.r_parent)))
+                for child in model.bodies
+                if child.parent == k and not isinstance(child.joint, Free)
+            )
+            axes = tuple(
+                self.flat(self.state.outward(body.name, tuple(float(i == j) for j in range(n))))
+                for i in range(n)
+            )
+            centre = self.point(body.name, (0.0,) * n)
+            at = dict.fromkeys(load.at for load in _loads_at(body.name, effects) if any(load.at))
+            loaded = tuple(self.point(body.name, _numbers(model, x)) for x in at)
+            found.append(Shape(body, centre, own, others, axes, loaded))
+        return tuple(found)
+
+    def _vector(self, parts: Iterable[Any]) -> tuple[float, ...]:
+        return tuple(self.model.value(part) for part in parts)
+
+
+def _loads_at(body: str, effects: Sequence[ToldEffect]) -> Iterator[Load]:
+    """The loads on a body, and those of unit impulses of its rigid contacts."""
+    for told in effects:
+        contacts = (load for contact in told.contacts for load in contact.normal)
+        for load in (*told.loads, *contacts):
+            if isinstance(load, Load) and load.body == body:
+                yield load
+
+
+def mechanism_sketch(model: Model, effects: Sequence[ToldEffect]) -> Drawing:
+    """The mechanism with its frames, arms and angles."""
+    pose = Pose(model)
+    shapes = pose.shapes(effects)
+    origin = pose.flat((0.0,) * model.dimensions)
+    every = [p for shape in shapes for p in shape.points]
+    if any(shape.own is not None and shape.body.parent < 0 for shape in shapes):
+        every.append(origin)
+    fit = _Fit(every, WIDE, HIGH)
+    items: list[Item] = []
+    for shape in shapes:
+        items += _skeleton(shape, fit.at)
+    few = len(shapes) <= MOST_NAMED
+    if model.dimensions == 2:
+        for shape in shapes:
+            items += _angle(pose, shapes, shape, fit.at)
+    taken = [item.at for item in items if isinstance(item, Label)]
+    taken += [fit.at(shape.centre) for shape in shapes]
+    for shape in shapes:
+        items += _arms(shape, fit.at, taken if few else None)
+    for shape in shapes:
+        items += _marks(shape, fit.at, model, few)
+    items += _world_axes(pose)
+    return Drawing(WIDE, HIGH, f"{model.title}: the mechanism at its initial pose", tuple(items))
+
+
+class _Fit:
+    """From the paper's metres to points of a drawing."""
+
+    def __init__(self, points: Sequence[Point], wide: float, high: float) -> None:
+        xs, ys = [p[0] for p in points], [p[1] for p in points]
+        width, height = max(xs) - min(xs), max(ys) - min(ys)
+        room = (wide - 2 * MARGIN, high - 2 * MARGIN)
+        scales = [r / size for r, size in zip(room, (width, height), strict=True) if size > 1e-9]
+        self.scale = min(scales, default=1.0)
+        self._middle = ((max(xs) + min(xs)) / 2, (max(ys) + min(ys)) / 2)
+        self._centre = (wide / 2, high / 2)
+
+    def at(self, p: Point) -> Point:
+        """A point of the paper in the drawing."""
+        return (
+            self._centre[0] + self.scale * (p[0] - self._middle[0]),
+            self._centre[1] + self.scale * (p[1] - self._middle[1]),
+        )
+
+
+def _skeleton(shape: Shape, at: Any) -> Iterator[Item]:
+    ends = [p for p in shape.joints if _apart(at(p), at(shape.centre)) > 2]
+    for end in ends:
+        yield Line((at(shape.centre), at(end)), "body")
+    for end in shape.loaded:
+        yield Line((at(shape.centre), at(end)), "thin")
+        yield Dot(at(end), 1.8, True)
+    if not ends:
+        x, y = at(shape.centre)
+        yield Dot((x, y), 13.0, False, "body")
+
+
+def _arms(shape: Shape, at: Any, taken: list[Point] | None) -> Iterator[Item]:
+    """Arms, with names away from the places that are taken; without names if these are None."""
+    arms = [(name, p, "parent") for name, p in shape.others]
+    if shape.own is not None:
+        arms.append((shape.body.joint.name, shape.own, "child"))
+    for name, p, role in arms:
+        start, end = at(shape.centre), at(p)
+        if _apart(start, end) < 16:
+            continue
+        yield Line((start, end), "arm", arrow=True)
+        if taken is not None:
+            sides = _beside(start, end, 5.0 * (len(name) + len(role) + 2))
+            place = max(sides, key=lambda x: min((_apart(x, p) for p in taken), default=0.0))
+            taken.append(place)
+            yield Label(place, sp.Symbol(f"r_{name},{role}"), "arm")
+
+
+def _angle(pose: Pose, shapes: Sequence[Shape], shape: Shape, at: Any) -> Iterator[Item]:
+    """The angle of a joint that turns, from the parent's x axis to the body's."""
+    model, body = pose.model, shape.body
+    kinds = [p.kind for p in body.joint.primitives(2)]
+    if "revolute" not in kinds:
+        return
+    name = body.positions[kinds.index("revolute")].name
+    base = shapes[body.parent].axes[0] if body.parent >= 0 else (1.0, 0.0)
+    start = math.atan2(base[1], base[0])
+    dofs = {c.name: x for c, x in zip(model.coordinates, model.initial_q, strict=True)}
+    own = math.atan2(shape.axes[0][1], shape.axes[0][0])
+    value = dofs.get(name, 0.0)
+    turn = math.remainder(own - start, 2 * math.pi)
+    if abs(value) > 1e-3 and turn * value < 0 and abs(abs(turn) - math.pi) < 0.2:
+        turn += math.copysign(2 * math.pi, value)
+    centre = at(shape.own if shape.own is not None else shape.centre)
+    radius = 34.0 if shape.own is None else 27.0
+    reach = radius + 14
+    for direction in (start, start + turn):
+        end = (centre[0] + reach * math.cos(direction), centre[1] + reach * math.sin(direction))
+        yield Line((centre, end), "thin")
+    if abs(turn) > 0.02:
+        yield Arc(centre, radius, start, start + turn, "angle", arrow=abs(turn) > 0.25)
+    middle = start + turn / 2
+    away = radius + 14
+    label = (centre[0] + away * math.cos(middle), centre[1] + away * math.sin(middle))
+    yield Label(label, sp.Symbol(name), "angle")
+
+
+def _marks(shape: Shape, at: Any, model: Model, few: bool) -> Iterator[Item]:
+    centre = at(shape.centre)
+    if few:
+        for letter, axis in zip("xyz", shape.axes, strict=False):
+            length = math.hypot(*axis)
+            if length > 0.15:
+                end = (centre[0] + 24 * axis[0], centre[1] + 24 * axis[1])
+                yield Line((centre, end), "axis", arrow=True)
+                tip = (centre[0] + 34 * axis[0], centre[1] + 34 * axis[1])
+                yield Label(tip, sp.Symbol(letter), "axis")
+    yield Dot(centre, 3.2, True)
+    if few:
+        yield Label((centre[0] - 11, centre[1] - 12), shape.body.name, "axis")
+    if shape.own is not None:
+        own = at(shape.own)
+        yield Dot(own, 4.2, False, "arm")
+        if shape.body.parent < 0:
+            yield from _ground(own)
+
+
+def _ground(p: Point) -> Iterator[Item]:
+    """Hatching under a joint on the world."""
+    x, y = p[0], p[1] - 7
+    yield Line(((x - 16, y), (x + 16, y)), "axis")
+    for i in range(5):
+        yield Line(((x - 12 + 7 * i, y), (x - 18 + 7 * i, y - 7)), "axis")
+
+
+def _world_axes(pose: Pose) -> Iterator[Item]:
+    n = pose.model.dimensions
+    corner = (30.0, 26.0) if n == 2 else (40.0, 34.0)
+    for i in range(n):
+        unit = pose.flat(tuple(float(i == j) for j in range(n)))
+        end = (corner[0] + 26 * unit[0], corner[1] + 26 * unit[1])
+        yield Line((corner, end), "axis", arrow=True)
+        tip = (corner[0] + 37 * unit[0], corner[1] + 37 * unit[1])
+        yield Label(tip, sp.Symbol("xyz"[i]), "axis")
+
+
+def body_diagrams(model: Model, effects: Sequence[ToldEffect]) -> tuple[Drawing, ...]:
+    """The free-body diagram of each body: every force with the name that it has in the equations."""
+    pose = Pose(model)
+    return tuple(_diagram(pose, shape, effects) for shape in pose.shapes(effects))
+
+
+def _diagram(pose: Pose, shape: Shape, effects: Sequence[ToldEffect]) -> Drawing:
+    model, body = pose.model, shape.body
+    fit = _Fit([*shape.points], PANEL_BODY + 2 * MARGIN, PANEL_BODY + 2 * MARGIN)
+    shift = (PANEL - PANEL_BODY - 2 * MARGIN) / 2
+
+    def at(p: Point) -> Point:
+        x, y = fit.at(p)
+        return (x + shift, y + shift)
+
+    forces: list[tuple[Point, Point, Expr, str]] = []
+    torques: list[tuple[Point, Expr]] = []
+    if shape.own is not None:
+        name = body.joint.name
+        forces.append((at(shape.own), _unknown(name, -1), -sp.Symbol(f"f_{name}"), "force"))
+    for name, p in shape.others:
+        forces.append((at(p), _unknown(name, 1), sp.Symbol(f"f_{name}"), "force"))
+    for told in effects:
+        for found in _loads_on(pose, shape, told):
+            start, direction, label, style = found
+            if direction is None:
+                torques.append((at(start), label))
+            else:
+                forces.append((at(start), direction, label, style))
+    items: list[Item] = [*_skeleton(shape, at)]
+    items.append(Dot(at(shape.centre), 3.2, True))
+    items += (Dot(at(p), 4.2, False, "arm") for p in shape.joints)
+    busy = [at(p) for p in shape.joints] + [p for p, _ in torques]
+    items += _drawn_forces(forces, busy)
+    for i, (p, label) in enumerate(torques):
+        radius = 17.0 + 7 * i
+        turning = -1 if label.could_extract_minus_sign() else 1
+        first = math.radians(200) if turning > 0 else math.radians(-20)
+        items.append(Arc(p, radius, first, first + turning * math.radians(220), "force"))
+        items.append(Label((p[0], p[1] - radius - 10 - 6 * (i % 2)), label, "force"))
+    items.append(Label((PANEL / 2, 10), body.name, "axis"))
+    title = f"Free-body diagram of {body.name} in {model.title}"
+    return Drawing(PANEL, PANEL, title, tuple(items))
+
+
+def _drawn_forces(
+    forces: Sequence[tuple[Point, Point, Expr, str]], busy: Sequence[Point]
+) -> Iterator[Item]:
+    """Arrows with labels; those at one point fan out if they have the same direction."""
+    used: list[tuple[Point, float]] = []
+    taken = [*busy, *(start for start, *_ in forces)]
+    for start, direction, label, style in forces:
+        angle = math.atan2(direction[1], direction[0])
+        for turn in (0.0, 0.45, -0.45, 0.9, -0.9, 1.4, -1.4, 2.0, -2.0):
+            if all(
+                _apart(p, start) > 6 or abs(math.remainder(a - angle - turn, 2 * math.pi)) > 0.35
+                for p, a in used
+            ):
+                angle += turn
+                break
+        used.append((start, angle))
+        c, s = math.cos(angle), math.sin(angle)
+        end = (start[0] + FORCE * c, start[1] + FORCE * s)
+        yield Line((start, end), style, arrow=True)
+        half = 3.2 * len(str(label)) + 4
+        places = [(end[0] + half * c * 0.9, end[1] + 11 * s)]
+        places += [(end[0] + side * half, end[1] + up) for up in (0, 12, -12) for side in (1, -1)]
+        places = [(min(max(x, half), PANEL - half), min(max(y, 24.0), PANEL - 8)) for x, y in places]
+        place = max(places, key=lambda p: min(35.0, *(_apart(p, q) for q in taken), 1e9))
+        taken += [place, end]
+        yield Label(place, label, style)
+
+
+def _unknown(joint: str, sign: int) -> Point:
+    """A direction for a force that is not known yet: opposite on the two bodies."""
+    angle = math.radians(35 + 40 * (sum(map(ord, joint)) % 3))
+    return (sign * math.cos(angle), sign * math.sin(angle))
+
+
+def _loads_on(
+    pose: Pose, shape: Shape, told: ToldEffect
+) -> Iterator[tuple[Point, Point | None, Expr, str]]:
+    """Start, direction (None for a torque), name and style of each load of an effect on a body."""
+    model, body = pose.model, shape.body
+    if isinstance(told.effect, Gravity) and told.kept:
+        weight = next((x for x in told.loads if isinstance(x, Load) and x.body == body.name), None)
+        if weight is not None and any(weight.force):
+            size = next(f for f in weight.force if f != 0)
+            down = pose.flat((*(0.0,) * (model.dimensions - 1), -1.0))
+            brief = len(size.args) <= 3  # -1, mass, g
+            name = sp.Symbol(f"f_{told.effect.name},{body.name}")
+            yield shape.centre, down, -size if brief else name, "force"
+        return
+    for load in told.loads:
+        if isinstance(load, Load):
+            if load.body == body.name:
+                yield from _one_load(pose, load, told)
+        elif load.joint == body.joint.name and shape.own is not None:
+            yield shape.own, None, _joint_name(load, told), "force"
+        else:
+            for name, p in shape.others:
+                if name == load.joint:
+                    yield p, None, -_joint_name(load, told), "force"
+    for contact in told.contacts:
+        for side in contact.normal:
+            if isinstance(side, Load) and side.body == body.name:
+                start = pose.point(body.name, _numbers(model, side.at))
+                direction = _direction(pose, side.force)
+                yield start, direction, sp.Symbol(f"P_{contact.name}"), "impulse"
+
+
+def _one_load(
+    pose: Pose, load: Load, told: ToldEffect
+) -> Iterator[tuple[Point, Point | None, Expr, str]]:
+    start = pose.point(load.body, _numbers(pose.model, load.at))
+    if any(load.force):
+        name = _vector_name(load.force) or f"f_{told.effect.name},{load.body}"
+        yield start, _direction(pose, load.force), sp.Symbol(name), "force"
+    if any(load.torque):
+        name = _vector_name(load.torque) or f"t_{told.effect.name},{load.body}"
+        yield start, None, sp.Symbol(name), "force"
+
+
+def _joint_name(load: JointLoad, told: ToldEffect) -> Expr:
+    if load.force.is_Symbol:
+        return load.force
+    return sp.Symbol(f"tau_{told.effect.name}")
+
+
+def _vector_name(parts: Sequence[Expr]) -> str:
+    """The shared name of components that are symbols: f_A of f_A_x and f_A_y."""
+    names = [part.name for part in parts if part != 0 and part.is_Symbol]
+    if len(names) != sum(part != 0 for part in parts):
+        return ""
+    if len(parts) == 1:
+        return str(names[0])
+    stems = {name[:-2] for name in names if name[-2:-1] in ("_", ",")}
+    return stems.pop() if len(stems) == 1 else ""
+
+
+def _numbers(model: Model, at: Sequence[Expr]) -> tuple[float, ...]:
+    """A point in body axes by its symbols' values."""
+    values = model.defaults
+    return tuple(float(sp.N(sp.S(x).subs({s: values[s.name] for s in sp.S(x).free_symbols})))
+                 for x in at)  # fmt: skip
+
+
+def _direction(pose: Pose, force: Sequence[Expr]) -> Point:
+    """The direction of a force at the initial pose if its components are numbers, else upwards."""
+    up = (*(0.0,) * (pose.model.dimensions - 1), 1.0)
+    known = all(sp.S(f).is_number for f in force)
+    x, y = pose.flat(tuple(float(f) for f in force) if known else up)
+    if known or pose.model.dimensions == 3:
+        return (x, y)
+    horizontal = any(f != 0 for f in force[:1])
+    vertical = any(f != 0 for f in force[1:])
+    return (0.55 * horizontal, 0.83 * vertical) if horizontal and vertical else (
+        (1.0, 0.0) if horizontal else (0.0, 1.0)
+    )
+
+
+def _apart(a: Point, b: Point) -> float:
+    return math.hypot(a[0] - b[0], a[1] - b[1])
+
+
+def _beside(start: Point, end: Point, width: float) -> list[Point]:
+    """The places for a label of a width on both sides of the middle of a line."""
+    length = _apart(start, end) or 1.0
+    nx, ny = -(end[1] - start[1]) / length, (end[0] - start[0]) / length
+    distance = 12.0 + abs(nx) * width / 2
+    x, y = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
+    return [(x + s * distance * nx, y + s * distance * ny) for s in (1, -1)]
+
