@@ -21,7 +21,7 @@ from eomgen.telling.effects import ToldEffect
 from eomgen.templating import render
 
 WIDTH = 100
-PAGE, PAPER = 112.0, 86.0
+PAGE, PAPER = 118.0, 106.0
 """The width of a formula's line on the page and on paper, as `_size` counts it."""
 Figures = dict[str, tuple[Drawing, ...]]
 
@@ -178,24 +178,24 @@ def _latex(equation: Equation) -> Iterator[list[str]]:
         return
     lines = [
         f"{'' if i else tex(equation.left) + ' ='}{{}}& {line}"
-        for i, line in enumerate(_broken(equation.right))
+        for i, line in enumerate(_broken(equation.right, _size(equation.left) + 4))
     ]
     yield lines
 
 
-def _broken(e: Any) -> Iterator[str]:
+def _broken(e: Any, indent: float) -> Iterator[str]:
     """A sum in lines of a bearable length; what is too long by itself is made smaller."""
-    line, length = "", 0
+    line, length = "", 0.0
     for i, term in enumerate(terms_of(e)):
-        size, minus = _size(term), negative(term)
-        if length and length + size > PAPER:
+        size, minus = _size(term) + 2, negative(term)
+        if length and indent + length + size > PAPER:
             yield line
-            line, length = "", 0
+            line, length = "", 0.0
         sign = "- " if minus else "+ " if i else ""
         text = tex(-term if minus else term)
         if isinstance(term, sp.Add):
             text = rf"\left({text}\right)"
-        if size > PAPER:
+        if indent + size > PAPER and not isinstance(term, sp.MatrixBase):
             text = rf"\resizebox{{0.85\linewidth}}{{!}}{{$\displaystyle {text}$}}"
         line, length = f"{line}{sign}{text} ", length + size
     yield line
@@ -296,15 +296,16 @@ def _html(equation: Equation) -> Iterator[str]:
         for entry in entries(equation):
             yield from _html(entry)
         return
-    if not isinstance(right, sp.Add) or _size(right) <= PAGE:
+    indent = _size(left) + 4
+    if not isinstance(right, sp.Add) or indent + _size(right) <= PAGE:
         yield mathml(left, right)
         return
-    rows, line, length = [], "", 0
+    rows, line, length = [], "", 0.0
     for i, term in enumerate(terms_of(right)):
-        size, minus = _size(term), negative(term)
-        if length and length + size > PAGE:
+        size, minus = _size(term) + 2, negative(term)
+        if length and indent + length + size > PAGE:
             rows.append(line)
-            line, length = "", 0
+            line, length = "", 0.0
         sign = f'<mo form="prefix">{"−" if minus else "+"}</mo>' if minus or i else ""
         line, length = f"{line}{sign}{written(-term if minus else term)}", length + size
     yield _aligned(left, [*rows, line])

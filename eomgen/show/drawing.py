@@ -8,7 +8,7 @@ from typing import Any
 
 from eomgen.show.mathml import decimal
 from eomgen.show.notation import parsed
-from eomgen.show.tex import tex
+from eomgen.show.tex import escaped, tex
 
 Expr = Any
 Point = tuple[float, float]
@@ -177,8 +177,8 @@ def tikz(drawing: Drawing) -> str:
 def _tikz_item(item: Item) -> str:
     if isinstance(item, Label):
         x, y = item.at
-        text = f"\\text{{{item.text}}}" if isinstance(item.text, str) else tex(item.text)
-        return f"\\node[text=eom{item.style}] at ({x:.1f},{y:.1f}) {{\\footnotesize ${text}$}};"
+        text = escaped(item.text) if isinstance(item.text, str) else f"${tex(item.text)}$"
+        return f"\\node[text=eom{item.style}] at ({x:.1f},{y:.1f}) {{\\footnotesize {text}}};"
     width = STYLES[item.style][1]
     options = f"eom{item.style}, line width={width * 0.6:.2f}pt"
     if isinstance(item, Dot):

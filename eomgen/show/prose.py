@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["word", "code", "name", "power"]
-NAME = re.compile(r"(?<![\w<.])([A-Za-zα-ωΑ-Ω]|I\^[Aa]|p\^[Aa])_([A-Za-z]+(?:,[a-z]+)*)(?![\w(])|I\^A|p\^A|\^(?:\([^)]*\)|-?[\w.]*\w)")
+NAME = re.compile(r"(?<![\w<.])([A-Za-zα-ωΑ-Ω]|I\^[Aa]|p\^[Aa])_([A-Za-z0-9]\w*(?:,[a-z]+)*)(?![\w(])|I\^A|p\^A|\^(?:\([^)]*\)|-?[\w.]*\w)")
 """A letter with a subscript, such as f_j, which prose writes as formulas do."""
 
 

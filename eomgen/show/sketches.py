@@ -276,7 +276,7 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[ToldEffect]) -> Drawing
         return (x + shift, y + shift)
 
     forces: list[tuple[Point, Point, Expr, str]] = []
-    torques: list[tuple[Point, Expr]] = []
+    torques: dict[Point, dict[Expr, None]] = {}
     if shape.own is not None:
         name = body.joint.name
         forces.append((at(shape.own), _unknown(name, -1), -sp.Symbol(f"f_{name}"), "force"))
@@ -286,23 +286,33 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[ToldEffect]) -> Drawing
         for found in _loads_on(pose, shape, told):
             start, direction, label, style = found
             if direction is None:
-                torques.append((at(start), label))
+                torques.setdefault(at(start), {})[label] = None
             else:
                 forces.append((at(start), direction, label, style))
     items: list[Item] = [*_skeleton(shape, at)]
     items.append(Dot(at(shape.centre), 3.2, True))
     items += (Dot(at(p), 4.2, False, "arm") for p in shape.joints)
-    busy = [at(p) for p in shape.joints] + [p for p, _ in torques]
+    busy = [*map(at, shape.joints), *torques]
     items += _drawn_forces(forces, busy)
-    for i, (p, label) in enumerate(torques):
-        radius = 17.0 + 7 * i
-        turning = -1 if label.could_extract_minus_sign() else 1
-        first = math.radians(200) if turning > 0 else math.radians(-20)
-        items.append(Arc(p, radius, first, first + turning * math.radians(220), "force"))
-        items.append(Label((p[0], p[1] - radius - 10 - 6 * (i % 2)), label, "force"))
+    for p, labels in torques.items():
+        items += _drawn_torques(p, list(labels))
     items.append(Label((PANEL / 2, 10), body.name, "axis"))
     title = f"Free-body diagram of {body.name} in {model.title}"
     return Drawing(PANEL, PANEL, title, tuple(items))
+
+
+def _drawn_torques(p: Point, labels: Sequence[Expr]) -> Iterator[Item]:
+    """One arc for all torques at a point that turn the same way, with their names below it."""
+    below = p[1] - 29.0
+    for turning in (1, -1):
+        named = [x for x in labels if x.could_extract_minus_sign() == (turning < 0)]
+        if named:
+            radius = 17.0 if turning > 0 else 22.0
+            first = math.radians(200) if turning > 0 else math.radians(-20)
+            yield Arc(p, radius, first, first + turning * math.radians(220), "force")
+        for label in named:
+            yield Label((p[0], below), label, "force")
+            below -= 13.0
 
 
 def _drawn_forces(
@@ -384,9 +394,11 @@ def _one_load(
 
 
 def _joint_name(load: JointLoad, told: ToldEffect) -> Expr:
-    if load.force.is_Symbol:
+    """The name of a load at a joint; the components of a torque at a ball share one."""
+    several = [x for x in told.loads if isinstance(x, JointLoad) and x.joint == load.joint]
+    if load.force.is_Symbol and len(several) == 1:
         return load.force
-    return sp.Symbol(f"tau_{told.effect.name}")
+    return sp.Symbol(f"tau_{told.effect.name},{load.joint}")
 
 
 def _vector_name(parts: Sequence[Expr]) -> str:

@@ -196,7 +196,7 @@ def _effect_steps(model: Model, effects: Sequence[ToldEffect]) -> Iterator[Step]
         if told.kept:
             lines = _loads_as_they_are(told)
         lines += [Equation(symbol, rate) for symbol, rate in told.rates]
-        yield Step("", f"Effect {told.effect.name} ({told.effect.type.replace('_', ' ')})", told.words, tuple(lines))
+        yield Step("", f"Effect `{told.effect.name}` ({told.effect.type.replace('_', ' ')})", told.words, tuple(lines))
 
 
 def used_bodies(told: ToldEffect) -> Iterator[str]:

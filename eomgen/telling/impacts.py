@@ -76,11 +76,11 @@ def _contact_step(model: Model, contact: Contact) -> Step:
     if contact.tangents and contact.friction != 0:
         lines.append(Equation(real(f"mu_{name}"), contact.friction))
     words = (
-        f"Contact {name}: its gap, the speed at which it opens and the slip speeds, which are the "
+        f"Contact `{name}`: its gap, the speed at which it opens and the slip speeds, which are the "
         "rows of J; by virtual work Jᵀ holds the generalised forces of unit impulses."
     )
     kept = tuple(line for line in lines if line.left != line.right)
-    return Step("", f"Contact {name}", words, kept)
+    return Step("", f"Contact `{name}`", words, kept)
 
 
 def _power(model: Model, loads: Sequence[Load | JointLoad]) -> Expr:

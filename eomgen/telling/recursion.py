@@ -87,7 +87,7 @@ def recursive_steps(model: Model, frames: tuple[Frame, ...], told: tuple[ToldEff
     r = Recursion(model, frames, told)
     yield Step("", "The algorithm", _algorithm(r), ())
     for k, frame in enumerate(frames):
-        yield Step("", f"Frame {frame.name}: {_kind(r, k)}", "", tuple(_constants(r, frame)))
+        yield Step("", f"Frame `{frame.name}`: {_kind(r, k)}", "", tuple(_constants(r, frame)))
     order = range(len(frames))
     lines = [line for k in order for line in _velocities(r, k)]
     yield Step("", "Outwards: velocities and bias forces", _outward_words(r), tuple(lines))
@@ -154,8 +154,8 @@ def _algorithm(r: Recursion) -> str:
 
 def _kind(r: Recursion, k: int) -> str:
     frame = r.frames[k]
-    above = r.frames[frame.parent].name if frame.parent >= 0 else f"the {WORLD}"
-    carries = f", carries {frame_name(r.model, frame)}" if frame.body >= 0 else ", without mass"
+    above = f"`{r.frames[frame.parent].name}`" if frame.parent >= 0 else f"the {WORLD}"
+    carries = f", carries `{frame_name(r.model, frame)}`" if frame.body >= 0 else ", without mass"
     moved = {
         "revolute": "turns about", "prismatic": "slides along", "spherical": "turns freely",
         "fixed": "fixed",

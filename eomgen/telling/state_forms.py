@@ -62,7 +62,9 @@ def momentum_form(equations: Equations) -> WrittenForm:
 def velocity_form(equations: Equations) -> WrittenForm:
     """[q, v] by the closed form (37), in coordinates."""
     s = equations.symbols
-    given = over_coordinates(equations.model, s)
+    accelerations = {*s.xdd, *s.ydd, *s.alpha}
+    turned = over_coordinates(equations.model, s)
+    given = {symbol: e for symbol, e in turned.items() if symbol not in accelerations}
     form: StateForm = state_form(equations)
     still = dict.fromkeys(s.tau, sp.Integer(0))
     own = {*s.q, *s.v}

@@ -67,19 +67,19 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
             pairs.append((sp.Symbol(f"R_{body.name}"), whole[:size, :size]))
         pairs.append((sp.Symbol(f"r_{body.name}"), position[:size, :].applyfunc(_short)))
         yield (
-            f"Joint {body.joint.name}: {body.joint.type}, {parent} to {body.name}",
-            f"R_{body.name} turns axes of {body.name} into those of {parent}, and r_{body.name} "
-            f"runs from the centre of mass of {parent} to that of {body.name}, axes of {parent}."
+            f"Joint `{body.joint.name}`: {body.joint.type}, `{parent}` to `{body.name}`",
+            f"R_{body.name} turns axes of `{body.name}` into those of `{parent}`, and r_{body.name} "
+            f"runs from the centre of mass of `{parent}` to that of `{body.name}`, axes of `{parent}`."
             if body.parent >= 0
-            else f"R_{body.name} turns axes of {body.name} into the world's, and r_{body.name} is "
-            f"the place of the centre of mass of {body.name} in the world.",
+            else f"R_{body.name} turns axes of `{body.name}` into the world's, and r_{body.name} is "
+            f"the place of the centre of mass of `{body.name}` in the world.",
             pairs,
         )
         yield (
-            f"Joint {body.joint.name}, differentiated twice",
-            f"Angular velocity ω and velocity u of the centre of mass of {body.name}, and their "
-            f"derivatives α and a, in axes of {body.name}"
-            + (f", by those of {parent}." if body.parent >= 0 else "."),
+            f"Joint `{body.joint.name}`, differentiated twice",
+            f"Angular velocity ω and velocity u of the centre of mass of `{body.name}`, and their "
+            f"derivatives α and a, in axes of `{body.name}`"
+            + (f", by those of `{parent}`." if body.parent >= 0 else "."),
             _differentiated(c, still),
         )
 
