@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from eomgen.derivation.matrices import Matrices
     from eomgen.derivation.steps import Step
     from eomgen.derivation.symbols import Expr
-    from eomgen.telling.derivation import Telling
     from eomgen.program.passes import PassReport
     from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
+    from eomgen.telling.derivation import Telling
 
 
 @dataclass(frozen=True)

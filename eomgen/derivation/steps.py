@@ -11,7 +11,6 @@ from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
 from eomgen.scene.joints import Free
 
-
 Definition = tuple[Expr, Expr]
 """A symbol and what it stands for."""
 

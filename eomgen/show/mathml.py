@@ -76,7 +76,7 @@ def _print(e: Expr) -> tuple[str, int]:
         a, b = (_bracketed(x, ATOM) for x in e.args)
         return f"{a}{sign}{b}", PRODUCT
     if isinstance(e, sp.Transpose):
-        return f"<msup>{_bracketed(e.arg, ATOM)}<mi mathvariant=\"normal\">T</mi></msup>", POWER
+        return f'<msup>{_bracketed(e.arg, ATOM)}<mi mathvariant="normal">T</mi></msup>', POWER
     if isinstance(e, sp.Inverse):
         minus = "<mrow><mo>−</mo><mn>1</mn></mrow>"
         return f"<msup>{_bracketed(e.arg, ATOM)}{minus}</msup>", POWER
@@ -203,15 +203,11 @@ def _brackets(inner: str) -> str:
     """Round brackets; around what is high they are borders."""
     if any(tag in inner for tag in ("<mfrac", "<mtable", "<msqrt")):
         return f'<mrow class="high">{inner}</mrow>'
-    return (
-        f'<mrow><mo stretchy="false">(</mo>{inner}<mo stretchy="false">)</mo></mrow>'
-    )
+    return f'<mrow><mo stretchy="false">(</mo>{inner}<mo stretchy="false">)</mo></mrow>'
 
 
 def _matrix(rows: Sequence[Sequence[str]]) -> str:
-    lines = "".join(
-        "<mtr>" + "".join(f"<mtd>{x}</mtd>" for x in row) + "</mtr>" for row in rows
-    )
+    lines = "".join("<mtr>" + "".join(f"<mtd>{x}</mtd>" for x in row) + "</mtr>" for row in rows)
     return f'<mrow class="matrix"><mtable displaystyle="true">{lines}</mtable></mrow>'
 
 

@@ -6,8 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["word", "code", "name", "power"]
-NAME = re.compile(r"(?<![\w<.])([A-Za-zα-ωΑ-Ω]|I\^[Aa]|p\^[Aa])_([A-Za-z0-9]\w*(?:,[a-z]+)*)(?![\w(])|I\^A|p\^A|\^(?:\([^)]*\)|-?[\w.]*\w)")
-"""A letter with a subscript, such as f_j, which prose writes as formulas do."""
+NAME = re.compile(
+    r"(?<![\w<.])([A-Za-zα-ωΑ-Ω]|I\^[Aa]|p\^[Aa])_([A-Za-z0-9]\w*(?:,[a-z]+)*)(?![\w(])|I\^A|p\^A|\^(?:\([^)]*\)|-?[\w.]*\w)"
+)
+"""A letter with a subscript, such as f_j, which prose writes as formulas do; a power."""
+WORD = re.compile(r"(?<![\w`<])([A-Za-z]{2,}\w*_\w+)(?![\w`(])")
+"""A name of the language of scenes."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +37,7 @@ def blocks(words: str) -> tuple[Block, ...]:
 def pieces(text: str) -> tuple[tuple[Kind, str], ...]:
     """A text in words, code and names."""
     found: list[tuple[Kind, str]] = []
-    for i, part in enumerate(" ".join(text.split()).split("`")):
+    for i, part in enumerate(_marked(" ".join(text.split())).split("`")):
         if i % 2:
             found.append(("code", part))
             continue
@@ -46,6 +50,13 @@ def pieces(text: str) -> tuple[tuple[Kind, str], ...]:
             start = match.end()
         found.append(("word", signs(part[start:])))
     return tuple(piece for piece in found if piece[1])
+
+
+def _marked(text: str) -> str:
+    """The text with its names of the scene's language marked as code too."""
+    parts = text.split("`")
+    parts[::2] = [WORD.sub(r"`\1`", part) for part in parts[::2]]
+    return "`".join(parts)
 
 
 def signs(text: str) -> str:

@@ -87,10 +87,7 @@ def tex_symbol(name: str) -> str:
     """A name with its dots, superscript and subscripts."""
     parts = parsed(name)
     letter = parts.letter
-    if parts.single:
-        base = _letter(letter)
-    else:
-        base = rf"\mathrm{{{escaped(letter)}}}"
+    base = _letter(letter) if parts.single else rf"\mathrm{{{escaped(letter)}}}"
     if parts.dots:
         base = rf"{ACCENTS[parts.dots]}{{{base}}}"
     below = ",".join(_below(part) for part in parts.below)
@@ -114,7 +111,8 @@ SPECIAL = {
     "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
     "<": r"$<$", ">": r"$>$", "|": r"$|$", "½": r"$\frac{1}{2}$", "²": "$^2$", "³": "$^3$",
     "⁻": "$^-$", "¹": "$^1$", "·": r"$\cdot$", "⋅": r"$\cdot$", "±": r"$\pm$", "∓": r"$\mp$",
-    "×": r"$\times$", "≥": r"$\geq$", "≤": r"$\leq$", "≫": r"$\gg$", "≈": r"$\approx$", "→": r"$\to$",
+    "×": r"$\times$", "≥": r"$\geq$", "≤": r"$\leq$", "≫": r"$\gg$", "≈": r"$\approx$",
+    "→": r"$\to$", "π": r"$\pi$",
     "∞": r"$\infty$", "√": r"$\sqrt{\ }$", "∂": r"$\partial$", "∑": r"$\sum$", "−": "$-$",
     "–": "--", "—": "---", "…": r"\dots{}", "°": r"$^\circ$", "’": "'", "“": "``", "”": "''",
     "∗": r"$*$", "ᵀ": r"$^{\mathrm T}$", "·̇": r"$\cdot$", '"': "''",

@@ -25,6 +25,7 @@ from eomgen.errors import SceneError
 from eomgen.language.formula import Formula
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import Load
+from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import Form
 from eomgen.telling.effects import ToldEffect, equations_of, told_effects, with_symbols
 from eomgen.telling.frames import frames_of
@@ -36,8 +37,8 @@ from eomgen.telling.recursion import recursive_steps
 from eomgen.telling.state_forms import form_step, momentum_form, plain_form, velocity_form
 
 HANDOUT = (
-    "Numbers in brackets up to (36) are those of the handout that this derivation follows: \"CS229 "
-    "Dynamics Handout\", a university handout on dynamics for computer graphics, section 2: two "
+    'Numbers in brackets up to (36) are those of the handout that this derivation follows: "CS229 '
+    'Dynamics Handout", a university handout on dynamics for computer graphics, section 2: two '
     "rigid bodies, one rotational joint, free in the plane. What is different here: the bodies and "
     "joints are those of the scene, ψ is the orientation of a body and ω its rate, sin and cos are "
     "written out where the handout has S and C, and each effect of the scene has its own forces "
@@ -45,7 +46,8 @@ HANDOUT = (
     "the computer."
 )
 PROJECTED = (
-    "The handout \"CS229 Dynamics Handout\" derives two rigid bodies in the plane with one rotational "
+    'The handout "CS229 Dynamics Handout" derives two rigid bodies in the plane with one '
+    "rotational "
     "joint. This mechanism is another, so the steps have numbers of their own. The equations "
     "M dv/dt + V + G = F have the handout's form (24), (36); M is symmetric here, the same as that "
     "of `mass_matrix()` in the generated module."
@@ -53,17 +55,19 @@ PROJECTED = (
 RECURSIVE = (
     "The equations of this mechanism written out would be too long to be read, so they are told as "
     "an algorithm: named quantities, one frame after another, each by those before. It solves "
-    "M dv/dt + V + G = F, the handout's (24) with (36) (\"CS229 Dynamics Handout\"), without forming "
+    'M dv/dt + V + G = F, the handout\'s (24) with (36) ("CS229 Dynamics Handout"), without '
+    "forming "
     "M. The symmetric M is what `mass_matrix()` of the generated module returns."
 )
 SYMMETRIC = (
-    "There are two ways to write (24). Its rows above are torques about the bodies' own centres of "
-    "mass, so M of (26) is not symmetric. A Lagrangian derivation has generalised forces as rows, "
-    "and its M is symmetric: ½ vᵀ M v is the kinetic energy. `mass_matrix()` of the generated module "
-    "returns that one, and `velocity_force()`, `gravity_force()`, `applied_force()` the V, G, F that "
-    "belong to it. The matrix T leads from one to the other: to the torque of each body it adds the "
-    "moment of the tree's total force, and then it sums the rows of all bodies that a joint "
-    "turns. T has an inverse, so both systems have the same solution."
+    "There are two ways to write (24). Its rows above are torques about the bodies' own centres "
+    "of mass, so M of (26) is not symmetric. A Lagrangian derivation has generalised forces as "
+    "rows, and its M is symmetric: ½ vᵀ M v is the kinetic energy. `mass_matrix()` of the "
+    "generated module returns that one, and `velocity_force()`, `gravity_force()`, "
+    "`applied_force()` the V, G, F that belong to it. The matrix T leads from one to the other: "
+    "to the torque of each body it adds the moment of the tree's total force, and then it sums "
+    "the rows of all bodies that a joint turns. T has an inverse, so both systems have the same "
+    "solution."
 )
 PRESCRIBED = (
     "Driven coordinates follow the formulas above, and their rates are the derivatives of these; "
@@ -129,11 +133,13 @@ def _of_pins(model: Model, bare: Model, effects: tuple[ToldEffect, ...], form: F
 def _of_any(model: Model, bare: Model, effects: tuple[ToldEffect, ...]) -> Telling:
     equations = derive_projected(bare)
     names = reading_names(model)
-    found = [step for step in projected_steps(equations)]
+    found = list(projected_steps(equations))
     place = next(i for i, step in enumerate(found) if step.title == "Closed form")
     form = plain_form(model, [real(c.acceleration) for c in model.velocities])
     ends = [*impact_steps(model, effects), form_step("velocity", form, effects)]
-    words = "Each body by itself, with its weight, the forces of the effects, and those of its joints."
+    words = (
+        "Each body by itself, with its weight, the forces of the effects, and those of its joints."
+    )
     state = replace(found[0], figure="mechanism")
     steps = [
         state,
@@ -164,7 +170,7 @@ def _recursive(model: Model, effects: tuple[ToldEffect, ...]) -> Telling:
     steps = [
         Step("", "State", words, tuple(state), "mechanism"),
         Step("", "Free bodies", _free_words(model), (), "bodies"),
-        *_effect_steps(model, effects),
+        *_effect_steps(model, effects, every=True),
         *recursive_steps(model, frames, effects),
         *impact_steps(model, effects),
         form_step("velocity", form, effects),
@@ -174,9 +180,14 @@ def _recursive(model: Model, effects: tuple[ToldEffect, ...]) -> Telling:
     return Telling((intro, *numbered(list(told))), None, effects)
 
 
-def _effect_steps(model: Model, effects: Sequence[ToldEffect]) -> Iterator[Step]:
-    """Poses and motions that the effects use, and each effect with its forces."""
-    needed = dict.fromkeys(body for told in effects for body in used_bodies(told))
+def _effect_steps(
+    model: Model, effects: Sequence[ToldEffect], *, every: bool = False
+) -> Iterator[Step]:
+    """Poses and motions that the effects use, and each effect with its forces.
+
+    The recursion needs the poses of bodies with forces that no motion changes as well (`every`).
+    """
+    needed = dict.fromkeys(body for t in effects if every or not t.kept for body in used_bodies(t))
     if needed:
         words = (
             "The forces below use where bodies are in the world and how they move. o is the place "
@@ -196,16 +207,22 @@ def _effect_steps(model: Model, effects: Sequence[ToldEffect]) -> Iterator[Step]
         if told.kept:
             lines = _loads_as_they_are(told)
         lines += [Equation(symbol, rate) for symbol, rate in told.rates]
-        yield Step("", f"Effect `{told.effect.name}` ({told.effect.type.replace('_', ' ')})", told.words, tuple(lines))
+        yield Step(
+            "",
+            f"Effect `{told.effect.name}` ({told.effect.type.replace('_', ' ')})",
+            told.words,
+            tuple(lines),
+        )
 
 
 def used_bodies(told: ToldEffect) -> Iterator[str]:
     """The bodies whose pose or motion the formulas of an effect, or its use, need."""
     yield from told.bodies
-    loads = [*(() if told.kept else told.loads)]
+    weight = told.kept and told.effect.type == "gravity"
+    loads = [*(() if weight else told.loads)]
     for contact in told.contacts:
         loads += [*contact.normal, *(load for tangent in contact.tangents for load in tangent)]
-    yield from (load.body for load in loads if isinstance(load, Load) and load.body != "world")
+    yield from (load.body for load in loads if isinstance(load, Load) and load.body != WORLD)
 
 
 def _loads_as_they_are(told: ToldEffect) -> list[Equation]:
@@ -277,6 +294,6 @@ def _whole(found: Matrices, model: Model, effects: Sequence[ToldEffect]) -> Matr
     known |= {s.name: s for s in (*found.q, *found.v)}
     definitions: list[Definition] = [
         (symbol, e.xreplace({s: known.get(s.name, s) for s in e.free_symbols}))
-        for symbol, e in ((s, sp.S(e)) for s, e in more)
+        for symbol, e in more
     ]
     return replace(found, definitions=(*definitions, *found.definitions))

@@ -13,6 +13,7 @@ from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Name
 from eomgen.model.model import Model
+from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import (
     Contact,
     EffectTable,
@@ -23,7 +24,6 @@ from eomgen.scene.effects.base import (
     Mechanism,
     Vector,
 )
-from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.joints.base import WORLD
 from eomgen.telling.mechanism import AXES, Notes, TellingMechanism
 
@@ -186,7 +186,9 @@ class StandIn(EffectTable):
 
         def fixed(value: Expr) -> Expr:
             free = getattr(value, "free_symbols", ())
-            return value.xreplace({s: mechanism.value(Name(s.name)) for s in free}) if free else value
+            return (
+                value.xreplace({s: mechanism.value(Name(s.name)) for s in free}) if free else value
+            )
 
         for load in self.told.loads:
             if isinstance(load, JointLoad):

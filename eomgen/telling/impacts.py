@@ -19,14 +19,14 @@ from eomgen.telling.mechanism import (
 )
 
 LAW = (
-    "A rigid contact exerts no force while its gap g is positive. Where g becomes 0 with u_n < 0 an "
-    "impact takes place, in no time: the coordinates stay, and an impulse P along the normal and the "
-    "tangents changes the velocities. J holds the rows that give the speeds u of the contact from "
-    "the velocities, and Jᵀ P are generalised impulses. A is the inverse mass that the "
-    "contact point has in these directions. The law is that of A. Chatterjee and A. Ruina, A new "
-    "algebraic rigid-body collision law based on impulse space considerations, J. Appl. Mech. 65 "
-    "(1998) 939-951: P_I ends the approach without friction, P_II ends the slip as well, e is the "
-    "coefficient of restitution and μ that of friction. κ is 1, or as much less as keeps the "
+    "A rigid contact exerts no force while its gap g is positive. Where g becomes 0 with u_n < 0 "
+    "an impact takes place, in no time: the coordinates stay, and an impulse P along the normal "
+    "and the tangents changes the velocities. J holds the rows that give the speeds u of the "
+    "contact from the velocities, and Jᵀ P are generalised impulses. A is the inverse mass that "
+    "the contact point has in these directions. The law is that of A. Chatterjee and A. Ruina, A "
+    "new algebraic rigid-body collision law based on impulse space considerations, J. Appl. Mech. "
+    "65 (1998) 939-951: P_I ends the approach without friction, P_II ends the slip as well, e is "
+    "the coefficient of restitution and μ that of friction. κ is 1, or as much less as keeps the "
     "tangential part of P within μ times its normal part."
 )
 
@@ -76,7 +76,8 @@ def _contact_step(model: Model, contact: Contact) -> Step:
     if contact.tangents and contact.friction != 0:
         lines.append(Equation(real(f"mu_{name}"), contact.friction))
     words = (
-        f"Contact `{name}`: its gap, the speed at which it opens and the slip speeds, which are the "
+        f"Contact `{name}`: its gap, the speed at which it opens and the slip speeds, which are "
+        f"the "
         "rows of J; by virtual work Jᵀ holds the generalised forces of unit impulses."
     )
     kept = tuple(line for line in lines if line.left != line.right)

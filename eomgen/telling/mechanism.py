@@ -10,15 +10,15 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
-from eomgen.derivation.steps import Definition
 from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.told_scalars import TellingScalars
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import Model, dofs_of
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
-from eomgen.derivation.told_scalars import TellingScalars
 
 AXES = "xyz"
 SCALARS = TellingScalars()
@@ -57,12 +57,10 @@ class TellingMechanism:
         self.bodies = tuple(body.name for body in model.bodies)
         self.joints = dofs_of(model.bodies, model.dimensions)
         self._by_joint = {body.joint.name: body for body in model.bodies}
-        self._points = {}
-        every = (
-            *model.parameters, *model.inputs, *model.states,
-            *(c for body in model.bodies for c in (*body.positions, *body.velocities)),
-        )  # fmt: skip
-        self.names = {"t": real("t"), **{c.name: real(c.name) for c in every}}
+        self._points: dict[tuple[str, Vector], str] = {}
+        names = [x.name for group in (model.parameters, model.inputs, model.states) for x in group]
+        names += [c.name for body in model.bodies for c in (*body.positions, *body.velocities)]
+        self.names = {"t": real("t"), **{name: real(name) for name in names}}
 
     @property
     def magnitude(self) -> float:
@@ -207,7 +205,7 @@ def omega_symbols(body: str, dimensions: int) -> tuple[Expr, ...]:
 
 
 def rotation_symbols(body: str, dimensions: int) -> Expr:
-    """The rotation from a body's axes to the world's: by its angle in the plane, else by entries."""
+    """The rotation from a body's axes to the world's: by its angle in the plane, or its entries."""
     if dimensions == 2:
         angle = real(f"psi_{body}")
         return sp.Matrix([[sp.cos(angle), -sp.sin(angle)], [sp.sin(angle), sp.cos(angle)]])

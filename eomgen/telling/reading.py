@@ -51,8 +51,9 @@ def read(expression: Expr, names: Mapping[str, str]) -> Expr:
 
 
 def read_all(equations: Sequence[Equation], names: Mapping[str, str]) -> tuple[Equation, ...]:
-    """Equations with the names that are read."""
-    return tuple(Equation(read(e.left, names), read(e.right, names)) for e in equations)
+    """Equations with the names that are read, but for those that then say nothing."""
+    found = (Equation(read(e.left, names), read(e.right, names)) for e in equations)
+    return tuple(e for e in found if e.left != e.right)
 
 
 def numbered(steps: Sequence[Step], start: int = 1) -> tuple[Step, ...]:

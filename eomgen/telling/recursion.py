@@ -37,6 +37,8 @@ ABOUT = (
     "(2008), table 7.1. Here it is with the bodies, joints and constants of this mechanism."
 )
 
+KINDS = ("gravity", "applied")
+
 
 @dataclass(frozen=True)
 class Recursion:
@@ -80,9 +82,9 @@ class Recursion:
         return [frame for frame in self.frames if frame.parent == k]
 
 
-def recursive_steps(model: Model, frames: tuple[Frame, ...], told: tuple[ToldEffect, ...]) -> (
-    Iterator[Step]
-):
+def recursive_steps(
+    model: Model, frames: tuple[Frame, ...], told: tuple[ToldEffect, ...]
+) -> Iterator[Step]:
     """The steps of the algorithm, frame by frame."""
     r = Recursion(model, frames, told)
     yield Step("", "The algorithm", _algorithm(r), ())
@@ -113,7 +115,10 @@ def _applied(r: Recursion) -> Step:
     loaded: set[int] = set()
     for k in reversed(range(len(r.frames))):
         frame = r.frames[k]
-        terms = [r.vector("f", frame)] if _wrench(r, frame) else []
+        applied = _wrench(r, frame, ["applied"])
+        terms = [r.vector("f", frame)] if applied else []
+        if len(applied) < len(_wrench(r, frame)):  # a weight that is told as a load
+            terms = [_sum(applied, r.size)] if applied else []
         for i, child in enumerate(r.frames):
             if child.parent == k and i in loaded:
                 terms.append(sp.MatMul(r.matrix("X", child).T, r.vector("Phi", child)))
@@ -126,9 +131,9 @@ def _applied(r: Recursion) -> Step:
         if frame.free:
             lines.append(Equation(r.joint("F", frame), _sum(force, len(frame.v))))
     words = (
-        "The same F as in M dv/dt + V + G = F, joint by joint; M, V and G do not depend on it. Φ is "
-        "the sum of the loads f on a frame and on all that hangs on it, taken to its origin; the "
-        "joint feels what of it is along its motion, and its own loads."
+        "The same F as in M dv/dt + V + G = F, joint by joint; M, V and G do not depend on it. Φ "
+        "is the sum of the loads f on a frame and on all that hangs on it, taken to its origin; "
+        "the joint feels what of it is along its motion, and its own loads."
     )
     return Step("", "Applied forces, term by term", words, tuple(lines))
 
@@ -143,12 +148,13 @@ def _algorithm(r: Recursion) -> str:
     return (
         f"{ABOUT}\n\n{vectors}, at the origin of a frame and in its axes. A frame moves on its "
         "parent by one joint primitive, with the motion subspace S; a joint with several "
-        "primitives is a chain of frames, all but the last without mass. R turns axes of the frame "
-        "into the parent's, r runs from the parent's origin to its own, X takes motions from the "
-        "parent to the frame, and its transpose takes forces back. The matrix of r × is written r^×. I "
-        "is the inertia of the frame's own body at the frame's origin, × the cross product of two motions, and ×* that of a "
-        "motion and a force. D is a number for one degree of freedom, and a matrix of three rows "
-        "for a ball. It is positive for positive masses, so no division can fail."
+        "primitives is a chain of frames, all but the last without mass. R turns axes of the "
+        "frame into the parent's, r runs from the parent's origin to its own, X takes motions "
+        "from the parent to the frame, and its transpose takes forces back. The matrix of r × is "
+        "written r^×. I is the inertia of the frame's own body at the frame's origin, × the cross "
+        "product of two motions, and ×* that of a motion and a force. D is a number for one "
+        "degree of freedom, and a matrix of three rows for a ball. It is positive for positive "
+        "masses, so no division can fail."
     )
 
 
@@ -278,7 +284,7 @@ def _sum(terms: Sequence[Expr], rows: int, columns: int = 1) -> Expr:
     return terms[0] if len(terms) == 1 else sp.MatAdd(*terms)
 
 
-def _wrench(r: Recursion, frame: Frame) -> list[Expr]:
+def _wrench(r: Recursion, frame: Frame, kinds: Sequence[str] = KINDS) -> list[Expr]:
     """The loads on a frame's body as spatial forces at its origin, in its axes."""
     if frame.body < 0:
         return []
@@ -288,7 +294,7 @@ def _wrench(r: Recursion, frame: Frame) -> list[Expr]:
         if isinstance(told.effect, Gravity) and told.kept:
             continue
         for load in told.loads:
-            if isinstance(load, Load) and load.body == name:
+            if isinstance(load, Load) and load.body == name and load.kind in kinds:
                 found += _one_wrench(load, frame, name, size)
     return found
 

@@ -31,8 +31,8 @@ class WrittenForm:
 
 
 def momentum_form(equations: Equations) -> WrittenForm:
-    """The handout's states, in the order of (1): Ẏ by (4) to (11), with the joint forces of (38) and
-    the closed form (37) in the numbers of this state.
+    """The handout's states, in the order of (1): Ẏ by (4) to (11), with the joint forces of (38)
+    and the closed form (37) in the numbers of this state.
     """
     form = state_form(equations)
     s, bodies = equations.symbols, equations.model.bodies
@@ -77,7 +77,7 @@ def velocity_form(equations: Equations) -> WrittenForm:
 
 
 def _in_state(expression: Expr, given: Mapping[Expr, Expr]) -> Expr:
-    """An expression over the symbols of a state: what is defined is put in until nothing is left."""
+    """An expression over the symbols of a state: what is defined is put in until none is left."""
     while True:
         inner = expression.xreplace(given)
         if inner == expression:
@@ -160,10 +160,8 @@ def plain_form(model: Model, accelerations: Sequence[Expr]) -> WrittenForm:
             half * (w * c + x * b - y * a),
         ]
     order = {c.name: i for i, c in enumerate(model.coordinates)}
-    pairs = sorted(zip(states, rates, strict=True), key=lambda pair: order[pair[0].name])
-    states, rates = [s for s, _ in pairs], [r for _, r in pairs]
+    both = sorted(zip(states, rates, strict=True), key=lambda pair: order[pair[0].name])
+    states, rates = [s for s, _ in both], [r for _, r in both]
     states += [real(c.name) for c in model.velocities]
     rates += list(accelerations)
     return WrittenForm(tuple(states), tuple(rates), ())
-
-

@@ -1,0 +1,308 @@
+"""Derivations as they are told: every scene, its effects, recursions, impacts, state forms."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import sympy as sp
+from campaign import some
+from effect_cases import CASES, TRIED, Case
+from test_driven import given
+from told import follow_effects, follow_recursion, instant
+
+import eomgen
+from eomgen.cli import main
+from eomgen.dynamics import impulses
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.model.elaborate import elaborate
+from eomgen.model.model import Model
+from eomgen.scene.reader import built_in_names, parse_scene, read_scene
+from eomgen.show.derivation import as_html, as_latex, as_text
+from eomgen.show.prose import blocks, pieces
+from eomgen.telling.derivation import tell
+from eomgen.telling.effects import told_effects
+from eomgen.telling.evaluate import array, define, number
+from eomgen.telling.impacts import impact_steps
+
+ROUNDING = 1e-9
+SHOWN = some(("two_body_forced", "bouncing_two_body", "furuta_pendulum", "walker_motors"),
+             built_in_names())  # fmt: skip
+
+
+def model_of(scene: str) -> Model:
+    """The model of a built-in scene or of a scene's text."""
+    text = "\n" in scene
+    return elaborate(parse_scene(scene) if text else read_scene(scene))
+
+
+def assert_close(ours: Any, theirs: Any, within: float = ROUNDING) -> None:
+    """Vectors, relative to the largest entry."""
+    ours, theirs = np.ravel(ours), np.ravel(theirs)
+    assert ours.shape == theirs.shape
+    size = max(1.0, float(np.max(np.abs(theirs), initial=0.0)))
+    assert float(np.max(np.abs(ours - theirs), initial=0.0)) < within * size
+
+
+@pytest.mark.parametrize("scene", built_in_names())
+def test_the_algorithm_followed_by_hand(scene: str) -> None:
+    """Every equation in its order, from parameters to v̇ and F: what the numeric solver has."""
+    model = model_of(scene)
+    at = instant(model)
+    rates, forces = follow_recursion(model, at.known)
+    assert_close(rates, at.solver.articulated_forward(), 1e-7)  # light bodies on heavy ones
+    assert_close(forces, at.solver.applied_force)
+
+
+@pytest.mark.parametrize("case", TRIED[:: some(3, 1)], ids=lambda case: case.name)
+def test_each_effect_by_its_formulas(case: Case) -> None:
+    """Every type and key: forces and the rates of its states, by the formulas that are told."""
+    model = model_of(case.text())
+    at = instant(model)
+    rates, forces = follow_recursion(model, at.known)
+    assert_close(forces, at.solver.applied_force)
+    assert_close(rates, at.solver.articulated_forward())
+    states = [at.known[f"{x.name}dot"] for x in model.states]
+    assert_close(states, at.solver.state_rates)
+
+
+@pytest.mark.parametrize("seed", range(some(4, 30)))
+def test_driven_and_locked_joints(seed: int) -> None:
+    """Trees of any joints: what is prescribed is a motion, not an unknown."""
+    model = model_of(given(2 + seed % 2, seed, 6).text)
+    for still in ((), ("velocity_forces",)):
+        left = replace(model, leave_out=still)
+        at = instant(left, seed)
+        rates, _ = follow_recursion(left, at.known)
+        assert_close(rates, at.solver.articulated_forward())
+
+
+CLOSED = """\
+name = "closed"
+[[bodies]]
+name = "a"
+mass = 1.1
+inertia_com = 0.3
+[[bodies]]
+name = "b"
+mass = 0.7
+inertia_com = 0.12
+[[joints]]
+name = "root"
+type = "free"
+child = "a"
+[[joints]]
+name = "hinge"
+type = "{}"
+parent = "a"
+child = "b"
+r_parent = [0.3, 0.1]
+r_child = [-0.2, 0.05]
+coordinate = "c"
+{}
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "spring"
+name = "tie"
+body_1 = "world"
+body_2 = "b"
+at_2 = [0.1, 0.2]
+stiffness = 40.0
+damping = 2.0
+rest_length = 0.3
+[[effects]]
+type = "drag"
+name = "air"
+bodies = "all"
+quadratic = 0.4
+turning_linear = 0.1
+[[effects]]
+type = "pid"
+name = "servo"
+joint = "hinge"
+target = "0.3*sin(t)"
+stiffness = 8.0
+integral_gain = 2.0
+limit = 3.0
+lag = 0.1
+[[effects]]
+type = "contact"
+name = "floor"
+law = "hunt_crossley"
+bodies = "all"
+radius = 0.4
+offset = -0.1
+stiffness = 300.0
+dissipation = 0.2
+friction = 0.4
+slip_speed = 0.1
+"""
+
+
+@pytest.mark.parametrize("joint", ["revolute", "prismatic"])
+def test_m_v_g_do_not_depend_on_effects(joint: str) -> None:
+    """By the handout's steps and by Kane's: M v̇ + V + G = F and its solution, F written out."""
+    model = model_of(CLOSED.format(joint, "axis = [0.6, 0.8]" * (joint == "prismatic")))
+    told, at = tell(model), instant(model)
+    bare = tell(replace(model, effects=model.effects[:1], states=()))
+    found, other = told.matrices, bare.matrices
+    assert found is not None and other is not None
+    for letter in "MVG":
+        assert getattr(found, letter) == getattr(other, letter)
+    define(found.definitions, at.known)
+    want = at.solver.articulated_forward()
+    assert_close([at.known[a.name] for a in found.a], want)
+    M, V, G, F = (array(x, at.known) for x in (found.M, found.V, found.G, found.F))
+    assert_close(F, at.solver.applied_force)
+    assert_close(M @ np.array(want) + (V + G - F).ravel(), np.zeros(len(want)))
+
+
+@pytest.mark.parametrize("form", ["redundant", "momentum", "velocity"])
+@pytest.mark.parametrize("scene", ["two_body", "two_body_forced"])
+def test_the_derivative_of_a_state_form(scene: str, form: Any) -> None:
+    """Ẏ as it is written out is the module's `derivative` in this form: 12 numbers, 8, [q, v]."""
+    module: Any = eomgen.load(eomgen.generate(scene, form=form))
+    last = tell(model_of(scene), form).steps[-1]
+    first, second, *lines = last.equations
+    assert len(first.right) == {"redundant": 12, "momentum": 8, "velocity": 8}[form]
+    rng = np.random.default_rng(5)
+    y = rng.uniform(-1.0, 1.0, len(module.STATES))
+    u = {name: float(rng.uniform(-2.0, 2.0)) for name in module.INPUTS}
+    if form == "redundant":  # the joint holds
+        y = np.array(module.initial_state())
+    known = {**module.PARAMETERS, **u}
+    known |= {s.name: float(x) for s, x in zip(first.right, y, strict=True)}
+    rates = {line.left.name: line.right for line in lines}
+
+    def value(name: str) -> float:
+        if name not in known:
+            for symbol in rates[name].free_symbols:
+                value(symbol.name)
+            known[name] = number(rates[name], known)
+        return float(known[name])
+
+    found = [value(symbol.name) for symbol in second.right]
+    assert_close(found, module.derivative(0.3, y, None, u), 1e-12)
+
+
+def test_from_the_handouts_m_to_the_symmetric_one() -> None:
+    """T M is symmetric, and the page says so; T has an inverse."""
+    steps = tell(model_of("two_body_forced")).steps
+    by_name = {str(e.left): e.right for step in steps for e in step.equations}
+    T, M, whole = (by_name[name] for name in ("T", "M", "M_sym"))
+    assert sp.simplify(T * M - whole) == sp.zeros(4, 4)
+    assert sp.simplify(whole - whole.T) == sp.zeros(4, 4) and M != M.T
+    assert sp.simplify(T.det()) == 1
+    for letter in "VGF":
+        columns = [e.right for s in steps for e in s.equations if str(e.left) == f"{letter}_sym"]
+        assert sp.simplify(T * by_name[letter] - columns[1]) == sp.zeros(4, 1)
+    words = " ".join(step.words for step in steps)
+    assert "`mass_matrix()`" in words and "not symmetric" in words
+
+
+def test_the_impulse_equations() -> None:
+    """Gap, opening speed and slip of each contact, against the solver's rows."""
+    model = model_of("bouncing_two_body")
+    at = instant(model)
+    told = told_effects(model)
+    follow_effects(model, told, at.known)
+    steps = list(impact_steps(model, told))
+    assert len(steps) == 4 and {"v^+", "P_II"} <= {e.left.name for e in steps[0].equations}
+    solver: Dynamics = at.solver
+    for step, contact in zip(steps[1:], solver.contacts, strict=True):
+        define(((e.left, e.right) for e in step.equations), at.known)
+        name = contact.name
+        assert_close(at.known[f"g_{name}"], contact.gap)
+        assert_close(at.known[f"u_{name},n"], solver.power_of(contact.normal))
+        (tangent,) = contact.tangents
+        assert_close(at.known[f"u_{name},t"], solver.power_of(tangent))
+        row = impulses.generalised(solver, contact.normal)
+        assert_close(at.known[f"u_{name},n"], np.dot(row, solver.v))
+
+
+@pytest.mark.parametrize("scene", SHOWN)
+def test_three_formats(scene: str) -> None:
+    """No refusal. In prose no markup, in formulas no hyphen for a minus, in LaTeX plain ASCII."""
+    found = eomgen.derive(scene)
+    args = (found.model, found.steps)
+    text, page, paper = as_text(*args), found.html(), found.latex()
+    assert page == as_html(*args, found.telling.effects)
+    assert paper == as_latex(*args, found.telling.effects) and paper.isascii()
+    formulas = [line for line in text.splitlines() if line.startswith("    ")]
+    assert formulas and not any("-" in line for line in formulas)
+    for step in found.steps:
+        for kind, words in (p for b in blocks(step.words) for item in b.items for p in item):
+            assert kind != "word" or not re.search(r"[`_^]", words), words
+    for formula in re.findall(r"<math.*?</math>", page):
+        tree = ElementTree.fromstring(formula)
+        assert "-" not in "".join(tree.itertext())
+    drawings = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    assert len(drawings) == 1 + len(found.model.bodies)
+    for drawing in drawings:
+        ElementTree.fromstring(drawing)
+    assert paper.count(r"\begin{tikzpicture}") == len(drawings)
+    assert "src=" not in page and not re.search(r'href="[^#]', page)
+    assert "nan" not in page and "zoo" not in page
+
+
+def test_no_character_is_lost_on_paper() -> None:
+    """Descriptions of all effects have LaTeX for every letter: a question mark would be a loss."""
+    for case in CASES[:: some(4, 1)]:
+        model = model_of(case.text())
+        for told in told_effects(model):
+            paper = as_latex(model, (tell_words(told.words),), ())
+            assert "?" not in paper, told.effect.type
+
+
+def tell_words(words: str) -> Any:
+    """A step of words alone."""
+    from eomgen.derivation.steps import Step
+
+    return Step("", "", words, ())
+
+
+def test_forces_in_sketches_have_the_names_of_the_equations() -> None:
+    """Weights, joint forces, external forces, the motor's torque on both bodies."""
+    page = eomgen.derive("two_body_forced").html()
+    drawings = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    texts = [
+        re.sub("<title>.*?</title>|<[^>]*>|\u200b", "", d.replace("</text>", "|")) for d in drawings
+    ]
+    assert {"rhinge, parent", "rhinge, child", "θ", "φ"} <= set(labels(texts[0]))
+    assert {"g\u2009mA", "fhinge", "fA", "−τ"} <= set(labels(texts[1]))
+    assert {"g\u2009mB", "−fhinge", "fB", "τ"} <= set(labels(texts[2]))
+
+
+def labels(text: str) -> list[str]:
+    """The labels of a drawing."""
+    return [part.strip() for part in text.split("|")]
+
+
+def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`derive --form`, and what has no such state."""
+    assert main(["derive", "bouncing_two_body", "--form", "redundant"]) == 0
+    end = capsys.readouterr().out.split("State form redundant")[1]
+    assert "12 numbers" in end and "Ṗ_A,x = f_hinge,x" in end and "L̇_B" in end
+    assert main(["derive", "furuta_pendulum", "--form", "momentum"]) == 1
+    assert "derived in the plane; use velocity" in capsys.readouterr().err
+
+
+def test_large_mechanisms_have_steps_and_no_matrices() -> None:
+    found = eomgen.derive("human_figure")
+    assert len(found.steps) > 30
+    with pytest.raises(eomgen.SceneError, match="too long to be written out"):
+        _ = found.M
+
+
+def test_words() -> None:
+    """Names in prose are formulas, minus signs are minus signs, ranges have dashes."""
+    assert pieces("The force f_j, -f_j at `r_a`, d^1.5 (29)-(34), a - b") == (
+        ("word", "The force "), ("name", "f_j"), ("word", ", −"), ("name", "f_j"),
+        ("word", " at "), ("code", "r_a"), ("word", ", d"), ("power", "1.5"),
+        ("word", " (29)–(34), a − b"),
+    )  # fmt: skip
