@@ -7,7 +7,7 @@ from typing import Literal
 
 Kind = Literal["word", "code", "name", "power"]
 NAME = re.compile(
-    r"(?<![\w<.])([A-Za-zα-ωΑ-Ω]|I\^[Aa]|p\^[Aa])_([A-Za-z0-9]\w*(?:,[a-z]+)*)(?![\w(])|I\^A|p\^A|\^(?:\([^)]*\)|-?[\w.]*\w)"
+    r"(?<![\w<.])([A-Za-zα-ωΑ-Ω]|I\^[Aa]|p\^[Aa])_([A-Za-z0-9]\w*(?:,[a-z]+)*)(?![\w(])|I\^A|p\^A|r\^×|I\^a|p\^a|\^(?:\([^)]*\)|-?[\w.]*\w)"
 )
 """A letter with a subscript, such as f_j, which prose writes as formulas do; a power."""
 WORD = re.compile(r"(?<![\w`<])([A-Za-z]{2,}\w*_\w+)(?![\w`(])")
