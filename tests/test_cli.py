@@ -167,7 +167,7 @@ def test_derive_prints_every_step_of_the_handout(
     """Text and LaTeX, numbered like the handout, for the forced bodies."""
     assert main(["derive", "two_body_forced"]) == 0
     text = capsys.readouterr().out
-    steps = ["(1)", "(2)-(17)", "(18), (19)", "(20), (21)", "(22), (23)", "(24), (25)"]
+    steps = ["(1)", "(2)-(11)", "(12)-(17)", "(18), (19)", "(20), (21)", "(22), (23)", "(24), (25)"]
     steps += ["(26)", "(27)", "(28)", "(29)-(36)", "(37)", "(38)"]
     places = [text.index(f"\n{number} ") for number in steps]
     assert places == sorted(places)

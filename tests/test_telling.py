@@ -1,6 +1,7 @@
 """Derivations as they are told: every scene, its effects, recursions, impacts, state forms."""
 
 import re
+import unicodedata
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -306,3 +307,17 @@ def test_words() -> None:
         ("word", " at "), ("code", "r_a"), ("word", ", d"), ("power", "1.5"),
         ("word", " (29)–(34), a − b"),
     )  # fmt: skip
+
+
+def test_the_handouts_equations_stand_where_the_table_says() -> None:
+    """(1) to (36), each in its step of `derive two_body`, or `two_body_forced` from (29) on."""
+    page = (Path(__file__).parent.parent / "docs" / "derivation.md").read_text("utf-8")
+    rows = re.findall(r"^\| \((\d+)\) \| .* \| (\([^|]*) \| (`.*) \|$", page, re.MULTILINE)
+    assert [int(number) for number, _, _ in rows] == list(range(1, 37))
+    for scene, some_rows in (("two_body", rows[:28]), ("two_body_forced", rows[28:])):
+        text = eomgen.derive(scene).text()
+        sections = re.split(r"^(\([\d., ()-]*\)) ", text, flags=re.MULTILINE)
+        by_number = dict(zip(sections[1::2], sections[2::2], strict=True))
+        for equation, step, lines in some_rows:
+            for line in re.findall(r"`([^`]*)`", unicodedata.normalize("NFC", lines)):
+                assert line in by_number[step], f"({equation}): {line}"

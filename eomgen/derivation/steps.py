@@ -60,6 +60,10 @@ def handout_steps(equations: Equations) -> tuple[Step, ...]:
     )
 
 
+NOT_SYMMETRIC = (
+    "Not symmetric: its rows are torques about the bodies' own centres. `mass_matrix()` of the "
+    "generated module is the symmetric one of (39)."
+)
 Pairs = list[tuple[Expr, Expr]]
 """Left and right sides, in the derivation's own symbols."""
 
@@ -80,10 +84,16 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
         ],
     )
     yield (
-        "(2)-(17)",
-        "Free bodies",
+        "(2)-(11)",
+        "Momenta and forces",
         "Force is dP/dt, torque is dL/dt. The joint force f_j acts on the parent, -f_j on the "
-        "child; both are unknown.",
+        "child; both are unknown. The forces of effects, (29) to (35), are among them.",
+        [pair for k in range(len(model.bodies)) for pair in _momenta(equations, k)],
+    )
+    yield (
+        "(12)-(17)",
+        "Free bodies",
+        "The same for the accelerations: three scalar equations a body.",
         list(equations.free_bodies.equations),
     )
     arms = []
@@ -116,6 +126,19 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
     )
 
 
+def _momenta(equations: Equations, k: int) -> Pairs:
+    """Rates of place and momentum of a body, as in (4) to (7): by its momenta, by its forces."""
+    s, name = equations.symbols, equations.model.bodies[k].name
+    (_, fx), (_, fy), (_, torque) = equations.free_bodies.equations[3 * k : 3 * k + 3]
+    px, py, spin = (sp.Symbol(f"{word}_{name}{axis}") for word, axis in
+                    (("P", ",x"), ("P", ",y"), ("L", "")))  # fmt: skip
+    dpx, dpy, dspin = (sp.Symbol(x.name.replace("_", "dot_", 1)) for x in (px, py, spin))
+    pairs = [(s.xd[k], px / s.mass[k]), (s.yd[k], py / s.mass[k]), (dpx, fx), (dpy, fy)]
+    if s.inertia[k] != 0:
+        pairs.append((s.omega[k], spin / s.inertia[k]))
+    return [*pairs, (dspin, torque)]
+
+
 def _redundant_state(equations: Equations) -> Expr:
     """The redundant state of all bodies (1): x, P, orientation, L."""
     s, row = equations.symbols, []
@@ -140,15 +163,22 @@ def _equations_of_motion(equations: Equations) -> Iterator[tuple[str, str, str, 
         f"The joint force {force} side of its joint. Put into the torque equations, with the "
         "dependent accelerations replaced by (22) and (23), this leaves M a + V + G = F in the "
         f"accelerations a of the coordinates{sums}",
-        [(sp.Symbol("a"), sp.Matrix(equations.symbols.a))],
+        [_system(equations), (sp.Symbol("a"), sp.Matrix(equations.symbols.a))],
     )
-    rows = "Not symmetric: its rows are torques about the bodies' own centres."
     collected = equations.collected
+    rows = "" if collected.M == collected.M.T else NOT_SYMMETRIC
     yield "(26)", "Mass matrix", rows, [(sp.Symbol("M"), collected.M)]
     yield "(27)", "Velocity forces", "", [(sp.Symbol("V"), collected.V)]
     yield "(28)", "Gravity forces", "", [(sp.Symbol("G"), collected.G)]
     words = "External forces and joint torques, eliminated alike."
     yield "(29)-(36)", "Applied forces", words, [(sp.Symbol("F"), collected.F)]
+
+
+def _system(equations: Equations) -> tuple[Expr, Expr]:
+    """M a + V + G = F, by its letters."""
+    n = len(equations.symbols.a)
+    M, (a, V, G, F) = sp.MatrixSymbol("M", n, n), (sp.MatrixSymbol(x, n, 1) for x in "aVGF")
+    return sp.MatAdd(sp.MatMul(M, a), V, G), F
 
 
 def _solution(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
