@@ -3,6 +3,7 @@
 import textwrap
 import unicodedata
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import Any
 
@@ -13,8 +14,8 @@ from eomgen.derivation.steps import Equation, Step
 from eomgen.model.model import Model
 from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.drawing import Drawing, svg, tikz, tikz_colours
+from eomgen.show.layout import entries, is_wide, row_lines, size_of
 from eomgen.show.mathml import mathml, negative, symbol, terms_of, written
-from eomgen.show.notation import parsed
 from eomgen.show.plain import PlainPrinter, minus_signs, printer
 from eomgen.show.prose import blocks, joined, pieces, signs
 from eomgen.show.sketches import mechanism_sketch
@@ -23,8 +24,8 @@ from eomgen.telling.effects import ToldEffect
 from eomgen.templating import render
 
 WIDTH = 100
-PAGE, PAPER = 118.0, 106.0
-"""The width of a formula's line on the page and on paper, as `_size` counts it."""
+PAGE, PAPER = 124.0, 112.0
+"""The width of a formula's line on the page and on paper, as `size_of` counts it."""
 Figures = dict[str, tuple[Drawing, ...]]
 
 
@@ -86,7 +87,7 @@ def _has(encoding: str, letters: str) -> bool:
 
 def _lines(equation: Equation, pretty: PlainPrinter) -> list[str]:
     """The text of an equation; if a matrix is too wide to read, that of each entry."""
-    if lines := _row_lines(equation.right, 0.8 * WIDTH):
+    if lines := row_lines(equation.right, 0.8 * WIDTH):
         parts = [",  ".join(pretty.doprint(e) for e in line) for line in lines]
         head = f"{pretty.doprint(equation.left)} = ("
         return [head + f",\n{' ' * len(head)}".join(parts) + ")"]
@@ -96,20 +97,6 @@ def _lines(equation: Equation, pretty: PlainPrinter) -> list[str]:
     if not isinstance(equation.right, sp.MatrixBase):
         return [_term_by_term(equation, pretty)]
     return [line for entry in entries(equation) for line in _lines(entry, pretty)]
-
-
-def entries(equation: Equation) -> Iterator[Equation]:
-    """A matrix equation as one equation for each entry."""
-    left, matrix = equation.left, equation.right
-    for i in range(matrix.rows):
-        for j in range(matrix.cols):
-            if isinstance(left, sp.MatrixBase):
-                yield Equation(left[i, j], matrix[i, j])
-                continue
-            index = [n + 1 for n, size in ((i, matrix.rows), (j, matrix.cols)) if size > 1]
-            joint = "," if "_" in left.name else "_"
-            symbol = sp.Symbol(f"{left.name}{joint}{','.join(map(str, index))}")
-            yield Equation(symbol, matrix[i, j])
 
 
 def _term_by_term(equation: Equation, pretty: PlainPrinter) -> str:
@@ -157,7 +144,7 @@ def as_latex(model: Model, steps: tuple[Step, ...], effects: Sequence[ToldEffect
                 }
                 for block in blocks(step.words)
             ],
-            "equations": [lines for e in step.equations for lines in _latex(e)],
+            "groups": _aligned_groups(step.equations),
             "figures": [tikz(drawing) for drawing in drawn.get(step.figure, ())],
         }
         for step in steps
@@ -179,30 +166,55 @@ def _tex_name(name: str) -> str:
     return f"${tex_symbol(name)}$"
 
 
-def _latex(equation: Equation) -> Iterator[list[str]]:
+@dataclass(frozen=True)
+class _TexEquation:
+    """Lines of an `align*`, and the sizes of the equation's two sides."""
+
+    lines: list[str]
+    left: float
+    right: float
+
+
+def _latex(equation: Equation) -> Iterator[_TexEquation]:
     """An equation as lines of an `align*`; a wide matrix as one equation for each entry."""
-    if row := _row_lines(equation.right, PAPER):
+    left = size_of(equation.left) + 4
+    right = min(size_of(equation.right), PAPER - left)
+    if row := row_lines(equation.right, PAPER - left):
         parts = [", ".join(map(tex, line)) for line in row]
         head = f"{tex(equation.left)} ={{}}& \\bigl( "
         ends = [*(part + "," for part in parts[:-1]), parts[-1] + r" \bigr)"]
-        yield [head + ends[0], *(r"& \quad " + end for end in ends[1:])]
+        yield _TexEquation([head + ends[0], *(r"& \quad " + end for end in ends[1:])], left, right)
         return
-    if _is_wide(equation.right, PAPER):
+    if is_wide(equation.right, PAPER - left):
         for entry in entries(equation):
             yield from _latex(entry)
         return
     lines = [
         f"{'' if i else tex(equation.left) + ' ='}{{}}& {line}"
-        for i, line in enumerate(_broken(equation.right, _size(equation.left) + 4))
+        for i, line in enumerate(_broken(equation.right, left))
     ]
-    yield lines
+    yield _TexEquation(lines, left, right)
+
+
+def _aligned_groups(equations: Sequence[Equation]) -> list[list[str]]:
+    """The lines of each `align*` of a step: as many equations as fit the page side by side."""
+    groups: list[list[str]] = []
+    left = right = 0.0
+    for e in (e for equation in equations for e in _latex(equation)):
+        wider = max(left, e.left), max(right, e.right)
+        if not groups or sum(wider) > PAPER:
+            groups.append([])
+            wider = e.left, e.right
+        left, right = wider
+        groups[-1] += e.lines
+    return groups
 
 
 def _broken(e: Any, indent: float) -> Iterator[str]:
     """A sum in lines of a bearable length; what is too long by itself is made smaller."""
     line, length = "", 0.0
     for i, term in enumerate(terms_of(e)):
-        size, minus = _size(term) + 2, negative(term)
+        size, minus = size_of(term) + 2, negative(term)
         if length and indent + length + size > PAPER:
             yield line
             line, length = "", 0.0
@@ -211,59 +223,10 @@ def _broken(e: Any, indent: float) -> Iterator[str]:
         if isinstance(term, sp.Add):
             text = rf"\left({text}\right)"
         if indent + size > PAPER and not isinstance(term, sp.MatrixBase):
-            text = rf"\resizebox{{0.85\linewidth}}{{!}}{{$\displaystyle {text}$}}"
+            share = max(0.3, 0.95 - indent / PAPER)
+            text = rf"\resizebox{{{share:.2f}\linewidth}}{{!}}{{$\displaystyle {text}$}}"
         line, length = f"{line}{sign}{text} ", length + size
     yield line
-
-
-def _row_lines(matrix: Any, line: float) -> list[list[Any]] | None:
-    """The entries of a row that is wider than a line, in lines; None for any other matrix."""
-    if not isinstance(matrix, sp.MatrixBase) or matrix.rows > 1 or _size(matrix) <= line:
-        return None
-    found: list[list[Any]] = [[]]
-    length = 6.0
-    for e in matrix:
-        if length + _size(e) + 2 > line:
-            found.append([])
-            length = 6.0
-        found[-1].append(e)
-        length += _size(e) + 2
-    return found
-
-
-def _is_wide(matrix: Any, line: float) -> bool:
-    """Whether a matrix is wider than a line."""
-    if not isinstance(matrix, sp.MatrixBase):
-        return False
-    return _size(matrix) > line
-
-
-def _size(e: Any) -> float:
-    """About how wide an expression is, in halves of the letter M; a fraction is as wide as its
-    wider part.
-    """
-    if isinstance(e, sp.MatrixBase):
-        columns = range(e.cols)
-        return 2 + sum(2 + max(_size(e[i, j]) for i in range(e.rows)) for j in columns)
-    if e.is_Symbol or isinstance(e, sp.MatrixSymbol):
-        parts = parsed(e.name)
-        below = sum(map(len, parts.below)) + max(0, len(parts.below) - 1)
-        return 1.1 * len(parts.letter) + 0.75 * below + (0.3 if below else 0)
-    if e.is_Number:
-        return float(len(str(e))) if e.is_Integer else 4.0
-    if e.is_Mul:
-        top, bottom = sp.fraction(e)
-        if bottom != 1:
-            return max(_size(top), _size(bottom)) + 1
-        return sum(_size(x) + (2.0 if isinstance(x, sp.Add) else 0.4) for x in e.args)
-    if e.is_Pow and e.args[1].is_Number:
-        return _size(e.args[0]) + (2.5 if e.args[0].is_Add else 0.8)
-    if e.is_Function:
-        name = type(e).__name__
-        return len(name) + 1.5 + sum(_size(x) + 1 for x in e.args)
-    if isinstance(e, sp.Piecewise):
-        return 4 + max(_size(value) + _size(when) for value, when in e.args)
-    return sum(_size(x) + 2 for x in e.args) if e.args else 4.0
 
 
 def as_html(model: Model, steps: tuple[Step, ...], effects: Sequence[ToldEffect]) -> str:
@@ -304,24 +267,24 @@ def _math_name(name: str) -> str:
 
 def _html(equation: Equation) -> Iterator[str]:
     left, right = equation.left, equation.right
-    if row := _row_lines(right, PAGE):
+    indent = size_of(left) + 4
+    if row := row_lines(right, PAGE - indent):
         comma = "<mo>,</mo>"
         parts = [comma.join(map(written, part)) for part in row]
         parts = [*(part + comma for part in parts[:-1]), parts[-1] + "<mo>)</mo>"]
         yield _aligned(left, ["<mo>(</mo>" + parts[0], *parts[1:]])
         return
-    if _is_wide(right, PAGE):
+    if is_wide(right, PAGE - indent):
         for entry in entries(equation):
             yield from _html(entry)
         return
-    indent = _size(left) + 4
-    if not isinstance(right, sp.Add) or indent + _size(right) <= PAGE:
+    if not isinstance(right, sp.Add) or indent + size_of(right) <= PAGE:
         yield mathml(left, right)
         return
     rows: list[str] = []
     line, length = "", 0.0
     for i, term in enumerate(terms_of(right)):
-        size, minus = _size(term) + 2, negative(term)
+        size, minus = size_of(term) + 2, negative(term)
         if length and indent + length + size > PAGE:
             rows.append(line)
             line, length = "", 0.0
