@@ -1,7 +1,7 @@
 """Free-body diagrams: each body by itself, every force with its name in the equations."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
@@ -9,7 +9,7 @@ import sympy as sp
 from eomgen.model.model import Model
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad, Load
-from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point
+from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
 from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, numbers, skeleton
 from eomgen.telling.effects import ToldEffect
 
@@ -18,8 +18,10 @@ PANEL, PANEL_BODY = 230.0, 92.0
 """The side of a free-body diagram, and the size of the body in it."""
 FORCE = 38.0
 """Length of a force whose size is not drawn."""
-CROWDED = 6
-"""From so many loads on a body its diagram is larger."""
+CROWDED = 7
+"""From so many loads on a body its diagram is larger, and they are numbered."""
+ROW = 15.0
+"""Height of a line of the list of numbered loads."""
 
 
 def body_diagrams(model: Model, effects: Sequence[ToldEffect]) -> tuple[Drawing, ...]:
@@ -56,15 +58,33 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[ToldEffect]) -> Drawing
     items.append(Dot(at(shape.centre), 3.2, True))
     items += (Dot(at(p), 4.2, False, "arm") for p in shape.joints)
     busy = [*map(at, shape.joints), *torques]
-    items += _drawn_forces(forces, busy, panel)
+    named = [label for *_, label, _ in forces]
+    named += [label for labels in torques.values() for label in labels]
+    numbers: dict[Expr, str] = {}
+    if len(named) >= CROWDED:
+        numbers = {label: str(i) for i, label in enumerate(dict.fromkeys(named), 1)}
+    items += _drawn_forces(forces, busy, panel, numbers)
     for p, labels in torques.items():
-        items += _drawn_torques(p, list(labels))
+        items += _drawn_torques(p, list(labels), numbers)
     items.append(Label((panel / 2, 10), body.name, "axis"))
+    depth = ROW * ((len(numbers) + 1) // 2) + 8.0 * bool(numbers)
+    items = [moved(item, depth) for item in items]
+    items += _legend(numbers, panel, depth)
     title = f"Free-body diagram of {body.name} in {model.title}"
-    return Drawing(panel, panel, title, tuple(items))
+    return Drawing(panel, panel + depth, title, tuple(items))
 
 
-def _drawn_torques(p: Point, labels: Sequence[Expr]) -> Iterator[Item]:
+def _legend(numbers: Mapping[Expr, str], panel: float, depth: float) -> Iterator[Item]:
+    """The names of numbered forces, in two columns below a diagram."""
+    rows = (len(numbers) + 1) // 2
+    for i, (label, shown) in enumerate(numbers.items()):
+        column, row = divmod(i, rows)
+        x, y = panel * (0.04 + 0.51 * column), depth - ROW * (row + 0.6)
+        yield Label((x, y), shown, "force")
+        yield Label((x + 12, y), label, "force", start=True)
+
+
+def _drawn_torques(p: Point, labels: Sequence[Expr], numbers: Mapping[Expr, str]) -> Iterator[Item]:
     """One arc for all torques at a point that turn the same way, with their names below it."""
     below = p[1] - 29.0
     for turning in (1, -1):
@@ -73,15 +93,21 @@ def _drawn_torques(p: Point, labels: Sequence[Expr]) -> Iterator[Item]:
             radius = 17.0 if turning > 0 else 22.0
             first = math.radians(200) if turning > 0 else math.radians(-20)
             yield Arc(p, radius, first, first + turning * math.radians(220), "force")
-        for label in named:
+        if named and numbers:
+            yield Label((p[0], below), ", ".join(numbers[x] for x in named), "force")
+            below -= 13.0
+        for label in named if not numbers else ():
             yield Label((p[0], below), label, "force")
             below -= 13.0
 
 
 def _drawn_forces(
-    forces: Sequence[tuple[Point, Point, Expr, str]], busy: Sequence[Point], panel: float
+    forces: Sequence[tuple[Point, Point, Expr, str]],
+    busy: Sequence[Point],
+    panel: float,
+    numbers: Mapping[Expr, str],
 ) -> Iterator[Item]:
-    """Arrows with labels; those at one point fan out if they have the same direction."""
+    """Arrows with names or numbers; those at one point fan out if they have the same direction."""
     used: list[tuple[Point, float]] = []
     taken = [*busy, *(start for start, *_ in forces)]
     for start, direction, label, style in forces:
@@ -97,7 +123,8 @@ def _drawn_forces(
         c, s = math.cos(angle), math.sin(angle)
         end = (start[0] + FORCE * c, start[1] + FORCE * s)
         yield Line((start, end), style, arrow=True)
-        half = 3.2 * len(str(label)) + 4
+        shown = numbers.get(label, label)
+        half = 3.2 * len(str(shown)) + 4
         places = [(end[0] + half * c * 0.9, end[1] + 11 * s)]
         places += [(end[0] + side * half, end[1] + up) for up in (0, 12, -12) for side in (1, -1)]
         places = [
@@ -105,7 +132,7 @@ def _drawn_forces(
         ]
         place = max(places, key=lambda p: min(35.0, *(apart(p, q) for q in taken), 1e9))
         taken += [place, end]
-        yield Label(place, label, style)
+        yield Label(place, shown, style)
 
 
 def _unknown(joint: str, sign: int) -> Point:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Any
 
@@ -67,11 +67,12 @@ class Dot:
 
 @dataclass(frozen=True)
 class Label:
-    """A formula or a word whose middle is at a point."""
+    """A formula or a word whose middle, or whose `start`, is at a point."""
 
     at: Point
     text: Expr
     style: str = "axis"
+    start: bool = False
 
 
 Item = Line | Arc | Dot | Label
@@ -85,6 +86,19 @@ class Drawing:
     height: float
     title: str
     items: tuple[Item, ...] = field(default=())
+
+
+def moved(item: Item, up: float) -> Item:
+    """An item higher by so many points."""
+
+    def shifted(p: Point) -> Point:
+        return (p[0], p[1] + up)
+
+    if isinstance(item, Line):
+        return replace(item, points=tuple(map(shifted, item.points)))
+    if isinstance(item, Label):
+        return replace(item, at=shifted(item.at))
+    return replace(item, centre=shifted(item.centre))
 
 
 def svg(drawing: Drawing) -> str:
@@ -102,10 +116,11 @@ def _svg_item(item: Item, height: float) -> str:
     if isinstance(item, Label):
         x, y = item.at
         colour = STYLES[item.style][0]
+        anchor = "start" if item.start else "middle"
         text = item.text if isinstance(item.text, str) else None
         inner = escape(text) if text is not None else _svg_formula(item.text)
         return (
-            f'<text x="{x:.1f}" y="{height - y + 4:.1f}" text-anchor="middle" '
+            f'<text x="{x:.1f}" y="{height - y + 4:.1f}" text-anchor="{anchor}" '
             f'fill="{colour}">{inner}</text>'
         )
     colour, width, dashes = STYLES[item.style]
@@ -178,7 +193,8 @@ def _tikz_item(item: Item) -> str:
     if isinstance(item, Label):
         x, y = item.at
         text = escaped(item.text) if isinstance(item.text, str) else f"${tex(item.text)}$"
-        return f"\\node[text=eom{item.style}] at ({x:.1f},{y:.1f}) {{\\footnotesize {text}}};"
+        west = ", anchor=west, inner sep=0pt" if item.start else ""
+        return f"\\node[text=eom{item.style}{west}] at ({x:.1f},{y:.1f}) {{\\footnotesize {text}}};"
     width = STYLES[item.style][1]
     options = f"eom{item.style}, line width={width * 0.6:.2f}pt"
     if isinstance(item, Dot):

@@ -111,6 +111,7 @@ def tell(model: Model, form: Form | None = None) -> Telling:
 def _of_pins(model: Model, bare: Model, effects: tuple[ToldEffect, ...], form: Form) -> Telling:
     equations = derive(bare)
     names = _names(model, readable(equations))
+    names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
     figures = {"(1)": "mechanism", "(2)-(11)": "bodies"}
     steps = [
         replace(step, figure=figures.get(step.number, "")) for step in handout_steps(equations)
