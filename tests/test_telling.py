@@ -22,7 +22,7 @@ from eomgen.dynamics.dynamics import Dynamics
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.results import Derivation
-from eomgen.scene.reader import built_in_names, parse_scene, read_scene
+from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
 from eomgen.show.derivation import as_html, as_latex, as_text
 from eomgen.show.prose import blocks, pieces
 from eomgen.telling.derivation import tell
@@ -152,10 +152,27 @@ slip_speed = 0.1
 """
 
 
-@pytest.mark.parametrize("joint", ["revolute", "prismatic"])
-def test_m_v_g_do_not_depend_on_effects(joint: str) -> None:
-    """By the handout's steps and by Kane's: M v̇ + V + G = F and its solution, F written out."""
-    model = model_of(CLOSED.format(joint, "axis = [0.6, 0.8]" * (joint == "prismatic")))
+TOP = """
+[[effects]]
+type = "drag"
+name = "air"
+body = "top"
+at = [0.1, 0.0, 0.2]
+linear = 0.3
+turning_linear = 0.2
+turning_quadratic = 0.1
+"""
+BY = {
+    "the handout's steps": CLOSED.format("revolute", ""),
+    "Kane's method": CLOSED.format("prismatic", "axis = [0.6, 0.8]"),
+    "Kane's method in space": (BUILT_IN / "spinning_top.toml").read_text("utf-8") + TOP,
+}
+
+
+@pytest.mark.parametrize("by", BY)
+def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
+    """M v̇ + V + G = F and its solution, F written out."""
+    model = model_of(BY[by])
     told, at = tell(model), instant(model)
     bare = tell(replace(model, effects=model.effects[:1], states=()))
     found, other = told.matrices, bare.matrices

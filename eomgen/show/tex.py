@@ -133,7 +133,8 @@ def escaped(text: str) -> str:
     for match in re.finditer(r"(.)([\u0300-\u036f]*)", plain, re.DOTALL):
         letter, marks = match[1], match[2]
         if not marks:
-            found.append(_character(letter))
+            opens = letter == '"' and plain[: match.start()][-1:] in ("", " ", "(")
+            found.append("``" if opens else _character(letter))
             continue
         math, word = MARKS.get(marks[0], ("", ""))
         if letter in NAMES or (marks[0] in "\u0307\u0302" and math):
