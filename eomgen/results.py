@@ -113,6 +113,9 @@ class Derivation:
     def _repr_latex_(self) -> str:
         import sympy as sp
 
+        if self.telling.matrices is None:
+            steps = f"M v̇ + V + G = F in {len(self.steps)} steps"
+            return f"$\\text{{{steps}}}$"
         found = self.matrices
         left = sp.latex(found.M) + sp.latex(sp.Matrix(found.a))
         rest = " + ".join(sp.latex(m) for m in (found.V, found.G))

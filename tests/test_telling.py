@@ -25,7 +25,8 @@ from eomgen.results import Derivation
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
 from eomgen.show.derivation import as_html, as_latex, as_text
 from eomgen.show.prose import blocks, pieces
-from eomgen.telling.derivation import tell
+from eomgen.show.terms import explained
+from eomgen.telling.derivation import prescribed_motion, tell
 from eomgen.telling.effects import told_effects
 from eomgen.telling.evaluate import array, define, number
 from eomgen.telling.impacts import impact_steps
@@ -84,6 +85,8 @@ def test_driven_and_locked_joints(seed: int) -> None:
     for still in ((), ("velocity_forces",)):
         left = replace(model, leave_out=still)
         at = instant(left, seed)
+        for line in prescribed_motion(left):
+            assert_close(number(line.right, at.known), at.known[line.left.name])
         rates, _ = follow_recursion(left, at.known)
         assert_close(rates, at.solver.articulated_forward())
 
@@ -350,3 +353,24 @@ def test_the_handouts_equations_stand_where_the_table_says() -> None:
         for equation, step, lines in some_rows:
             for line in re.findall(r"`([^`]*)`", unicodedata.normalize("NFC", lines)):
                 assert line in by_number[step], f"({equation}): {line}"
+
+
+def test_each_line_of_code_names_its_term(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every assignment of every kernel, and what it is or is part of; the same in `--explain`."""
+    source = eomgen.generate("two_body").source
+    lines = list(explained(source))
+    assert len(lines) == len(
+        re.findall(r"^    (?!.*\bk = |.* = [ky]$)[\w]+ = ", kernels(source), re.M)
+    )
+    terms = {(line.kernel, line.line.split(" = ")[0]): line.term for line in lines}
+    assert terms["derivative", "alpha_A"] == "angular acceleration α of A"
+    assert terms["derivative", "coupling_B_A"].startswith("coupling of B A: c of the closed form")
+    assert terms["fixed", "pivot_B"].startswith("pivot of B: d of the closed form (37)")
+    assert "M_1,3" in " ".join(t for (kernel, _), t in terms.items() if kernel == "mass_matrix")
+    assert all(term and "part of ;" not in term for term in terms.values())
+
+
+def kernels(source: str) -> str:
+    """The kernels of a generated module, without what checks its arguments."""
+    fixed, rest = source[source.index("def _fixed") :].split("def _constants")
+    return fixed + rest[rest.index("def _initial_state") : rest.index("def _numbers")]

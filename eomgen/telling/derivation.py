@@ -8,7 +8,6 @@ forces are.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import sympy as sp
 
@@ -21,8 +20,10 @@ from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation, Step, handout_steps, readable
 from eomgen.derivation.supported import MOST_REPORTED, why_not_closed, why_not_pins
 from eomgen.derivation.symbols import Expr
+from eomgen.derivation.told_scalars import TellingScalars
 from eomgen.errors import SceneError
-from eomgen.language.formula import Formula
+from eomgen.language.formula import names_in
+from eomgen.language.rates import with_rates
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import Load
 from eomgen.scene.joints.base import WORLD
@@ -162,9 +163,7 @@ def _recursive(model: Model, effects: tuple[ToldEffect, ...]) -> Telling:
         Equation(sp.Symbol(letter), sp.Matrix([[real(c.name) for c in group]]))
         for letter, group in (("q", model.coordinates), ("v", model.velocities))
     ]
-    state += [
-        Equation(real(c.position.name), _prescribed(model, c.value)) for c in model.prescribed
-    ]
+    state += prescribed_motion(model)
     form = plain_form(model, [real(c.acceleration) for c in model.velocities])
     words = "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
     words += "axes of its own body."
@@ -240,9 +239,18 @@ def _loads_as_they_are(told: ToldEffect) -> list[Equation]:
     return lines
 
 
-def _prescribed(model: Model, formula: Formula) -> Expr:
-    mechanism: Any = TellingMechanism(model, Notes())
-    return mechanism.value(formula)
+def prescribed_motion(model: Model) -> list[Equation]:
+    """Driven coordinates with their rates and accelerations, and locked ones."""
+    names = TellingMechanism(model, Notes()).names
+    found = []
+    for c in model.prescribed:
+        used = {name: names[name] for name in names_in(c.value) if name != "t"}
+        x, v, a = with_rates(c.value, used, names["t"], TellingScalars())
+        found.append(Equation(real(c.position.name), x))
+        if not c.locked:
+            found.append(Equation(real(c.velocity.name), v))
+            found.append(Equation(real(c.velocity.acceleration), a))
+    return found
 
 
 def _free_words(model: Model) -> str:
