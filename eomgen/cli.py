@@ -135,7 +135,9 @@ def _parser() -> argparse.ArgumentParser:
     generate.add_argument(
         "--check", action="store_true", help="report which are stale, write nothing"
     )
-    generate.add_argument("--explain", action="store_true", help="say why its route was chosen")
+    generate.add_argument(
+        "--explain", action="store_true", help="say why its route was chosen, and what each line is"
+    )
     generate.add_argument("--report", action="store_true", help="say what each pass saved")
     _force(generate)
     for name, run, about in (

@@ -137,7 +137,9 @@ def _of_any(model: Model, bare: Model, effects: tuple[ToldEffect, ...]) -> Telli
     names = reading_names(model)
     found = list(projected_steps(equations))
     place = next(i for i, step in enumerate(found) if step.title == "Closed form")
-    form = plain_form(model, [real(c.acceleration) for c in model.velocities])
+    solved = {line.left.name: line.right for line in found[place].equations}
+    rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
+    form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
     ends = [*impact_steps(model, effects), form_step("velocity", form, effects)]
     words = (
         "Each body by itself, with its weight, the forces of the effects, and those of its joints."

@@ -17,6 +17,7 @@ def reading_names(model: Model) -> dict[str, str]:
         for c in body.positions[body.plain :]:  # a quaternion, named <prefix>_qw
             stem, _, part = c.name.rpartition("_")
             names[c.name] = f"q_{stem},{part[1:]}"
+            names[f"{c.name}_dot"] = f"qdot_{stem},{part[1:]}"
         for c in body.velocities:
             stem = c.name.removesuffix("_dot")
             if stem != c.name:

@@ -21,6 +21,15 @@ FORMS = {
 }
 
 
+QUATERNION = ("_qw", "_qx", "_qy", "_qz", "_wx", "_wy", "_wz")
+"""How the names of quaternions and of their angular velocities end."""
+
+
+BELOW = "; below, what the lines are written with"
+OWN = ", in this state's own numbers. The lines on bodies are (4) to (11)."
+BEFORE = "; what the lines are written with stands in the steps before"
+
+
 @dataclass(frozen=True)
 class WrittenForm:
     """A state by its symbols, its derivative, and what that is written with, in order."""
@@ -105,14 +114,9 @@ def form_step(form: str, written: WrittenForm, extra: Iterable[ToldEffect]) -> S
         for symbol, rate in told.rates:
             states.append(real(symbol.name.removesuffix("dot")))
             rates.append(rate)
-    words = FORMS[form].format(count=len(states))
-    words += (
-        " Its time derivative, one line for each number; below, what the lines are written with, "
-        "in this state's own numbers. The lines on bodies are (4) to (11)."
-        if form != "velocity"
-        else " Its time derivative, one line for each number; below, what the lines are written "
-        "with."
-    )
+    words = FORMS[form].format(count=len(states)) + " Its time derivative, one line for each number"
+    words += BELOW if written.definitions else BEFORE
+    words += "." if form == "velocity" else OWN
     dotted = [rate_symbol(state) for state in states]
     own = {*states}
     plain = [rate if rate in own else symbol for symbol, rate in zip(dotted, rates, strict=True)]
@@ -130,7 +134,7 @@ def rate_symbol(state: Expr) -> Expr:
     base, underscore, rest = state.name.partition("_")
     if rest.endswith("_dot") or rest == "dot":
         return real(state.name.removesuffix("dot") + "ddot")
-    if rest.endswith(tuple(f"_w{axis}" for axis in "xyz")):
+    if state.name.endswith(QUATERNION):
         return real(f"{state.name}_dot")
     return real(f"{base}dot{underscore}{rest}")
 
