@@ -30,6 +30,7 @@ from eomgen.telling.derivation import prescribed_motion, tell
 from eomgen.telling.effects import told_effects
 from eomgen.telling.evaluate import array, define, number
 from eomgen.telling.impacts import impact_steps
+from eomgen.telling.reading import dotted
 
 ROUNDING = 1e-9
 SHOWN = some(("two_body_forced", "bouncing_two_body", "furuta_pendulum", "walker_motors"),
@@ -74,7 +75,7 @@ def test_each_effect_by_its_formulas(case: Case) -> None:
     rates, forces = follow_recursion(model, at.known)
     assert_close(forces, at.solver.applied_force)
     assert_close(rates, at.solver.articulated_forward())
-    states = [at.known[f"{x.name}dot"] for x in model.states]
+    states = [at.known[dotted(x.name, "dot")] for x in model.states]
     assert_close(states, at.solver.state_rates)
 
 

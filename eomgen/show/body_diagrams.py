@@ -12,6 +12,7 @@ from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
 from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, numbers, skeleton
 from eomgen.telling.effects import ToldEffect
+from eomgen.telling.reading import read, reading_names
 
 Expr = Any
 PANEL, PANEL_BODY = 230.0, 92.0
@@ -32,7 +33,12 @@ def body_diagrams(model: Model, effects: Sequence[ToldEffect]) -> tuple[Drawing,
 
 def _diagram(pose: Pose, shape: Shape, effects: Sequence[ToldEffect]) -> Drawing:
     model, body = pose.model, shape.body
-    found = [load for told in effects for load in _loads_on(pose, shape, told)]
+    names = reading_names(model)
+    found = [
+        (start, direction, read(label, names), style)
+        for told in effects
+        for start, direction, label, style in _loads_on(pose, shape, told)
+    ]
     panel = PANEL if len(found) + len(shape.joints) < CROWDED else 1.45 * PANEL
     room = PANEL_BODY + 2 * MARGIN + 0.6 * (panel - PANEL)
     fit = Fit([*shape.points], room, room)

@@ -288,7 +288,8 @@ def _html(equation: Equation) -> Iterator[str]:
         if length and indent + length + size > PAGE:
             rows.append(line)
             line, length = "", 0.0
-        sign = f'<mo form="prefix">{"−" if minus else "+"}</mo>' if minus or i else ""
+        form = "infix" if line else "prefix"
+        sign = f'<mo form="{form}">{"−" if minus else "+"}</mo>' if minus or i else ""
         line, length = f"{line}{sign}{written(-term if minus else term)}", length + size
     yield _aligned(left, [*rows, line])
 

@@ -119,7 +119,7 @@ def _of_pins(model: Model, bare: Model, effects: tuple[ToldEffect, ...], form: F
     ]
     place = next(i for i, step in enumerate(steps) if step.number == "(37)")
     written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
-    last = form_step(form, written, effects)
+    last = form_step(model, form, written, effects)
     ends = [_symmetry(equations), *impact_steps(model, effects), last]
     inner = _numbered_within(_effect_steps(model, effects), "36")
     steps = [
@@ -140,7 +140,7 @@ def _of_any(model: Model, bare: Model, effects: tuple[ToldEffect, ...]) -> Telli
     solved = {line.left.name: line.right for line in found[place].equations}
     rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
     form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
-    ends = [*impact_steps(model, effects), form_step("velocity", form, effects)]
+    ends = [*impact_steps(model, effects), form_step(model, "velocity", form, effects)]
     words = (
         "Each body by itself, with its weight, the forces of the effects, and those of its joints."
     )
@@ -175,7 +175,7 @@ def _recursive(model: Model, effects: tuple[ToldEffect, ...]) -> Telling:
         *_effect_steps(model, effects, every=True),
         *recursive_steps(model, frames, effects),
         *impact_steps(model, effects),
-        form_step("velocity", form, effects),
+        form_step(model, "velocity", form, effects),
     ]
     told = (_renamed(step, names) for step in steps)
     intro = Step("", "Beside the handout", RECURSIVE, ())

@@ -26,6 +26,7 @@ from eomgen.scene.effects.base import (
 )
 from eomgen.scene.joints.base import WORLD
 from eomgen.telling.mechanism import AXES, Notes, TellingMechanism
+from eomgen.telling.reading import dotted
 
 AnyLoad = Load | JointLoad
 
@@ -72,7 +73,7 @@ def _told(model: Model, effect: Effect) -> ToldEffect:
     if not kept:
         loads = _named(model, effect.name, loads, definitions)
     rates = tuple(
-        (real(f"{state.name}dot"), rate)
+        (real(dotted(state.name, "dot")), rate)
         for state, rate in zip(effect.states(model.dimensions), states, strict=True)
     )
     return ToldEffect(

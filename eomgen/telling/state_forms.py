@@ -107,13 +107,11 @@ def _used(
     yield from reversed(kept)
 
 
-def form_step(form: str, written: WrittenForm, extra: Iterable[ToldEffect]) -> Step:
+def form_step(model: Model, form: str, written: WrittenForm, extra: Iterable[ToldEffect]) -> Step:
     """The last step: Y, and Ẏ line by line."""
     states, rates = list(written.states), list(written.rates)
-    for told in extra:
-        for symbol, rate in told.rates:
-            states.append(real(symbol.name.removesuffix("dot")))
-            rates.append(rate)
+    states += (real(x.name) for x in model.states)
+    rates += (rate for told in extra for _, rate in told.rates)
     words = FORMS[form].format(count=len(states)) + " Its time derivative, one line for each number"
     words += BELOW if written.definitions else BEFORE
     words += "." if form == "velocity" else OWN
