@@ -124,6 +124,12 @@ def _parser(
     derive.add_argument(
         "--format", choices=("text", "latex", "html"), default="text", help="what is written"
     )
+    derive.add_argument(
+        "--form",
+        dest="state_form",
+        choices=("velocity", "momentum", "redundant"),
+        help="state whose time derivative is written out: [q, v]; the handout's 8 numbers, or 12",
+    )
     derive.add_argument("-o", "--output", metavar="FILE", type=path, help="write it to a file")
     add_force(derive)
     _generation(command("generate", commands.generate, "write the module of a scene", "scenes"))
@@ -174,7 +180,9 @@ def _generation(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check", action="store_true", help="report which are stale, write nothing"
     )
-    parser.add_argument("--explain", action="store_true", help="say why its route was chosen")
+    parser.add_argument(
+        "--explain", action="store_true", help="say why its route was chosen, and what each line is"
+    )
     parser.add_argument("--report", action="store_true", help="say what each pass saved")
     add_force(parser)
 

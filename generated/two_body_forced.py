@@ -1287,7 +1287,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (4, 4), ('cos', 'sin'), y, p, u)
 
 

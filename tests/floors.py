@@ -28,6 +28,7 @@ FLOORS = (
     "model",
     "derivation",
     "dynamics",
+    "telling",
     "templating",
     "program",
     "codegen",

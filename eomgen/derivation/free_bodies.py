@@ -93,4 +93,5 @@ def _wrenches(
         force, at = (load.force[0], load.force[1]), (load.at[0], load.at[1])
         forces[load.body] = add(forces[load.body], force)
         torques[load.body] += cross(rotate(at, angles[load.body]), force)
+        torques[load.body] += sum(load.torque, sp.Integer(0))
     return tuple((forces[body.name], torques[body.name]) for body in model.bodies)

@@ -52,15 +52,16 @@ class Inertia:
 
 @dataclass(frozen=True)
 class Loads:
-    """The loads: forces in world axes with their points, and generalised forces by index in v.
+    """The loads: forces in world axes with their points and torques, and generalised forces by
+    index in v.
 
     `uniform` is the acceleration of gravity in world axes, if it is the same for all bodies. Then
     `gravity` is empty.
     """
 
     uniform: Expr
-    gravity: tuple[tuple[int, Expr, Expr], ...]
-    applied: tuple[tuple[int, Expr, Expr], ...]
+    gravity: tuple[tuple[int, Expr, Expr, Expr], ...]
+    applied: tuple[tuple[int, Expr, Expr, Expr], ...]
     motors: Mapping[int, Expr]
 
 
@@ -97,11 +98,16 @@ def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...], ledger: L
     motors, definitions = joint_loads(model, symbols, at_joints)
     ledger.definitions.update(definitions)
 
-    def forces(kind: str) -> tuple[tuple[int, Expr, Expr], ...]:
+    def forces(kind: str) -> tuple[tuple[int, Expr, Expr, Expr], ...]:
         return tuple(
-            (mechanism.bodies.index(load.body), _spatial(load.at), _spatial(load.force))
+            (
+                mechanism.bodies.index(load.body),
+                _spatial(load.at),
+                _spatial(load.force),
+                _moment(load.torque),
+            )
             for load in given
-            if isinstance(load, Load) and load.kind == kind and any(f != 0 for f in load.force)
+            if isinstance(load, Load) and load.kind == kind and any((*load.force, *load.torque))
         )
 
     gravity = forces("gravity")
@@ -113,16 +119,21 @@ def _spatial(vector: tuple[Expr, ...]) -> Expr:
     return sp.Matrix([*vector, *([0] * (3 - len(vector)))])
 
 
-def _uniform(forces: tuple[tuple[int, Expr, Expr], ...], bodies: tuple[Inertia, ...]) -> Expr:
+def _moment(torque: tuple[Expr, ...]) -> Expr:
+    """A torque with three components; in the plane it is about z."""
+    return sp.Matrix([*([0] * (3 - len(torque))), *torque])
+
+
+def _uniform(forces: tuple[tuple[int, Expr, Expr, Expr], ...], bodies: tuple[Inertia, ...]) -> Expr:
     """The acceleration that gravity gives all bodies, if it is the same for all; else 0."""
     none = sp.zeros(3, 1)
     if len(forces) != sum(body.mass != 0 for body in bodies) or not forces:
         return none
-    k, _, force = forces[0]
+    k, _, force, _ = forces[0]
     shared = (force / bodies[k].mass).applyfunc(sp.cancel)
     same = all(
         not any(at) and not any((f - bodies[k].mass * shared).applyfunc(sp.expand))
-        for k, at, f in forces
+        for k, at, f, _ in forces
     )
     return shared if same else none
 
@@ -317,13 +328,15 @@ def _written_out(entry: Expr, ledger: Ledger) -> Expr:
 
 
 def generalised(
-    model: Model, motions: Sequence[Motion], world: World, load: tuple[int, Expr, Expr]
+    model: Model, motions: Sequence[Motion], world: World, load: tuple[int, Expr, Expr, Expr]
 ) -> dict[int, Expr]:
-    """The generalised forces of a force (world axes) at a point of a body, by index in v."""
-    k, at, outside = load
+    """The generalised forces of a force at a point of a body and a torque (world axes), by index
+    in v.
+    """
+    k, at, outside, beside = load
     motion, floating = motions[k], translational_velocities(model)
     force = world.rotation(k).T * outside
-    torque = at.cross(force)
+    torque = at.cross(force) + world.rotation(k).T * beside
     found: dict[int, Expr] = {}
     for i, partial_velocity in motion.partial_velocities.items():
         found[i] = outside[floating[i]] if i in floating else partial_velocity.dot(force)

@@ -71,4 +71,5 @@ at = [5, 0]
         zeros = (mechanism.value(ZERO),) * mechanism.dimensions
         centre = tuple(mechanism.value(part) for part in self.at)
         arm = sub(mechanism.position(body, zeros), centre)
+        arm = mechanism.called("r", *arm)
         return arm, dot(arm, arm)

@@ -168,6 +168,11 @@ class Mechanism(Protocol):
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """Value of a function of `scalars.functions.FUNCTIONS`."""
 
+    def called(self, letter: str, *values: Scalar) -> Vector:
+        """The values themselves, a scalar or the components of a vector. A derivation shows them by
+        this letter, with their formula beside it.
+        """
+
 
 class Unmoved:
     """A base for mechanisms whose effects all satisfy `is_plain`: they need few members."""
@@ -200,6 +205,10 @@ class Unmoved:
     def state(self, name: str) -> Scalar:
         """Unused."""
         raise AssertionError(name)
+
+    def called(self, letter: str, *values: Scalar) -> Vector:
+        """The values themselves."""
+        return values
 
 
 class EffectTable(Table):

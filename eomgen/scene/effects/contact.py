@@ -217,11 +217,11 @@ dissipation = 0.2
         found: list[Load] = []
         for touch in self._touches(mechanism):
             if self.friction == ZERO:
-                force = self._force(mechanism, touch, gap_rate_of(mechanism, touch))
+                force = self._named_force(mechanism, touch, gap_rate_of(mechanism, touch))
                 found += normal_loads(touch, force)
                 continue
             gap_rate, slip = gap_rate_and_slip(mechanism, touch)
-            force = self._force(mechanism, touch, gap_rate)
+            force = self._named_force(mechanism, touch, gap_rate)
             speed = self._slip_speed(mechanism)
             size = mechanism.call("sqrt", dot(slip, slip) + speed * speed)
             drag = mechanism.value(self.friction) * force / size
@@ -315,6 +315,9 @@ dissipation = 0.2
             force = force * (mechanism.number(1.0) - factor * gap_rate)
             return mechanism.call("max", force, nothing)
         return force
+
+    def _named_force(self, mechanism: Mechanism, touch: Touch, gap_rate: Scalar) -> Scalar:
+        return mechanism.called("F", self._force(mechanism, touch, gap_rate))[0]
 
     def _slip_speed(self, mechanism: Mechanism) -> Scalar:
         """The slip speed, m/s; without friction, where it has no effect, 1."""

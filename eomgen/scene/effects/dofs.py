@@ -61,8 +61,9 @@ def joint_dof(mechanism: Mechanism, joint: str, kind: str, index: int) -> Dof:
     half = mechanism.call("atan2", sine, mechanism.call("abs", w))
     per_sine = mechanism.number(1.0) / sine
     per_sine = mechanism.call("select", -w, -per_sine, per_sine)
-    direction = scale(per_sine, vector)
-    return Dof(joint, index, half + half, direction, rates)
+    direction = mechanism.called("n", *scale(per_sine, vector))
+    (angle,) = mechanism.called("beta", half + half)
+    return Dof(joint, index, angle, direction, rates)
 
 
 def spring_energy(mechanism: Mechanism, stiffness: Formula, stretches: Iterable[Scalar]) -> Scalar:

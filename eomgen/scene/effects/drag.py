@@ -94,7 +94,7 @@ wind = ["3*sin(t)", 0]
                 if has_wind:
                     names = local_names(mechanism, self.wind, body, at)
                     wind = tuple(mechanism.value(part, **names) for part in self.wind)
-                    speed = sub(speed, wind)
+                    speed = mechanism.called("w", *sub(speed, wind))
                 force = _drag(mechanism, linear, quadratic, speed)
             torque: Vector = ()
             if has_torque:

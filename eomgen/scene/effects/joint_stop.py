@@ -186,4 +186,4 @@ damping = 1.0
             within = mechanism.call("min", within, mechanism.value(self.high))
         if self.low is not None:
             within = mechanism.call("max", within, mechanism.value(self.low))
-        return q - within
+        return mechanism.called("x", q - within)[0]

@@ -55,6 +55,7 @@ class Servo(OnCoordinate):
         if self.limit is None:
             return command
         limit = mechanism.value(self.limit)
+        (command,) = mechanism.called("c", command)
         return mechanism.call("max", -limit, mechanism.call("min", limit, command))
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:

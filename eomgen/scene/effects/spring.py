@@ -102,6 +102,7 @@ rest_length = 0.5
             tension = per_length * stretch
             if self.rest_length != ZERO:
                 per_length = tension / line.length
+        (per_length,) = mechanism.called("k", per_length)
         opposed = line.damped_velocity(mechanism.number(1.0))
         pull = tuple(per_length * d + damping * w for d, w in zip(line.d, opposed, strict=True))
         if not self.tension_only:
@@ -168,10 +169,11 @@ def _line(spring: Spring, mechanism: Mechanism) -> _Line:
     at_2 = tuple(mechanism.value(part) for part in spring.at_2)
     d = sub(mechanism.position(spring.body_2, at_2), mechanism.position(spring.body_1, at_1))
     d_dot = sub(mechanism.velocity(spring.body_2, at_2), mechanism.velocity(spring.body_1, at_1))
+    d, d_dot = mechanism.called("d", *d), mechanism.called("ddot", *d_dot)
     square = dot(d, d)
     larger = mechanism.call("max", square, nearest_square(mechanism))
-    length = mechanism.call("sqrt", larger)
-    stretch = length - mechanism.value(spring.rest_length)
+    (length,) = mechanism.called("l", mechanism.call("sqrt", larger))
+    (stretch,) = mechanism.called("s", length - mechanism.value(spring.rest_length))
     return _Line(at_1, at_2, d, d_dot, square, larger, length, stretch)
 
 
