@@ -373,5 +373,5 @@ def test_each_line_of_code_names_its_term(capsys: pytest.CaptureFixture[str]) ->
 
 def kernels(source: str) -> str:
     """The kernels of a generated module, without what checks its arguments."""
-    fixed, rest = source[source.index("def _fixed") :].split("def _constants")
+    fixed, rest = source[source.index("def _fixed") :].split("def _constants(")
     return fixed + rest[rest.index("def _initial_state") : rest.index("def _numbers")]

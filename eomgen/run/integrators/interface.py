@@ -49,6 +49,10 @@ Remark = Callable[[str], None]
 """Called with a method's remark on a step, as text."""
 
 
+def ignored(text: str) -> None:
+    """A `Remark` that does nothing."""
+
+
 @dataclass(frozen=True)
 class FixedStep:
     """A method whose step the user chooses.

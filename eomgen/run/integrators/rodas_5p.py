@@ -16,7 +16,7 @@ import numpy as np
 
 from eomgen.run.integrators.elimination import Factors, factored
 from eomgen.run.integrators.first_length import first_length, norm
-from eomgen.run.integrators.interface import Adaptive, Remark
+from eomgen.run.integrators.interface import Adaptive, Remark, ignored
 from eomgen.run.integrators.rodas_5p_coefficients import (
     COUPLINGS,
     DENSE,
@@ -27,7 +27,6 @@ from eomgen.run.integrators.rodas_5p_coefficients import (
     PLACES,
     Row,
 )
-from eomgen.run.integrators.unwarned import ignored
 from eomgen.run.problem import FloatArray
 
 STAGES = len(NODES)
