@@ -51,8 +51,8 @@ def usable() -> list[int]:
 
 @cache
 def trigonometry(width: int) -> Any:
-    each = {"each": [(name, c.C_NAMES.get(name, name)) for name in c_lanes.EACH]}
-    texts = {"vector.c": render(c.TEMPLATES, "vector.c.jinja", each), "both.c": WRAPPER}
+    each = {"each": [(name, c.C_NAMES.get(name, name)) for name in c.EACH]}
+    texts = {"vector.c": render(c.TEMPLATES, "sine.c.jinja", each), "both.c": WRAPPER}
     flags = (f"-DWIDTH={width}", *lanes.FLAGS[width])
     return compiled_library(f"trigonometry {width} {texts}", lambda: texts, "both.c", *flags)
 

@@ -57,7 +57,7 @@ def pair(scene: str) -> tuple[Any, Any]:
         python = load_module(python_module(system), scene)
         outputs = {"derivative": system.program.outputs["derivative"]}
         program = replace(system.program, outputs=outputs)
-        sources = c.library(program, interface_of(replace(system, program=program)))
+        sources = c.library(program, interface_of(replace(system, program=program)), vectors=True)
     else:
         made = eomgen.generate(scene, backend="c")
         python, sources = load_module(made.reference, made.name), made.library
