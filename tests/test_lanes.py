@@ -14,7 +14,7 @@ from campaign import some
 
 import eomgen
 from eomgen.api.given import check, read
-from eomgen.codegen.backends import c, c_lanes
+from eomgen.codegen.backends import c
 from eomgen.model.elaborate import in_order
 from eomgen.native import lanes
 from eomgen.native.lanes import Lanes

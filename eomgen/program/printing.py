@@ -20,8 +20,8 @@ class Dialect:
     """How a language spells each function, its reserved words, and the format of a number.
 
     assigned  functions whose value is always assigned to a variable
-    fused     functions of (a, b, c) that compute a b + c, a b - c and c - a b with one rounding, for
-              products that are used nowhere else; none if empty
+    fused     functions of (a, b, c) that compute a b + c, a b - c and c - a b with one rounding;
+              they are called for products that are used nowhere else; none if empty
     """
 
     functions: Mapping[str, str]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from eomgen.codegen.backends.conditions import Test, refusals
-from eomgen.codegen.backends.division import Line, divided, in_place, together
+from eomgen.codegen.backends.division import Line, Part, divided, in_place, together
 from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.language.formula import names_in
@@ -34,7 +34,7 @@ MACROS = (
     "DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE MAXFLOAT"
 )
 """Macros of <math.h> or of compilers."""
-OURS = "y p u k out extra between real R failed"
+OURS = "y p u k out extra between real R failed AGAIN APART"
 C_NAMES = {"abs": "fabs"}
 """Names of functions of formulas that differ in C."""
 OWN = {
@@ -60,7 +60,9 @@ DIALECT = Dialect(
 )
 OURS_IN_VECTORS = (
     "V I N EACH LANES INLINE STATES INPUTS CONSTANTS WIDTH RAISED either size_of any root columns "
-    "times reduced bits_from sine_and_cosine put taken lanes_of beside begin unit suspicious l i"
+    "times reduced bits_from sine_and_cosine put taken lanes_of beside begin unit suspicious l i "
+    "fused plus_product product_minus minus_product from_row to_row finite_lanes FUSED SUM VECTORS "
+    "AGAIN APART"
 )
 VECTORS = replace(
     DIALECT,
@@ -108,9 +110,7 @@ def _files(values: Mapping[str, Any], interface: Interface) -> dict[str, str]:
     }
 
 
-def library(
-    program: Program, interface: Interface, *, vectors: bool = False
-) -> Mapping[str, str]:
+def library(program: Program, interface: Interface, *, vectors: bool = False) -> Mapping[str, str]:
     """The sources of a shared library: those of `files`, and `MAIN`, which includes them.
 
     `MAIN` defines `checked_NAME` and `columns_NAME` for each output, which report whether a result
@@ -218,9 +218,9 @@ def in_parts(
     """The same kernel, in parts if it is long; `rewritten` is applied to the lines of each."""
     lines = together(kernel["lines"], ANGLE)
     division = divided(lines, kernel["given"], kernel["results"])
-    if division is None:
-        given, parts = kernel["given"], ()
-    else:
+    given: Sequence[Line] = kernel["given"]
+    parts: tuple[Part, ...] = ()
+    if division is not None:
         given, lines = division.given, []
         parts = tuple(
             replace(part, lines=in_place(rewritten(part.lines), part.given))

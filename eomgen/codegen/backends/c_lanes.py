@@ -3,7 +3,7 @@
 The vector extensions of GCC and clang compute all lanes by the operations of single numbers, so the
 results do not depend on the number of lanes, or on what other lanes hold. They differ from those of
 the C backend, and of the Python module, by the roundings of sine and cosine, which are computed by
-polynomials here.
+polynomials here, and by those of sums with a product, which are rounded once.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from eomgen.templating import render
 
 MAIN = "lanes.c"
 """The source of a shared library to compile; it includes the others."""
-DIALECT = replace(c.VECTORS, fused=("fused", "fused_less", "less_fused"))
+DIALECT = replace(c.VECTORS, fused=("plus_product", "product_minus", "minus_product"))
 LIMIT = 2.78
 """Greatest h|λ| at which the classical Runge-Kutta method is stable, for real λ; 2.83 if λ is
 imaginary."""

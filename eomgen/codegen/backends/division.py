@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 Line = tuple[str, str]
 """A name, and the source of its value."""
-MOST = 800
+MOST = 2000
 """Lines of a function."""
 WORD = re.compile(r"[A-Za-z_]\w*")
 
