@@ -100,6 +100,7 @@ def test_the_bits_are_those_of_the_python_module(scene: str) -> None:
         together = ours(0.7, y.T)
         for k, state in enumerate(y):
             assert same(together[..., k], theirs(0.7, state)), name
+        assert same(ours(0.7, np.tile(y.T, 7)), np.tile(together, 7)), name  # of whole registers
 
 
 @pytest.mark.parametrize("level", ["-O1", "-O2", "-O3"])

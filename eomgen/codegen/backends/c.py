@@ -11,6 +11,7 @@ from eomgen.codegen.backends.division import Line, Part, divided, in_place, toge
 from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.language.formula import names_in
+from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.scalars.functions import FUNCTIONS
@@ -84,10 +85,11 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
     `-std=c99` in GCC) and with the same mathematical library, each function returns the same bits
     as that of the Python module.
     """
-    return _files(context(program, interface), interface)
+    return files_of(context(ordered(program), interface), interface)
 
 
-def _files(values: Mapping[str, Any], interface: Interface) -> dict[str, str]:
+def files_of(values: Mapping[str, Any], interface: Interface) -> dict[str, str]:
+    """The same from the values for their templates."""
     name = interface.name
     shared = {key: values[key] for key in _SHARED}
     return {
@@ -119,6 +121,7 @@ def library(program: Program, interface: Interface, *, vectors: bool = False) ->
     vectors  whether columns of the derivative are computed in vector registers; it has the same
              bits, but takes as long again to compile
     """
+    program = ordered(program)
     values = context(program, interface)
     wanted = ("derivative",) if vectors else ()
     checked = {
@@ -131,7 +134,7 @@ def library(program: Program, interface: Interface, *, vectors: bool = False) ->
         "each": [(name, C_NAMES.get(name, name)) for name in ("sin", "cos", *EACH)],
         "vectors": {k["name"]: k for k in in_vectors(program, interface, VECTORS, wanted)},
     }
-    return {**_files(values, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
+    return {**files_of(values, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
 
 
 _SHARED = ("scene", "prefix", "kernels")

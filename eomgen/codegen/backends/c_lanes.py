@@ -12,6 +12,7 @@ from typing import Any
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.program.ordering import ordered
 from eomgen.program.program import Program
 from eomgen.templating import render
 
@@ -37,7 +38,7 @@ def files(
 
     usual_length  lengths of quaternions between which squares neither overflow nor underflow
     """
-    scalar = c.files(program, interface)
+    program = ordered(program)
     context = c.context(program, interface)
     wanted = [f.name for f in interface.functions if f.name != "initial_state"]
     values: dict[str, Any] = {
@@ -56,4 +57,4 @@ def files(
         "streak": STREAK,
         "noise": NOISE,
     }
-    return {**scalar, MAIN: render(c.TEMPLATES, "lanes.c.jinja", values)}
+    return {**c.files_of(context, interface), MAIN: render(c.TEMPLATES, "lanes.c.jinja", values)}
