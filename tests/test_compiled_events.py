@@ -219,7 +219,7 @@ def test_a_check_left_out_is_noticed(
     monkeypatch.setattr(checked, "context", lambda: {**right(), **fault})
     options: dict[str, Any] = {"rtol": 1e-9}
     if scene == WHEEL:
-        options = {"rtol": 1e-3, "parameters": {"w": 1e-3}}
+        options = {"rtol": 1e-3, "parameters": {"w": 1e-2}}
     with pytest.raises(AssertionError):
         alike(scene, **options)
 

@@ -2,9 +2,10 @@
 
 import ast
 import math
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 from math import cos, sin, sqrt
 from types import ModuleType
 from typing import Any
@@ -21,6 +22,7 @@ from eomgen.codegen.system import optimised
 from eomgen.pipeline import compile_scene
 from eomgen.program.differentiate import jacobian
 from eomgen.program.extended import evaluator
+from eomgen.program.ordering import ordered
 from eomgen.program.passes import PASSES, optimise_and_report, parts_of
 from eomgen.program.program import Output, Program, cost, finish, interpret, live_steps
 from eomgen.program.tape import Node, Stage, Tape, power, total
@@ -592,3 +594,41 @@ def test_digits_at_mass_ratios(ratio: float) -> None:
             expected = np.array([float(value) for value in values])
             actual = np.ravel(getattr(c.module, output)(0.0, y, p))
             assert np.max(np.abs(actual - expected)) <= 1e-13 * np.max(np.abs(expected))
+
+
+def test_an_order_for_registers_and_short_waits() -> None:
+    """A long sum takes up what was computed for it at once; two long chains advance together. The
+    steps are the same, operands come before what uses them, and results keep their bits.
+    """
+    tape, x, y = fresh()
+    terms = [(x + tape.constant(i)) * y for i in range(100)]
+    one, other = x, y
+    for i in range(100):
+        one = one * x + tape.constant(i)
+    for i in range(100):
+        other = other * y + tape.constant(i)
+    nodes = (total(terms, tape).index, (one / other).index)
+    program = finish(tape, {"f": Output((2,), nodes)}, [])
+    made = ordered(program)
+    before, after = (Counter(s.operation for s in p.steps if s.operands) for p in (program, made))
+    assert before == after
+    assert all(o < i for i, step in enumerate(made.steps) for o in step.operands)
+    given = {"x": 0.3, "y": -0.7}
+    results = [interpret(p, "f", given, DoubleScalars()) for p in (program, made)]
+    assert results[0] == results[1]
+    assert most_in_use(program) > 100 and most_in_use(made) < 70
+    of_y = [step.stage is Stage.VELOCITIES for step in made.steps if step.operation == "mul"]
+    changes = sum(a != b for a, b in pairwise(of_y[100:]))
+    assert changes > 50, "the two chains are not interleaved"
+
+
+def most_in_use(program: Program) -> int:
+    """The largest number of computed values that wait for a use."""
+    last = {o: i for i, step in enumerate(program.steps) for o in step.operands}
+    computed = [i for i, step in enumerate(program.steps) if step.operands]
+    ends = Counter(last.get(i, len(program.steps)) for i in computed)
+    in_use = most = 0
+    for i in range(len(program.steps)):
+        in_use += bool(program.steps[i].operands) - ends[i]
+        most = max(most, in_use)
+    return most
