@@ -23,13 +23,20 @@ TABLE_PART = 4096
 
 
 def output_paths(
-    folder: Path, name: str, *, figure: Path | None = None, force: bool = False
+    folder: Path,
+    name: str,
+    *,
+    figure: Path | None = None,
+    parquet: bool = False,
+    force: bool = False,
 ) -> dict[str, Path]:
-    """The paths of the files of a run, by kind; `figure` replaces the path of the figure.
+    """The paths of the files of a run, by kind; `figure` replaces the path of the figure, with
+    `parquet` there is a Parquet file.
 
     Makes the folders. Raises `RunError` for a path that cannot be written, before the run begins.
     """
-    paths = {kind: folder / f"{name}.{kind}" for kind in KINDS}
+    kinds = (*KINDS, *(("parquet",) if parquet else ()))
+    paths = {kind: folder / f"{name}.{kind}" for kind in kinds}
     if figure is not None:
         paths["png"] = figure
         from eomgen.show.style import check_figure  # it loads Matplotlib
@@ -37,9 +44,18 @@ def output_paths(
         check_figure(figure, force=force)
     for kind, path in paths.items():
         check_folder(path.parent)
-        own = kind == "csv" and path.is_file() and is_own_table(path)
+        own = path.is_file() and _is_own(kind, path)
         check_writable(path, force=force or own)
     return paths
+
+
+def _is_own(kind: str, path: Path) -> bool:
+    """Whether a table is ours, which has no mark of its own at its start."""
+    if kind == "parquet":
+        from eomgen.run.parquet import is_own_parquet
+
+        return is_own_parquet(path)
+    return kind == "csv" and is_own_table(path)
 
 
 def save_run(
@@ -52,6 +68,10 @@ def save_run(
     # The table first: the archive of the earlier run shows whether its table is ours to overwrite.
     save_csv(run.trajectory, paths["csv"], force=force)
     save_npz(run.trajectory, paths["npz"], force=force)
+    if "parquet" in paths:
+        from eomgen.run.parquet import save_parquet
+
+        save_parquet(run.trajectory, paths["parquet"], force=force)
     if pictures:
         return _save_pictures(run, paths, force)
     _remove_pictures(paths)

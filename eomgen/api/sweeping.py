@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, check_name, check_time, read, values_of
+from eomgen.api.given import Source, Values, check_name, check_time, model_of, read, values_of
+from eomgen.api.planning import Backend
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
-from eomgen.api.simulating import Backend
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
@@ -101,7 +101,7 @@ def ensemble(
     design = vary if isinstance(vary, Design) else listed(vary)
     plan = plan_sweep(
         scene,
-        check(scene),
+        model_of(scene, source),
         design,
         t_end=t_end,
         integrator=integrator,

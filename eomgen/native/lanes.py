@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c_lanes
 from eomgen.codegen.interface import Interface
+from eomgen.native.compiler import find_compiler
 from eomgen.native.library import compiled_library
 from eomgen.native.module import USUAL, USUAL_CONSTANT
 from eomgen.program.program import Program
@@ -84,7 +85,8 @@ class Lanes:
     def __init__(self, texts: Mapping[str, str], lanes: int | None = None) -> None:
         lanes = lanes or width()
         about = f"lanes {lanes} {sorted(texts.items())!r}"
-        flags = (f"-DWIDTH={lanes}", *FLAGS[lanes])
+        fused = ("-mfma",) if lanes == 2 < width() else ()  # as those that are wider
+        flags = (f"-DWIDTH={lanes}", *FLAGS[lanes], *fused, *find_compiler().ordering)
         self.library = compiled_library(about, lambda: texts, self.main, *flags)
         sizes = (_LONG * 5).in_dll(self.library, "sizes")
         self.states, self.inputs, self.parameters, self.constants, self.lanes = sizes

@@ -2,7 +2,8 @@
 
 SymPy's sums and products have many operands in no particular order of evaluation. Lowering chooses
 one: factors that depend on parameters alone are multiplied first, so that their product is computed
-once, and terms with the same such coefficient are added before they are multiplied by it.
+once. Such coefficients of one product are added. Then terms with the same coefficient are added
+before they are multiplied by it.
 """
 
 from collections.abc import Mapping
@@ -49,7 +50,7 @@ class Lowering:
             fixed, moving = self._factors(expression)
             return fixed * moving if fixed.step.stage <= Stage.PARAMETERS else moving
         name = type(expression).__name__
-        return self._tape.apply(name, self.lower(expression.args[0]))
+        return self._tape.apply(name, *[self.lower(part) for part in expression.args])
 
     def _factors(self, expression: Any) -> tuple[Node, Node]:
         """A product split in two: the factors that depend on parameters alone, and the rest."""
@@ -78,13 +79,19 @@ class Lowering:
         return parts[0], parts[1]
 
     def _sum(self, expression: Any) -> Node:
-        groups: dict[int, tuple[Node, list[Node]]] = {}
+        coefficients: dict[int, tuple[Node, list[Node]]] = {}
         plain: list[Node] = []
         for term in expression.args:
             fixed, moving = self._factors(term)
             if moving.step.stage <= Stage.PARAMETERS:
                 plain.append(fixed * moving)
                 continue
+            if moving.step.operation == "neg":
+                fixed, moving = -fixed, -moving
+            coefficients.setdefault(moving.index, (moving, []))[1].append(fixed)
+        groups: dict[int, tuple[Node, list[Node]]] = {}
+        for moving, parts in coefficients.values():
+            fixed = _positive_first(parts, self._tape)
             if fixed.step.operation == "neg":
                 fixed, moving = -fixed, -moving
             groups.setdefault(fixed.index, (fixed, []))[1].append(moving)

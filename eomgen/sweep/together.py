@@ -115,7 +115,7 @@ class _Starts:
         self.k, self._own, sound = kernels.prepare(np.ascontiguousarray(p.T))
         pushes = {name: columns[name] for name in columns if kinds[name] == "input"}
         inputs: dict[str, float | FloatArray] = {
-            **dict.fromkeys(module.INPUTS, 0.0),
+            **module.INPUTS,
             **task.inputs,
             **pushes,
         }
