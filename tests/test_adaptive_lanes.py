@@ -104,6 +104,26 @@ def test_a_member_that_is_slow_is_given_up() -> None:
         assert (sound == valid).all()
 
 
+@pytest.mark.parametrize("method", ["dop853", "rk4"])
+def test_runs_are_counted_and_can_be_stopped(method: str) -> None:
+    """From outside, through two integers in memory."""
+    ours, module = kernels(SCENES[0])
+    count, shared = 13, np.zeros(2, dtype=np.int64)
+    columns = members(module, count)
+    places = (shared.ctypes.data, shared.ctypes.data + 8)
+
+    def valid() -> np.ndarray:
+        if method == "dop853":
+            return run(ours, columns, np.array([0.5]), addresses=places)[1]
+        y, p, u = map(np.ascontiguousarray, columns)
+        k, _, _ = ours.prepare(p.T)
+        return ours.rk4(y, k, u, t_end=0.5, dt=0.01, every=50, addresses=places)[1]
+
+    assert valid().all() and shared.tolist() == [count, 0]
+    shared[1] = 1
+    assert not valid().any() and shared[0] == count
+
+
 def test_a_sweep_in_lanes_is_that_of_single_runs() -> None:
     """To the tolerance; the same tolerances are taken, and members that stop or are refused say
     why in the same words.

@@ -69,6 +69,7 @@ class _Times(ctypes.Structure):
     _fields_ = (
         *((name, _REAL) for name in ("t_start", "t_end", "dt", "last")),
         *((name, _WHOLE) for name in ("steps", "every")),
+        *((name, _POINTER) for name in ("done", "stop")),
     )
 
 
@@ -124,11 +125,22 @@ class Lanes:
         return out.reshape(*shape, n), sound != 0
 
     def rk4(
-        self, y: FloatArray, k: FloatArray, u: FloatArray, *, t_end: float, dt: float, every: int
+        self,
+        y: FloatArray,
+        k: FloatArray,
+        u: FloatArray,
+        *,
+        t_end: float,
+        dt: float,
+        every: int,
+        addresses: tuple[int, int] | None = None,
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Runs from states (ny, n) at 0 to `t_end` by the classical Runge-Kutta method, with steps
         of `dt`: rows (r, ny, n) after each `every`-th step and at the end, and which runs are
         valid: finite, and with steps that look short enough for stability.
+
+        Of two 64-bit integers at `addresses`, members that have ended are counted in the first, and
+        all runs end early once the second is not 0.
         """
         y = np.ascontiguousarray(y, dtype=float)
         n, steps = y.shape[1], int(count_steps(t_end, dt))
@@ -136,7 +148,9 @@ class Lanes:
         last = dt if whole else t_end - (steps - 1) * dt
         rows = np.empty((math.ceil(steps / every), self.states, n))
         sound = np.zeros(n, dtype=np.int8)
-        times = _Times(0.0, t_end, dt, last, steps, every)
+        idle = np.zeros(2, dtype=np.int64)
+        shared = addresses or (idle.ctypes.data, idle.ctypes.data + 8)
+        times = _Times(0.0, t_end, dt, last, steps, every, *shared)
         call = self.library.rk4
         call.argtypes, call.restype = [_POINTER, _LONG, *[Columns] * 3, *[_POINTER] * 2], None
         call(

@@ -73,7 +73,7 @@ class Ensemble:
             return values if self.rows is None else np.asarray(values[:, -1])
         if name in self.design.names:
             return np.asarray(self.design.values[:, self.design.names.index(name)])
-        known = (*self.states, *self.outputs, *self.design.names)
+        known = tuple(dict.fromkeys((*self.states, *self.outputs, *self.design.names)))
         listed = ", ".join(known)
         raise RunError(f"of: unknown name '{name}'{nearest(name, known)}; known: {listed}")
 

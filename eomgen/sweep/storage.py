@@ -97,7 +97,7 @@ class Storage:
                     _reserve(file.fileno(), whole)
             except OSError as error:
                 path.unlink(missing_ok=True)
-                needed = f"{whole / 1e6:.3g} MB are needed"
+                needed = f"{_words(whole)} are needed"
                 raise RunError(f"{path}: cannot be written: {error.strerror}; {needed}") from None
 
     def _sum(self, number: int) -> str:
@@ -215,6 +215,12 @@ def _reserve(handle: int, size: int) -> None:
         reserve(handle, 0, size)
     else:
         os.truncate(handle, size)
+
+
+def _words(size: int) -> str:
+    """A number of bytes in words: "14.4 TB"."""
+    power = min(4, int(math.log10(max(1, size)) / 3))
+    return f"{size / 1000**power:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB')[power]}"
 
 
 def _size(column: Column) -> int:

@@ -41,8 +41,13 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
             addresses=counter.addresses,
         )
     else:
-        rows, valid = kernels.rk4(y, k, u, t_end=task.t_end, dt=task.dt, every=task.every)
-        counter.add(len(values))
+        rows, valid = kernels.rk4(
+            *(y, k, u),
+            t_end=task.t_end,
+            dt=task.dt,
+            every=task.every,
+            addresses=counter.addresses,
+        )
     counter.check()
     rows = np.concatenate([y[None], rows])
     sound &= valid
