@@ -1,13 +1,16 @@
 """Many states at once: kernels in vector registers beside those of others, and ensembles."""
 
+import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from paired import COLUMNS, compared, paired, row, spread
 
+import eomgen
 from eomgen.model.model import Model
 from eomgen.native.lanes import Lanes, columns_of, sources
 from eomgen.program.kernel import kernel
@@ -194,3 +197,41 @@ def ensembles(models: Sequence[tuple[str, Model]], cores: int, rounds: int) -> N
         made = 4 * steps * sum(y.shape[1] for y in parts)
         one, all_of = (made / np.median(column) for column in times.T)
         row(name, f"{one:.3g}", f"{all_of:.3g}", spread(times[:, 0] / times[:, 1]))
+
+
+def adaptive_ensembles(cores: int, rounds: int) -> None:
+    """Print times of ensembles of double pendulums of 5 s by DOP853, a relative tolerance of 1e-9:
+    members in lanes, and one by one in compiled steps. Both by `eomgen.ensemble`, checks included.
+    """
+    count = 4096
+    rng = np.random.default_rng(2)
+    vary = {name: rng.uniform(-1.0, 1.0, count) for name in ("theta_1", "theta_2")}
+    names = "in lanes, s", "one by one, s"
+    row("processes or threads", *names, "one by one / lanes")
+    row(*["---"] * 4)
+    for workers in sorted({1, cores}):
+
+        def lanes(workers: int = workers) -> Any:
+            return eomgen.ensemble(
+                "double_pendulum",
+                vary,
+                t_end=5.0,
+                integrator="DOP853",
+                rtol=1e-9,
+                backend="c",
+                workers=workers,
+            )
+
+        def alone(lanes: Callable[[], Any] = lanes) -> Any:
+            with patch("eomgen.api.sweeping._run_together", return_value=False):
+                return lanes()
+
+        apart = np.abs(lanes().final - alone().final).max(axis=1)
+        assert np.median(apart) < 1e-8  # some are chaotic: their errors grow
+        times = paired(rounds, lanes, alone)
+        least = (f"{seconds:.3g}" for seconds in times.min(axis=0))
+        row(str(workers), *least, compared(times[:, 0], times[:, 1]))
+
+
+if __name__ == "__main__":
+    adaptive_ensembles(os.cpu_count() or 1, 7)

@@ -167,6 +167,7 @@ def vectors(rounds: int) -> None:
     built_in = ("two_body", "double_pendulum", "tumbling_body", "human_figure")
     models = [(name, elaborate(read_scene(name))) for name in built_in]
     peer_lanes.ensembles(models, os.cpu_count() or 1, max(5, rounds // 3))
+    peer_lanes.adaptive_ensembles(os.cpu_count() or 1, max(5, rounds // 3))
 
 
 def is_same(peer: Any, y: np.ndarray) -> bool:
