@@ -17,6 +17,11 @@ MARKS = {0: "", 1: "\u0307", 2: "\u0308"}
 class PlainPrinter(PrettyPrinter):  # type: ignore[misc]
     """SymPy's printer with this project's names, decimals, and cross products."""
 
+    @property
+    def _use_unicode(self) -> bool:
+        """As asked for; SymPy's own takes a flag of the process instead of False."""
+        return bool(self._settings["use_unicode"])
+
     def doprint(self, expr: Expr) -> str:
         """The formula as text. SymPy's signs and brackets depend on a flag of the process."""
         before = pretty_use_unicode(self._use_unicode)
