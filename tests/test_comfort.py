@@ -184,7 +184,7 @@ def test_an_interrupt_says_what_is_kept(
     assert capsys.readouterr().err == said
     assert [path.name for path in tmp_path.iterdir()] == ["pendulum.py"]
     monkeypatch.setattr(
-        "eomgen.commands.deriving.derivation_of", lambda *_: interrupted("two_body")
+        "eomgen.commands.deriving.derivation_of", lambda *_, **__: interrupted("two_body")
     )
     assert main(["derive", "pendulum"]) == 130
     assert "interrupted; what was derived is kept" in capsys.readouterr().err

@@ -6,6 +6,7 @@ once. Such coefficients of one product are added. Then terms with the same coeff
 before they are multiplied by it.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -38,7 +39,7 @@ class Lowering:
 
     def _lower(self, expression: Any) -> Node:
         if expression.is_Number:
-            return self._tape.constant(float(expression))
+            return self._number(expression)
         if expression.is_Symbol:
             node = self.lower(self._defined[expression])
             if node.step.operation not in ("input", "constant", "neg"):
@@ -51,6 +52,13 @@ class Lowering:
             return fixed * moving if fixed.step.stage <= Stage.PARAMETERS else moving
         name = type(expression).__name__
         return self._tape.apply(name, *[self.lower(part) for part in expression.args])
+
+    def _number(self, number: Any) -> Node:
+        """A number; if it is too large for a double, a product that overflows when computed."""
+        if math.isfinite(float(number)):
+            return self._tape.constant(float(number))
+        root = self._number(sp.sqrt(abs(number)))
+        return root * root if number > 0 else -(root * root)
 
     def _factors(self, expression: Any) -> tuple[Node, Node]:
         """A product split in two: the factors that depend on parameters alone, and the rest."""

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from eomgen.program.program import Output, Program, finish, live_steps
-from eomgen.program.tape import Stage, Step, Tape
+from eomgen.program.tape import ExactTape, Stage, Step, Tape
 
 MOST_FACTORS = 8
 """Products of so many factors are not taken apart."""
@@ -308,7 +308,7 @@ def _rebuilt(
     """The program recorded on a new tape, each operation by `rule`; `note` gets each step. The
     `products` are recorded as those of the given steps, from the left.
     """
-    tape = Tape()
+    tape = ExactTape()
     new: list[int] = []
     for i, (operation, operands, stage, value) in enumerate(program.steps):
         if operation == "constant":

@@ -3,6 +3,7 @@
 from typing import Any
 
 from sympy.printing.pretty.pretty import PrettyPrinter
+from sympy.printing.pretty.pretty_symbology import pretty_use_unicode
 from sympy.printing.pretty.stringpict import prettyForm, stringPict
 
 from eomgen.show.mathml import decimal
@@ -15,6 +16,19 @@ MARKS = {0: "", 1: "\u0307", 2: "\u0308"}
 
 class PlainPrinter(PrettyPrinter):  # type: ignore[misc]
     """SymPy's printer with this project's names, decimals, and cross products."""
+
+    @property
+    def _use_unicode(self) -> bool:
+        """As asked for; SymPy's own takes a flag of the process instead of False."""
+        return bool(self._settings["use_unicode"])
+
+    def doprint(self, expr: Expr) -> str:
+        """The formula as text. SymPy's signs and brackets depend on a flag of the process."""
+        before = pretty_use_unicode(self._use_unicode)
+        try:
+            return str(super().doprint(expr))
+        finally:
+            pretty_use_unicode(before)
 
     def _print_Symbol(self, e: Expr, bold_name: bool = False) -> Any:
         return prettyForm(self.name(e.name), binding=prettyForm.ATOM)
