@@ -21,7 +21,7 @@ from eomgen.api.saving import save_statistics, save_sweep
 from eomgen.cli import main
 from eomgen.errors import RunError
 from eomgen.show.sweep import draw_sweep
-from eomgen.sweep import ensemble, execute, together
+from eomgen.sweep import ensemble, execute, storage, together
 from eomgen.sweep.design import Law
 from eomgen.sweep.ensemble import Ensemble
 
@@ -135,6 +135,28 @@ def test_what_was_stopped_goes_on(
         eomgen.ensemble("two_body", design, folder=folder, **asked)
     with pytest.raises(RunError, match="is no empty folder"):
         eomgen.ensemble("two_body", design, folder=tmp_path, **asked)
+
+
+def test_a_full_disk_keeps_what_has_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line says so, and the sweep goes on when there is space."""
+    vary, asked = {"theta": np.linspace(0, 1, 6)}, {"backend": "numpy", **QUICK}
+    left, write = [3], storage.write_whole
+
+    def filling(path: Path, data: str, **options: Any) -> None:
+        left[0] -= path.name.startswith("chunk_")
+        if left[0] < 0:
+            raise RunError(f"{path}: cannot be written: No space left on device")
+        write(path, data, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(storage, "write_whole", filling)
+        said = "No space left on device; other chunks are kept, and the same sweep goes on"
+        with pytest.raises(RunError, match=said):
+            eomgen.ensemble("pendulum", vary, folder=tmp_path / "kept", **asked)
+    assert storage.kept_members(tmp_path / "kept") == 3
+    again = eomgen.ensemble("pendulum", vary, folder=tmp_path / "kept", **asked)
+    assert same(again, eomgen.ensemble("pendulum", vary, **asked))
+    assert storage.kept_members(tmp_path / "kept") == 6
 
 
 def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from eomgen.sweep.layout import Column, Layout, said
 from eomgen.sweep.members import Arrays, Task
 
 ABOUT, FORMAT = "sweep.json", 2
+GOES_ON = "other chunks are kept, and the same sweep goes on with them"
 LARGEST = 2**26
 """Greatest size of the file of a chunk, bytes."""
 
@@ -65,13 +66,17 @@ class Storage:
                     file.seek(self._place(column, number))
                     file.write(data)
             except OSError as error:
-                raise RunError(f"{path}: cannot be written: {error.strerror}") from None
+                text = f"{path}: cannot be written: {error.strerror}; {GOES_ON}"
+                raise RunError(text) from None
         about = {
             "eomgen": self._name(number),
             "sha256": found.hexdigest(),
             "messages": {str(i): text for i, text in sorted(said(arrays).items())},
         }
-        write_whole(self._chunk(number), json.dumps(about) + "\n", force=True)
+        try:
+            write_whole(self._chunk(number), json.dumps(about) + "\n", force=True)
+        except RunError as error:
+            raise RunError(f"{error}; {GOES_ON}") from None
 
     def results(self) -> tuple[Arrays, dict[int, str]]:
         """The arrays of all members, which stay on disk, and messages by number of the member."""
