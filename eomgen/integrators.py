@@ -41,6 +41,8 @@ INTEGRATORS: Mapping[str, IntegratorSpec] = {
     "gauss_6": IntegratorSpec("Gauss collocation, order 6", "symplectic", "gauss_6:INTEGRATOR"),
     "RK45": IntegratorSpec("Dormand-Prince 5(4), by SciPy", "explicit", "from_scipy:RK45"),
     "DOP853": IntegratorSpec("Dormand-Prince 8(5,3)", "explicit", "dormand_prince_8:INTEGRATOR"),
+    "taylor": IntegratorSpec("Taylor series, order 8 to 24", "explicit", "taylor:INTEGRATOR"),
+    "heyoka": IntegratorSpec("Taylor series, by heyoka", "explicit", "taylor:HEYOKA"),
     "gragg_bulirsch_stoer": IntegratorSpec(
         "extrapolated modified midpoint rule, variable order",
         "explicit",

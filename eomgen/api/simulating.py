@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -227,8 +228,8 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     }
     problem = problem_of(functions, *values, model)
     accelerator = _accelerator(plan, functions, values, reporter)
-    if accelerator:
-        problem = accelerator.of(problem)
+    made = accelerator.of if accelerator else _plain(model, functions, values)
+    problem = made(problem)
     start = _start(plan, problem)
     if start is not None:
         problem = start.problem
@@ -237,9 +238,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     if plan.setting is None or plan.estimate:
         from eomgen.study.accuracy.moved import moved_problem
 
-        moved = moved_problem(
-            functions, model, *values, compiled=accelerator.of if accelerator else None
-        )
+        moved = moved_problem(functions, model, *values, compiled=made)
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     warnings, error = [*model.notices, *module.notices], math.nan
@@ -292,6 +291,20 @@ def _accelerator(
         with reporter.waiting(f"compiling {plan.model.name} …"):
             accelerator.compile()
     return accelerator
+
+
+def _plain(
+    model: Model, module: GeneratedModule, values: tuple[Mapping[str, float] | None, ...]
+) -> "Callable[..., Problem]":
+    """A function that gives a problem, of a module or one with other constants, its series."""
+
+    def of(problem: "Problem", other: GeneratedModule = module) -> "Problem":
+        from eomgen.native.accelerator import plain_series
+
+        series = cache(partial(plain_series, model, other, values))
+        return replace(problem, series={"taylor": series})
+
+    return of
 
 
 def _why_not_compiled(plan: Plan, accelerator: "Accelerator | None") -> str:

@@ -20,9 +20,9 @@ from typing import Any
 from eomgen.codegen.backends import c
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import functions, runs
+from eomgen.native import functions, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
-from eomgen.run.compiled import Compiled, EqualSteps, Steps
+from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
 from eomgen.run.problem import Problem
 from eomgen.store import interfaced_program_of, key_of
 
@@ -101,7 +101,13 @@ class Accelerator:
                 made.append(runs.CompiledSteps(module, library, *self._values))
             return made[0] if made else None
 
+        @cache
+        def series() -> taylor.CompiledTaylor | None:
+            return self._taylor(module)
+
         def steps(name: str) -> Steps | None:
+            if name == "taylor":
+                return found.steps if (found := series()) else None
             found = held.named(name) if (held := compiled()) else None
             self.used = self.used or found is not None
             return found
@@ -111,7 +117,14 @@ class Accelerator:
             self.used = self.used or found is not None
             return found
 
-        return replace(problem, compiled=Compiled(problem.derivative, steps, equal))
+        def of_solutions() -> Series:
+            found = series()
+            return found.series if found else plain_series(self._model, module, self._values)
+
+        made_of = {**problem.series, "taylor": of_solutions}
+        return replace(
+            problem, compiled=Compiled(problem.derivative, steps, equal), series=made_of
+        )
 
     def compile(self) -> None:
         """Compile the steps now, unless they are in the store, and each function at its first call.
@@ -120,6 +133,23 @@ class Accelerator:
         """
         self._at_once = True
         self._library("derivative").compile()
+
+    def _taylor(self, module: Any) -> taylor.CompiledTaylor | None:
+        """The Taylor series of a module; None without a compiler. They are compiled at once: other
+        code would compute other bits, so a run must not change over to them.
+        """
+        program, interface = interfaced_program_of(self._model)
+        taylor.system_of(program, interface)
+        try:
+            library = self._library("taylor")
+            library.compile()
+            found = library.after(0.0)
+        except RunError as error:
+            self._fail(str(error))
+            return None
+        assert found is not None
+        self.used = True
+        return taylor.CompiledTaylor(program, interface, module, found, self._values)
 
     def _start(self) -> None:
         self.used = True
@@ -144,8 +174,8 @@ class Accelerator:
             self._libraries[name] = _Library(
                 library_key(self._model, name),
                 partial(_sources, self._model, name),
-                runs.MAIN if name == "derivative" else c.MAIN,
-                STARTING + AN_OPERATION * self._module.COST[name]["total"],
+                {"derivative": runs.MAIN, "taylor": taylor.MAIN}.get(name, c.MAIN),
+                STARTING + AN_OPERATION * self._module.COST.get(name, {"total": 0})["total"],
                 self._fail,
             )
         return self._libraries[name]
@@ -154,11 +184,18 @@ class Accelerator:
         self.notice = why
 
 
+def plain_series(model: Model, module: Any, values: tuple[Any, Any]) -> Series:
+    """The Taylor series of a model's module at given parameters and inputs, without a compiler."""
+    return taylor.plain_series(*interfaced_program_of(model), module, *values)
+
+
 def _sources(model: Model, name: str) -> Mapping[str, str]:
     """The sources of a function's library; with the derivative are the steps."""
     program, interface = interfaced_program_of(model)
     if name == "derivative":
         return runs.sources(program, interface)
+    if name == "taylor":
+        return taylor.sources(program, interface)
     return functions.sources(program, interface, name)
 
 

@@ -59,6 +59,10 @@ class Steps(Protocol):
     ) -> Stride: ...
 
 
+Series = Callable[[float, Array, int], Array]
+"""The Taylor coefficients (order + 1, ny) of the solution from a state y on: `(t, y, order)`."""
+
+
 @dataclass(frozen=True, eq=False)
 class EqualStride:
     """Some steps of equal length, in order: m of them, which may be none.

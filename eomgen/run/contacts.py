@@ -204,7 +204,10 @@ def restrained(
     derivative = counted(holding.derivative)
     sizes = np.array(problem.sizes or (1.0,))
     return replace(
-        problem, derivative=derivative, jacobian=partial(_differences, derivative, sizes)
+        problem,
+        derivative=derivative,
+        jacobian=partial(_differences, derivative, sizes),
+        series={},
     )
 
 

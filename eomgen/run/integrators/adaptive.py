@@ -114,6 +114,7 @@ def advances(
             samples,
             problem,
             partial(_between, problem, step),
+            derivatives=getattr(stepper.solver, "expanded", 0),
             factorisations=stepper.factorisations - factored,
             resume=stepper.continuation(),
             capped=stepper.is_capped(step),
@@ -163,6 +164,9 @@ class _Stepper:
         options: dict[str, Any] = {"rtol": self._bounds.rtol, "atol": self._bounds.atol}
         if self.method.uses_jacobian:
             options["jac"] = self._problem.jacobian
+        if self.method.series:
+            make = self._problem.series.get(self.method.series)
+            options["series"] = make() if make else None
         # y is copied because LSODA's compiled code modifies state arrays in place. If a later run
         # can continue from this one, the choice of the first step must not depend on the end.
         bound = np.inf if self.method.memory else until
