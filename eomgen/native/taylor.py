@@ -24,8 +24,8 @@ from eomgen.templating import render
 
 MAIN = "taylor.c"
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-_UNUSUAL = 2
-"""What C returns before a step that Python must make."""
+_AT_END, _UNUSUAL = 1, 2
+"""What C returns at the end of a run, and before a step that Python must make."""
 
 
 def system_of(program: Program, interface: Interface) -> Recurrences:
@@ -117,14 +117,14 @@ class CompiledTaylor:
     ) -> None:
         values = fixed_values(system_of(program, interface), module, *given)
         self._fixed, self._states = np.array([*values.values(), 0.0]), len(interface.states)
-        self._library = library
+        self._library, self._at = library, self._fixed.ctypes.data
         library.taylor_series.argtypes = [_POINTER, _REAL, *[_POINTER] * 2]
         library.taylor_steps.argtypes = [_POINTER, _WHOLE, _REAL, *[_POINTER] * 4]
 
     def series(self, t: float, y: Array, order: int) -> Array:
         """The Taylor coefficients (order + 1, ny) from the state y at t on."""
         rows, start = np.empty((order + 1, self._states)), np.ascontiguousarray(y)
-        settings = _Settings(self._fixed.ctypes.data, None, 0.0, 0.0, 0.0, order)
+        settings = _Settings(self._at, None, 0.0, 0.0, 0.0, order)
         self._library.taylor_series(
             ctypes.byref(settings), t, start.ctypes.data, rows.ctypes.data
         )
@@ -145,23 +145,25 @@ class CompiledTaylor:
     ) -> Stride:
         """Steps, with the arguments of `run.compiled.Steps`."""
         ny = self._states
-        ends, lengths = np.empty((2, most))
-        states, losses = np.empty((2, most, ny))
-        derivatives, sampled = np.empty((2, most), np.int64)
+        # Numbers and counts are parts of one array each: to ask for an address takes a microsecond.
+        numbers, counts = np.empty((2 + 2 * ny) * most), np.empty(2 * most, np.int64)
+        at, of_counts, n = numbers.ctypes.data, counts.ctypes.data, 8 * most
         rows, made = np.empty((len(times), ny)), ctypes.c_int64()
-        arrays = (ends, lengths, states, losses, derivatives, sampled, times, rows)
-        records = _Records(*(array.ctypes.data for array in arrays), len(times))
-        held = self._fixed.ctypes.data, atol.ctypes.data
-        settings = _Settings(*held, rtol, longest, t_end, order_of(rtol))
-        start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
-        why = self._library.taylor_steps(
-            ctypes.byref(settings),
-            most,
-            t,
-            *(array.ctypes.data for array in start),
-            ctypes.byref(records),
-            ctypes.byref(made),
+        records = _Records(
+            *(at, at + n, at + 2 * n, at + (2 + ny) * n, of_counts, of_counts + n),
+            *(times.ctypes.data, rows.ctypes.data, len(times)),
         )
+        settings = _Settings(
+            self._at, atol.ctypes.data, rtol, longest, t_end, order_of(rtol)
+        )
+        start = [np.ascontiguousarray(array).ctypes for array in (y, memory["lost"])]
+        why = self._library.taylor_steps(
+            *(ctypes.byref(settings), most, t, start[0].data, start[1].data),
+            *(ctypes.byref(records), ctypes.byref(made)),
+        )
+        ends, lengths = numbers[:most], numbers[most : 2 * most]
+        states, losses = numbers[2 * most :].reshape(2, most, ny)
+        derivatives, sampled = counts[:most], counts[most:]
         n = made.value
         passed = int(sampled[n - 1]) if n else 0
         return Stride(
@@ -172,4 +174,5 @@ class CompiledTaylor:
             sampled[:n],
             rows[:passed].copy(),  # the array for all rows to come is not kept with them
             usual=why != _UNUSUAL,
+            ended=why == _AT_END,
         )

@@ -24,6 +24,7 @@ class Stride:
     sampled      (m,), number of rows passed so far
     rows         (r, ny), the states at the times of these rows
     usual        whether the next step may be made so, too
+    ended        whether the last step reaches the end of the run
     """
 
     ends: Array
@@ -33,10 +34,11 @@ class Stride:
     sampled: NDArray[np.int64]
     rows: Array
     usual: bool
+    ended: bool = False
 
 
 class Steps(Protocol):
-    """Makes up to `most` steps from the state `y` at t, but none that would reach `t_end`.
+    """Makes up to `most` steps from the state `y` at t, but none beyond `t_end`.
 
     memory      of the solver, by name
     rtol, atol  tolerances, atol (ny,)

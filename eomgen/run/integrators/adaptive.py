@@ -93,6 +93,8 @@ def advances(
         if compiled and stride:
             yield from compiled.advances(stride, sampled, stepper.is_whole, each)
             here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
+            if stepper.ended:
+                return
             continue
         here += 1
         step = stepper.step()

@@ -1,6 +1,7 @@
 """Steps of an adaptive method that compiled code makes, many at once."""
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
@@ -40,7 +41,7 @@ class Strides:
         self._steps = steps
         self._method, self._problem, self._t_end, self._bounds = method, problem, t_end, bounds
         self._times = times
-        self._atol = np.array(np.broadcast_to(bounds.atol, problem.initial.shape), dtype=float)
+        self._atol = np.zeros(problem.initial.shape) + bounds.atol
         self._unusual = False
 
     def made(self, solver: Any, sampled: int, most: int) -> Stride | None:
@@ -53,11 +54,10 @@ class Strides:
         if self._unusual:  # the last stride ended before a step that Python must make
             self._unusual = False
             return None
-        memory = {name: getattr(solver, name) for name in self._method.memory}
         stride = steps(
             solver.t,
             solver.y,
-            memory,
+            _Memory(solver, self._method.memory),
             t_end=self._t_end,
             rtol=self._bounds.rtol,
             atol=self._atol,
@@ -75,6 +75,8 @@ class Strides:
         for name, values in stride.memory.items():
             last = values[-1]
             setattr(solver, name, last.copy() if last.ndim else float(last))
+        if stride.ended:
+            solver.status = "finished"
         return stride
 
     def advances(
@@ -84,11 +86,14 @@ class Strides:
         their ends.
         """
         ends = stride.ends.tolist()
-        lengths = np.diff(stride.ends, prepend=self._start)
-        capped = np.cumsum(lengths >= self._bounds.longest * (1 - 1e-9)).tolist()
+        capped = [0] * len(ends)
+        if self._bounds.longest < np.inf:
+            lengths = np.diff(stride.ends, prepend=self._start)
+            capped = np.cumsum(lengths >= self._bounds.longest * (1 - 1e-9)).tolist()
         derivatives, passed = stride.derivatives.tolist(), stride.sampled.tolist()
         times = self._times[sampled : sampled + passed[-1]].tolist()
         steps, rows, called, shortened = 0, 0, 0, 0
+        whole = len(ends) - stride.ended  # the end shortens the last step
         for i in range(len(ends)) if each else (len(ends) - 1,):
             at = slice(rows, passed[i])
             yield Advance(
@@ -99,10 +104,27 @@ class Strides:
                 _unknown,
                 steps=i + 1 - steps,
                 derivatives=derivatives[i] - called,
-                resume=partial(_after, stride, i) if resumes else None,
+                resume=partial(_after, stride, min(i, whole - 1)) if resumes and whole else None,
                 capped=capped[i] - shortened,
             )
             steps, rows, called, shortened = i + 1, passed[i], derivatives[i], capped[i]
+
+
+@dataclass(frozen=True)
+class _Memory(Mapping[str, Any]):
+    """What determines a solver's next step. It is read when it is used, for it may be computed."""
+
+    solver: Any
+    names: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Any:
+        return getattr(self.solver, name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
 
 
 def _after(stride: Stride, i: int) -> Resume:

@@ -63,7 +63,7 @@ class TaylorSeries:
         self.order = self.expanded = order_of(rtol)
         self._series = series
         self._known: tuple[float, FloatArray, FloatArray] | None = None
-        self._taken = (self.t, self._terms())
+        self._taken = (self.t, np.zeros((1, len(y0))))
 
     def _terms(self) -> FloatArray:
         """The coefficients at t, y."""
@@ -79,8 +79,8 @@ class TaylorSeries:
         terms, order = self._terms(), self.order
         allowed = self.atol + self.rtol * np.abs(self.y)
         last, other = (np.max(np.abs(row) / allowed, initial=0.0) for row in (terms[-1], terms[-2]))
-        lengths = _root(float(last), order), _root(float(other), order - 1)
-        return min(*lengths, self.max_step)
+        larger = max(_log(float(last)) / order, _log(float(other)) / (order - 1))
+        return min(math.exp(-larger) if larger > -math.inf else math.inf, self.max_step)
 
     @h_abs.setter
     def h_abs(self, length: float) -> None:
@@ -115,9 +115,8 @@ class TaylorSeries:
         return states
 
 
-def _root(size: float, order: int) -> float:
-    """How long a step may be for a term of this size per s to the power of the order."""
-    return size ** (-1 / order) if size > 0 else math.inf
+def _log(size: float) -> float:
+    return math.log(size) if size > 0 else -math.inf
 
 
 def _change(terms: FloatArray, h: Any) -> Any:
