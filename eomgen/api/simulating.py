@@ -1,9 +1,8 @@
 """Simulation of a scene: `simulate`, which calls `plan_run` and `run_plan`."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -294,15 +293,16 @@ def _accelerator(
 
 
 def _plain(
-    model: Model, module: GeneratedModule, values: tuple[Mapping[str, float] | None, ...]
-) -> "Callable[..., Problem]":
+    model: Model,
+    module: GeneratedModule,
+    values: tuple[Mapping[str, float] | None, Mapping[str, float] | None],
+) -> Callable[..., Problem]:
     """A function that gives a problem, of a module or one with other constants, its series."""
 
-    def of(problem: "Problem", other: GeneratedModule = module) -> "Problem":
-        from eomgen.native.accelerator import plain_series
+    def of(problem: Problem, other: GeneratedModule = module) -> Problem:
+        from eomgen.native.accelerator import with_series
 
-        series = cache(partial(plain_series, model, other, values))
-        return replace(problem, series={"taylor": series})
+        return with_series(problem, model, other, values)
 
     return of
 

@@ -20,7 +20,7 @@ from typing import Any
 from eomgen.codegen.backends import c
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import functions, runs, taylor
+from eomgen.native import functions, heyoka, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
 from eomgen.run.problem import Problem
@@ -107,7 +107,7 @@ class Accelerator:
 
         def steps(name: str) -> Steps | None:
             if name == "taylor":
-                return found.steps if (found := series()) else None
+                return of.steps if (of := series()) else None
             found = held.named(name) if (held := compiled()) else None
             self.used = self.used or found is not None
             return found
@@ -119,12 +119,12 @@ class Accelerator:
 
         def of_solutions() -> Series:
             found = series()
-            return found.series if found else plain_series(self._model, module, self._values)
+            return found.series if found else plain()
 
+        problem = with_series(problem, self._model, module, self._values)
+        plain = problem.series["taylor"]
         made_of = {**problem.series, "taylor": of_solutions}
-        return replace(
-            problem, compiled=Compiled(problem.derivative, steps, equal), series=made_of
-        )
+        return replace(problem, compiled=Compiled(problem.derivative, steps, equal), series=made_of)
 
     def compile(self) -> None:
         """Compile the steps now, unless they are in the store, and each function at its first call.
@@ -184,9 +184,24 @@ class Accelerator:
         self.notice = why
 
 
-def plain_series(model: Model, module: Any, values: tuple[Any, Any]) -> Series:
-    """The Taylor series of a model's module at given parameters and inputs, without a compiler."""
-    return taylor.plain_series(*interfaced_program_of(model), module, *values)
+def with_series(problem: Problem, model: Model, module: Any, values: tuple[Any, Any]) -> Problem:
+    """A problem with the Taylor series of its solutions that need no compiler."""
+
+    def plain() -> Series:
+        return taylor.plain_series(*interfaced_program_of(model), module, *values)
+
+    def by_heyoka() -> Series:
+        given = heyoka.parameter_values(*interfaced_program_of(model), module, *values)
+        key = key_of(model)
+        if key not in _BY_HEYOKA:  # they take long to compile
+            _BY_HEYOKA[key] = heyoka.integrators_of(*interfaced_program_of(model))
+        return heyoka.heyoka_series(_BY_HEYOKA[key], given)
+
+    return replace(problem, series={"taylor": cache(plain), "heyoka": cache(by_heyoka)})
+
+
+_BY_HEYOKA: dict[str, Callable[[int], Any]] = {}
+"""heyoka's integrators of each model so far, by its key."""
 
 
 def _sources(model: Model, name: str) -> Mapping[str, str]:

@@ -2,7 +2,6 @@
 
 import ctypes
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -125,9 +124,7 @@ class CompiledTaylor:
         """The Taylor coefficients (order + 1, ny) from the state y at t on."""
         rows, start = np.empty((order + 1, self._states)), np.ascontiguousarray(y)
         settings = _Settings(self._at, None, 0.0, 0.0, 0.0, order)
-        self._library.taylor_series(
-            ctypes.byref(settings), t, start.ctypes.data, rows.ctypes.data
-        )
+        self._library.taylor_series(ctypes.byref(settings), t, start.ctypes.data, rows.ctypes.data)
         return rows
 
     def steps(
@@ -153,9 +150,7 @@ class CompiledTaylor:
             *(at, at + n, at + 2 * n, at + (2 + ny) * n, of_counts, of_counts + n),
             *(times.ctypes.data, rows.ctypes.data, len(times)),
         )
-        settings = _Settings(
-            self._at, atol.ctypes.data, rtol, longest, t_end, order_of(rtol)
-        )
+        settings = _Settings(self._at, atol.ctypes.data, rtol, longest, t_end, order_of(rtol))
         start = [np.ascontiguousarray(array).ctypes for array in (y, memory["lost"])]
         why = self._library.taylor_steps(
             *(ctypes.byref(settings), most, t, start[0].data, start[1].data),

@@ -1,7 +1,7 @@
 """C source of the recurrences of Taylor coefficients: what `templates/c/taylor.c.jinja` is filled
 with.
 
-Coefficients of a series that products need are kept in order, `F`, or times their index, `D`, and
+Coefficients of a series that products need are kept in order, some times their index, `A`, and
 those of the other factor in reverse, `R`: so a sum of products runs through two arrays in one
 direction, several at a time. The terms with the first and the last coefficients are added to it one
 by one, those that are known last in the end: how fast a step is depends on the longest chain of
@@ -102,9 +102,8 @@ class Writer:
             calls.setdefault(min(last, len(rank) - 1), []).append(f"MULTIPLY({first});")
         lines = []
         for i, n in rank.items():
-            text = self._texts.get(i)
-            if text is not None:
-                lines.append(text.format(*numbers))
+            if i in self._texts:
+                lines.append(self._texts[i].format(*numbers))
             lines += [*stores.get(i, []), *calls.get(n, [])]
         missing = -len(factors) % together
         return [*factors, *[(0, 0)] * missing], lines
@@ -199,17 +198,19 @@ class Writer:
         of_slopes: bool = False,
     ) -> None:
         """Write coefficient k as a sum of parts and sums of products, times a factor."""
-        texts = []
+        texts = list[str]()
         for sign, slope, a, b in products:
-            texts.append(f"{'-' if sign < 0 else '+' if texts else ''} d[{{{len(self._products)}}}]")
+            texts.append(
+                f"{'-' if sign < 0 else '+' if texts else ''} d[{{{len(self._products)}}}]"
+            )
             self._products.append((a, b, slope))
         if of_slopes and texts:
             texts = [f"({' '.join(texts)}) * by_k"]
         known = 0
         for part in sorted(parts):
             known = max(known + MULTIPLY_ADD if texts else 0, part.known)
-            sign = "-" if part.sign < 0 else "+" if texts else ""
-            texts.append(f"{sign} {part.text}" if texts else f"{sign}{part.text}")
+            mark = "-" if part.sign < 0 else "+" if texts else ""
+            texts.append(f"{mark} {part.text}" if texts else f"{mark}{part.text}")
         text = " ".join(texts) or "0.0"
         self._texts[i] = f"const double s{i} = {f'({text}) * {factor}' if factor else text};"
         self._known[i] = known + (MULTIPLY_ADD if factor else 0)

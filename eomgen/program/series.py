@@ -115,7 +115,9 @@ class _Series:
     def _sum(self, terms: Sequence[Term], k: int) -> Any:
         total = self._zero
         for sign, left, right in terms:
-            part = self.at(left, k) if right is None else self._product(left, right, k, range(k + 1))
+            part = (
+                self.at(left, k) if right is None else self._product(left, right, k, range(k + 1))
+            )
             total = total + part if sign > 0 else total - part
         return total
 

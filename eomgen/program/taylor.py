@@ -111,7 +111,9 @@ def recurrences(program: Program, states: Sequence[str], output: str = "derivati
         if i in given.values() or any(o in moving for o in step.operands):
             moving.add(i)
     inside = [i for i in live if i in moving and steps[i].operation != "input"]
-    rules = _Rules(program, moving, Counter([*rates, *(o for i in live for o in steps[i].operands)]))
+    rules = _Rules(
+        program, moving, Counter([*rates, *(o for i in live for o in steps[i].operands)])
+    )
     for i in inside:
         rules.add(i, steps[i])
     used = {o for i in inside for o in steps[i].operands} | set(rates)

@@ -10,8 +10,8 @@ from eomgen.errors import RunError
 from eomgen.run.checks import (
     allowed_errors,
     check_no_step,
-    check_series,
     check_samples,
+    check_series,
     check_steps,
     check_times,
     check_tolerances,

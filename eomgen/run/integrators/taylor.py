@@ -110,7 +110,7 @@ class TaylorSeries:
 
         def states(times: FloatArray | float) -> FloatArray:
             x = (np.asarray(times) - start)[..., None]
-            return (terms[0] + _change(terms, x)).T
+            return np.asarray(terms[0] + _change(terms, x)).T
 
         return states
 
@@ -119,12 +119,12 @@ def _log(size: float) -> float:
     return math.log(size) if size > 0 else -math.inf
 
 
-def _change(terms: FloatArray, h: Any) -> Any:
+def _change(terms: FloatArray, h: Any) -> FloatArray:
     """The change of the state after h s, (ny,) or for times (m, 1), by Horner's rule."""
-    found = terms[-1]
+    found: FloatArray = terms[-1]
     for row in terms[-2:0:-1]:
         found = found * h + row
-    return found * h
+    return np.asarray(found * h)
 
 
 class _Held(DormandPrince8):
