@@ -1,7 +1,7 @@
 """Simulation of a scene: `simulate`, which calls `plan_run` and `run_plan`."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -212,6 +212,7 @@ def plan_run(
 def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
     """Run a plan. Raises `RunError` if the run cannot start."""
     # Imported here: plans are checked without SciPy.
+    from eomgen.native.accelerator import without_compiler
     from eomgen.show.observe import observe
     from eomgen.study.accuracy.trial import Case
 
@@ -227,7 +228,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     }
     problem = problem_of(functions, *values, model)
     accelerator = _accelerator(plan, functions, values, reporter)
-    made = accelerator.of if accelerator else _plain(model, functions, values)
+    made = accelerator.of if accelerator else without_compiler(model, functions, values)
     problem = made(problem)
     start = _start(plan, problem)
     if start is not None:
@@ -290,21 +291,6 @@ def _accelerator(
         with reporter.waiting(f"compiling {plan.model.name} …"):
             accelerator.compile()
     return accelerator
-
-
-def _plain(
-    model: Model,
-    module: GeneratedModule,
-    values: tuple[Mapping[str, float] | None, Mapping[str, float] | None],
-) -> Callable[..., Problem]:
-    """A function that gives a problem, of a module or one with other constants, its series."""
-
-    def of(problem: Problem, other: GeneratedModule = module) -> Problem:
-        from eomgen.native.accelerator import with_series
-
-        return with_series(problem, model, other, values)
-
-    return of
 
 
 def _why_not_compiled(plan: Plan, accelerator: "Accelerator | None") -> str:

@@ -200,6 +200,15 @@ def with_series(problem: Problem, model: Model, module: Any, values: tuple[Any, 
     return replace(problem, series={"taylor": cache(plain), "heyoka": cache(by_heyoka)})
 
 
+def without_compiler(model: Model, module: Any, values: tuple[Any, Any]) -> Callable[..., Problem]:
+    """The same as `Accelerator.of` for runs in Python."""
+
+    def of(problem: Problem, other: Any = None) -> Problem:
+        return with_series(problem, model, other or module, values)
+
+    return of
+
+
 _BY_HEYOKA: dict[str, Callable[[int], Any]] = {}
 """heyoka's integrators of each model so far, by its key."""
 
