@@ -122,7 +122,9 @@ def faults(system: Recurrences) -> list[Recurrences]:
     for i, rule in system.rules.items():
         other: Any = rule
         match rule:
-            case Sum(terms) | Quotient(terms) | Solution(terms=terms):
+            case Quotient(terms):
+                other = Sum(terms)
+            case Sum(terms) | Solution(terms=terms):
                 last = Term(-terms[-1].sign, *terms[-1].factors)
                 other = replace(rule, terms=(*terms[:-1], last))
             case Root() if i < system.one:
