@@ -112,7 +112,9 @@ def check_no_step(integrator: str, dt: float | None) -> None:
 def check_series(problem: Problem, integrator: str, series: str) -> None:
     """Raise `RunError` if a problem does not have the Taylor series that a method needs."""
     if series not in problem.series:
-        raise RunError(f"integrator: {integrator} does not serve here; take --integrator DOP853")
+        raise RunError(
+            f"integrator: {integrator} serves single runs of scenes; take --integrator DOP853"
+        )
     problem.series[series]()
 
 
