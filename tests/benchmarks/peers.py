@@ -14,7 +14,8 @@ and on all of them.
 Runs at true errors of 1e-6, 1e-9 and 1e-12: our Taylor series and DOP853 in C, beside heyoka's
 Taylor series fed with the same program, and SciPy's DOP853 over the NumPy module. For each the
 loosest of a ladder of tolerances whose end is that near to a reference in extended precision.
-Compilation comes first and is told apart. The same beside MuJoCo, and beside Pinocchio and SymPy's lambdify in SciPy.
+Compilation comes first and is told apart. The same beside MuJoCo, and beside Pinocchio and SymPy's
+lambdify in SciPy.
 
 Printed are medians, and of the ratios of paired rounds median and quartiles.
 """
