@@ -18,11 +18,13 @@ class IntegratorSpec:
     about   what it is
     kind    by which tables and figures group it
     method  "module:attribute" in `eomgen.run.integrators`: its `FixedStep` or `Adaptive`
+    extra   whether it needs an extra of this program
     """
 
     about: str
     kind: Kind
     method: str
+    extra: bool = False
 
 
 INTEGRATORS: Mapping[str, IntegratorSpec] = {
@@ -41,6 +43,8 @@ INTEGRATORS: Mapping[str, IntegratorSpec] = {
     "gauss_6": IntegratorSpec("Gauss collocation, order 6", "symplectic", "gauss_6:INTEGRATOR"),
     "RK45": IntegratorSpec("Dormand-Prince 5(4), by SciPy", "explicit", "from_scipy:RK45"),
     "DOP853": IntegratorSpec("Dormand-Prince 8(5,3)", "explicit", "dormand_prince_8:INTEGRATOR"),
+    "taylor": IntegratorSpec("Taylor series, order 8 to 24", "explicit", "taylor:INTEGRATOR"),
+    "heyoka": IntegratorSpec("Taylor series, by heyoka", "explicit", "taylor:HEYOKA", True),
     "gragg_bulirsch_stoer": IntegratorSpec(
         "extrapolated modified midpoint rule, variable order",
         "explicit",

@@ -27,7 +27,7 @@ from eomgen.scene.reader import parse_scene
 ADAPTIVE = [
     name
     for name, method in INTEGRATORS.items()
-    if isinstance(method, Adaptive) and not name.endswith("_differences")
+    if isinstance(method, Adaptive) and not (name.endswith("_differences") or method.series)
 ]
 INERTIA = 0.4
 WHEEL = """

@@ -37,7 +37,8 @@ from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Outcome
 
 FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
-ADAPTIVE = [name for name in INTEGRATORS if name not in FIXED]
+SERIES = [name for name, method in INTEGRATORS.items() if getattr(method, "series", "")]
+ADAPTIVE = [name for name in INTEGRATORS if name not in (*FIXED, *SERIES)]
 ALL = [*FIXED, *ADAPTIVE]
 # Leapfrog can integrate few problems.
 GENERAL = [name for name in ALL if name != "leapfrog"]
@@ -613,7 +614,7 @@ def test_adaptive_run_stops_after_max_steps():
             {},
             "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
             "semi_implicit_euler, leapfrog, rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
+            "DOP853, taylor, heyoka, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
         (
@@ -621,7 +622,7 @@ def test_adaptive_run_stops_after_max_steps():
             {},
             "integrator: unknown name 'radau' (did you mean 'Radau'?); known: euler, "
             "semi_implicit_euler, leapfrog, rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
+            "DOP853, taylor, heyoka, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
         ("euler", {}, "dt: euler needs a step; give e.g. --dt 0.001"),

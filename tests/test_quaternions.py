@@ -17,7 +17,11 @@ from eomgen.run.problem import Problem
 from eomgen.scene.reader import read_scene
 from eomgen.scene.schema import SHOWN
 
-ADAPTIVE = [name for name, method in INTEGRATORS.items() if isinstance(method, Adaptive)]
+ADAPTIVE = [
+    name
+    for name, method in INTEGRATORS.items()
+    if isinstance(method, Adaptive) and not method.series
+]
 SCENES = ("tumbling_body", "spinning_top")
 
 

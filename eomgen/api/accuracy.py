@@ -259,6 +259,7 @@ def _bench(
     truth: "Reference",
 ) -> "Bench":
     """The bench that measures runs of the plan's model against the reference."""
+    from eomgen.native.accelerator import Accelerator
     from eomgen.show.balance import keeps_energy
     from eomgen.show.observe import joint_drift
     from eomgen.study.accuracy.work_precision import Bench
@@ -282,8 +283,11 @@ def _bench(
     potential = energy(t, y) - kinetic(t, y)
     scale = float(np.max(kinetic(t, y)) + np.ptp(potential)) or 1.0
     keeps = keeps_energy(own, inputs)
+    problem = problem_of(module, *values, own)
     return Bench(
-        problem=problem_of(module, *values, own),
+        problem=replace(
+            problem, series=Accelerator(plan.model, module, *values).of(problem).series
+        ),
         reference=truth,
         rest_speed=plan.simulation.rest_speed,
         kinetic=kinetic,

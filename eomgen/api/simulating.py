@@ -125,6 +125,7 @@ def simulate(
 def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
     """Run a plan. Raises `RunError` if the run cannot start."""
     # Imported here: plans are checked without SciPy.
+    from eomgen.native.accelerator import without_compiler
     from eomgen.show.observe import observe
     from eomgen.study.accuracy.trial import Case
 
@@ -142,8 +143,10 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     }
     problem, model = _problem(plan, model, functions, values, reporter)
     accelerator = _accelerator(plan, functions, values, reporter)
-    if accelerator:
-        problem = accelerator.of(problem)
+    made = accelerator.of if accelerator else without_compiler(model, functions, values)
+    if plan.varying:  # functions of time have no series
+        made = _unchanged
+    problem = made(problem)
     began, start = problem.initial, _start(plan, problem)
     if start is not None:
         problem = start.problem
@@ -152,13 +155,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     if plan.setting is None or plan.estimate:
         from eomgen.study.accuracy.moved import moved_problem
 
-        moved = moved_problem(
-            functions,
-            model,
-            *values,
-            start=began,
-            compiled=accelerator.of if accelerator else None,
-        )
+        moved = moved_problem(functions, model, *values, start=began, compiled=made)
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     if powers and accelerator:
@@ -198,6 +195,10 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         begun=start.reported(trajectory) if start else "",
         compiled=accelerator is not None and accelerator.used,
     )
+
+
+def _unchanged(problem: Problem, other: Any = None) -> Problem:
+    return problem
 
 
 def _error_of_choice(choice: "Choice | None") -> tuple[float, list[str]]:

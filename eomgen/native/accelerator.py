@@ -22,10 +22,10 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import functions, implicit, runs
+from eomgen.native import functions, heyoka, implicit, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.program.program import Program
-from eomgen.run.compiled import Compiled, EqualSteps, Steps
+from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
 from eomgen.run.problem import Problem
 from eomgen.run.works import Powers
 from eomgen.store import interfaced_program_of, key_of
@@ -144,6 +144,10 @@ class Accelerator:
                 made[needed] = runs.CompiledSteps(module, own, *self._values, beside)
             return made[needed]
 
+        @cache
+        def series() -> taylor.CompiledTaylor | None:
+            return self._taylor(module)
+
         def implicit_steps() -> implicit.CompiledImplicit | None:
             if not stiff and (libraries := self._of_implicit_steps()):
                 given = (module, libraries, *self._values, origin)
@@ -151,6 +155,8 @@ class Accelerator:
             return stiff[0] if stiff else None
 
         def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
+            if name == "taylor":  # its steps are not checked
+                return of.steps if not needed and (of := series()) else None
             if name in implicit.METHODS:
                 other = None if needed else implicit_steps()
                 found = other.named(name) if other else None
@@ -167,7 +173,14 @@ class Accelerator:
             self.used = self.used or found is not None
             return found
 
-        return replace(problem, compiled=Compiled(problem.derivative, steps, equal))
+        def of_solutions() -> Series:
+            found = series()
+            return found.series if found else plain()
+
+        problem = with_series(problem, self._model, module, self._values)
+        plain = problem.series["taylor"]
+        made_of = {**problem.series, "taylor": of_solutions}
+        return replace(problem, compiled=Compiled(problem.derivative, steps, equal), series=made_of)
 
     def powers(self, powers: Powers) -> Powers:
         """The same powers, which are compiled once that pays."""
@@ -184,6 +197,23 @@ class Accelerator:
 
     def _compilable(self, module: Any, origin: Any) -> functions.Compilable:
         return functions.Compilable(module, self._values, origin, self._look, self._start)
+
+    def _taylor(self, module: Any) -> taylor.CompiledTaylor | None:
+        """The Taylor series of a module; None without a compiler. They are compiled at once: other
+        code would compute other bits, so a run must not change over to them.
+        """
+        program, interface = self._of_model()
+        taylor.system_of(program, interface)
+        try:
+            library = self._library("taylor")
+            library.compile()
+            found = library.after(0.0)
+        except RunError as error:
+            self._fail(str(error))
+            return None
+        assert found is not None
+        self.used = True
+        return taylor.CompiledTaylor(program, interface, module, found, self._values)
 
     def _start(self) -> None:
         self.used = True
@@ -247,21 +277,55 @@ class Accelerator:
             self._libraries[name] = _Library(
                 library_key(self._model, name),
                 partial(self._sources, name),
-                runs.MAIN if name == "derivative" else c.MAIN,
-                STARTING + AN_OPERATION * self._module.COST[name]["total"],
+                {"derivative": runs.MAIN, "taylor": taylor.MAIN}.get(name, c.MAIN),
+                STARTING + AN_OPERATION * self._module.COST.get(name, {"total": 0})["total"],
                 self._fail,
             )
         return self._libraries[name]
 
     def _sources(self, name: str) -> Mapping[str, str]:
         """The sources of a function's library; with the derivative are the steps."""
-        program, interface = self._program or interfaced_program_of(self._model)
+        program, interface = self._of_model()
         if name == "derivative":
             return runs.sources(program, interface)
+        if name == "taylor":
+            return taylor.sources(program, interface)
         return functions.sources(program, interface, name)
+
+    def _of_model(self) -> tuple[Program, Interface]:
+        return self._program or interfaced_program_of(self._model)
 
     def _fail(self, why: str) -> None:
         self.notice = why
+
+
+def with_series(problem: Problem, model: Model, module: Any, values: tuple[Any, Any]) -> Problem:
+    """A problem with the Taylor series of its solutions that need no compiler."""
+
+    def plain() -> Series:
+        return taylor.plain_series(*interfaced_program_of(model), module, *values)
+
+    def by_heyoka() -> Series:
+        given = heyoka.parameter_values(*interfaced_program_of(model), module, *values)
+        key = key_of(model)
+        if key not in _BY_HEYOKA:  # they take long to compile
+            _BY_HEYOKA[key] = heyoka.integrators_of(*interfaced_program_of(model))
+        return heyoka.heyoka_series(_BY_HEYOKA[key], given)
+
+    return replace(problem, series={"taylor": cache(plain), "heyoka": cache(by_heyoka)})
+
+
+def without_compiler(model: Model, module: Any, values: tuple[Any, Any]) -> Callable[..., Problem]:
+    """The same as `Accelerator.of` for runs in Python."""
+
+    def of(problem: Problem, other: Any = None) -> Problem:
+        return with_series(problem, model, other or module, values)
+
+    return of
+
+
+_BY_HEYOKA: dict[str, Callable[[int], Any]] = {}
+"""heyoka's integrators of each model so far, by its key."""
 
 
 def library_key(model: Model, name: str = "derivative") -> str:

@@ -97,8 +97,10 @@ def check_rest_speed(rest_speed: float | None) -> None:
         raise RunError(f"rest_speed: {rest_speed:g} is not a positive speed, in m/s")
 
 
-def check_repairs(problem: Problem, resumed: bool) -> None:
+def check_repairs(problem: Problem, method: FixedStep | Adaptive, resumed: bool) -> None:
     """Raise `RunError` for a run that cannot be repaired in extended precision."""
+    if isinstance(method, Adaptive) and method.series:
+        raise RunError("guard: Taylor series cannot be repaired; take --integrator DOP853")
     if problem.contacts is not None:
         raise RunError(
             "guard: a run with rigid contacts cannot be repaired; let it stop instead (--guard)"
@@ -117,6 +119,16 @@ def check_no_step(integrator: str, dt: float | None) -> None:
             f"dt: {integrator} chooses its own steps; leave --dt out, "
             f"or take one of {', '.join(fixed)}"
         )
+
+
+def check_series(problem: Problem, integrator: str, series: str) -> None:
+    """Raise `RunError` if a problem does not have the Taylor series that a method needs."""
+    if series not in problem.series:
+        raise RunError(
+            f"integrator: {integrator} serves single runs of scenes, with inputs that are constant "
+            "or formulas; take --integrator DOP853"
+        )
+    problem.series[series]()
 
 
 def check_steps(

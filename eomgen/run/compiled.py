@@ -31,6 +31,7 @@ class Stride:
     jacobians, factorisations
                  (m,), numbers of these so far; None if there are none
     within       gives the state at a time in the step of a number; None if that was not asked for
+    ended        whether the last step reaches the end of the run
     """
 
     ends: Array
@@ -47,6 +48,7 @@ class Stride:
     jacobians: NDArray[np.int64] | None = None
     factorisations: NDArray[np.int64] | None = None
     within: Callable[[int, float], Array] | None = None
+    ended: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Watched:
 
 
 class Steps(Protocol):
-    """Makes up to `most` steps from the state `y` at t, but none that would reach `t_end`.
+    """Makes up to `most` steps from the state `y` at t, but none beyond `t_end`.
 
     memory      of the solver, by name
     rtol, atol  tolerances, atol (ny,)
@@ -97,6 +99,10 @@ class Steps(Protocol):
         sizes: Array | None = None,
         dense: bool = False,
     ) -> Stride: ...
+
+
+Series = Callable[[float, Array, int], Array]
+"""The Taylor coefficients (order + 1, ny) of the solution from a state y on: `(t, y, order)`."""
 
 
 @dataclass(frozen=True, eq=False)

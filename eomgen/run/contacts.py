@@ -205,7 +205,9 @@ def restrained(
     derivative = counted(holding.derivative)
     sizes = np.array(problem.sizes or (1.0,))
     jacobian = partial(_differences, derivative, sizes)
-    return replace(problem, derivative=derivative, jacobian=jacobian, timed=True, compiled=None)
+    return replace(
+        problem, derivative=derivative, jacobian=jacobian, timed=True, compiled=None, series={}
+    )
 
 
 def _differences(derivative: Rate, sizes: FloatArray, t: float, y: FloatArray) -> FloatArray:

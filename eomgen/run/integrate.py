@@ -206,7 +206,7 @@ def _monitor(
     Raises `RunError` if the run cannot be repaired.
     """
     if guard.repairs:
-        check_repairs(problem, asked.resume is not None)
+        check_repairs(problem, method, asked.resume is not None)
     tight = OF_TOLERANCE * asked.rtol if isinstance(method, Adaptive) else guard.bound
     return RoundingMonitor(guard, problem, min(guard.bound, tight))
 

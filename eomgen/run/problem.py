@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.errors import RunError
-from eomgen.run.compiled import Compiled
+from eomgen.run.compiled import Compiled, Series
 from eomgen.run.intervals import Interval
 from eomgen.run.origin import Origin
 
@@ -113,6 +113,8 @@ class Problem:
     switching   the switching functions of these corners; None if not known
     origin      what the motion depends on, to check runs that continue; None if not known
     compiled    steps of `derivative` in compiled code; None if there are none
+    series      makes the Taylor series of the solutions, by the name of the method that takes them;
+                raises `RunError` where that is not possible
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
     quaternion in it is 0.
@@ -136,6 +138,7 @@ class Problem:
     columns: bool = False
     timed: bool = True
     compiled: Compiled | None = None
+    series: Mapping[str, Callable[[], Series]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

@@ -11,6 +11,7 @@ from eomgen.run.checks import (
     allowed_errors,
     check_no_step,
     check_samples,
+    check_series,
     check_steps,
     check_times,
     check_tolerances,
@@ -127,6 +128,8 @@ def adaptive_steps(
     Raises `RunError` if `dt` is given, or `max_step` is invalid.
     """
     check_no_step(asked.integrator, asked.dt)
+    if method.series:
+        check_series(problem, asked.integrator, method.series)
     times = np.linspace(asked.t_start, asked.t_end, asked.samples or ADAPTIVE_SAMPLES)
     longest, unseen = longest_steps(asked.max_step, asked.span)
     if asked.resume is not None and asked.max_step is None:

@@ -13,10 +13,11 @@ The same for several states at once in vector registers, beside Pinocchio and be
 program by JAX and by CasADi; and ensembles of runs by the classical Runge-Kutta method, on one core
 and on all of them.
 
-Runs at true errors of 1e-6, 1e-9 and 1e-12: steps of DOP853 in C, beside heyoka's Taylor series fed
-with the same program, and SciPy's DOP853 over the NumPy module. For each the loosest of a ladder of
-tolerances whose end is that near to a reference in extended precision. heyoka compiles first; that
-is told apart. The same beside MuJoCo, and beside Pinocchio and SymPy's lambdify in SciPy.
+Runs at true errors of 1e-6, 1e-9 and 1e-12: our Taylor series and DOP853 in C, beside heyoka's
+Taylor series fed with the same program, and SciPy's DOP853 over the NumPy module. For each the
+loosest of a ladder of tolerances whose end is that near to a reference in extended precision.
+Compilation comes first and is told apart. The same beside MuJoCo, and beside Pinocchio and SymPy's
+lambdify in SciPy.
 
 Printed of derivatives are the least times and the ratios of these, of runs medians; and of the
 ratios of paired rounds the quartiles.
@@ -49,6 +50,8 @@ from eomgen.native.accelerator import Accelerator
 from eomgen.native.functions import restricted
 from eomgen.native.library import compiled_library
 from eomgen.native.module import Kernels
+from eomgen.native.taylor import MAIN as MAIN_OF_TAYLOR
+from eomgen.native.taylor import sources as sources_of_taylor
 from eomgen.program.kernel import kernel
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
@@ -240,12 +243,20 @@ class Case:
         accelerator = Accelerator(model, module, None, None)
         accelerator.compile()
         self.problem = accelerator.of(self.plain)
+        texts = sources_of_taylor(*interfaced_program_of(model))
+        start = time.perf_counter()
+        compiled_library(f"bench {key_of(model)} {time.time()}", lambda: texts, MAIN_OF_TAYLOR)
+        self.own_seconds = time.perf_counter() - start
         self.true = reference(model, module, t_end=t_end)
         self.taylor, self.seconds = taylor(model, module)
 
     def by_c(self, tolerance: float) -> Any:
         bounds = {"rtol": tolerance, "atol": 0.1 * tolerance}
         return integrate(self.problem, "DOP853", self.t_end, samples=2, **bounds).y[-1]
+
+    def by_taylor(self, tolerance: float) -> Any:
+        bounds = {"rtol": tolerance, "atol": 0.1 * tolerance}
+        return integrate(self.problem, "taylor", self.t_end, samples=2, **bounds).y[-1]
 
     def by_heyoka(self, tolerance: float) -> Any:
         integrator = self.taylor(tolerance)
@@ -270,14 +281,16 @@ class Case:
 
 def runs(rounds: int) -> None:
     """Print the table of runs."""
-    row("motion", "true error", "C", "heyoka", "NumPy, SciPy", "heyoka / C", "NumPy / C")
-    row(*["---"] * 7)
+    names = ("taylor", "DOP853 in C", "heyoka", "NumPy, SciPy's DOP853")
+    row("motion", "true error", *names, *(f"{name} / taylor" for name in names[1:]))
+    row(*["---"] * 9)
     for case in (
         Case("double_pendulum, 10 s", elaborate(read_scene("double_pendulum")), 10.0),
         Case("chain of 10, 1 s", chain(10), 1.0),
+        Case("chain of 10, 10 s", chain(10), 10.0),
     ):
         for most in ERRORS:
-            methods = (case.by_c, case.by_heyoka, case.by_scipy)
+            methods = (case.by_taylor, case.by_c, case.by_heyoka, case.by_scipy)
             calls = [case.loosest(method, most) for method in methods]
             columns = iter(paired(rounds, *(call for call in calls if call)).T)
             times = [next(columns) if call else None for call in calls]
@@ -287,7 +300,8 @@ def runs(rounds: int) -> None:
                 *("not reached" if x is None else f"{1e3 * np.median(x):.3g} ms" for x in times),
                 *("" if x is None or times[0] is None else spread(x / times[0]) for x in times[1:]),
             )
-        row(f"heyoka's compilation: {case.seconds:.2g} s", *[""] * 6)
+        own, other = case.own_seconds, case.seconds
+        row(f"compilation: taylor {own:.2g} s, heyoka {other:.2g} s", *[""] * 8)
 
 
 def engines(rounds: int) -> None:

@@ -1,6 +1,7 @@
 """The methods of the integrators in `eomgen.integrators`, by name."""
 
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pkgutil import resolve_name
 
 from eomgen import integrators
@@ -21,15 +22,21 @@ class _Methods(Mapping[str, FixedStep | Adaptive]):
     """The methods by name. Each is imported when it is first used: some load much of SciPy."""
 
     def __getitem__(self, name: str) -> FixedStep | Adaptive:
-        method = resolve_name(f"{__name__}.{integrators.INTEGRATORS[name].method}")
-        assert isinstance(method, FixedStep | Adaptive)
-        return method
+        return _loaded(integrators.INTEGRATORS[name].method)
 
     def __iter__(self) -> Iterator[str]:
         return iter(integrators.INTEGRATORS)
 
     def __len__(self) -> int:
         return len(integrators.INTEGRATORS)
+
+
+@cache
+def _loaded(place: str) -> FixedStep | Adaptive:
+    """The method at "module:attribute"."""
+    method = resolve_name(f"{__name__}.{place}")
+    assert isinstance(method, FixedStep | Adaptive)
+    return method
 
 
 INTEGRATORS = _Methods()

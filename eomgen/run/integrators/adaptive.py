@@ -107,6 +107,8 @@ def advances(
         if use and stride:
             yield from use.advances(stride, sampled, stepper.is_whole, each)
             here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
+            if stepper.ended:
+                return
             continue
         here += 1
         step = stepper.step()
@@ -128,6 +130,7 @@ def advances(
             samples,
             problem,
             partial(_between, problem, step),
+            derivatives=getattr(stepper.solver, "expanded", 0),
             factorisations=stepper.factorisations - factored,
             resume=stepper.continuation(),
             capped=stepper.is_capped(step),
@@ -179,6 +182,9 @@ class _Stepper:
             options["jac"] = self._problem.jacobian
         if self.method.asks_more:
             options |= {"timed": self._problem.timed, "positions": self._problem.leading_positions}
+        if self.method.series:
+            make = self._problem.series.get(self.method.series)
+            options["series"] = make() if make else None
         # y is copied because LSODA's compiled code modifies state arrays in place. If a later run
         # can continue from this one, the choice of the first step must not depend on the end.
         bound = np.inf if self.method.memory else until

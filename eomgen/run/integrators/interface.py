@@ -90,6 +90,7 @@ class Adaptive:
     memory         attributes of the solver, numbers or arrays, that together with time and state
                    determine the next step; the first is its length. Empty if these do not suffice
     vectors        those of `memory` that have a number for each state
+    series         name of the Taylor series that it is given; "" if it needs none
     sees_end       whether its error estimate depends on the derivative at the end of a step
     """
 
@@ -102,6 +103,7 @@ class Adaptive:
     vectors: tuple[str, ...] = ("f", "slope", "lost")
     sees_end: bool = True
     compiled: str = ""
+    series: str = ""
     smallest_rtol: float = SMALLEST_RTOL
 
 

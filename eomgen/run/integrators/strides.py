@@ -1,6 +1,7 @@
 """Steps of an adaptive method that compiled code makes, many at once."""
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
@@ -57,7 +58,7 @@ class Strides:
         switching, contacts = problem.switching, problem.contacts
         self._steps, self._dense = steps, dense
         self._method, self._problem, self._bounds, self._times = method, problem, bounds, times
-        self._atol = np.array(np.broadcast_to(bounds.atol, problem.initial.shape), dtype=float)
+        self._atol = np.zeros(problem.initial.shape) + bounds.atol
         self._needed = (
             *(OF_STATE if switching and switching.of_state else ()),
             *(OF_CONTACTS if contacts else ()),
@@ -81,11 +82,10 @@ class Strides:
         watched = branches.watched(solver.t, solver.h_abs, most) if branches else None
         if branches and not watched:
             return None
-        memory = {name: getattr(solver, name) for name in self._method.memory}
         stride = steps(
             solver.t,
             solver.y,
-            memory,
+            _Memory(solver, self._method.memory),
             t_end=stepper.until,
             rtol=self._bounds.rtol,
             atol=self._atol,
@@ -109,6 +109,8 @@ class Strides:
             setattr(solver, name, last.copy() if last.ndim else float(last))
         if branches and watched:
             branches.restore(_checks(watched, stride, count - 1))
+        if stride.ended:
+            solver.status = "finished"
         return stride
 
     def advances(
@@ -118,14 +120,16 @@ class Strides:
         their ends.
         """
         ends = stride.ends.tolist()
-        lengths = np.diff(stride.ends, prepend=self._start)
-        capped = np.cumsum(lengths >= self._longest * (1 - 1e-9))
-        none = np.zeros_like(stride.derivatives)
+        capped = none = np.zeros_like(stride.derivatives)
+        if self._longest < np.inf:
+            lengths = np.diff(stride.ends, prepend=self._start)
+            capped = np.cumsum(lengths >= self._longest * (1 - 1e-9))
         solved = (none if x is None else x for x in (stride.jacobians, stride.factorisations))
         called = (stride.derivatives, *solved, stride.switches, stride.gap_checks)
         sums = np.column_stack((np.arange(1, len(ends) + 1), stride.sampled, capped, *called))
         kept = slice(None) if each else slice(-1, None)
         made = np.diff(sums[kept], axis=0, prepend=0).tolist()
+        whole = len(ends) - stride.ended  # the end shortens the last step
         times, rows = self._times[sampled : sampled + sums[-1, 1]].tolist(), 0
         for i, (steps, passed, shortened, *calls) in zip(range(len(ends))[kept], made, strict=True):
             at = slice(rows, rows + passed)
@@ -138,10 +142,31 @@ class Strides:
                 steps=steps,
                 **dict(zip(_COUNTED, calls, strict=True)),
                 checked=True,
-                resume=partial(_after, stride, self._watched, self._until, i) if resumes else None,
+                resume=self._resume(stride, min(i, whole - 1)) if resumes and whole else None,
                 capped=shortened,
             )
             rows += passed
+
+    def _resume(self, stride: Stride, i: int) -> Callable[[], Resume]:
+        """A function that gives what a later run needs to continue after step i."""
+        return partial(_after, stride, self._watched, self._until, i)
+
+
+@dataclass(frozen=True)
+class _Memory(Mapping[str, Any]):
+    """What determines a solver's next step. It is read when it is used, for it may be computed."""
+
+    solver: Any
+    names: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Any:
+        return getattr(self.solver, name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
 
 
 def _after(stride: Stride, watched: Watched | None, until: float, i: int) -> Resume:

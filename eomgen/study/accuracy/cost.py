@@ -8,6 +8,8 @@ unit takes on the given machine.
 `METHODS` was fitted to runs of six built-in scenes with 2 to 90 states (mean deviation 20 %). That
 of Rodas5P was not: in Python its steps take as long as those of Radau, or longer, but a long run
 makes them in compiled code, where little is left beside the functions. It is counted like that.
+For Taylor series, a derivative is a coefficient of all states, and the numbers are those by which
+their steps in C are faster than those of DOP853 in C.
 """
 
 from collections.abc import Callable, Mapping
@@ -66,6 +68,8 @@ METHODS: Mapping[str, Overhead] = {
     "gauss_6": Overhead(64.0, 12.0, 2.0, stages=3),
     "RK45": Overhead(25.0, 9.0, 0.3, 8.0),
     "DOP853": Overhead(20.0, 7.5, 0.1, 12.0),
+    "taylor": Overhead(10.0, 1.0, 0.1, 2.0),
+    "heyoka": Overhead(40.0, 1.0, 0.1, 2.0),
     "gragg_bulirsch_stoer": Overhead(60.0, 7.0, 0.3, 12.0),
     "Rodas5P": Overhead(10.0, 2.0, 0.2, 1.0, compiled=True),
     "Radau": Overhead(150.0, 30.0, 1.0, 12.0),

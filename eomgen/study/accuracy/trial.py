@@ -21,9 +21,9 @@ from eomgen.run.works import Powers
 from eomgen.study.accuracy.cost import meter
 from eomgen.study.accuracy.measure import scales
 
-TIGHTEST = {"LSODA": 1e-12, "DOP853": 1e-16, "Rodas5P": 3e-15}
+TIGHTEST = {"LSODA": 1e-12, "DOP853": 1e-16, "taylor": 1e-16, "heyoka": 1e-16, "Rodas5P": 3e-15}
 """Relative tolerances below which a method fails for many scenes, or gains nothing. The sums of
-DOP853 and Rodas5P are compensated: their errors go on to fall with the tolerance."""
+DOP853, Rodas5P and Taylor series are compensated: their errors go on to fall with the tolerance."""
 TIGHTEST_OF_ALL = 1e-13
 ORDERS = {
     "RK45": 5,
@@ -33,9 +33,11 @@ ORDERS = {
     "Radau": 5,
     "BDF": 4,
     "gragg_bulirsch_stoer": 12,
+    "taylor": 20,
+    "heyoka": 20,
 }
 """Orders of adaptive methods: the time for an error e grows like e^(-1/order). LSODA has orders up
-to 12; extrapolation chooses its own."""
+to 12; extrapolation chooses its own, and so do Taylor series."""
 LEAST = 1e-9
 """Shortest time that is measured, s."""
 OVER = "no time for more"

@@ -6,7 +6,7 @@ import numpy as np
 
 from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
+from eomgen.run.integrators import Adaptive, EndedRunError, FixedStep, find_integrator
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
@@ -37,7 +37,8 @@ def sampled(
     """About `count` states at which the integrator of the `wanted` run calls the derivative.
 
     They are evenly spaced among its calls, and so are denser where it takes small steps. A run that
-    takes too long, or fails, gives the states up to there.
+    takes too long, or fails, gives the states up to there. Taylor series call no derivative: for
+    them DOP853 runs.
 
     Raises `RunError` if the module has no derivative at its initial state.
     """
@@ -48,10 +49,11 @@ def sampled(
         keep.see(t, y)
         return problem.derivative(t, y)
 
-    fixed = isinstance(find_integrator(wanted.integrator), FixedStep)
+    method = find_integrator(wanted.integrator)
+    fixed = isinstance(method, FixedStep)
     run = integrate(
         replace(problem, derivative=derivative),
-        wanted.integrator,
+        "DOP853" if isinstance(method, Adaptive) and method.series else wanted.integrator,
         wanted.t_end,
         dt=wanted.dt if fixed else None,
         rtol=wanted.rtol,

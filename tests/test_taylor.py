@@ -1,0 +1,262 @@
+"""Taylor series: their coefficients against the program itself, runs against extended precision."""
+
+import math
+import shutil
+import sys
+from dataclasses import replace
+from importlib.util import find_spec
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen
+from eomgen.errors import RunError
+from eomgen.model.elaborate import elaborate
+from eomgen.native import accelerator, taylor
+from eomgen.native.library import compiled_library
+from eomgen.precision.precise import digits
+from eomgen.program.program import Output, Program, finish, interpret
+from eomgen.program.series import coefficients
+from eomgen.program.tape import TIME, Node, Stage, Tape
+from eomgen.program.taylor import (
+    NoSeriesError,
+    Quotient,
+    Recurrences,
+    Root,
+    Solution,
+    Sum,
+    Term,
+    recurrences,
+)
+from eomgen.run.module import load_module
+from eomgen.scalars.extended import Digits
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scene.reader import read_scene
+from eomgen.store import generated_code
+from eomgen.study.accuracy.measure import error
+from eomgen.study.accuracy.reference import reference
+
+CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+compiler = pytest.mark.skipif(CC is None, reason="there is no C compiler")
+ORDER, LATER = 12, 1e-3
+STATES = ("a", "b", "c", "d")
+START = {"a": 0.3, "b": -0.4, "c": 0.7, "d": 1.2}
+VALUES = {"p": 1.3, "u": -0.6}
+DRIVEN = """
+name = "driven"
+dimensions = 2
+[[bodies]]
+name = "bead"
+mass = 2.0
+inertia_com = 0
+[[joints]]
+name = "wire"
+type = "prismatic"
+parent = "world"
+child = "bead"
+axis = [1, 0]
+coordinate = "x"
+[[effects]]
+type = "motor"
+name = "push"
+joint = "wire"
+torque = "3*cos(2*t)"
+[initial]
+q = [0.1]
+v = [0.2]
+"""
+
+
+def everything() -> Program:
+    """A program with all operations and functions that have a series, in several uses."""
+    tape = Tape()
+    t, u = tape.input(TIME, Stage.INPUTS), tape.input("u", Stage.INPUTS)
+    p = tape.input("p", Stage.PARAMETERS)
+    a, b, c, d = (tape.input(name, Stage.POSITIONS) for name in STATES)
+    two = tape.constant(2.0)
+
+    def of(function: str, *nodes: Node) -> Node:
+        return tape.apply(function, *nodes)
+
+    both = of("sin", a * t) * of("cos", a * t) + of("sin", b) - of("cos", d) * p
+    arcs = of("asin", a) + of("acos", b) - of("atan", c) + of("atan2", b, d) - of("atan2", a, p)
+    mixed = (of("exp", a * b) - of("log", d) * u) / (d * d + p)
+    steep = of("tan", b) + of("tanh", c) * of("sqrt", d) / p - p / d + of("atan2", u, c)
+    rates = [both - mixed, arcs * c, steep - both * both, -(mixed * t) + two / (c * p)]
+    nodes = tuple(node.index for node in rates)
+    return finish(tape, {"derivative": Output((4,), nodes)}, ())
+
+
+def residual(program: Program, system: Recurrences) -> float:
+    """By how much the polynomial misses y' = f(t, y) a little later, in extended precision."""
+    with digits():
+        scalars = Digits()
+        values = {name: scalars.number(x) for name, x in VALUES.items()}
+        fixed = {i: _fixed(program, i, values) for i in system.fixed}
+        start = {name: scalars.number(x) for name, x in START.items()}
+        t, h = scalars.number(0.5), scalars.number(LATER)
+        rows = coefficients(system, fixed, t, start, ORDER, scalars)
+        at = {n: sum(row[j] * h**k for k, row in enumerate(rows)) for j, n in enumerate(STATES)}
+        slopes = interpret(program, "derivative", {**values, **at, TIME: t + h}, scalars)
+        terms = [(k * h ** (k - 1), row) for k, row in enumerate(rows) if k]
+        there = [sum(factor * row[j] for factor, row in terms) for j in range(4)]
+        return max(float(abs(x - y)) for x, y in zip(slopes, there, strict=True))
+
+
+def _fixed(program: Program, i: int, values: dict[str, Any]) -> Any:
+    one = replace(program, outputs={"it": Output((), (i,))})
+    return interpret(one, "it", values, Digits())[0]
+
+
+def test_the_series_solve_the_equations() -> None:
+    """The error of a polynomial of order 12 after 0.001 s is what the next term makes of it."""
+    program = everything()
+    assert residual(program, recurrences(program, STATES)) < 1e-30
+
+
+def faults(system: Recurrences) -> list[Recurrences]:
+    """The system with one rule changed, each in turn."""
+    changed = []
+    for i, rule in system.rules.items():
+        other: Any = rule
+        match rule:
+            case Quotient(terms):
+                other = Sum(terms)
+            case Sum(terms) | Solution(terms=terms):
+                last = Term(-terms[-1].sign, *terms[-1].factors)
+                other = replace(rule, terms=(*terms[:-1], last))
+            case Root() if i < system.one:
+                other = Quotient((Term(1, rule.of),), rule.of)
+        if other is not rule:
+            changed.append(replace(system, rules={**system.rules, i: other}))
+    return changed
+
+
+def test_each_wrong_rule_shows() -> None:
+    program = everything()
+    system = recurrences(program, STATES)
+    kinds = {type(rule) for rule in system.rules.values()}
+    assert kinds == {Sum, Quotient, Root, Solution}
+    assert min(residual(program, wrong) for wrong in faults(system)) > 1e-20
+
+
+@compiler
+@pytest.mark.parametrize("small", [0, 64])
+def test_compiled_coefficients(small: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of small and of large systems, whose code differs."""
+    monkeypatch.setattr("eomgen.native.taylor_source.SMALL", small)
+    program = everything()
+    states = [SimpleNamespace(name=name) for name in STATES]
+    interface: Any = SimpleNamespace(name="everything", states=states, quaternions=())
+    texts = taylor.sources(program, interface)
+    library = compiled_library(repr(texts), lambda: texts, taylor.MAIN)
+    system = recurrences(program, STATES)
+    module: Any = SimpleNamespace(
+        PARAMETERS={"p": 1.3}, INPUTS={"u": 0.0}, _DEFAULT={"derivative": (1.3,)}
+    )
+    made = taylor.CompiledTaylor(program, interface, module, library, (None, VALUES))
+    fixed = taylor.fixed_values(system, module, None, VALUES)
+    for order in (8, 15, 24):
+        found = made.series(0.5, np.array(list(START.values())), order)
+        true = np.array(coefficients(system, fixed, 0.5, START, order, FloatScalars()))
+        sizes = np.abs(true).max(axis=1, keepdims=True)
+        assert found.shape == (order + 1, 4)
+        assert (np.abs(found - true) < 1e-12 * sizes).all()
+
+
+def test_functions_with_corners_are_refused() -> None:
+    with pytest.raises(RunError, match="'driven' use max; take --integrator DOP853"):
+        eomgen.simulate(DRIVEN.replace("3*", "max(x, 0)*"), integrator="taylor", t_end=0.1)
+    tape = Tape()
+    x = tape.input("x", Stage.POSITIONS)
+    nodes = (tape.apply("abs", x).index,)
+    with pytest.raises(NoSeriesError, match="abs"):
+        recurrences(finish(tape, {"derivative": Output((1,), nodes)}, ()), ["x"])
+
+
+@compiler
+@pytest.mark.parametrize(("scene", "end"), [("double_pendulum", 1.0), ("tumbling_body", 0.3)])
+def test_runs_end_where_they_should(scene: str, end: float) -> None:
+    """To within 1e-12, also with quaternions."""
+    model = elaborate(read_scene(scene))
+    module = load_module(generated_code(model).module, scene)
+    true = reference(model, module, t_end=end)
+    assert true.error < 1e-13
+    run = eomgen.simulate(scene, integrator="taylor", t_end=end, rtol=1e-15, atol=1e-16)
+    assert error(run.y[-1], true.y[-1], true.scale) < 1e-12
+    loose = eomgen.simulate(scene, integrator="taylor", t_end=end, rtol=1e-7, atol=1e-8)
+    assert error(loose.y[-1], true.y[-1], true.scale) < 1e-6
+    assert np.abs(loose.y - run.y).max() < 1e-3  # rows within steps
+
+
+@compiler
+@pytest.mark.parametrize("backend", ["auto", "numpy"])
+def test_forces_that_depend_on_time(backend: Any) -> None:
+    run = eomgen.simulate(
+        DRIVEN, integrator="taylor", t_end=4.0, rtol=1e-13, atol=1e-14, backend=backend
+    )
+    exact = 0.1 + 0.2 * run.t + 1.5 * (1 - np.cos(2 * run.t)) / 4
+    assert np.abs(run.y[:, 0] - exact).max() < 1e-12
+    assert run.compiled == (backend == "auto")
+
+
+@compiler
+def test_a_run_goes_on_to_the_same_bytes() -> None:
+    """Steps in C and single ones, which `follow` asks for, are the same."""
+    options: dict[str, Any] = {"integrator": "taylor", "rtol": 1e-9}
+    whole = eomgen.simulate("tumbling_body", t_end=4.0, **options)
+    begun = eomgen.simulate("tumbling_body", t_end=1.9, **options)
+    run = eomgen.simulate("tumbling_body", t_end=4.0, resume=begun, **options)
+    assert "as if the run had not ended" in run.begun
+    assert run.y[-1].tobytes() == whole.y[-1].tobytes()
+    seen = list[float]()
+    singly = eomgen.simulate(
+        "tumbling_body", t_end=4.0, follow=lambda t, y: bool(seen.append(t)), **options
+    )
+    assert singly.y.tobytes() == whole.y.tobytes() and len(seen) == whole.trajectory.counts["steps"]
+    assert singly.trajectory.counts == whole.trajectory.counts
+
+
+@compiler
+def test_impacts_end_steps() -> None:
+    """The events of another method, and while contacts are held its steps."""
+    options: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-13, "t_end": 1.2}
+    run = eomgen.simulate("bouncing_two_body", integrator="taylor", **options)
+    other = eomgen.simulate("bouncing_two_body", integrator="DOP853", **options)
+    assert run.finished and len(run.trajectory.events) == len(other.trajectory.events) > 2
+    for one, two in zip(run.trajectory.events, other.trajectory.events, strict=True):
+        assert (one.contact, one.kind) == (two.contact, two.kind)
+        assert math.isclose(one.t, two.t, abs_tol=1e-9)
+
+
+def test_without_a_compiler_the_run_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+    """It goes on in Python."""
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
+    monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    run = eomgen.simulate("pendulum", t_end=0.5, integrator="taylor")
+    assert run.finished and not run.compiled
+    assert [line for line in run.warnings if "no C compiler is found" in line]
+
+
+def test_guards_cannot_repair() -> None:
+    with pytest.raises(RunError, match="Taylor series cannot be repaired"):
+        eomgen.simulate("pendulum", t_end=0.5, integrator="taylor", guard="repair")
+
+
+def test_heyoka(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its series are ours; where it is not installed, a run says how to install it."""
+    if find_spec("heyoka"):
+        options: dict[str, Any] = {"t_end": 1.0, "rtol": 1e-12, "atol": 1e-13}
+        options["inputs"] = {"tau": 0.3}
+        run = eomgen.simulate("two_body_forced", integrator="heyoka", **options)
+        ours = eomgen.simulate("two_body_forced", integrator="taylor", **options)
+        assert np.abs(run.y - ours.y).max() < 1e-11
+        assert run.trajectory.counts == ours.trajectory.counts
+    accelerator._BY_HEYOKA.clear()
+    monkeypatch.setitem(sys.modules, "heyoka", None)
+    with pytest.raises(RunError, match=r"pip install 'eomgen\[heyoka\]'"):
+        eomgen.simulate("two_body_forced", integrator="heyoka", t_end=0.1)
