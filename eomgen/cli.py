@@ -7,16 +7,26 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from eomgen import commands
 from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
+from eomgen.options import add_folder, add_force, add_simulation, add_values
 from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
-from eomgen.text import breaks_lines, one_line
+from eomgen.text import one_line
+from eomgen.usage import Parser, Version, example_of, path
 
 Arguments = argparse.Namespace
+Command = Callable[..., argparse.ArgumentParser]
+"""Adds a command: its name, function, what it does, and what it takes as SCENE."""
 INTERRUPTED = 130
+DERIVED = "what was derived is kept for the next call"
+KEPT = {
+    "accuracy": "the runs made so far are in the table, and the same command continues",
+    **dict.fromkeys(("derive", "verify", "effects", "linearise"), DERIVED),
+    **dict.fromkeys(("simulate", "view"), DERIVED),
+}
+"""What an interrupt leaves, for commands that do not say so themselves."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,6 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    given: Arguments | None = None
     try:
         parser = _parser()
         given = parser.parse_args(arguments)
@@ -53,58 +64,52 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"eomgen: {why}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("eomgen: interrupted", file=sys.stderr)
+        kept = KEPT.get(given.command, "") if given else ""
+        print(f"eomgen: interrupted{kept and '; '}{kept}", file=sys.stderr)
         return INTERRUPTED
     return code
 
 
-def _path(text: str) -> Path:
-    if breaks_lines(text):
-        raise argparse.ArgumentTypeError(f"{text} has a control character in its name")
-    return Path(text)
+def command_parsers() -> list[tuple[str, argparse.ArgumentParser]]:
+    """The name of each command, and the parser of its arguments, in the order of the help."""
+    found: list[tuple[str, argparse.ArgumentParser]] = []
+    _parser(found)
+    return found
 
 
-class _Version(argparse.Action):
-    """Prints the version, which is looked up only if the option is given."""
-
-    def __init__(self, option_strings: Sequence[str], dest: str, help: str) -> None:
-        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help=help)
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        from importlib.metadata import version
-
-        print(f"eomgen {version('eomgen')}")
-        parser.exit()
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser whose error messages stay on one line, whatever the arguments contain."""
-
-    def error(self, message: str) -> NoReturn:
-        super().error(one_line(message))
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+def _parser(
+    found: list[tuple[str, argparse.ArgumentParser]] | None = None,
+) -> argparse.ArgumentParser:
+    """The parser of the command line; those of the commands are appended to `found`."""
+    parser = Parser(
         prog="eomgen",
         description="Equations of motion from a scene: derived, solved once, written as code.",
         epilog="SCENE is a file or the name of a built-in scene (eomgen list).",
     )
-    parser.add_argument("--version", action=_Version, help="print the version and end")
+    parser.add_argument("--version", action=Version, help="print the version and end")
     sub = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def command(
         name: str, run: Callable[[Arguments], int], about: str, scenes: str | None = "scene"
     ) -> argparse.ArgumentParser:
-        added = sub.add_parser(name, help=about, description=about)
-        added.set_defaults(run=run)
+        added = sub.add_parser(name, help=about, description=about, epilog=example_of(name))
+        added.set_defaults(run=run, command=name)
+        if found is not None:
+            found.append((name, added))
         if scenes == "scene":
             added.add_argument("scene", metavar="SCENE", help="file or built-in name")
         elif scenes == "scenes":
             added.add_argument("scenes", metavar="SCENE", nargs="*", help="file or built-in name")
         return added
 
-    command("list", commands.list_scenes, "list the built-in scenes", None)
+    _scene_files(command)
+    completion = command(
+        "completion", commands.completion, "print the completion of commands for a shell", None
+    )
+    completion.add_argument(
+        "shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish"
+    )
+    completion.set_defaults(parser=parser)
     command("schema", commands.print_schema, "print the JSON Schema of scenes, for editors", None)
     reference = command(
         "reference", commands.print_reference, "print the keys of joints and effects", None
@@ -116,27 +121,23 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("--long", action="store_true", help="do not shorten long lists")
     _form(check)
     derive = command("derive", commands.derive, "print the derivation, step by step")
-    derive.add_argument("--format", choices=("text", "latex", "html"), default="text")
-    derive.add_argument("-o", "--output", metavar="FILE", type=_path, help="write it to a file")
-    _force(derive)
-    generate = command("generate", commands.generate, "write the module of a scene", "scenes")
-    _code(_form(generate))
-    generate.add_argument(
-        "--backend", metavar="NAME", default="numpy", help="numpy (default), c, javascript"
+    derive.add_argument(
+        "--format", choices=("text", "latex", "html"), default="text", help="what is written"
     )
-    generate.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("generated"))
-    generate.add_argument("--all", action="store_true", help="all built-in scenes")
-    generate.add_argument(
-        "--check", action="store_true", help="report which are stale, write nothing"
+    derive.add_argument(
+        "--form",
+        dest="state_form",
+        choices=("velocity", "momentum", "redundant"),
+        help="state whose time derivative is written out: [q, v]; the handout's 8 numbers, or 12",
     )
-    generate.add_argument("--explain", action="store_true", help="say why its route was chosen")
-    generate.add_argument("--report", action="store_true", help="say what each pass saved")
-    _force(generate)
+    derive.add_argument("-o", "--output", metavar="FILE", type=path, help="write it to a file")
+    add_force(derive)
+    _generation(command("generate", commands.generate, "write the module of a scene", "scenes"))
     for name, run, about in (
         ("simulate", commands.simulate, "integrate, and write trajectory, figure and page"),
         ("view", commands.view, "integrate, and open the animated page"),
     ):
-        _simulation(_code(_form(command(name, run, about))))
+        add_simulation(_code(_form(command(name, run, about))))
     about = "run a scene many times, with other parameters, initial states or inputs"
     _sweep(_route(_form(command("sweep", commands.sweep, about))))
     about = "compare the module with an independent solver and 60 digits"
@@ -154,14 +155,50 @@ def _parser() -> argparse.ArgumentParser:
         metavar="S",
         type=float,
         default=10.0,
-        help="length of the motions that are compared, 10 s",
+        help="length of the motions that are compared, s",
     )
-    costing.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
-    _force(costing)
+    add_folder(costing)
+    add_force(costing)
     _linearisation(
         command("linearise", commands.linearise, "compute A, B and modes about an equilibrium")
     )
     return parser
+
+
+def _generation(parser: argparse.ArgumentParser) -> None:
+    _code(_form(parser))
+    parser.add_argument("--backend", metavar="NAME", default="numpy", help="numpy, c or javascript")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        type=path,
+        default=Path("generated"),
+        help="folder of the modules",
+    )
+    parser.add_argument("--all", action="store_true", help="all built-in scenes")
+    parser.add_argument(
+        "--check", action="store_true", help="report which are stale, write nothing"
+    )
+    parser.add_argument(
+        "--explain", action="store_true", help="say why its route was chosen, and what each line is"
+    )
+    parser.add_argument("--report", action="store_true", help="say what each pass saved")
+    add_force(parser)
+
+
+def _scene_files(command: Command) -> None:
+    """The commands on files of scenes."""
+    command("list", commands.list_scenes, "list the built-in scenes", None)
+    command("show", commands.show, "print the file of a scene")
+    new = command("new", commands.new, "write a small scene with comments, to begin with", None)
+    new.add_argument("name", metavar="NAME", type=path, help="the scene is written to NAME.toml")
+    add_force(new)
+    copy = command("copy", commands.copy, "copy a scene to a file of your own")
+    copy.add_argument(
+        "name", metavar="NAME", type=path, nargs="?", help="the copy is NAME.toml (the scene's)"
+    )
+    add_force(copy)
 
 
 def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
@@ -189,77 +226,6 @@ def _code(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     return parser
 
 
-def _values(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
-    )
-    parser.add_argument(
-        "--input", metavar="NAME=X", action="append", default=[], help="constant value of an input"
-    )
-
-
-def _force(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--force", action="store_true", help="also overwrite files that eomgen did not write"
-    )
-
-
-def _simulation(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
-    parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
-    parser.add_argument(
-        "--unstable",
-        action="store_true",
-        help="allow steps of an explicit method that are too long for stability",
-    )
-    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
-    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
-    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
-    parser.add_argument(
-        "--accuracy",
-        metavar="X",
-        type=float,
-        help="choose method and tolerances for an error of X at the end, relative to the motion",
-    )
-    parser.add_argument(
-        "--budget",
-        metavar="TIME",
-        help="choose the most accurate run of about this time, 2s for example",
-    )
-    parser.add_argument(
-        "--estimate", action="store_true", help="estimate the error by a second run"
-    )
-    parser.add_argument(
-        "--guard",
-        choices=("stop", "repair"),
-        nargs="?",
-        const="stop",
-        help="check rounding at each step; stop (default) or repair where digits are lost",
-    )
-    parser.add_argument("--t-end", metavar="S", type=float, help="end time")
-    parser.add_argument(
-        "--from",
-        metavar="FILE.npz",
-        dest="resume",
-        type=_path,
-        help="continue an earlier run as if it had not ended",
-    )
-    parser.add_argument(
-        "--backend",
-        metavar="NAME",
-        default="auto",
-        help="auto (default): compute in compiled C code if that pays; numpy: never; c: always",
-    )
-    parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
-    parser.add_argument("--works", action="store_true", help="compute the work of each effect")
-    _values(parser)
-    parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
-    parser.add_argument("--plot", metavar="FILE", type=_path, help="figure (DIR/NAME.png)")
-    parser.add_argument("--no-pictures", action="store_true", help="write no figure and no page")
-    parser.add_argument("--view", action="store_true", help="open the page when done")
-    _force(parser)
-
-
 def _sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vary",
@@ -272,6 +238,11 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sample", metavar="N", type=int, help="draw N members, instead of a grid")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of the sample")
     parser.add_argument("--of", metavar="NAME", help="state or output in the figure (the first)")
+    parser.add_argument(
+        "--statistics",
+        action="store_true",
+        help="also write mean, deviation and quantiles over the members, at each kept time",
+    )
     parser.add_argument("--outputs", metavar="A,B,…", help="functions of the module to compute")
     parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
     parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
@@ -280,21 +251,21 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument(
-        "--samples", metavar="N", type=int, default=2, help="rows to keep (2, the ends)"
+        "--samples", metavar="N", type=int, default=2, help="rows to keep; 2 are the ends"
     )
     parser.add_argument(
         "--backend",
         metavar="NAME",
         default="auto",
-        help="auto (default): compute in compiled C code if that pays; numpy: never; c: always",
+        help="auto: compute in compiled C code if that pays; numpy: never; c: always",
     )
     parser.add_argument("--workers", metavar="N", type=int, help="processes (one a core)")
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", default="", help="run on the workers of a Dask scheduler"
     )
-    _values(parser)
-    parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
-    _force(parser)
+    add_values(parser)
+    add_folder(parser)
+    add_force(parser)
 
 
 def _accuracy(parser: argparse.ArgumentParser) -> None:
@@ -302,13 +273,13 @@ def _accuracy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="only every second tolerance or step")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time (the scene's)")
     parser.add_argument(
-        "--run-time", metavar="S", type=float, default=3.0, help="longest time of one run, 3 s"
+        "--run-time", metavar="S", type=float, default=3.0, help="longest time of one run, s"
     )
     parser.add_argument(
-        "--time", metavar="S", type=float, default=300.0, help="start no run after this, 300 s"
+        "--time", metavar="S", type=float, default=300.0, help="start no run after this, s"
     )
     parser.add_argument("--fresh", action="store_true", help="use no runs of an earlier call")
-    _values(parser)
+    add_values(parser)
     half = parser.add_mutually_exclusive_group()
     half.add_argument("--arithmetic", action="store_true", help="only rounding errors, no runs")
     half.add_argument("--no-arithmetic", action="store_true", help="only runs, no rounding errors")
@@ -322,8 +293,8 @@ def _accuracy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", metavar="N", type=int, default=0, help="seed of the random states"
     )
-    parser.add_argument("-o", "--output", metavar="DIR", type=_path, default=Path("out"))
-    _force(parser)
+    add_folder(parser)
+    add_force(parser)
 
 
 def _verification(parser: argparse.ArgumentParser) -> None:
@@ -347,12 +318,12 @@ def _verification(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save",
         metavar="DIR",
-        type=_path,
+        type=path,
         nargs="?",
         const=Path("generated"),
         help="write the report beside the module, in DIR (generated)",
     )
-    _force(parser)
+    add_force(parser)
 
 
 def _linearisation(parser: argparse.ArgumentParser) -> None:
@@ -383,9 +354,9 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="an input whose value is searched as well",
     )
-    _values(parser)
+    add_values(parser)
     _route(parser)
     parser.add_argument(
-        "-o", "--output", metavar="FILE", type=_path, help="write A and B to FILE.npz or FILE.csv"
+        "-o", "--output", metavar="FILE", type=path, help="write A and B to FILE.npz or FILE.csv"
     )
-    _force(parser)
+    add_force(parser)

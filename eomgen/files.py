@@ -7,6 +7,7 @@ bounded size are read.
 import os
 import secrets
 import stat
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -24,6 +25,7 @@ SIGNATURES = (
     b"method,kind,order,dt_s,rtol,atol,status,error,error_is,",
     b"state_kind,t,condition,",
     b"member,status,t,",
+    b"name,unit,t,members,mean,deviation,",
     b"# eomgen verification of ",
     b'"eomgen": "verification of ',
     b"eomgen.npy",  # archives: their first member
@@ -127,15 +129,20 @@ def write_whole(path: Path, data: bytes | str, *, force: bool = False) -> None:
     Missing folders are created. Raises `RunError` if `path` exists and may not be replaced (see
     `check_writable`), or cannot be written; then no file is left behind.
     """
+    write_pieces(path, [data], force=force)
+
+
+def write_pieces(path: Path, pieces: Iterable[bytes | str], *, force: bool = False) -> None:
+    """The same for data in pieces, which need not be in memory at once."""
     check_writable(path, force=force)
-    content = data.encode("utf-8") if isinstance(data, str) else data
     # The name is known before the file exists, so that an interrupt at any time leaves no file.
     temporary = path.parent / f".{path.name[:40]}.{secrets.token_hex(6)}"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with os.fdopen(os.open(temporary, flags, 0o666), "wb") as file:
-            file.write(content)
+            for piece in pieces:
+                file.write(piece.encode("utf-8") if isinstance(piece, str) else piece)
         temporary.replace(path)
     except OSError as error:
         raise RunError(f"{path}: cannot be written: {error.strerror}") from None

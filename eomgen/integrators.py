@@ -50,6 +50,7 @@ INTEGRATORS: Mapping[str, IntegratorSpec] = {
         "explicit",
         "gragg_bulirsch_stoer:INTEGRATOR",
     ),
+    "Rodas5P": IntegratorSpec("Rosenbrock method, order 5", "implicit", "rodas_5p:INTEGRATOR"),
     "Radau": IntegratorSpec("Radau IIA, order 5, by SciPy", "implicit", "from_scipy:RADAU"),
     "Radau_differences": IntegratorSpec(
         "Radau with a Jacobian by differences", "implicit", "from_scipy:RADAU_DIFFERENCES"

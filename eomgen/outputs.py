@@ -53,7 +53,8 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     ),
     "mass_matrix": OutputSpec(
         ("nv", "nv"),
-        "Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v.",
+        "Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see "
+        "`derive`.",
         forms=False,
     ),
     "velocity_force": _force("V(q, v) of M v̇ + V + G = F, (nv,)."),

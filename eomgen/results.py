@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from eomgen.errors import SceneError
 from eomgen.files import check_writable, write_whole
 from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from eomgen.show.motion import Motion
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
+    from eomgen.telling.derivation import Telling
 
 
 @dataclass(frozen=True)
@@ -31,12 +33,31 @@ class Derivation:
     """Equations of motion M v̇ + V + G = F as SymPy expressions, and the steps of their derivation.
 
     `matrices` has the equations and the symbols of coordinates `q`, velocities `v` and
-    accelerations `a`.
+    accelerations `a`. A mechanism that is told as an algorithm has none: see `steps`.
     """
 
-    name: str
-    title: str
-    matrices: "Matrices"
+    model: Model
+    telling: "Telling"
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+        return self.model.name
+
+    @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.model.title
+
+    @property
+    def matrices(self) -> "Matrices":
+        """The equations as matrices. Raises `SceneError` if they are too long to be written out."""
+        if self.telling.matrices is None:
+            raise SceneError(
+                f"derive: M, V, G and F of {self.name} are too long to be written out; its steps "
+                "tell the algorithm, and the generated module computes them"
+            )
+        return self.telling.matrices
 
     @property
     def M(self) -> "Expr":
@@ -69,29 +90,32 @@ class Derivation:
     @property
     def steps(self) -> "tuple[Step, ...]":
         """The steps of the derivation, with number, title, explanation and equations."""
-        return self.matrices.steps
+        return self.telling.steps
 
     def text(self, *, encoding: str = "utf-8") -> str:
         """All steps as plain text, in ASCII if the encoding lacks Greek letters."""
         from eomgen.show.derivation import as_text
 
-        return as_text(self.name, self.title, self.steps, encoding=encoding)
+        return as_text(self.model, self.steps, encoding=encoding)
 
     def latex(self) -> str:
         """All steps as one LaTeX document."""
         from eomgen.show.derivation import as_latex
 
-        return as_latex(self.name, self.title, self.steps)
+        return as_latex(self.model, self.steps, self.telling.effects)
 
     def html(self) -> str:
         """All steps as one HTML page."""
         from eomgen.show.derivation import as_html
 
-        return as_html(self.name, self.title, self.steps)
+        return as_html(self.model, self.steps, self.telling.effects)
 
     def _repr_latex_(self) -> str:
         import sympy as sp
 
+        if self.telling.matrices is None:
+            steps = f"M v̇ + V + G = F in {len(self.steps)} steps"
+            return f"$\\text{{{steps}}}$"
         found = self.matrices
         left = sp.latex(found.M) + sp.latex(sp.Matrix(found.a))
         rest = " + ".join(sp.latex(m) for m in (found.V, found.G))
@@ -208,6 +232,11 @@ class Run:
         return self.motion.kinetic_energy + self.motion.potential_energy
 
     @property
+    def saved(self) -> Mapping[str, FloatArray]:
+        """What `save` asked for, (n, …) each, by output."""
+        return {name: each.values for name, each in self.trajectory.saved.items()}
+
+    @property
     def imbalance(self) -> "Imbalance | None":
         """The error of the energy balance; None where it is not defined."""
         from eomgen.show.balance import imbalance
@@ -255,8 +284,11 @@ class Run:
 
         return draw_motion(self.motion)
 
-    def save(self, folder: str | Path, *, force: bool = False) -> tuple[Path, ...]:
-        """Write module, table, archive and page into a folder; return their paths.
+    def save(
+        self, folder: str | Path, *, parquet: bool = False, force: bool = False
+    ) -> tuple[Path, ...]:
+        """Write module, table, archive and page into a folder, with `parquet` also the table as a
+        Parquet file; return their paths.
 
         Raises `RunError` if a file cannot be written, or exists and this program did not write it.
         """
@@ -271,6 +303,11 @@ class Run:
         save_npz(self.trajectory, archive, force=force)
         parameters = tuple(self.model.defaults.values())
         save_page(self.motion, self.module.poses, parameters, page, force=force)
+        if parquet:
+            from eomgen.run.parquet import save_parquet
+
+            save_parquet(self.trajectory, base.with_suffix(".parquet"), force=force)
+            return (*paths, base.with_suffix(".parquet"))
         return paths
 
     def _repr_html_(self) -> str:

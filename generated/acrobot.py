@@ -22,12 +22,13 @@ Parameters p, with the scene's values:
     g = 9.8      m/s^2   gravitational acceleration
 
 Effects: gravity, motor.
-One call of `derivative` takes 30 operations: 3 add, 7 sub, 15 mul, 1 div, 3 sin, 1 cos; 33 more on
+One call of `derivative` takes 29 operations: 3 add, 7 sub, 14 mul, 1 div, 3 sin, 1 cos; 30 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (4, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (4, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (8, k) and (1, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -85,28 +86,28 @@ JOINTS = ('shoulder', 'elbow')
 POINTS = ('feet',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 3, "sub": 7, "mul": 15, "div": 1, "sin": 3, "cos": 1, "total": 30, "parameters": 33},
-    "jacobian": {"add": 14, "sub": 8, "mul": 43, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 80, "parameters": 35},
-    "forward_dynamics": {"add": 5, "sub": 7, "mul": 15, "div": 1, "sin": 3, "cos": 1, "total": 32, "parameters": 33},
-    "inverse_dynamics": {"add": 12, "sub": 2, "mul": 15, "sin": 3, "cos": 1, "total": 33, "parameters": 21},
+    "derivative": {"add": 3, "sub": 7, "mul": 14, "div": 1, "sin": 3, "cos": 1, "total": 29, "parameters": 30},
+    "jacobian": {"add": 11, "sub": 11, "mul": 35, "div": 5, "neg": 1, "sin": 3, "cos": 3, "total": 69, "parameters": 33},
+    "forward_dynamics": {"add": 5, "sub": 7, "mul": 14, "div": 1, "sin": 3, "cos": 1, "total": 31, "parameters": 30},
+    "inverse_dynamics": {"add": 11, "sub": 2, "mul": 14, "sin": 3, "cos": 1, "total": 31, "parameters": 21},
     "mass_matrix": {"add": 2, "mul": 2, "cos": 1, "total": 5, "parameters": 16},
-    "velocity_force": {"add": 1, "sub": 1, "mul": 6, "sin": 1, "total": 9, "parameters": 2},
-    "gravity_force": {"add": 3, "mul": 3, "sin": 2, "total": 8, "parameters": 6},
-    "bias_force": {"add": 6, "sub": 1, "mul": 9, "sin": 3, "total": 19, "parameters": 7},
+    "velocity_force": {"add": 1, "sub": 1, "mul": 5, "sin": 1, "total": 8, "parameters": 2},
+    "gravity_force": {"add": 2, "mul": 2, "sin": 2, "total": 6, "parameters": 6},
+    "bias_force": {"add": 5, "sub": 1, "mul": 7, "sin": 3, "total": 16, "parameters": 7},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 11, "mul": 20, "sin": 2, "cos": 2, "total": 35, "parameters": 5},
-    "potential_energy": {"add": 1, "sub": 3, "mul": 5, "cos": 2, "total": 11, "parameters": 3},
-    "effect_powers": {"add": 5, "sub": 1, "mul": 8, "neg": 1, "sin": 2, "total": 17, "parameters": 3},
-    "momentum": {"add": 14, "sub": 3, "mul": 28, "sin": 2, "cos": 2, "total": 49, "parameters": 2},
-    "centre_of_mass": {"add": 4, "sub": 3, "mul": 12, "sin": 2, "cos": 2, "total": 23, "parameters": 4},
-    "joint_forces": {"add": 11, "sub": 8, "mul": 29, "div": 1, "neg": 3, "sin": 3, "cos": 3, "total": 58, "parameters": 38},
-    "body_poses": {"add": 3, "sub": 2, "mul": 6, "neg": 1, "sin": 2, "cos": 2, "total": 16, "parameters": 2},
-    "body_velocities": {"add": 6, "mul": 10, "sin": 2, "cos": 2, "total": 20, "parameters": 1},
-    "point_positions": {"add": 4, "sub": 3, "mul": 6, "sin": 2, "cos": 2, "total": 17, "parameters": 2},
-    "point_velocities": {"add": 8, "mul": 10, "sin": 2, "cos": 2, "total": 22, "parameters": 1},
+    "kinetic_energy": {"add": 11, "mul": 19, "sin": 2, "cos": 2, "total": 34, "parameters": 5},
+    "potential_energy": {"add": 1, "sub": 2, "mul": 4, "cos": 2, "total": 9, "parameters": 5},
+    "effect_powers": {"add": 3, "sub": 3, "mul": 8, "sin": 2, "total": 16, "parameters": 4},
+    "momentum": {"add": 14, "sub": 2, "mul": 26, "sin": 2, "cos": 2, "total": 46, "parameters": 5},
+    "centre_of_mass": {"add": 4, "sub": 2, "mul": 11, "sin": 2, "cos": 2, "total": 21, "parameters": 6},
+    "joint_forces": {"add": 8, "sub": 11, "mul": 28, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 55, "parameters": 35},
+    "body_poses": {"add": 3, "sub": 1, "mul": 6, "sin": 2, "cos": 2, "total": 14, "parameters": 4},
+    "body_velocities": {"add": 6, "mul": 9, "sin": 2, "cos": 2, "total": 19, "parameters": 1},
+    "point_positions": {"add": 4, "sub": 2, "mul": 5, "sin": 2, "cos": 2, "total": 15, "parameters": 3},
+    "point_velocities": {"add": 8, "mul": 9, "sin": 2, "cos": 2, "total": 21, "parameters": 1},
     "point_jacobians": {"add": 9, "mul": 6, "sin": 2, "cos": 2, "total": 19, "parameters": 1},
-    "input_jacobian": {"add": 1, "sub": 3, "mul": 6, "div": 1, "sin": 1, "cos": 1, "total": 13, "parameters": 27},
-    "parameter_jacobian": {"add": 28, "sub": 22, "mul": 82, "div": 9, "neg": 8, "sin": 3, "cos": 1, "total": 153, "parameters": 93},
+    "input_jacobian": {"add": 1, "sub": 3, "mul": 6, "div": 1, "sin": 1, "cos": 1, "total": 13, "parameters": 25},
+    "parameter_jacobian": {"add": 20, "sub": 30, "mul": 76, "div": 9, "neg": 3, "sin": 3, "cos": 1, "total": 142, "parameters": 88},
 }
 
 
@@ -129,93 +130,101 @@ def _fixed(m_1, m_2, I_1, I_2, l_1, c_1, c_2, g):
     if not I_2 >= 0.0:
         return "inertia_com of lower is negative"
     c_2_squared = c_2 * c_2
-    k44 = m_2 * c_2_squared
-    pivot_lower = I_2 + k44
-    k45 = m_2 * I_1
+    k51 = m_2 * c_2_squared
+    pivot_lower = I_2 + k51
+    k52 = I_1 * I_2
     c_1_squared = c_1 * c_1
-    k46 = m_1 * I_2
+    k53 = m_1 * c_1_squared
     l_1_squared = l_1 * l_1
-    k47 = m_2 * I_2
-    k48 = m_1 * m_2
-    k49 = c_2_squared * k48
-    k50 = l_1_squared * k47 + (c_1_squared * k46 + (I_1 * I_2 + c_2_squared * k45))
-    k1 = (c_1_squared * k49 + k50) / pivot_lower
+    k54 = m_2 * I_2
+    k55 = l_1_squared * k54
+    k1 = (m_1 * (k51 * c_1_squared) + (k55 + (I_2 * k53 + (k52 + I_1 * k51)))) / pivot_lower
     m_2_squared = m_2 * m_2
-    k51 = c_2_squared * l_1_squared
-    k2 = m_2_squared * k51 / pivot_lower
-    k22 = m_2 * l_1
-    k3 = c_2 * k22
-    k23 = m_2 * c_2
-    k18 = m_2 * g
-    k4 = c_2 * k18
+    k56 = c_2_squared * l_1_squared
+    k2 = m_2_squared * k56 / pivot_lower
+    k26 = m_2 * l_1
+    k3 = c_2 * k26
+    k19 = m_2 * g
+    k4 = c_2 * k19
     k5 = 1.0 / pivot_lower
-    k9 = g * k22
-    k19 = m_1 * g
-    k10 = c_1 * k19
-    k6 = k9 + k10
-    k7 = k2 * 2.0
-    k8 = k3 * 2.0
-    k52 = m_1 * c_1_squared
-    k53 = m_2 * l_1_squared
-    k54 = m_2 * 2.0
-    k26 = l_1 * c_2
-    k11 = k54 * k26
-    k12 = I_2 + (I_1 + (k52 + (k44 + k53)))
-    k13 = I_1 / 2.0
-    k14 = I_2 / 2.0
-    k15 = m_1 / 2.0
-    k20 = c_1 - l_1
-    k16 = l_1 - c_1
-    k17 = m_2 / 2.0
-    k55 = m_1 + m_2
-    k21 = 1.0 / k55
-    k24 = k22 + m_1 * c_1
-    k25 = g * k55
-    k27 = pivot_lower * c_1_squared / pivot_lower
-    k28 = c_1 * g
-    k56 = c_1_squared * (m_1 * c_2_squared) + (I_1 * c_2_squared + I_2 * l_1_squared)
-    k29 = (k56 - c_2_squared * k1) / pivot_lower
-    k30 = (k51 * k54 - c_2_squared * k2) / pivot_lower
-    k31 = c_2 * g
-    k32 = c_2_squared * k5 / pivot_lower
-    k33 = l_1 * g
-    k34 = pivot_lower / pivot_lower
-    k35 = (k53 + (I_1 + k52) - k1) / pivot_lower
-    k36 = k2 / pivot_lower
-    k37 = k5 / pivot_lower
-    k57 = l_1 * 2.0
-    k38 = k47 * k57 / pivot_lower
-    k39 = m_2_squared * (c_2_squared * k57) / pivot_lower
-    k40 = c_1 * 2.0 * (k46 + k49) / pivot_lower
-    k58 = c_2 * 2.0
-    k59 = m_2 * k58
-    k41 = (k45 * k58 + c_1_squared * (k48 * k58) - k1 * k59) / pivot_lower
-    k42 = (m_2_squared * (l_1_squared * k58) - k2 * k59) / pivot_lower
-    k43 = k5 * k59 / pivot_lower
+    k24 = m_1 * c_1
+    k27 = k26 + k24
+    k6 = g * k27
+    k28 = m_2 * c_2
+    k7 = g * k28
+    k8 = -k5
+    k9 = k2 * 2.0
+    k10 = k3 * 2.0
+    k57 = m_2 * l_1_squared
+    k32 = l_1 * c_2
+    k11 = 2.0 * (m_2 * k32)
+    k12 = I_2 + (I_1 + (k53 + (k51 + k57)))
+    k13 = l_1 * k28
+    k14 = I_1 / 2.0
+    k15 = I_2 / 2.0
+    k16 = m_1 / 2.0
+    k17 = l_1 - c_1
+    k18 = m_2 / 2.0
+    k20 = c_1 - l_1 - c_1
+    k21 = g * k24
+    k22 = m_1 * g
+    k23 = -k17
+    k58 = m_1 + m_2
+    k25 = 1.0 / k58
+    k29 = -g * k58
+    k30 = -k26
+    k31 = -c_1
+    k59 = m_2 * I_1
+    k60 = m_1 * I_2
+    k61 = m_1 * m_2
+    k62 = c_2_squared * k61
+    k63 = c_1_squared * k62 + (k55 + (c_1_squared * k60 + (k52 + c_2_squared * k59)))
+    k33 = k63 / pivot_lower
+    k34 = pivot_lower * c_1_squared / pivot_lower
+    k64 = c_2_squared * k53 + (I_1 * c_2_squared + I_2 * l_1_squared) - c_2_squared * k33
+    k35 = k64 / pivot_lower
+    k36 = (k56 * (m_2 * 2.0) - c_2_squared * k2) / pivot_lower
+    k37 = c_2_squared * k5 / pivot_lower
+    k38 = -k37
+    k39 = pivot_lower / pivot_lower
+    k40 = (k57 + (I_1 + k53) - k33) / pivot_lower
+    k41 = k2 / pivot_lower
+    k42 = k5 / pivot_lower
+    k43 = -k42
+    k65 = l_1 * 2.0
+    k44 = k54 * k65 / pivot_lower
+    k45 = m_2_squared * (c_2_squared * k65) / pivot_lower
+    k46 = c_1 * 2.0 * (k60 + k62) / pivot_lower
+    k66 = c_2 * 2.0
+    k67 = m_2 * k66
+    k47 = (k59 * k66 + c_1_squared * (k61 * k66) - k33 * k67) / pivot_lower
+    k48 = (m_2_squared * (l_1_squared * k66) - k2 * k67) / pivot_lower
+    k49 = k5 * k67 / pivot_lower
+    k50 = -k49
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6),
-        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8),
+        "jacobian": (k1, k2, k3, k5, k6, k7, k8, k9, k10),
         "forward_dynamics": (k1, k2, k3, k4, k5, k6),
-        "inverse_dynamics": (pivot_lower, k3, k4, k9, k10, k11, k12),
-        "mass_matrix": (pivot_lower, k3, k11, k12),
+        "inverse_dynamics": (pivot_lower, k3, k4, k6, k11, k12),
+        "mass_matrix": (pivot_lower, k11, k12, k13),
         "velocity_force": (k3,),
-        "gravity_force": (k4, k9, k10),
-        "bias_force": (k3, k4, k9, k10),
+        "gravity_force": (k4, k6),
+        "bias_force": (k3, k6, k7),
         "applied_force": (),
-        "kinetic_energy": (c_1, c_2, k13, k14, k15, k16, k17),
-        "potential_energy": (c_1, c_2, k18, k19, k20),
-        "effect_powers": (c_1, c_2, k18, k19, k16),
-        "momentum": (m_1, m_2, I_1, I_2, c_1, c_2, k20, k16),
-        "centre_of_mass": (m_1, m_2, c_1, c_2, k20, k16, k21),
-        "joint_forces": (k1, k2, k22, k3, k23, k18, k4, k5, k6, k24, k25),
-        "body_poses": (c_1, c_2, k20, k16),
-        "body_velocities": (c_1, c_2, k16),
-        "point_positions": (c_1, c_2, k20, k16),
-        "point_velocities": (c_1, c_2, k16),
-        "point_jacobians": (c_1, c_2, k16),
-        "input_jacobian": (k1, k2, k3, k5),
-        "parameter_jacobian": (k1, k2, k22, k3, k23, k18, k4, k5, k19, k6, k26, k24, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43),
+        "kinetic_energy": (c_1, c_2, k14, k15, k16, k17, k18),
+        "potential_energy": (c_2, k19, k20, k21),
+        "effect_powers": (c_1, c_2, k19, k22, k23),
+        "momentum": (m_1, m_2, I_1, I_2, c_1, c_2, c_1_squared, k24, k17, k20),
+        "centre_of_mass": (m_2, c_1, c_2, k24, k17, k20, k25),
+        "joint_forces": (k1, k2, k26, k3, k19, k5, k27, k6, k28, k7, k29, k30),
+        "body_poses": (c_1, c_2, k17, k20, k31),
+        "body_velocities": (c_1, c_2, k17),
+        "point_positions": (c_1, c_2, k17, k20),
+        "point_velocities": (c_1, c_2, k17),
+        "point_jacobians": (c_1, c_2, k17),
+        "input_jacobian": (k1, k2, k5, k13),
+        "parameter_jacobian": (m_1, l_1, c_1, c_2, g, k2, k26, k3, k19, k5, k27, k28, k8, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50),
     }
 
 
@@ -265,16 +274,17 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """30 operations: 3 add, 7 sub, 15 mul, 1 div, 3 sin, 1 cos."""
+    """29 operations: 3 add, 7 sub, 14 mul, 1 div, 3 sin, 1 cos."""
     k1, k2, k3, k4, k5, k6 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
-    load_lower = tau - sin(theta_1 + theta_2) * k4 - k3 * (sin_theta_2 * (theta_1_dot * theta_1_dot))
+    s1 = sin_theta_2 * k3
+    load_lower = tau - sin(theta_1 + theta_2) * k4 - theta_1_dot * theta_1_dot * s1
     omega_lower = theta_1_dot + theta_2_dot
-    s1 = k3 * (sin_theta_2 * (omega_lower * omega_lower)) - tau - k5 * (coupling_lower_upper * load_lower)
-    alpha_upper = (s1 - sin(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s2 = s1 * (omega_lower * omega_lower) - tau - k5 * (coupling_lower_upper * load_lower)
+    alpha_upper = (s2 - sin(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         theta_1_dot,
         theta_2_dot,
@@ -284,31 +294,32 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """80 operations: 14 add, 8 sub, 43 mul, 5 div, 4 neg, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k8 = k
+    """69 operations: 11 add, 11 sub, 35 mul, 5 div, 1 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k5, k6, k7, k8, k9, k10 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
     pivot_upper = k1 + sin_theta_2 * sin_theta_2 * k2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
-    s2 = theta_1 + theta_2
+    s3 = theta_1 + theta_2
     theta_1_dot_squared = theta_1_dot * theta_1_dot
-    load_lower = tau - sin(s2) * k4 - k3 * (sin_theta_2 * theta_1_dot_squared)
+    s1 = sin_theta_2 * k3
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
-    s1 = k3 * (sin_theta_2 * omega_lower_squared) - tau - k5 * (coupling_lower_upper * load_lower)
-    alpha_upper = (s1 - sin(theta_1) * k6) / pivot_upper
-    s3 = k4 * cos(s2)
-    s4 = (k5 * (coupling_lower_upper * s3) - k6 * cos(theta_1)) / pivot_upper
-    s5 = sin_theta_2 * k3
-    s6 = s3 + k3 * (cos_theta_2 * theta_1_dot_squared)
-    s7 = k5 * (load_lower * s5 + coupling_lower_upper * s6) + k3 * (cos_theta_2 * omega_lower_squared)
-    s8 = (s7 - alpha_upper * (sin_theta_2 * cos_theta_2 * k7)) / pivot_upper
-    s9 = k8 * (theta_1_dot * sin_theta_2)
-    s10 = k8 * (sin_theta_2 * omega_lower)
-    s11 = (k5 * (coupling_lower_upper * s9) + s10) / pivot_upper
-    s12 = s10 / pivot_upper
+    load_lower_2 = tau - sin(s3) * k7 - theta_1_dot_squared * s1
+    s4 = coupling_lower_upper * k5
+    alpha_upper_2 = (s1 * omega_lower_squared - tau - load_lower_2 * s4 - sin(theta_1) * k6) / pivot_upper
+    s5 = k7 * cos(s3)
+    s6 = (s4 * s5 - k6 * cos(theta_1)) / pivot_upper
+    s7 = s5 + coupling_lower_upper * theta_1_dot_squared
+    s8 = k5 * (s1 * load_lower_2 + coupling_lower_upper * s7) + coupling_lower_upper * omega_lower_squared
+    s9 = (s8 - alpha_upper_2 * (sin_theta_2 * cos_theta_2 * k9)) / pivot_upper
+    s10 = sin_theta_2 * k10
+    s11 = theta_1_dot * s10
+    s12 = omega_lower * s10
+    s13 = (s4 * s11 + s12) / pivot_upper
+    s14 = s12 / pivot_upper
     return (
         0.0,
         0.0,
@@ -318,108 +329,105 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         1.0,
-        s4,
-        s8,
-        s11,
-        s12,
-        -(s4 + k5 * (s3 + coupling_lower_upper * s4)),
-        -(s8 + k5 * (s6 + (coupling_lower_upper * s8 - alpha_upper * s5))),
-        -(s11 + k5 * (s9 + coupling_lower_upper * s11)),
-        -(s12 + k5 * (coupling_lower_upper * s12)),
+        s6,
+        s9,
+        s13,
+        s14,
+        k8 * (s5 + coupling_lower_upper * s6) - s6,
+        k8 * (s7 + (coupling_lower_upper * s9 - s1 * alpha_upper_2)) - s9,
+        k8 * (s11 + coupling_lower_upper * s13) - s13,
+        -(s14 + s4 * s14),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """32 operations: 5 add, 7 sub, 15 mul, 1 div, 3 sin, 1 cos."""
+    """31 operations: 5 add, 7 sub, 14 mul, 1 div, 3 sin, 1 cos."""
     k1, k2, k3, k4, k5, k6 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     tau__theta_1, tau__theta_2 = extra
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
+    s1 = sin_theta_2 * k3
     omega_lower = theta_1_dot + theta_2_dot
-    s13 = tau + tau__theta_2
-    load_lower_2 = s13 - sin(theta_1 + theta_2) * k4 - k3 * (sin_theta_2 * (theta_1_dot * theta_1_dot))
-    s14 = tau__theta_1 + k3 * (sin_theta_2 * (omega_lower * omega_lower)) - s13 - k5 * (coupling_lower_upper * load_lower_2)
-    alpha_upper_2 = (s14 - sin(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s15 = tau + tau__theta_2
+    load_lower_3 = s15 - sin(theta_1 + theta_2) * k4 - theta_1_dot * theta_1_dot * s1
+    s16 = tau__theta_1 + s1 * (omega_lower * omega_lower) - s15 - k5 * (coupling_lower_upper * load_lower_3)
+    alpha_upper_3 = (s16 - sin(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
-        alpha_upper_2,
-        k5 * (load_lower_2 - coupling_lower_upper * alpha_upper_2) - alpha_upper_2,
+        alpha_upper_3,
+        k5 * (load_lower_3 - coupling_lower_upper * alpha_upper_3) - alpha_upper_3,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """33 operations: 12 add, 2 sub, 15 mul, 3 sin, 1 cos."""
-    pivot_lower, k3, k4, k9, k10, k11, k12 = k
+    """31 operations: 11 add, 2 sub, 14 mul, 3 sin, 1 cos."""
+    pivot_lower, k3, k4, k6, k11, k12 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     theta_1_ddot, theta_2_ddot = extra
     sin_theta_2 = sin(theta_2)
     cos_theta_2 = cos(theta_2)
-    theta_1_dot_squared = theta_1_dot * theta_1_dot
-    s15 = sin(theta_1 + theta_2) * k4
-    sin_theta_1 = sin(theta_1)
+    s17 = sin(theta_1 + theta_2) * k4
     omega_lower = theta_1_dot + theta_2_dot
-    s16 = pivot_lower + cos_theta_2 * k3
-    s17 = sin_theta_1 * k10 + (theta_1_ddot * (cos_theta_2 * k11 + k12) + theta_2_ddot * s16)
-    s18 = k3 * (sin_theta_2 * theta_1_dot_squared) + (s15 + (theta_1_ddot * s16 + theta_2_ddot * pivot_lower))
+    s18 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    s19 = pivot_lower + cos_theta_2 * k3
+    s20 = sin(theta_1) * k6 + (theta_1_ddot * (cos_theta_2 * k11 + k12) + theta_2_ddot * s19)
     return (
-        k3 * (sin_theta_2 * (theta_1_dot_squared - omega_lower * omega_lower)) + (sin_theta_1 * k9 + (s15 + s17)),
-        s18 - tau,
+        k3 * (s18 - sin_theta_2 * (omega_lower * omega_lower)) + (s17 + s20),
+        k3 * s18 + (s17 + (theta_1_ddot * s19 + theta_2_ddot * pivot_lower)) - tau,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     """5 operations: 2 add, 2 mul, 1 cos."""
-    pivot_lower, k3, k11, k12 = k
+    pivot_lower, k11, k12, k13 = k
     _, theta_2, _, _ = y
     cos_theta_2 = cos(theta_2)
-    s16 = pivot_lower + cos_theta_2 * k3
+    s21 = pivot_lower + cos_theta_2 * k13
     return (
         cos_theta_2 * k11 + k12,
-        s16,
-        s16,
+        s21,
+        s21,
         pivot_lower,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin):
-    """9 operations: 1 add, 1 sub, 6 mul, 1 sin."""
+    """8 operations: 1 add, 1 sub, 5 mul, 1 sin."""
     k3, = k
     _, theta_2, theta_1_dot, theta_2_dot = y
-    sin_theta_2 = sin(theta_2)
     theta_1_dot_squared = theta_1_dot * theta_1_dot
+    s1 = sin(theta_2) * k3
     omega_lower = theta_1_dot + theta_2_dot
     return (
-        k3 * (sin_theta_2 * (theta_1_dot_squared - omega_lower * omega_lower)),
-        k3 * (sin_theta_2 * theta_1_dot_squared),
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower),
+        theta_1_dot_squared * s1,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), sin=sin):
-    """8 operations: 3 add, 3 mul, 2 sin."""
-    k4, k9, k10 = k
+    """6 operations: 2 add, 2 mul, 2 sin."""
+    k4, k6 = k
     theta_1, theta_2, _, _ = y
-    s15 = sin(theta_1 + theta_2) * k4
-    sin_theta_1 = sin(theta_1)
+    s17 = sin(theta_1 + theta_2) * k4
     return (
-        sin_theta_1 * k9 + (s15 + sin_theta_1 * k10),
-        s15,
+        s17 + sin(theta_1) * k6,
+        s17,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin):
-    """19 operations: 6 add, 1 sub, 9 mul, 3 sin."""
-    k3, k4, k9, k10 = k
+    """16 operations: 5 add, 1 sub, 7 mul, 3 sin."""
+    k3, k6, k7 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    sin_theta_2 = sin(theta_2)
     theta_1_dot_squared = theta_1_dot * theta_1_dot
-    s15 = sin(theta_1 + theta_2) * k4
-    sin_theta_1 = sin(theta_1)
+    s1 = sin(theta_2) * k3
     omega_lower = theta_1_dot + theta_2_dot
+    s22 = sin(theta_1 + theta_2) * k7
     return (
-        k3 * (sin_theta_2 * (theta_1_dot_squared - omega_lower * omega_lower)) + (sin_theta_1 * k9 + (s15 + sin_theta_1 * k10)),
-        s15 + k3 * (sin_theta_2 * theta_1_dot_squared),
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s22 + sin(theta_1) * k6),
+        s22 + theta_1_dot_squared * s1,
     )
 
 
@@ -433,267 +441,265 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """35 operations: 11 add, 20 mul, 2 sin, 2 cos."""
-    c_1, c_2, k13, k14, k15, k16, k17 = k
+    """34 operations: 11 add, 19 mul, 2 sin, 2 cos."""
+    c_1, c_2, k14, k15, k16, k17, k18 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s2 = theta_1 + theta_2
+    s3 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s19 = theta_1_dot * cos(theta_1)
-    xd_upper = c_1 * s19
-    s20 = theta_1_dot * sin(theta_1)
-    yd_upper = c_1 * s20
-    xd_lower = s19 * k16 + (xd_upper + c_2 * (omega_lower * cos(s2)))
-    yd_lower = s20 * k16 + (yd_upper + c_2 * (sin(s2) * omega_lower))
-    s21 = (xd_upper * xd_upper + yd_upper * yd_upper) * k15 + (theta_1_dot * theta_1_dot * k13 + omega_lower * omega_lower * k14)
+    s23 = theta_1_dot * cos(theta_1)
+    xd_upper = c_1 * s23
+    s24 = theta_1_dot * sin(theta_1)
+    yd_upper = c_1 * s24
+    s25 = c_2 * omega_lower
+    xd_lower = s23 * k17 + (xd_upper + cos(s3) * s25)
+    yd_lower = s24 * k17 + (yd_upper + sin(s3) * s25)
+    s26 = (xd_upper * xd_upper + yd_upper * yd_upper) * k16 + (theta_1_dot * theta_1_dot * k14 + omega_lower * omega_lower * k15)
     return (
-        (xd_lower * xd_lower + yd_lower * yd_lower) * k17 + s21,
+        (xd_lower * xd_lower + yd_lower * yd_lower) * k18 + s26,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
-    """11 operations: 1 add, 3 sub, 5 mul, 2 cos."""
-    c_1, c_2, k18, k19, k20 = k
+    """9 operations: 1 add, 2 sub, 4 mul, 2 cos."""
+    c_2, k19, k20, k21 = k
     theta_1, theta_2, _, _ = y
     cos_theta_1 = cos(theta_1)
-    s22 = c_1 * cos_theta_1
     return (
-        k18 * (cos_theta_1 * k20 - s22 - c_2 * cos(theta_1 + theta_2)) - k19 * s22,
+        (cos_theta_1 * k20 - c_2 * cos(theta_1 + theta_2)) * k19 - cos_theta_1 * k21,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), sin=sin):
-    """17 operations: 5 add, 1 sub, 8 mul, 1 neg, 2 sin."""
-    c_1, c_2, k18, k19, k16 = k
+    """16 operations: 3 add, 3 sub, 8 mul, 2 sin."""
+    c_1, c_2, k19, k22, k23 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     omega_lower = theta_1_dot + theta_2_dot
-    s20 = theta_1_dot * sin(theta_1)
-    yd_upper = c_1 * s20
-    s23 = k18 * (s20 * k16 + (yd_upper + c_2 * (sin(theta_1 + theta_2) * omega_lower)))
+    s24 = theta_1_dot * sin(theta_1)
+    yd_upper = c_1 * s24
+    s27 = (s24 * k23 - (yd_upper + c_2 * (sin(theta_1 + theta_2) * omega_lower))) * k19
     return (
-        -(s23 + k19 * yd_upper),
+        s27 - yd_upper * k22,
         tau * (omega_lower - theta_1_dot),
     )
 
 
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """49 operations: 14 add, 3 sub, 28 mul, 2 sin, 2 cos."""
-    m_1, m_2, I_1, I_2, c_1, c_2, k20, k16 = k
+    """46 operations: 14 add, 2 sub, 26 mul, 2 sin, 2 cos."""
+    m_1, m_2, I_1, I_2, c_1, c_2, c_1_squared, k24, k17, k20 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s2 = theta_1 + theta_2
-    sin_theta_1_theta_2 = sin(s2)
+    s3 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    cos_theta_1_theta_2 = cos(s2)
     cos_theta_1 = cos(theta_1)
-    s19 = theta_1_dot * cos_theta_1
-    xd_upper = c_1 * s19
-    s20 = theta_1_dot * sin_theta_1
-    yd_upper = c_1 * s20
-    xd_lower = s19 * k16 + (xd_upper + c_2 * (omega_lower * cos_theta_1_theta_2))
-    yd_lower = s20 * k16 + (yd_upper + c_2 * (sin_theta_1_theta_2 * omega_lower))
-    s22 = c_1 * cos_theta_1
-    x_upper = c_1 * sin_theta_1
-    s24 = yd_lower * (sin_theta_1 * k16 + (x_upper + c_2 * sin_theta_1_theta_2)) - xd_lower * (cos_theta_1 * k20 - s22 - c_2 * cos_theta_1_theta_2)
-    s25 = m_1 * (yd_upper * x_upper + xd_upper * s22) + (I_2 * omega_lower + I_1 * theta_1_dot)
+    s23 = theta_1_dot * cos_theta_1
+    s24 = theta_1_dot * sin_theta_1
+    s28 = c_2 * cos(s3)
+    xd_lower_2 = s23 * k17 + (c_1 * s23 + omega_lower * s28)
+    s29 = c_2 * sin(s3)
+    yd_lower_2 = s24 * k17 + (c_1 * s24 + omega_lower * s29)
+    s30 = yd_lower_2 * (sin_theta_1 * k17 + (s29 + c_1 * sin_theta_1)) - xd_lower_2 * (cos_theta_1 * k20 - s28)
+    s31 = m_1 * (c_1_squared * (sin_theta_1 * s24 + cos_theta_1 * s23)) + (I_2 * omega_lower + I_1 * theta_1_dot)
     return (
-        m_2 * xd_lower + m_1 * xd_upper,
-        m_2 * yd_lower + m_1 * yd_upper,
-        m_2 * s24 + s25,
+        m_2 * xd_lower_2 + s23 * k24,
+        m_2 * yd_lower_2 + s24 * k24,
+        m_2 * s30 + s31,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """23 operations: 4 add, 3 sub, 12 mul, 2 sin, 2 cos."""
-    m_1, m_2, c_1, c_2, k20, k16, k21 = k
+    """21 operations: 4 add, 2 sub, 11 mul, 2 sin, 2 cos."""
+    m_2, c_1, c_2, k24, k17, k20, k25 = k
     theta_1, theta_2, _, _ = y
-    s2 = theta_1 + theta_2
+    s3 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     cos_theta_1 = cos(theta_1)
-    s22 = c_1 * cos_theta_1
-    x_upper = c_1 * sin_theta_1
+    s32 = m_2 * (sin_theta_1 * k17 + (c_1 * sin_theta_1 + c_2 * sin(s3))) + sin_theta_1 * k24
     return (
-        (m_2 * (sin_theta_1 * k16 + (x_upper + c_2 * sin(s2))) + m_1 * x_upper) * k21,
-        k21 * (m_2 * (cos_theta_1 * k20 - s22 - c_2 * cos(s2)) - m_1 * s22),
+        s32 * k25,
+        k25 * (m_2 * (cos_theta_1 * k20 - c_2 * cos(s3)) - cos_theta_1 * k24),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """58 operations: 11 add, 8 sub, 29 mul, 1 div, 3 neg, 3 sin, 3 cos."""
-    k1, k2, k22, k3, k23, k18, k4, k5, k6, k24, k25 = k
+    """55 operations: 8 add, 11 sub, 28 mul, 1 div, 1 neg, 3 sin, 3 cos."""
+    k1, k2, k26, k3, k19, k5, k27, k6, k28, k7, k29, k30 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
-    s2 = theta_1 + theta_2
-    sin_theta_1_theta_2 = sin(s2)
+    s3 = theta_1 + theta_2
+    sin_theta_1_theta_2 = sin(s3)
     theta_1_dot_squared = theta_1_dot * theta_1_dot
-    load_lower = tau - sin_theta_1_theta_2 * k4 - k3 * (sin_theta_2 * theta_1_dot_squared)
+    s1 = sin_theta_2 * k3
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
-    s1 = k3 * (sin_theta_2 * omega_lower_squared) - tau - k5 * (coupling_lower_upper * load_lower)
-    alpha_upper = (s1 - sin_theta_1 * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
-    alpha_lower = k5 * (load_lower - coupling_lower_upper * alpha_upper)
-    cos_theta_1_theta_2 = cos(s2)
+    load_lower_2 = tau - sin_theta_1_theta_2 * k7 - theta_1_dot_squared * s1
+    cos_theta_1_theta_2 = cos(s3)
     cos_theta_1 = cos(theta_1)
-    s26 = theta_1_dot_squared * sin_theta_1 - alpha_upper * cos_theta_1
-    s27 = sin_theta_1_theta_2 * omega_lower_squared - alpha_lower * cos_theta_1_theta_2
-    s28 = k23 * s27
-    s29 = sin_theta_1 * alpha_upper + theta_1_dot_squared * cos_theta_1
-    s30 = sin_theta_1_theta_2 * alpha_lower + omega_lower_squared * cos_theta_1_theta_2
-    s31 = k23 * s30
+    s33 = s1 * omega_lower_squared - tau - k5 * (coupling_lower_upper * load_lower_2)
+    alpha_upper_4 = (s33 - sin_theta_1 * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    alpha_lower = k5 * (load_lower_2 - coupling_lower_upper * alpha_upper_4)
+    s34 = theta_1_dot_squared * sin_theta_1 - alpha_upper_4 * cos_theta_1
+    s35 = sin_theta_1_theta_2 * omega_lower_squared - alpha_lower * cos_theta_1_theta_2
+    s36 = k28 * s35
+    s37 = sin_theta_1 * alpha_upper_4 + theta_1_dot_squared * cos_theta_1
+    s38 = sin_theta_1_theta_2 * alpha_lower + omega_lower_squared * cos_theta_1_theta_2
+    s39 = k28 * s38
     return (
-        k24 * s26 + s28,
-        -(s31 + (k25 + k24 * s29)),
+        k27 * s34 + s36,
+        k29 - k27 * s37 - s39,
         0.0,
-        s28 + k22 * s26,
-        -(k22 * s29 + (k18 + s31)),
+        s36 + k26 * s34,
+        k30 * s37 - (k19 + s39),
         -tau,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """16 operations: 3 add, 2 sub, 6 mul, 1 neg, 2 sin, 2 cos."""
-    c_1, c_2, k20, k16 = k
+    """14 operations: 3 add, 1 sub, 6 mul, 2 sin, 2 cos."""
+    c_1, c_2, k17, k20, k31 = k
     theta_1, theta_2, _, _ = y
-    s2 = theta_1 + theta_2
+    s3 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     cos_theta_1 = cos(theta_1)
-    s22 = c_1 * cos_theta_1
     x_upper = c_1 * sin_theta_1
     return (
         x_upper,
-        -s22,
+        k31 * cos_theta_1,
         theta_1,
-        sin_theta_1 * k16 + (x_upper + c_2 * sin(s2)),
-        cos_theta_1 * k20 - s22 - c_2 * cos(s2),
-        s2,
+        sin_theta_1 * k17 + (x_upper + c_2 * sin(s3)),
+        cos_theta_1 * k20 - c_2 * cos(s3),
+        s3,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """20 operations: 6 add, 10 mul, 2 sin, 2 cos."""
-    c_1, c_2, k16 = k
+    """19 operations: 6 add, 9 mul, 2 sin, 2 cos."""
+    c_1, c_2, k17 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s2 = theta_1 + theta_2
+    s3 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s19 = theta_1_dot * cos(theta_1)
-    xd_upper = c_1 * s19
-    s20 = theta_1_dot * sin(theta_1)
-    yd_upper = c_1 * s20
+    s23 = theta_1_dot * cos(theta_1)
+    xd_upper = c_1 * s23
+    s24 = theta_1_dot * sin(theta_1)
+    yd_upper = c_1 * s24
+    s25 = c_2 * omega_lower
     return (
         xd_upper,
         yd_upper,
         theta_1_dot,
-        s19 * k16 + (xd_upper + c_2 * (omega_lower * cos(s2))),
-        s20 * k16 + (yd_upper + c_2 * (sin(s2) * omega_lower)),
+        s23 * k17 + (xd_upper + cos(s3) * s25),
+        s24 * k17 + (yd_upper + sin(s3) * s25),
         omega_lower,
     )
 
 
 def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """17 operations: 4 add, 3 sub, 6 mul, 2 sin, 2 cos."""
-    c_1, c_2, k20, k16 = k
+    """15 operations: 4 add, 2 sub, 5 mul, 2 sin, 2 cos."""
+    c_1, c_2, k17, k20 = k
     theta_1, theta_2, _, _ = y
-    s2 = theta_1 + theta_2
+    s3 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
-    cos_theta_1 = cos(theta_1)
-    s32 = c_2 * cos(s2)
-    s33 = c_2 * sin(s2)
+    s28 = c_2 * cos(s3)
+    s29 = c_2 * sin(s3)
     return (
-        s33 + (sin_theta_1 * k16 + (c_1 * sin_theta_1 + s33)),
-        cos_theta_1 * k20 - c_1 * cos_theta_1 - s32 - s32,
+        s29 + (sin_theta_1 * k17 + (c_1 * sin_theta_1 + s29)),
+        cos(theta_1) * k20 - s28 - s28,
     )
 
 
 def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """22 operations: 8 add, 10 mul, 2 sin, 2 cos."""
-    c_1, c_2, k16 = k
+    """21 operations: 8 add, 9 mul, 2 sin, 2 cos."""
+    c_1, c_2, k17 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    s2 = theta_1 + theta_2
-    omega_lower = theta_1_dot + theta_2_dot
-    s19 = theta_1_dot * cos(theta_1)
-    s20 = theta_1_dot * sin(theta_1)
-    s34 = c_2 * (omega_lower * cos(s2))
-    s35 = c_2 * (sin(s2) * omega_lower)
+    s3 = theta_1 + theta_2
+    s23 = theta_1_dot * cos(theta_1)
+    s24 = theta_1_dot * sin(theta_1)
+    s25 = c_2 * (theta_1_dot + theta_2_dot)
+    s40 = cos(s3) * s25
+    s41 = sin(s3) * s25
     return (
-        s34 + (s19 * k16 + (c_1 * s19 + s34)),
-        s35 + (s20 * k16 + (c_1 * s20 + s35)),
+        s40 + (s23 * k17 + (c_1 * s23 + s40)),
+        s41 + (s24 * k17 + (c_1 * s24 + s41)),
     )
 
 
 def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     """19 operations: 9 add, 6 mul, 2 sin, 2 cos."""
-    c_1, c_2, k16 = k
+    c_1, c_2, k17 = k
     theta_1, theta_2, _, _ = y
-    s2 = theta_1 + theta_2
+    s3 = theta_1 + theta_2
     sin_theta_1 = sin(theta_1)
     cos_theta_1 = cos(theta_1)
-    s32 = c_2 * cos(s2)
-    s33 = c_2 * sin(s2)
+    s28 = c_2 * cos(s3)
+    s29 = c_2 * sin(s3)
     return (
-        s32 + (cos_theta_1 * k16 + (c_1 * cos_theta_1 + s32)),
-        s32 + s32,
-        s33 + (sin_theta_1 * k16 + (c_1 * sin_theta_1 + s33)),
-        s33 + s33,
+        s28 + (cos_theta_1 * k17 + (c_1 * cos_theta_1 + s28)),
+        s28 + s28,
+        s29 + (sin_theta_1 * k17 + (c_1 * sin_theta_1 + s29)),
+        s29 + s29,
     )
 
 
 def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     """13 operations: 1 add, 3 sub, 6 mul, 1 div, 1 sin, 1 cos."""
-    k1, k2, k3, k5 = k
+    k1, k2, k5, k13 = k
     _, theta_2, _, _ = y
     sin_theta_2 = sin(theta_2)
-    coupling_lower_upper = cos(theta_2) * k3
-    s36 = (-1.0 - coupling_lower_upper * k5) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    coupling_lower_upper_2 = cos(theta_2) * k13
+    s42 = (-1.0 - coupling_lower_upper_2 * k5) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
         0.0,
         0.0,
-        s36,
-        k5 * (1.0 - coupling_lower_upper * s36) - s36,
+        s42,
+        k5 * (1.0 - coupling_lower_upper_2 * s42) - s42,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """153 operations: 28 add, 22 sub, 82 mul, 9 div, 8 neg, 3 sin, 1 cos."""
-    k1, k2, k22, k3, k23, k18, k4, k5, k19, k6, k26, k24, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43 = k
+    """142 operations: 20 add, 30 sub, 76 mul, 9 div, 3 neg, 3 sin, 1 cos."""
+    m_1, l_1, c_1, c_2, g, k2, k26, k3, k19, k5, k27, k28, k8, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     tau, = u
     sin_theta_2 = sin(theta_2)
-    s37 = sin_theta_2 * sin_theta_2
-    pivot_upper = k1 + s37 * k2
+    s43 = sin_theta_2 * sin_theta_2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
     sin_theta_1_theta_2 = sin(theta_1 + theta_2)
-    s38 = sin_theta_2 * (theta_1_dot * theta_1_dot)
-    load_lower = tau - sin_theta_1_theta_2 * k4 - k3 * s38
-    s39 = coupling_lower_upper * load_lower
     sin_theta_1 = sin(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    s40 = sin_theta_2 * (omega_lower * omega_lower)
-    alpha_upper = (k3 * s40 - tau - k5 * s39 - sin_theta_1 * k6) / pivot_upper
-    s41 = load_lower - coupling_lower_upper * alpha_upper
-    s42 = (sin_theta_1 * k28 + alpha_upper * k27) / pivot_upper
-    s43 = cos_theta_2 * k26
-    s44 = sin_theta_1_theta_2 * k31 + s38 * k26
-    s45 = s40 * k26 - (k5 * (load_lower * s43 - coupling_lower_upper * s44) - s39 * k32)
-    s46 = (s45 - sin_theta_1 * k33 - alpha_upper * (k29 + s37 * k30)) / pivot_upper
-    s47 = s41 * k32 + k5 * (s44 + (alpha_upper * s43 + coupling_lower_upper * s46))
-    s48 = alpha_upper * k34 / pivot_upper
-    s49 = (s39 * k37 - alpha_upper * (k35 - s37 * k36)) / pivot_upper
-    s50 = cos_theta_2 * k23
-    s51 = k23 * (theta_1_dot * (theta_1_dot * sin_theta_2))
-    s52 = k23 * (omega_lower * (sin_theta_2 * omega_lower)) - k5 * (load_lower * s50 - coupling_lower_upper * s51)
-    s53 = (s52 - k18 * sin_theta_1 - alpha_upper * (k38 + s37 * k39)) / pivot_upper
-    s54 = (sin_theta_1 * k19 + alpha_upper * k40) / pivot_upper
-    s55 = cos_theta_2 * k22
-    s56 = sin_theta_1_theta_2 * k18 + k22 * s38
-    s57 = k22 * s40 - (k5 * (load_lower * s55 - coupling_lower_upper * s56) - s39 * k43)
-    s58 = (s57 - alpha_upper * (k41 + s37 * k42)) / pivot_upper
-    s59 = s41 * k43 + k5 * (s56 + (alpha_upper * s55 + coupling_lower_upper * s58))
-    s60 = sin_theta_1_theta_2 * k23
-    s61 = (k5 * (coupling_lower_upper * s60) - sin_theta_1 * k24) / pivot_upper
+    s4 = coupling_lower_upper * k5
+    s18 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    s44 = sin_theta_2 * (omega_lower * omega_lower)
+    pivot_upper_2 = k33 + s43 * k2
+    s45 = g * sin_theta_1_theta_2
+    load_lower_4 = tau - k28 * s45 - k3 * s18
+    s46 = coupling_lower_upper * load_lower_4
+    s47 = g * sin_theta_1
+    alpha_upper_5 = (k3 * s44 - tau - k5 * s46 - k27 * s47) / pivot_upper_2
+    s48 = load_lower_4 - coupling_lower_upper * alpha_upper_5
+    s49 = (c_1 * s47 + alpha_upper_5 * k34) / pivot_upper_2
+    s50 = cos_theta_2 * k32
+    s51 = c_2 * s45 + s18 * k32
+    s52 = s44 * k32 - (k5 * (load_lower_4 * s50 - coupling_lower_upper * s51) - s46 * k37)
+    s53 = (s52 - l_1 * s47 - alpha_upper_5 * (k35 + s43 * k36)) / pivot_upper_2
+    s54 = s48 * k38 - k5 * (s51 + (alpha_upper_5 * s50 + coupling_lower_upper * s53))
+    s55 = alpha_upper_5 * k39 / pivot_upper_2
+    s56 = (s46 * k42 - alpha_upper_5 * (k40 - s43 * k41)) / pivot_upper_2
+    s57 = cos_theta_2 * k28
+    s58 = k28 * s18
+    s59 = k28 * s44 - k5 * (load_lower_4 * s57 - coupling_lower_upper * s58) - sin_theta_1 * k19
+    s60 = (s59 - alpha_upper_5 * (k44 + s43 * k45)) / pivot_upper_2
+    s61 = (m_1 * s47 + alpha_upper_5 * k46) / pivot_upper_2
+    s62 = cos_theta_2 * k26
+    s63 = sin_theta_1_theta_2 * k19 + k26 * s18
+    s64 = k26 * s44 - (k5 * (load_lower_4 * s62 - coupling_lower_upper * s63) - s46 * k49)
+    s65 = (s64 - alpha_upper_5 * (k47 + s43 * k48)) / pivot_upper_2
+    s66 = s48 * k50 - k5 * (s63 + (alpha_upper_5 * s62 + coupling_lower_upper * s65))
+    s67 = sin_theta_1_theta_2 * k28
+    s68 = (s4 * s67 - sin_theta_1 * k27) / pivot_upper_2
     return (
         0.0,
         0.0,
@@ -711,22 +717,22 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s42,
-        s46,
-        -s48,
-        s49,
+        -s49,
         s53,
-        -s54,
-        s58,
-        s61,
-        s42 + k5 * (coupling_lower_upper * s42),
-        -(s46 + s47),
-        s48 + k5 * (coupling_lower_upper * s48),
-        -(s49 + (s41 * k37 + k5 * (coupling_lower_upper * s49))),
-        -(s53 + k5 * (s51 + (alpha_upper * s50 + coupling_lower_upper * s53))),
-        s54 + k5 * (coupling_lower_upper * s54),
-        -(s58 + s59),
-        -(s61 + k5 * (s60 + coupling_lower_upper * s61)),
+        -s55,
+        s56,
+        s60,
+        -s61,
+        s65,
+        s68,
+        s49 + s49 * s4,
+        s54 - s53,
+        s55 + s4 * s55,
+        s48 * k43 - s4 * s56 - s56,
+        k8 * (s58 + (alpha_upper_5 * s57 + coupling_lower_upper * s60)) - s60,
+        s61 + s4 * s61,
+        s66 - s65,
+        k8 * (s67 + coupling_lower_upper * s68) - s68,
     )
 
 
@@ -752,17 +758,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -771,19 +796,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -798,7 +832,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 2
 _COLUMNS = {
     "sin": np.sin,
@@ -904,17 +938,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -982,7 +1017,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (2, 2), ('cos',), y, p, u)
 
 

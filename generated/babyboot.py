@@ -20,12 +20,13 @@ Parameters p, with the scene's values:
     g = 9.81        m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 19 operations: 2 add, 12 mul, 1 div, 1 neg, 2 sin, 1 cos; 18 more on
+One call of `derivative` takes 18 operations: 1 add, 1 sub, 12 mul, 1 div, 2 sin, 1 cos; 19 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (4, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (4, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (9, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -83,24 +84,24 @@ JOINTS = ('swing', 'twist')
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 2, "mul": 12, "div": 1, "neg": 1, "sin": 2, "cos": 1, "total": 19, "parameters": 18},
-    "jacobian": {"add": 2, "sub": 2, "mul": 23, "div": 5, "neg": 4, "sin": 2, "cos": 2, "total": 40, "parameters": 20},
-    "parameter_jacobian": {"add": 4, "sub": 5, "mul": 33, "div": 9, "neg": 8, "sin": 2, "cos": 1, "total": 62, "parameters": 27},
-    "forward_dynamics": {"add": 2, "sub": 2, "mul": 13, "div": 1, "sin": 2, "cos": 1, "total": 21, "parameters": 17},
+    "derivative": {"add": 1, "sub": 1, "mul": 12, "div": 1, "sin": 2, "cos": 1, "total": 18, "parameters": 19},
+    "jacobian": {"add": 2, "sub": 2, "mul": 20, "div": 5, "neg": 2, "sin": 2, "cos": 2, "total": 35, "parameters": 23},
+    "parameter_jacobian": {"add": 4, "sub": 5, "mul": 26, "div": 9, "neg": 6, "sin": 2, "cos": 1, "total": 53, "parameters": 27},
+    "forward_dynamics": {"add": 2, "sub": 2, "mul": 13, "div": 1, "sin": 2, "cos": 1, "total": 21, "parameters": 16},
     "inverse_dynamics": {"add": 4, "mul": 12, "sin": 2, "cos": 1, "total": 19, "parameters": 14},
     "mass_matrix": {"add": 1, "mul": 2, "sin": 1, "total": 4, "parameters": 8},
     "velocity_force": {"mul": 7, "sin": 1, "cos": 1, "total": 9, "parameters": 3},
     "gravity_force": {"mul": 1, "sin": 1, "total": 2, "parameters": 4},
     "bias_force": {"add": 1, "mul": 8, "sin": 2, "cos": 1, "total": 12, "parameters": 7},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 6, "mul": 19, "sin": 1, "cos": 1, "total": 27, "parameters": 2},
-    "potential_energy": {"sub": 1, "mul": 4, "cos": 1, "total": 6, "parameters": 4},
-    "effect_powers": {"add": 1, "sub": 1, "mul": 10, "sin": 2, "cos": 1, "total": 15, "parameters": 4},
+    "kinetic_energy": {"add": 6, "mul": 17, "sin": 1, "cos": 1, "total": 25, "parameters": 5},
+    "potential_energy": {"mul": 1, "cos": 1, "total": 2, "parameters": 7},
+    "effect_powers": {"add": 1, "sub": 1, "mul": 8, "sin": 2, "cos": 1, "total": 13, "parameters": 6},
     "momentum": {"add": 5, "sub": 6, "mul": 29, "sin": 2, "cos": 2, "total": 44, "parameters": 9},
-    "centre_of_mass": {"sub": 2, "mul": 8, "div": 2, "sin": 1, "cos": 1, "total": 14, "parameters": 3},
-    "joint_forces": {"add": 42, "sub": 27, "mul": 132, "div": 1, "neg": 11, "sin": 2, "cos": 2, "total": 217, "parameters": 20},
-    "body_poses": {"mul": 8, "neg": 4, "sin": 2, "cos": 2, "total": 16, "parameters": 2},
-    "body_velocities": {"add": 3, "sub": 3, "mul": 24, "neg": 2, "sin": 2, "cos": 2, "total": 36, "parameters": 2},
+    "centre_of_mass": {"mul": 2, "div": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 7},
+    "joint_forces": {"add": 40, "sub": 29, "mul": 130, "div": 1, "neg": 8, "sin": 2, "cos": 2, "total": 212, "parameters": 22},
+    "body_poses": {"mul": 8, "neg": 2, "sin": 2, "cos": 2, "total": 14, "parameters": 4},
+    "body_velocities": {"add": 3, "sub": 2, "mul": 19, "neg": 2, "sin": 2, "cos": 2, "total": 30, "parameters": 2},
 }
 
 
@@ -138,56 +139,72 @@ def _fixed(m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, l_B, g):
     if not I_Bz >= 0.0:
         return "inertia_com zz of B is negative"
     l_A_squared = l_A * l_A
-    k23 = m_A * l_A_squared
+    k38 = m_A * l_A_squared
     l_B_squared = l_B * l_B
-    k24 = m_B * l_B_squared
-    k1 = k24 + (k23 + (I_A + I_Bx))
-    k2 = k24 + (k23 + (I_A + I_By))
-    k21 = m_A * l_A
-    k8 = k21 + m_B * l_B
-    k3 = g * k8
-    k17 = I_By - I_Bx
-    k4 = k17 * 2.0
-    k9 = 1.0 / I_Bz
-    k5 = k17 * k9
-    k6 = k2 - k1
-    k7 = 2.0 * k5
-    k10 = l_A * g
-    k11 = l_B * g
-    k12 = k17 * (k9 / I_Bz)
-    k13 = m_A * (l_A * 2.0)
-    k14 = m_A * g
-    k15 = m_B * (l_B * 2.0)
-    k16 = m_B * g
-    k18 = I_Bx + (I_A + (k23 + k24))
-    k19 = I_Bx - I_By
-    k20 = l_A - l_B - l_A
-    inertia_A_xx = I_A + l_A * k21
-    moment_B_z = m_B * k20
-    k25 = k20 * moment_B_z
-    inertia_B_xx = I_Bx + k25
-    inertia_B_yy = I_By + k25
-    k22 = m_A + m_B
+    k39 = m_B * l_B_squared
+    k1 = k39 + (k38 + (I_A + I_Bx))
+    k2 = k39 + (k38 + (I_A + I_By))
+    k28 = m_A * l_A
+    k40 = m_B * l_B
+    k32 = k28 + k40
+    k6 = g * k32
+    k19 = I_By - I_Bx
+    k3 = k19 * 2.0
+    k4 = -k6
+    k10 = 1.0 / I_Bz
+    k5 = k19 * k10
+    k7 = 2.0 * (k2 - k1)
+    k8 = 2.0 * k5
+    k9 = -k3
+    k11 = l_A * g
+    k12 = l_B * g
+    k13 = -k19 * (k10 / I_Bz)
+    k14 = k28 * 2.0
+    k15 = m_A * g
+    k16 = k40 * 2.0
+    k17 = m_B * g
+    k18 = -k32
+    k20 = I_Bx + (I_A + (k38 + k39))
+    k21 = I_Bx - I_By
+    k22 = 2.0 * k19
+    k33 = l_A - l_B - l_A
+    k23 = l_A * k28
+    k24 = k33 * k33
+    k26 = l_A * k15
+    k27 = k17 * k33
+    k25 = k27 - k26
+    inertia_A_xx = I_A + k23
+    moment_B_z = m_B * k33
+    k41 = k33 * moment_B_z
+    inertia_B_xx = I_Bx + k41
+    inertia_B_yy = I_By + k41
+    k29 = k28 - moment_B_z
+    k30 = moment_B_z - k28
+    k31 = m_A + m_B
+    k34 = -m_B
+    k35 = -m_A
+    k36 = -l_A
+    k37 = -k33
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5),
-        "jacobian": (k1, k2, k3, k4, k5, k6, k7),
-        "parameter_jacobian": (l_A_squared, l_B_squared, k1, k2, k8, k3, k4, k9, k10, k11, k12, k13, k14, k15, k16),
-        "forward_dynamics": (k1, k2, k3, k17, k4, k9),
-        "inverse_dynamics": (I_Bz, k3, k17, k4, k18, k19),
-        "mass_matrix": (I_Bz, k17, k18),
-        "velocity_force": (k4, k19),
-        "gravity_force": (k3,),
-        "bias_force": (k3, k4, k19),
+        "jacobian": (k1, k2, k6, k3, k4, k5, k7, k8, k9),
+        "parameter_jacobian": (l_A_squared, l_B_squared, k1, k2, k6, k3, k10, k11, k12, k13, k14, k15, k16, k17, k18),
+        "forward_dynamics": (k1, k2, k6, k19, k10),
+        "inverse_dynamics": (I_Bz, k6, k19, k3, k20, k21),
+        "mass_matrix": (I_Bz, k19, k20),
+        "velocity_force": (k21, k22),
+        "gravity_force": (k6,),
+        "bias_force": (k6, k21, k22),
         "applied_force": (),
-        "kinetic_energy": (m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, k20),
-        "potential_energy": (l_A, k14, k16, k20),
-        "effect_powers": (l_A, k14, k16, k20),
-        "momentum": (I_Bz, k21, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy),
-        "centre_of_mass": (m_A, m_B, l_A, k20, k22),
-        "joint_forces": (m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k3, k4, k5, k20),
-        "body_poses": (l_A, k20),
-        "body_velocities": (l_A, k20),
+        "kinetic_energy": (m_B, I_A, I_Bx, I_By, I_Bz, k23, k24),
+        "potential_energy": (k25,),
+        "effect_powers": (k26, k27),
+        "momentum": (I_Bz, k28, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy),
+        "centre_of_mass": (k29, k30, k31),
+        "joint_forces": (m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k28, k32, k3, k5, k33, moment_B_z, k34, k35),
+        "body_poses": (l_A, k33, k36, k37),
+        "body_velocities": (l_A, k33),
     }
 
 
@@ -237,35 +254,34 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """19 operations: 2 add, 12 mul, 1 div, 1 neg, 2 sin, 1 cos."""
+    """18 operations: 1 add, 1 sub, 12 mul, 1 div, 2 sin, 1 cos."""
     k1, k2, k3, k4, k5 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     s1 = cos_q_B * sin_q_B
-    s2 = (sin(q_A) * k3 + k4 * (s1 * (q_A_dot * q_B_dot))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
     return (
         q_A_dot,
         q_B_dot,
-        -s2,
+        (sin(q_A) * k4 - k3 * (s1 * (q_A_dot * q_B_dot))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2),
         k5 * (q_A_dot * (q_A_dot * s1)),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """40 operations: 2 add, 2 sub, 23 mul, 5 div, 4 neg, 2 sin, 2 cos."""
-    k1, k2, k3, k4, k5, k6, k7 = k
+    """35 operations: 2 add, 2 sub, 20 mul, 5 div, 2 neg, 2 sin, 2 cos."""
+    k1, k2, k6, k3, k4, k5, k7, k8, k9 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
-    s3 = cos_q_B * cos_q_B
+    s2 = cos_q_B * cos_q_B
     sin_q_B = sin(q_B)
-    s4 = sin_q_B * sin_q_B
-    pivot_q_A_dot = s3 * k1 + s4 * k2
+    s3 = sin_q_B * sin_q_B
+    pivot_q_A_dot = s2 * k1 + s3 * k2
     s1 = cos_q_B * sin_q_B
-    s5 = q_A_dot * s1
-    s6 = q_A_dot * q_B_dot
-    s7 = s3 - s4
-    s8 = k4 * (s6 * s7) - (sin(q_A) * k3 + k4 * (s1 * s6)) / pivot_q_A_dot * (2.0 * s1 * k6)
+    s4 = q_A_dot * s1
+    s5 = q_B_dot * k3
+    s6 = s2 - s3
+    s7 = q_A_dot * (s5 * s6) - k7 * (s1 * ((sin(q_A) * k6 + s4 * s5) / pivot_q_A_dot))
     return (
         0.0,
         0.0,
@@ -275,33 +291,34 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         1.0,
-        -k3 * cos(q_A) / pivot_q_A_dot,
-        -s8 / pivot_q_A_dot,
-        -k4 * (q_B_dot * s1) / pivot_q_A_dot,
-        -k4 * s5 / pivot_q_A_dot,
+        k4 * cos(q_A) / pivot_q_A_dot,
+        -s7 / pivot_q_A_dot,
+        -s1 * s5 / pivot_q_A_dot,
+        k9 * s4 / pivot_q_A_dot,
         0.0,
-        k5 * (q_A_dot * q_A_dot * s7),
-        s5 * k7,
+        q_A_dot * q_A_dot * s6 * k5,
+        s4 * k8,
         0.0,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """62 operations: 4 add, 5 sub, 33 mul, 9 div, 8 neg, 2 sin, 1 cos."""
-    l_A_squared, l_B_squared, k1, k2, k8, k3, k4, k9, k10, k11, k12, k13, k14, k15, k16 = k
+    """53 operations: 4 add, 5 sub, 26 mul, 9 div, 6 neg, 2 sin, 1 cos."""
+    l_A_squared, l_B_squared, k1, k2, k6, k3, k10, k11, k12, k13, k14, k15, k16, k17, k18 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
-    s3 = cos_q_B * cos_q_B
+    s2 = cos_q_B * cos_q_B
     sin_q_B = sin(q_B)
-    s4 = sin_q_B * sin_q_B
-    pivot_q_A_dot = s3 * k1 + s4 * k2
+    s3 = sin_q_B * sin_q_B
+    pivot_q_A_dot = s2 * k1 + s3 * k2
     sin_q_A = sin(q_A)
     s1 = cos_q_B * sin_q_B
-    s5 = q_A_dot * s1
-    s2 = (sin_q_A * k3 + k4 * (s1 * (q_A_dot * q_B_dot))) / pivot_q_A_dot
-    s9 = s3 + s4
-    s10 = 2.0 * (q_B_dot * s5)
-    s11 = s1 * (q_A_dot * q_A_dot) * k9
+    s8 = q_B_dot * (q_A_dot * s1)
+    s9 = (sin_q_A * k6 + k3 * s8) / pivot_q_A_dot
+    s10 = s1 * (q_A_dot * q_A_dot)
+    s11 = s9 * (s2 + s3)
+    s12 = 2.0 * s8
+    s13 = s10 * k10
     return (
         0.0,
         0.0,
@@ -321,21 +338,21 @@ def _parameter_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         0.0,
-        -(sin_q_A * k10 - s2 * (l_A_squared * s9)) / pivot_q_A_dot,
-        -(sin_q_A * k11 - s2 * (l_B_squared * s9)) / pivot_q_A_dot,
-        s2 * s9 / pivot_q_A_dot,
-        (s10 + s3 * s2) / pivot_q_A_dot,
-        -(s10 - s4 * s2) / pivot_q_A_dot,
+        -(sin_q_A * k11 - l_A_squared * s11) / pivot_q_A_dot,
+        -(sin_q_A * k12 - l_B_squared * s11) / pivot_q_A_dot,
+        s11 / pivot_q_A_dot,
+        (s12 + s2 * s9) / pivot_q_A_dot,
+        -(s12 - s3 * s9) / pivot_q_A_dot,
         0.0,
-        -(sin_q_A * k14 - s2 * (s9 * k13)) / pivot_q_A_dot,
-        -(sin_q_A * k16 - s2 * (s9 * k15)) / pivot_q_A_dot,
-        -k8 * sin_q_A / pivot_q_A_dot,
+        -(sin_q_A * k15 - s11 * k14) / pivot_q_A_dot,
+        -(sin_q_A * k17 - s11 * k16) / pivot_q_A_dot,
+        k18 * sin_q_A / pivot_q_A_dot,
         0.0,
         0.0,
         0.0,
-        -s11,
-        s11,
-        -q_A_dot * s5 * k12,
+        -s13,
+        s13,
+        s10 * k13,
         0.0,
         0.0,
         0.0,
@@ -344,38 +361,38 @@ def _parameter_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 def _forward_dynamics(y, k, u=(), extra=(), cos=cos, sin=sin):
     """21 operations: 2 add, 2 sub, 13 mul, 1 div, 2 sin, 1 cos."""
-    k1, k2, k3, k17, k4, k9 = k
+    k1, k2, k6, k19, k10 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     tau__q_A_dot, tau__q_B_dot = extra
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
-    s1 = cos_q_B * sin_q_B
+    s14 = k19 * (cos_q_B * sin_q_B)
     return (
-        (tau__q_A_dot - sin(q_A) * k3 - k4 * (s1 * (q_A_dot * q_B_dot))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2),
-        k9 * (k17 * (s1 * (q_A_dot * q_A_dot)) + tau__q_B_dot),
+        (tau__q_A_dot - sin(q_A) * k6 - q_B_dot * (q_A_dot * (2.0 * s14))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2),
+        k10 * (s14 * (q_A_dot * q_A_dot) + tau__q_B_dot),
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), cos=cos, sin=sin):
     """19 operations: 4 add, 12 mul, 2 sin, 1 cos."""
-    I_Bz, k3, k17, k4, k18, k19 = k
+    I_Bz, k6, k19, k3, k20, k21 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     vd__q_A_dot, vd__q_B_dot = extra
     sin_q_B = sin(q_B)
     s1 = cos(q_B) * sin_q_B
     return (
-        k4 * (q_B_dot * (q_A_dot * s1)) + (sin(q_A) * k3 + vd__q_A_dot * (sin_q_B * sin_q_B * k17 + k18)),
-        I_Bz * vd__q_B_dot + s1 * (q_A_dot * q_A_dot) * k19,
+        q_B_dot * (q_A_dot * s1) * k3 + (sin(q_A) * k6 + vd__q_A_dot * (sin_q_B * sin_q_B * k19 + k20)),
+        I_Bz * vd__q_B_dot + s1 * (q_A_dot * q_A_dot) * k21,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), sin=sin):
     """4 operations: 1 add, 2 mul, 1 sin."""
-    I_Bz, k17, k18 = k
+    I_Bz, k19, k20 = k
     _, q_B, _, _ = y
     sin_q_B = sin(q_B)
     return (
-        sin_q_B * sin_q_B * k17 + k18,
+        sin_q_B * sin_q_B * k19 + k20,
         0.0,
         0.0,
         I_Bz,
@@ -384,33 +401,33 @@ def _mass_matrix(y, k, u=(), extra=(), sin=sin):
 
 def _velocity_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     """9 operations: 7 mul, 1 sin, 1 cos."""
-    k4, k19 = k
+    k21, k22 = k
     _, q_B, q_A_dot, q_B_dot = y
     s1 = cos(q_B) * sin(q_B)
     return (
-        k4 * (q_B_dot * (q_A_dot * s1)),
-        s1 * (q_A_dot * q_A_dot) * k19,
+        q_B_dot * (q_A_dot * s1) * k22,
+        s1 * (q_A_dot * q_A_dot) * k21,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), sin=sin):
     """2 operations: 1 mul, 1 sin."""
-    k3, = k
+    k6, = k
     q_A, _, _, _ = y
     return (
-        sin(q_A) * k3,
+        sin(q_A) * k6,
         0.0,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), cos=cos, sin=sin):
     """12 operations: 1 add, 8 mul, 2 sin, 1 cos."""
-    k3, k4, k19 = k
+    k6, k21, k22 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     s1 = cos(q_B) * sin(q_B)
     return (
-        sin(q_A) * k3 + k4 * (q_B_dot * (q_A_dot * s1)),
-        s1 * (q_A_dot * q_A_dot) * k19,
+        sin(q_A) * k6 + q_B_dot * (q_A_dot * s1) * k22,
+        s1 * (q_A_dot * q_A_dot) * k21,
     )
 
 
@@ -423,178 +440,174 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """27 operations: 6 add, 19 mul, 1 sin, 1 cos."""
-    m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, k20 = k
+    """25 operations: 6 add, 17 mul, 1 sin, 1 cos."""
+    m_B, I_A, I_Bx, I_By, I_Bz, k23, k24 = k
     _, q_B, q_A_dot, q_B_dot = y
     omega_B_x = q_A_dot * cos(q_B)
-    s12 = q_A_dot * sin(q_B)
-    s13 = l_A * q_A_dot
-    s14 = k20 * s12
-    s15 = k20 * omega_B_x
-    s16 = m_A * (s13 * s13) + q_A_dot * (I_A * q_A_dot) + m_B * (s14 * s14 + s15 * s15)
-    s17 = omega_B_x * (I_Bx * omega_B_x) + s12 * (I_By * s12) + q_B_dot * (I_Bz * q_B_dot)
+    s15 = q_A_dot * sin(q_B)
+    s16 = q_A_dot * q_A_dot * k23 + q_A_dot * (I_A * q_A_dot) + m_B * (k24 * (s15 * s15 + omega_B_x * omega_B_x))
+    s17 = omega_B_x * (I_Bx * omega_B_x) + s15 * (I_By * s15) + q_B_dot * (I_Bz * q_B_dot)
     return (
         0.5 * (s16 + s17),
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
-    """6 operations: 1 sub, 4 mul, 1 cos."""
-    l_A, k14, k16, k20 = k
+    """2 operations: 1 mul, 1 cos."""
+    k25, = k
     q_A, _, _, _ = y
-    cos_q_A = cos(q_A)
     return (
-        k16 * (cos_q_A * k20) - k14 * (l_A * cos_q_A),
+        cos(q_A) * k25,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """15 operations: 1 add, 1 sub, 10 mul, 2 sin, 1 cos."""
-    l_A, k14, k16, k20 = k
+    """13 operations: 1 add, 1 sub, 8 mul, 2 sin, 1 cos."""
+    k26, k27 = k
     q_A, q_B, q_A_dot, _ = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
-    s18 = sin_q_A * k20 * (cos_q_B * (q_A_dot * cos_q_B) + sin_q_B * (q_A_dot * sin_q_B))
+    s18 = sin_q_A * (cos_q_B * (q_A_dot * cos_q_B) + sin_q_B * (q_A_dot * sin_q_B))
     return (
-        k16 * s18 - k14 * (q_A_dot * (l_A * sin_q_A)),
+        k27 * s18 - k26 * (q_A_dot * sin_q_A),
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
     """44 operations: 5 add, 6 sub, 29 mul, 2 sin, 2 cos."""
-    I_Bz, k21, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy = k
+    I_Bz, k28, inertia_A_xx, moment_B_z, inertia_B_xx, inertia_B_yy = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     cos_q_A = cos(q_A)
-    s19 = sin_q_B * cos_q_A
-    s20 = cos_q_B * cos_q_A
-    s21 = sin_q_B * sin_q_A
-    s22 = cos_q_B * sin_q_A
     omega_B_x = q_A_dot * cos_q_B
-    s12 = q_A_dot * sin_q_B
-    s23 = I_Bz * q_B_dot
-    s24 = q_A_dot * k21
-    s25 = moment_B_z * s12
+    s15 = q_A_dot * sin_q_B
+    s19 = I_Bz * q_B_dot
+    s20 = sin_q_B * cos_q_A
+    s21 = cos_q_B * cos_q_A
+    s22 = sin_q_B * sin_q_A
+    s23 = cos_q_B * sin_q_A
+    s24 = q_A_dot * k28
+    s25 = moment_B_z * s15
     s26 = moment_B_z * omega_B_x
     s27 = inertia_B_xx * omega_B_x
-    s28 = inertia_B_yy * s12
+    s28 = inertia_B_yy * s15
     return (
         sin_q_B * s26 - cos_q_B * s25,
-        cos_q_A * s24 - (s19 * s25 + s20 * s26),
-        sin_q_A * s24 - (s21 * s25 + s22 * s26),
+        cos_q_A * s24 - (s20 * s25 + s21 * s26),
+        sin_q_A * s24 - (s22 * s25 + s23 * s26),
         q_A_dot * inertia_A_xx + (cos_q_B * s27 + sin_q_B * s28),
-        s19 * s27 - s20 * s28 - sin_q_A * s23,
-        s21 * s27 - s22 * s28 + cos_q_A * s23,
+        s20 * s27 - s21 * s28 - sin_q_A * s19,
+        s22 * s27 - s23 * s28 + cos_q_A * s19,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """14 operations: 2 sub, 8 mul, 2 div, 1 sin, 1 cos."""
-    m_A, m_B, l_A, k20, k22 = k
+    """6 operations: 2 mul, 2 div, 1 sin, 1 cos."""
+    k29, k30, k31 = k
     q_A, _, _, _ = y
-    sin_q_A = sin(q_A)
-    cos_q_A = cos(q_A)
     return (
         0.0,
-        (m_A * (l_A * sin_q_A) - m_B * (sin_q_A * k20)) / k22,
-        (m_B * (cos_q_A * k20) - m_A * (l_A * cos_q_A)) / k22,
+        sin(q_A) * k29 / k31,
+        cos(q_A) * k30 / k31,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """217 operations: 42 add, 27 sub, 132 mul, 1 div, 11 neg, 2 sin, 2 cos."""
-    m_A, m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k3, k4, k5, k20 = k
+    """212 operations: 40 add, 29 sub, 130 mul, 1 div, 8 neg, 2 sin, 2 cos."""
+    m_B, I_A, I_Bx, I_By, I_Bz, l_A, g, k1, k2, k28, k32, k3, k5, k33, moment_B_z, k34, k35 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     s1 = cos_q_B * sin_q_B
-    s2 = (sin_q_A * k3 + k4 * (s1 * (q_A_dot * q_B_dot))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
-    q_B_ddot = k5 * (q_A_dot * (q_A_dot * s1))
+    q_A_dot_squared = q_A_dot * q_A_dot
     cos_q_A = cos(q_A)
-    s19 = sin_q_B * cos_q_A
-    s20 = cos_q_B * cos_q_A
-    s21 = sin_q_B * sin_q_A
-    s22 = cos_q_B * sin_q_A
     omega_B_x = q_A_dot * cos_q_B
-    s12 = q_A_dot * sin_q_B
-    s29 = sin_q_A * k20
-    s30 = cos_q_A * k20
-    s31 = cos_q_B * omega_B_x + sin_q_B * s12
-    s32 = s19 * omega_B_x - s20 * s12 - q_B_dot * sin_q_A
-    s33 = s21 * omega_B_x - s22 * s12 + q_B_dot * cos_q_A
+    s15 = q_A_dot * sin_q_B
+    s29 = cos_q_B * omega_B_x + sin_q_B * s15
+    s20 = sin_q_B * cos_q_A
+    s21 = cos_q_B * cos_q_A
+    s22 = sin_q_B * sin_q_A
+    s23 = cos_q_B * sin_q_A
     a_A_y = g * sin_q_A
+    s30 = (k32 * a_A_y + k3 * (q_B_dot * (q_A_dot * s1))) / (cos_q_B * cos_q_B * k1 + sin_q_B * sin_q_B * k2)
+    s31 = s20 * omega_B_x - s21 * s15 - q_B_dot * sin_q_A
+    s32 = s22 * omega_B_x - s23 * s15 + q_B_dot * cos_q_A
     a_A_z = g * cos_q_A
-    s34 = q_B_dot * s12
-    s35 = q_B_dot * omega_B_x
-    s36 = cos_q_B * s2 + s34
-    s37 = sin_q_B * s2 - s35
-    s38 = a_A_y - l_A * s2
-    s39 = a_A_z + l_A * (q_A_dot * q_A_dot)
-    s40 = m_A * (cos_q_A * s38 - sin_q_A * s39)
-    s41 = m_A * (sin_q_A * s38 + cos_q_A * s39)
-    s42 = sin_q_B * a_A_y + k20 * (s35 + s37)
-    s43 = cos_q_B * a_A_y + k20 * (s36 - s34)
-    s44 = a_A_z - k20 * (omega_B_x * omega_B_x + s12 * s12)
-    s45 = cos_q_B * s36 + sin_q_B * s37
-    s46 = s20 * s37 - s19 * s36 - sin_q_A * q_B_ddot
-    s47 = s22 * s37 - s21 * s36 + q_B_ddot * cos_q_A
-    s48 = I_Bx * cos_q_B
-    s49 = I_By * sin_q_B
-    s50 = I_Bx * s19
-    s51 = I_By * s20
-    s52 = I_Bz * sin_q_A
-    s53 = I_Bx * s21
-    s54 = I_By * s22
-    s55 = I_Bz * cos_q_A
-    s56 = cos_q_B * s48 + sin_q_B * s49
-    s57 = s19 * s48 - s20 * s49
-    s58 = s21 * s48 - s22 * s49
-    s59 = cos_q_B * s50 - sin_q_B * s51
-    s60 = s19 * s50 + s20 * s51 + sin_q_A * s52
-    s61 = s21 * s50 + s22 * s51 - cos_q_A * s52
+    s33 = q_B_dot * s15
+    s34 = q_B_dot * omega_B_x
+    s35 = cos_q_B * s30 + s33
+    s36 = sin_q_B * s30 - s34
+    s37 = a_A_y - l_A * s30
+    s38 = a_A_z + l_A * q_A_dot_squared
+    s39 = cos_q_A * s37 - sin_q_A * s38
+    s40 = sin_q_A * s37 + cos_q_A * s38
+    s41 = sin_q_B * a_A_y + k33 * (s34 + s36)
+    s42 = cos_q_B * a_A_y + k33 * (s35 - s33)
+    s43 = a_A_z - k33 * (omega_B_x * omega_B_x + s15 * s15)
+    s44 = cos_q_B * s41 - sin_q_B * s42
+    s45 = s20 * s41 + s21 * s42 - sin_q_A * s43
+    s46 = s22 * s41 + s23 * s42 + cos_q_A * s43
+    s47 = cos_q_B * s35 + sin_q_B * s36
+    s48 = s1 * q_A_dot_squared * k5
+    s49 = s21 * s36 - s20 * s35 - sin_q_A * s48
+    s50 = s23 * s36 - s22 * s35 + cos_q_A * s48
+    s51 = I_Bx * cos_q_B
+    s52 = I_By * sin_q_B
+    s53 = I_Bx * s20
+    s54 = I_By * s21
+    s55 = I_Bz * sin_q_A
+    s56 = I_Bx * s22
+    s57 = I_By * s23
+    s58 = I_Bz * cos_q_A
+    s59 = cos_q_B * s51 + sin_q_B * s52
+    s60 = s20 * s51 - s21 * s52
+    s61 = s22 * s51 - s23 * s52
     s62 = cos_q_B * s53 - sin_q_B * s54
-    s63 = s19 * s53 + s20 * s54 - sin_q_A * s55
-    s64 = s21 * s53 + s22 * s54 + cos_q_A * s55
-    s65 = m_B * (cos_q_B * s42 - sin_q_B * s43)
-    s66 = m_B * (s19 * s42 + s20 * s43 - sin_q_A * s44)
-    s67 = m_B * (s21 * s42 + s22 * s43 + cos_q_A * s44)
-    s68 = s31 * s56 + s32 * s57 + s33 * s58
-    s69 = s31 * s59 + s32 * s60 + s33 * s61
-    s70 = s31 * s62 + s32 * s63 + s33 * s64
-    s71 = s46 * s57 - s45 * s56 + s47 * s58 + (s32 * s70 - s33 * s69)
-    s72 = s46 * s60 - s45 * s59 + s47 * s61 + (s33 * s68 - s31 * s70)
-    s73 = s46 * s63 - s45 * s62 + s47 * s64 + (s31 * s69 - s32 * s68)
-    s74 = l_A * sin_q_A * s41 + l_A * cos_q_A * s40 - I_A * s2 + (s71 - (s29 * s67 + s30 * s66))
-    s75 = -s65
+    s63 = s20 * s53 + s21 * s54 + sin_q_A * s55
+    s64 = s22 * s53 + s23 * s54 - cos_q_A * s55
+    s65 = cos_q_B * s56 - sin_q_B * s57
+    s66 = s20 * s56 + s21 * s57 - sin_q_A * s58
+    s67 = s22 * s56 + s23 * s57 + cos_q_A * s58
+    s68 = m_B * s45
+    s69 = m_B * s46
+    s70 = s29 * s59 + s31 * s60 + s32 * s61
+    s71 = s29 * s62 + s31 * s63 + s32 * s64
+    s72 = s29 * s65 + s31 * s66 + s32 * s67
+    s73 = s49 * s60 - s47 * s59 + s50 * s61 + (s31 * s72 - s32 * s71)
+    s74 = s49 * s63 - s47 * s62 + s50 * s64 + (s32 * s70 - s29 * s72)
+    s75 = s49 * s66 - s47 * s65 + s50 * s67 + (s29 * s71 - s31 * s70)
+    s76 = s44 * moment_B_z
+    s77 = k28 * (sin_q_A * s40 + cos_q_A * s39) - I_A * s30 + (s73 - moment_B_z * (sin_q_A * s46 + cos_q_A * s45))
+    s78 = k34 * s44
     return (
-        s75,
-        -(s40 + s66),
-        -(s41 + s67),
-        -s74,
-        -(s72 + s30 * s65),
-        -(s73 + s29 * s65),
-        s75,
-        -s66,
-        -s67,
-        -s71,
-        -s72,
+        s78,
+        k35 * s39 - s68,
+        k35 * s40 - s69,
+        -s77,
+        -(s74 + cos_q_A * s76),
+        -(s75 + sin_q_A * s76),
+        s78,
+        -s68,
+        -s69,
         -s73,
+        -s74,
+        -s75,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """16 operations: 8 mul, 4 neg, 2 sin, 2 cos."""
-    l_A, k20 = k
+    """14 operations: 8 mul, 2 neg, 2 sin, 2 cos."""
+    l_A, k33, k36, k37 = k
     q_A, q_B, _, _ = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
-    s76 = -sin_q_A
     cos_q_A = cos(q_A)
+    s79 = -sin_q_A
     return (
         1.0,
         0.0,
@@ -602,55 +615,57 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
         0.0,
         0.0,
         cos_q_A,
-        s76,
+        s79,
         l_A * sin_q_A,
         0.0,
         sin_q_A,
         cos_q_A,
-        -l_A * cos_q_A,
+        k36 * cos_q_A,
         cos_q_B,
         -sin_q_B,
         0.0,
         0.0,
         sin_q_B * cos_q_A,
         cos_q_B * cos_q_A,
-        s76,
-        -sin_q_A * k20,
+        s79,
+        sin_q_A * k37,
         sin_q_B * sin_q_A,
         cos_q_B * sin_q_A,
         cos_q_A,
-        cos_q_A * k20,
+        cos_q_A * k33,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """36 operations: 3 add, 3 sub, 24 mul, 2 neg, 2 sin, 2 cos."""
-    l_A, k20 = k
+    """30 operations: 3 add, 2 sub, 19 mul, 2 neg, 2 sin, 2 cos."""
+    l_A, k33 = k
     q_A, q_B, q_A_dot, q_B_dot = y
     cos_q_B = cos(q_B)
     sin_q_B = sin(q_B)
     sin_q_A = sin(q_A)
     cos_q_A = cos(q_A)
     omega_B_x = q_A_dot * cos_q_B
-    s12 = q_A_dot * sin_q_B
-    s29 = sin_q_A * k20
-    s30 = cos_q_A * k20
-    s31 = cos_q_B * omega_B_x + sin_q_B * s12
-    s32 = sin_q_B * cos_q_A * omega_B_x - cos_q_B * cos_q_A * s12 - q_B_dot * sin_q_A
-    s33 = sin_q_B * sin_q_A * omega_B_x - cos_q_B * sin_q_A * s12 + q_B_dot * cos_q_A
+    s15 = q_A_dot * sin_q_B
+    s29 = cos_q_B * omega_B_x + sin_q_B * s15
+    s80 = cos_q_A * k33
+    s81 = sin_q_A * k33
+    s82 = l_A * q_A_dot
+    s83 = sin_q_B * omega_B_x - cos_q_B * s15
+    s84 = cos_q_A * s83 - q_B_dot * sin_q_A
+    s85 = sin_q_A * s83 + q_B_dot * cos_q_A
     return (
         0.0,
-        q_A_dot * (l_A * cos_q_A),
-        q_A_dot * (l_A * sin_q_A),
+        cos_q_A * s82,
+        sin_q_A * s82,
         q_A_dot,
         0.0,
         0.0,
-        s30 * s32 + s29 * s33,
-        -s30 * s31,
-        -s29 * s31,
-        s31,
-        s32,
-        s33,
+        s80 * s84 + s81 * s85,
+        -s80 * s29,
+        -s81 * s29,
+        s29,
+        s84,
+        s85,
     )
 
 
@@ -676,17 +691,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -695,19 +729,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -722,7 +765,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 2
 _COLUMNS = {
     "sin": np.sin,
@@ -828,17 +871,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -901,7 +945,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (2, 2), ('sin',), y, p, u)
 
 

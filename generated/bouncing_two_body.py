@@ -36,8 +36,9 @@ One call of `derivative` takes 87 operations: 14 add, 18 sub, 41 mul, 9 div, 1 n
 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (8, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (8, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (11, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -116,11 +117,11 @@ CONTACTS = {
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 14, "sub": 18, "mul": 41, "div": 9, "neg": 1, "sin": 2, "cos": 2, "total": 87, "parameters": 3},
-    "jacobian": {"add": 65, "sub": 87, "mul": 153, "div": 29, "neg": 1, "sin": 2, "cos": 2, "total": 339, "parameters": 5},
+    "jacobian": {"add": 70, "sub": 76, "mul": 147, "div": 29, "neg": 2, "sin": 2, "cos": 2, "total": 328, "parameters": 6},
     "gaps": {"add": 3, "sub": 4, "mul": 2, "sin": 2, "total": 11, "parameters": 1},
     "gap_rates": {"add": 4, "sub": 1, "mul": 4, "cos": 2, "total": 11, "parameters": 1},
     "impact": {"add": 40, "sub": 38, "mul": 90, "div": 17, "neg": 1, "sin": 2, "cos": 2, "sqrt": 1, "max": 6, "select": 1, "total": 198, "parameters": 4},
-    "held": {"add": 33, "sub": 40, "mul": 80, "div": 12, "sin": 2, "cos": 2, "sqrt": 3, "max": 3, "total": 175, "parameters": 5},
+    "held": {"add": 33, "sub": 40, "mul": 78, "div": 12, "sin": 2, "cos": 2, "sqrt": 3, "max": 3, "total": 173, "parameters": 5},
 }
 
 
@@ -154,17 +155,18 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, g
     moment_B_x = m_B * l_B
     inertia_B_zz = I_B + l_B * moment_B_x
     k1 = m_A + m_B
-    k2 = I_A + inertia_B_zz
-    k3 = l_B + l_B
+    k2 = m_B * l_A
+    k3 = I_A + inertia_B_zz
+    k4 = l_B + l_B
     ground_slip_speed_squared = ground_slip_speed * ground_slip_speed
     return {
         "initial_state": (),
         "derivative": (m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz),
-        "jacobian": (m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, k1, k2),
-        "gaps": (l_A, ground_radius, k3),
-        "gap_rates": (l_A, k3),
-        "impact": (m_A, I_A, m_B, l_A, ground_radius, ground_restitution, ground_friction, moment_B_x, inertia_B_zz, k3),
-        "held": (m_A, I_A, m_B, l_A, g, ground_radius, ground_friction, moment_B_x, inertia_B_zz, k3, ground_slip_speed_squared),
+        "jacobian": (m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, k1, k2, k3),
+        "gaps": (l_A, ground_radius, k4),
+        "gap_rates": (l_A, k4),
+        "impact": (m_A, I_A, m_B, l_A, moment_B_x, inertia_B_zz, ground_radius, k4, ground_restitution, ground_friction),
+        "held": (m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, ground_radius, k4, ground_friction, ground_slip_speed_squared),
     }
 
 
@@ -226,33 +228,33 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
     s2 = l_A * sin(theta)
     s3 = moment_B_x * cos(angle_B)
     s4 = moment_B_x * sin(angle_B)
-    s5 = s4 / inertia_B_zz
-    s6 = s3 / inertia_B_zz
-    s7 = m_B - s4 * s5
-    s8 = m_B - s3 * s6
-    s9 = s3 * s5
-    s10 = s1 * s9 - s2 * s7
-    s11 = s1 * s8 - s2 * s9
-    pivot_A = I_A + (s1 * s11 - s2 * s10)
-    s12 = s10 / pivot_A
-    s13 = s11 / pivot_A
-    pivot_A_2 = m_A + s8 - s11 * s13
-    s14 = s9 - s11 * s12
-    s15 = s14 / pivot_A_2
     omega_B_z = theta_dot + phi_dot
     theta_dot_squared = theta_dot * theta_dot
-    s16 = s1 * theta_dot_squared
-    s17 = s2 * theta_dot_squared
+    s5 = s1 * theta_dot_squared
+    s6 = s2 * theta_dot_squared
     omega_B_z_squared = omega_B_z * omega_B_z
-    s18 = s3 * s17 - s4 * s16
-    s19 = m_B * s16 + s3 * omega_B_z_squared + s5 * s18
-    s20 = s6 * s18 - (m_B * s17 + s4 * omega_B_z_squared)
+    s7 = s4 / inertia_B_zz
+    s8 = s3 / inertia_B_zz
+    s9 = m_B - s4 * s7
+    s10 = m_B - s3 * s8
+    s11 = s3 * s7
+    s12 = s1 * s11 - s2 * s9
+    s13 = s1 * s10 - s2 * s11
+    pivot_A = I_A + (s1 * s13 - s2 * s12)
+    s14 = s12 / pivot_A
+    s15 = s13 / pivot_A
+    pivot_A_2 = m_A + s10 - s13 * s15
+    s16 = s11 - s13 * s14
+    s17 = s16 / pivot_A_2
+    s18 = s3 * s6 - s4 * s5
+    s19 = m_B * s5 + s3 * omega_B_z_squared + s7 * s18
+    s20 = s8 * s18 - (m_B * s6 + s4 * omega_B_z_squared)
     s21 = s1 * s20 + s2 * s19
-    s22 = s13 * s21 - s20
-    delta_A_1_x = (s19 + s12 * s21 - s15 * s22) / (m_A + s7 - s10 * s12 - s14 * s15)
-    delta_A_2_y = s22 / pivot_A_2 - s15 * delta_A_1_x
-    s23 = s21 / pivot_A + (s12 * delta_A_1_x + s13 * delta_A_2_y)
-    alpha_B_z = s18 / inertia_B_zz - (s6 * (delta_A_2_y - s1 * s23) - s5 * (delta_A_1_x + s2 * s23))
+    s22 = s15 * s21 - s20
+    delta_A_1_x = (s19 + s14 * s21 - s17 * s22) / (m_A + s9 - s12 * s14 - s16 * s17)
+    delta_A_2_y = s22 / pivot_A_2 - s17 * delta_A_1_x
+    s23 = s21 / pivot_A + (s14 * delta_A_1_x + s15 * delta_A_2_y)
+    alpha_B_z = s18 / inertia_B_zz - (s8 * (delta_A_2_y - s1 * s23) - s7 * (delta_A_1_x + s2 * s23))
     return (
         x_A_dot,
         y_A_dot,
@@ -266,111 +268,111 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """339 operations: 65 add, 87 sub, 153 mul, 29 div, 1 neg, 2 sin, 2 cos."""
-    m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, k1, k2 = k
+    """328 operations: 70 add, 76 sub, 147 mul, 29 div, 2 neg, 2 sin, 2 cos."""
+    m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, k1, k2, k3 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
+    cos_theta = cos(theta)
+    sin_theta = sin(theta)
     angle_B = theta + phi
-    s1 = l_A * cos(theta)
-    s2 = l_A * sin(theta)
+    s1 = l_A * cos_theta
+    s2 = l_A * sin_theta
     s3 = moment_B_x * cos(angle_B)
     s4 = moment_B_x * sin(angle_B)
-    s5 = s4 / inertia_B_zz
-    s6 = s3 / inertia_B_zz
-    s24 = s4 * s5
-    s7 = m_B - s24
-    s25 = s3 * s6
-    s8 = m_B - s25
-    s9 = s3 * s5
-    s10 = s1 * s9 - s2 * s7
-    s11 = s1 * s8 - s2 * s9
-    s26 = s4 + m_B * s2
-    s27 = s3 + m_B * s1
-    pivot_A = I_A + (s1 * s11 - s2 * s10)
-    s12 = s10 / pivot_A
-    s13 = s11 / pivot_A
-    pivot_A_2 = m_A + s8 - s11 * s13
-    s14 = s9 - s11 * s12
-    s15 = s14 / pivot_A_2
-    s28 = theta_dot * s2
-    velocity_B_x = x_A_dot - s28
-    velocity_B_y = y_A_dot + theta_dot * s1
     omega_B_z = theta_dot + phi_dot
     theta_dot_squared = theta_dot * theta_dot
-    s16 = s1 * theta_dot_squared
-    s17 = s2 * theta_dot_squared
+    s5 = s1 * theta_dot_squared
+    s6 = s2 * theta_dot_squared
     omega_B_z_squared = omega_B_z * omega_B_z
-    s29 = s3 * omega_B_z_squared
-    s30 = s4 * omega_B_z_squared
-    s18 = s3 * s17 - s4 * s16
-    s19 = m_B * s16 + s29 + s5 * s18
-    s20 = s6 * s18 - (m_B * s17 + s30)
+    s24 = s3 * omega_B_z_squared
+    s25 = s4 * omega_B_z_squared
+    s7 = s4 / inertia_B_zz
+    s8 = s3 / inertia_B_zz
+    s26 = s4 * s7
+    s9 = m_B - s26
+    s27 = s3 * s8
+    s10 = m_B - s27
+    s11 = s3 * s7
+    s12 = s1 * s11 - s2 * s9
+    s13 = s1 * s10 - s2 * s11
+    pivot_A = I_A + (s1 * s13 - s2 * s12)
+    s14 = s12 / pivot_A
+    s15 = s13 / pivot_A
+    pivot_A_2 = m_A + s10 - s13 * s15
+    s16 = s11 - s13 * s14
+    s17 = s16 / pivot_A_2
+    s18 = s3 * s6 - s4 * s5
+    s19 = m_B * s5 + s24 + s7 * s18
+    s20 = s8 * s18 - (m_B * s6 + s25)
     s21 = s1 * s20 + s2 * s19
-    s22 = s13 * s21 - s20
-    delta_A_1_x = (s19 + s12 * s21 - s15 * s22) / (m_A + s7 - s10 * s12 - s14 * s15)
-    delta_A_2_y = s22 / pivot_A_2 - s15 * delta_A_1_x
-    s23 = s21 / pivot_A + (s12 * delta_A_1_x + s13 * delta_A_2_y)
-    s31 = s2 * s23
-    s32 = s1 * s23
-    alpha_B_z = s18 / inertia_B_zz - (s6 * (delta_A_2_y - s32) - s5 * (delta_A_1_x + s31))
+    s22 = s15 * s21 - s20
+    delta_A_1_x = (s19 + s14 * s21 - s17 * s22) / (m_A + s9 - s12 * s14 - s16 * s17)
+    delta_A_2_y = s22 / pivot_A_2 - s17 * delta_A_1_x
+    s23 = s21 / pivot_A + (s14 * delta_A_1_x + s15 * delta_A_2_y)
+    s28 = s2 * s23
+    s29 = s1 * s23
+    alpha_B_z = s18 / inertia_B_zz - (s8 * (delta_A_2_y - s29) - s7 * (delta_A_1_x + s28))
     phi_ddot = s23 + alpha_B_z
+    s30 = theta_dot * s2
+    velocity_B_x = x_A_dot - s30
+    velocity_B_y = y_A_dot + theta_dot * s1
+    s31 = s4 + m_B * s2
+    s32 = s3 + m_B * s1
     s33 = inertia_B_zz + (s2 * s4 + s1 * s3)
     s34 = s33 / inertia_B_zz
-    pivot_theta_dot = s1 * (s3 + s27) + s2 * (s4 + s26) + k2 - s33 * s34
-    s35 = s27 - s3 * s34
-    s36 = s4 * s34 - s26
+    pivot_theta_dot = s1 * (s3 + s32) + s2 * (s4 + s31) + k3 - s33 * s34
+    s35 = s32 - s3 * s34
+    s36 = s4 * s34 - s31
     s37 = s35 / pivot_theta_dot
     s38 = s36 / pivot_theta_dot
-    pivot_y_A_dot = k1 - s25 - s35 * s37
-    s39 = s4 * s6 - s36 * s37
+    pivot_y_A_dot = k1 - s27 - s35 * s37
+    s39 = s4 * s8 - s36 * s37
     s40 = s39 / pivot_y_A_dot
-    pivot_x_A_dot = k1 - s24 - s36 * s38 - s39 * s40
+    pivot_x_A_dot = k1 - s26 - s36 * s38 - s39 * s40
     a_A_2_y = g + (delta_A_2_y - g)
-    a_B_x = delta_A_1_x + (s31 - s16)
-    a_B_y = a_A_2_y - (s17 + s32)
-    s41 = m_B * a_B_x + (s4 * (s23 - phi_ddot) - s29)
-    s42 = m_B * a_B_y + (s3 * (phi_ddot - s23) - s30)
-    s43 = m_B * velocity_B_x - s4 * omega_B_z
-    s44 = m_B * velocity_B_y + s3 * omega_B_z
-    s45 = s3 * velocity_B_x + s4 * velocity_B_y
-    s46 = y_A_dot + y_A_dot
-    s47 = x_A_dot + x_A_dot
-    s48 = theta_dot * velocity_B_y
-    s49 = s28 - x_A_dot
-    s50 = a_B_y - theta_dot * (velocity_B_x + s49)
-    s51 = s48 - (a_B_x + s48)
-    s52 = velocity_B_y + velocity_B_y
-    s53 = s49 + s49
-    s54 = 2.0 * s45
-    s55 = m_B * s50
-    s56 = s3 * s51
-    s57 = s4 * s50
-    s58 = s41 + m_B * s51
-    s59 = m_B * s52
-    s60 = 2.0 * s44
-    s61 = s54 + (s3 * s53 - s4 * s52)
-    s62 = m_B * s53 + 2.0 * s43
-    s63 = s4 * a_A_2_y + s3 * delta_A_1_x
-    s64 = s27 * delta_A_1_x + s26 * a_A_2_y - s34 * s63
-    s65 = k1 * delta_A_1_x - (m_A * delta_A_1_x + s41) - s6 * s63 - s37 * s64
-    s66 = (m_A * a_A_2_y + s42 - k1 * a_A_2_y + s5 * s63 - s38 * s64 - s40 * s65) / pivot_x_A_dot
-    s67 = s65 / pivot_y_A_dot - s40 * s66
-    s68 = s64 / pivot_theta_dot - s37 * s67 - s38 * s66
-    s69 = s57 - s56
-    s70 = s56 - s57 + (s1 * s58 - s2 * (s55 - s42)) + s34 * s69
-    s71 = s37 * s70 - (s58 + s6 * s69)
-    s72 = (s42 - s55 + s5 * s69 + s38 * s70 - s40 * s71) / pivot_x_A_dot
+    s41 = cos_theta * k2
+    s42 = sin_theta * k2
+    s43 = s3 + s41
+    s44 = s4 + s42
+    s45 = s4 * (s23 - phi_ddot)
+    s46 = s45 - s24
+    s47 = s3 * (phi_ddot - s23)
+    s48 = s47 - s25
+    s49 = s4 * omega_B_z
+    s50 = s3 * omega_B_z
+    s51 = s3 * velocity_B_x + s4 * velocity_B_y
+    s52 = y_A_dot + y_A_dot
+    s53 = x_A_dot + x_A_dot
+    s54 = theta_dot * velocity_B_y
+    s55 = s30 - x_A_dot
+    s56 = 2.0 * s51
+    s57 = s3 * (s54 - (delta_A_1_x + (s28 - s5) + s54))
+    s58 = s4 * (a_A_2_y - (s6 + s29) - theta_dot * (velocity_B_x + s55))
+    s59 = 2.0 * s50
+    s60 = 2.0 * s49
+    s61 = s56 + (s3 * (s55 + s55) - s4 * (velocity_B_y + velocity_B_y))
+    s62 = s4 * a_A_2_y + s3 * delta_A_1_x
+    s63 = delta_A_1_x * s43 + a_A_2_y * s44 - s34 * s62
+    s64 = s23 * s42 - theta_dot_squared * s41 + s46 + s8 * s62 + s37 * s63
+    s65 = s48 - (s23 * s41 + theta_dot_squared * s42) + s7 * s62 - s38 * s63 + s40 * s64
+    s66 = s65 / pivot_x_A_dot
+    s67 = s64 / pivot_y_A_dot + s40 * s66
+    s68 = s63 / pivot_theta_dot + s37 * s67 - s38 * s66
+    s69 = s58 - s57
+    s70 = s57 - s58 + (s1 * s46 - s2 * (s25 - s47)) + s34 * s69
+    s71 = s24 - s45 - s8 * s69 + s37 * s70
+    s72 = (s48 + s7 * s69 + s38 * s70 - s40 * s71) / pivot_x_A_dot
     s73 = s71 / pivot_y_A_dot - s40 * s72
     s74 = s70 / pivot_theta_dot + s37 * s73 + s38 * s72
-    s75 = s4 * s46 + s3 * s47 - s54
-    s76 = s27 * s47 + s26 * s46 - 2.0 * (s45 + (s1 * s43 + s2 * s44)) - s34 * s75
-    s77 = k1 * s47 - 2.0 * (m_A * x_A_dot + s43) - s6 * s75 - s37 * s76
-    s78 = 2.0 * (m_A * y_A_dot + s44) - k1 * s46 + s5 * s75 - s38 * s76 - s40 * s77
-    s79 = s78 / pivot_x_A_dot
-    s80 = s77 / pivot_y_A_dot - s40 * s79
-    s81 = s76 / pivot_theta_dot - s37 * s80 - s38 * s79
-    s82 = s34 * s61 - (s61 + (s1 * s62 - s2 * (s59 - s60)))
-    s83 = s6 * s61 - s62 - s37 * s82
-    s84 = (s60 - s59 - s5 * s61 - s38 * s82 - s40 * s83) / pivot_x_A_dot
+    s75 = s43 * s53 + s44 * s52 - 2.0 * (x_A_dot * s41 + y_A_dot * s42 + (s51 + (s2 * s50 - s1 * s49)))
+    s76 = s4 * s52 + s3 * s53 - s56
+    s77 = s75 - s34 * s76
+    s78 = 2.0 * (theta_dot * s42 + s49) - s8 * s76 - s37 * s77
+    s79 = (2.0 * (theta_dot * s41 + s50) + s7 * s76 - s38 * s77 - s40 * s78) / pivot_x_A_dot
+    s80 = s78 / pivot_y_A_dot - s40 * s79
+    s81 = s77 / pivot_theta_dot - s37 * s80 - s38 * s79
+    s82 = s34 * s61 - (s61 + (s2 * s59 - s1 * s60))
+    s83 = s60 + s8 * s61 - s37 * s82
+    s84 = (s59 - s7 * s61 - s38 * s82 - s40 * s83) / pivot_x_A_dot
     s85 = s83 / pivot_y_A_dot - s40 * s84
     s86 = s82 / pivot_theta_dot - s37 * s85 - s38 * s84
     return (
@@ -416,7 +418,7 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         s84,
         0.0,
         0.0,
-        s67,
+        -s67,
         s73,
         0.0,
         0.0,
@@ -432,44 +434,44 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         s86,
         0.0,
         0.0,
-        s63 / inertia_B_zz - s34 * s68 - s6 * s67 + s5 * s66,
-        s69 / inertia_B_zz + s34 * s74 - s6 * s73 + s5 * s72,
+        s62 / inertia_B_zz - s34 * s68 + s8 * s67 + s7 * s66,
+        s69 / inertia_B_zz + s34 * s74 - s8 * s73 + s7 * s72,
         0.0,
         0.0,
-        s75 / inertia_B_zz - s34 * s81 - s6 * s80 + s5 * s79,
-        s5 * s84 - (s61 / inertia_B_zz + s34 * s86 + s6 * s85),
+        s76 / inertia_B_zz - s34 * s81 - s8 * s80 + s7 * s79,
+        s7 * s84 - (s61 / inertia_B_zz + s34 * s86 + s8 * s85),
     )
 
 
 def _gaps(y, k, u=(), extra=(), sin=sin):
     """11 operations: 3 add, 4 sub, 2 mul, 2 sin."""
-    l_A, ground_radius, k3 = k
+    l_A, ground_radius, k4 = k
     _, y_A, theta, phi, _, _, _, _ = y
     s2 = l_A * sin(theta)
     s87 = y_A + s2
     return (
         y_A - s2 - ground_radius,
         s87 - ground_radius,
-        s87 + sin(theta + phi) * k3 - ground_radius,
+        s87 + sin(theta + phi) * k4 - ground_radius,
     )
 
 
 def _gap_rates(y, k, u=(), extra=(), cos=cos):
     """11 operations: 4 add, 1 sub, 4 mul, 2 cos."""
-    l_A, k3 = k
+    l_A, k4 = k
     _, _, theta, phi, _, y_A_dot, theta_dot, phi_dot = y
     s88 = theta_dot * (l_A * cos(theta))
     velocity_B_y = y_A_dot + s88
     return (
         y_A_dot - s88,
         velocity_B_y,
-        velocity_B_y + (theta_dot + phi_dot) * (cos(theta + phi) * k3),
+        velocity_B_y + (theta_dot + phi_dot) * (cos(theta + phi) * k4),
     )
 
 
 def _impact(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, select=select, sqrt=sqrt):
     """198 operations: 40 add, 38 sub, 90 mul, 17 div, 1 neg, 2 sin, 2 cos, 1 sqrt, 6 max, 1 select."""
-    m_A, I_A, m_B, l_A, ground_radius, ground_restitution, ground_friction, moment_B_x, inertia_B_zz, k3 = k
+    m_A, I_A, m_B, l_A, moment_B_x, inertia_B_zz, ground_radius, k4, ground_restitution, ground_friction = k
     x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     struck__ground_end_A, struck__ground_elbow, struck__ground_end_B, impact__bounce = extra
     angle_B = theta + phi
@@ -479,44 +481,44 @@ def _impact(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, select=select, sqrt
     s2 = l_A * sin(theta)
     s3 = moment_B_x * cos_angle_B
     s4 = moment_B_x * sin_angle_B
-    s5 = s4 / inertia_B_zz
-    s6 = s3 / inertia_B_zz
-    s7 = m_B - s4 * s5
-    s8 = m_B - s3 * s6
-    s9 = s3 * s5
-    s10 = s1 * s9 - s2 * s7
-    s11 = s1 * s8 - s2 * s9
-    pivot_A = I_A + (s1 * s11 - s2 * s10)
-    s12 = s10 / pivot_A
-    s13 = s11 / pivot_A
-    pivot_A_2 = m_A + s8 - s11 * s13
-    s14 = s9 - s11 * s12
-    s15 = s14 / pivot_A_2
-    pivot_A_1 = m_A + s7 - s10 * s12 - s14 * s15
+    s7 = s4 / inertia_B_zz
+    s8 = s3 / inertia_B_zz
+    s9 = m_B - s4 * s7
+    s10 = m_B - s3 * s8
+    s11 = s3 * s7
+    s12 = s1 * s11 - s2 * s9
+    s13 = s1 * s10 - s2 * s11
+    pivot_A = I_A + (s1 * s13 - s2 * s12)
+    s14 = s12 / pivot_A
+    s15 = s13 / pivot_A
+    pivot_A_2 = m_A + s10 - s13 * s15
+    s16 = s11 - s13 * s14
+    s17 = s16 / pivot_A_2
+    pivot_A_1 = m_A + s9 - s12 * s14 - s16 * s17
     s89 = struck__ground_end_B + (struck__ground_end_A + struck__ground_elbow)
     s90 = ground_friction * s89
-    s91 = cos_angle_B * k3 * struck__ground_end_B
+    s91 = cos_angle_B * k4 * struck__ground_end_B
     s92 = s1 * (struck__ground_elbow - struck__ground_end_A) + (s91 + s1 * struck__ground_end_B)
     s93 = struck__ground_elbow * (s2 - ground_radius) - struck__ground_end_A * (ground_radius + s2)
-    s94 = struck__ground_end_B * (sin_angle_B * k3 - ground_radius)
+    s94 = struck__ground_end_B * (sin_angle_B * k4 - ground_radius)
     s95 = s93 + (s94 + s2 * struck__ground_end_B)
-    s96 = s5 * s91
-    s97 = s6 * s91
+    s96 = s7 * s91
+    s97 = s8 * s91
     s98 = s92 - (s91 + (s1 * s97 + s2 * s96))
-    s99 = s89 - (s97 + s13 * s98)
-    s100 = (s12 * s98 - s96 + s15 * s99) / pivot_A_1
-    delta_A_2_y_2 = s99 / pivot_A_2 + s15 * s100
-    alpha_A_z = s98 / pivot_A - (s13 * delta_A_2_y_2 - s12 * s100)
-    alpha_B_z_2 = s91 / inertia_B_zz - (s5 * (s100 + s2 * alpha_A_z) + s6 * (delta_A_2_y_2 + s1 * alpha_A_z))
+    s99 = s89 - (s97 + s15 * s98)
+    s100 = (s14 * s98 - s96 + s17 * s99) / pivot_A_1
+    delta_A_2_y_2 = s99 / pivot_A_2 + s17 * s100
+    alpha_A_z = s98 / pivot_A - (s15 * delta_A_2_y_2 - s14 * s100)
+    alpha_B_z_2 = s91 / inertia_B_zz - (s7 * (s100 + s2 * alpha_A_z) + s8 * (delta_A_2_y_2 + s1 * alpha_A_z))
     s101 = alpha_B_z_2 - alpha_A_z
-    s102 = s5 * s94
-    s103 = s6 * s94
+    s102 = s7 * s94
+    s103 = s8 * s94
     s104 = s95 - (s94 + (s1 * s103 + s2 * s102))
-    s105 = s103 + s13 * s104
-    s106 = (s89 + (s12 * s104 - s102 - s15 * s105)) / pivot_A_1
-    delta_A_2_y_3 = s15 * s106 - s105 / pivot_A_2
-    alpha_A_z_2 = s104 / pivot_A - (s13 * delta_A_2_y_3 - s12 * s106)
-    alpha_B_z_3 = s94 / inertia_B_zz - (s5 * (s106 + s2 * alpha_A_z_2) + s6 * (delta_A_2_y_3 + s1 * alpha_A_z_2))
+    s105 = s103 + s15 * s104
+    s106 = (s89 + (s14 * s104 - s102 - s17 * s105)) / pivot_A_1
+    delta_A_2_y_3 = s17 * s106 - s105 / pivot_A_2
+    alpha_A_z_2 = s104 / pivot_A - (s15 * delta_A_2_y_3 - s14 * s106)
+    alpha_B_z_3 = s94 / inertia_B_zz - (s7 * (s106 + s2 * alpha_A_z_2) + s8 * (delta_A_2_y_3 + s1 * alpha_A_z_2))
     s107 = alpha_B_z_3 - alpha_A_z_2
     s108 = s91 * s107 + (s89 * delta_A_2_y_3 + s92 * alpha_A_z_2)
     s109 = s94 * s107 + (s89 * s106 + s95 * alpha_A_z_2)
@@ -545,70 +547,69 @@ def _impact(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, select=select, sqrt
 
 
 def _held(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt):
-    """175 operations: 33 add, 40 sub, 80 mul, 12 div, 2 sin, 2 cos, 3 sqrt, 3 max."""
-    m_A, I_A, m_B, l_A, g, ground_radius, ground_friction, moment_B_x, inertia_B_zz, k3, ground_slip_speed_squared = k
+    """173 operations: 33 add, 40 sub, 78 mul, 12 div, 2 sin, 2 cos, 3 sqrt, 3 max."""
+    m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, ground_radius, k4, ground_friction, ground_slip_speed_squared = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     force__ground_end_A, force__ground_elbow, force__ground_end_B = extra
-    sin_theta = sin(theta)
     angle_B = theta + phi
     cos_angle_B = cos(angle_B)
     sin_angle_B = sin(angle_B)
     s1 = l_A * cos(theta)
-    s2 = l_A * sin_theta
+    s2 = l_A * sin(theta)
     s3 = moment_B_x * cos_angle_B
     s4 = moment_B_x * sin_angle_B
-    s5 = s4 / inertia_B_zz
-    s6 = s3 / inertia_B_zz
-    s7 = m_B - s4 * s5
-    s8 = m_B - s3 * s6
-    s9 = s3 * s5
-    s10 = s1 * s9 - s2 * s7
-    s11 = s1 * s8 - s2 * s9
-    pivot_A = I_A + (s1 * s11 - s2 * s10)
-    s12 = s10 / pivot_A
-    s13 = s11 / pivot_A
-    pivot_A_2 = m_A + s8 - s11 * s13
-    s14 = s9 - s11 * s12
-    s15 = s14 / pivot_A_2
-    s28 = theta_dot * s2
-    s88 = theta_dot * s1
-    velocity_B_y = y_A_dot + s88
     omega_B_z = theta_dot + phi_dot
     theta_dot_squared = theta_dot * theta_dot
-    s16 = s1 * theta_dot_squared
-    s17 = s2 * theta_dot_squared
+    s5 = s1 * theta_dot_squared
+    s6 = s2 * theta_dot_squared
     omega_B_z_squared = omega_B_z * omega_B_z
-    s122 = cos_angle_B * k3
-    s123 = sin_angle_B * k3
-    s124 = omega_B_z * s123
+    s7 = s4 / inertia_B_zz
+    s8 = s3 / inertia_B_zz
+    s9 = m_B - s4 * s7
+    s10 = m_B - s3 * s8
+    s11 = s3 * s7
+    s12 = s1 * s11 - s2 * s9
+    s13 = s1 * s10 - s2 * s11
+    pivot_A = I_A + (s1 * s13 - s2 * s12)
+    s14 = s12 / pivot_A
+    s15 = s13 / pivot_A
+    pivot_A_2 = m_A + s10 - s13 * s15
+    s16 = s11 - s13 * s14
+    s17 = s16 / pivot_A_2
+    s30 = theta_dot * s2
+    s88 = theta_dot * s1
+    velocity_B_y = y_A_dot + s88
+    s122 = sin_angle_B * k4
+    s123 = cos_angle_B * k4
+    s124 = omega_B_z * s122
     s125 = ground_radius * theta_dot
-    s126 = x_A_dot + s28 + s125
+    s126 = x_A_dot + s30 + s125
     s127 = s126 * s126
     s128 = ground_friction * force__ground_end_A / sqrt(max(s127 + ground_slip_speed_squared, 1e-300))
     s129 = s126 * s128
-    s130 = s28 - x_A_dot - s125
+    s130 = s30 - x_A_dot - s125
     s131 = s130 * s130
     s132 = ground_friction * force__ground_elbow / sqrt(max(ground_slip_speed_squared + s131, 1e-300))
     s133 = s130 * s132
-    s134 = s124 - (x_A_dot - s28) - ground_radius * omega_B_z
+    s134 = s124 - (x_A_dot - s30) - ground_radius * omega_B_z
     s135 = s134 * s134
     s136 = ground_friction * force__ground_end_B / sqrt(max(ground_slip_speed_squared + s135, 1e-300))
     s137 = s134 * s136
     s138 = ground_radius * s133 + (s1 * force__ground_elbow - s2 * s133) - (ground_radius * s129 + (s1 * force__ground_end_A + s2 * s129))
-    s139 = ground_radius * s137 + (s122 * force__ground_end_B - s123 * s137)
-    s140 = s139 - (s4 * s16 - s3 * s17)
-    s141 = m_B * s16 + s3 * omega_B_z_squared + s5 * s140
-    s142 = s6 * s140 - (m_B * s17 + s4 * omega_B_z_squared)
+    s139 = ground_radius * s137 + (s123 * force__ground_end_B - s122 * s137)
+    s140 = s139 - (s4 * s5 - s3 * s6)
+    s141 = m_B * s5 + s3 * omega_B_z_squared + s7 * s140
+    s142 = s8 * s140 - (m_B * s6 + s4 * omega_B_z_squared)
     s143 = s138 + (s139 + (s1 * force__ground_end_B - s2 * s137)) - (s139 + (s1 * s142 + s2 * s141))
-    s144 = force__ground_end_B + (force__ground_end_A + force__ground_elbow) - (s142 + s13 * s143)
-    delta_A_1_x_2 = (s137 + (s133 - s129) - (s12 * s143 - s141 + s15 * s144)) / (m_A + s7 - s10 * s12 - s14 * s15)
-    delta_A_2_y_4 = s144 / pivot_A_2 - s15 * delta_A_1_x_2
-    alpha_A_z_3 = s143 / pivot_A - (s12 * delta_A_1_x_2 + s13 * delta_A_2_y_4)
+    s144 = force__ground_end_B + (force__ground_end_A + force__ground_elbow) - (s142 + s15 * s143)
+    delta_A_1_x_2 = (s137 + (s133 - s129) - (s14 * s143 - s141 + s17 * s144)) / (m_A + s9 - s12 * s14 - s16 * s17)
+    delta_A_2_y_4 = s144 / pivot_A_2 - s17 * delta_A_1_x_2
+    alpha_A_z_3 = s143 / pivot_A - (s14 * delta_A_1_x_2 + s15 * delta_A_2_y_4)
     s145 = s1 * alpha_A_z_3
-    alpha_B_z_4 = s140 / inertia_B_zz - (s6 * (delta_A_2_y_4 + s145) - s5 * (delta_A_1_x_2 - s2 * alpha_A_z_3))
+    alpha_B_z_4 = s140 / inertia_B_zz - (s8 * (delta_A_2_y_4 + s145) - s7 * (delta_A_1_x_2 - s2 * alpha_A_z_3))
     phi_ddot_2 = alpha_B_z_4 - alpha_A_z_3
     y_A_ddot = delta_A_2_y_4 - g
-    s146 = s145 - theta_dot * (l_A * (theta_dot * sin_theta))
+    s146 = s145 - theta_dot * s30
     s147 = y_A_ddot + s146
     return (
         x_A_dot,
@@ -621,10 +622,10 @@ def _held(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt):
         phi_ddot_2,
         y_A_ddot - s146,
         s147,
-        s147 + (s122 * (alpha_A_z_3 + phi_ddot_2) - omega_B_z * s124),
+        s147 + (s123 * (alpha_A_z_3 + phi_ddot_2) - omega_B_z * s124),
         force__ground_end_A * (y_A_dot - s88) - s127 * s128,
         velocity_B_y * force__ground_elbow - s131 * s132,
-        force__ground_end_B * (velocity_B_y + omega_B_z * s122) - s135 * s136,
+        force__ground_end_B * (velocity_B_y + omega_B_z * s123) - s135 * s136,
     )
 
 
@@ -650,17 +651,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -669,19 +689,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -696,7 +725,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _COLUMNS = {
     "sin": np.sin,
     "cos": np.cos,
@@ -804,17 +833,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)

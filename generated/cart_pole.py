@@ -19,12 +19,13 @@ Parameters p, with the scene's values:
     g = 9.81        m/s^2   gravitational acceleration
 
 Effects: gravity, motor.
-One call of `derivative` takes 18 operations: 4 add, 10 mul, 1 div, 1 neg, 1 sin, 1 cos; 19 more on
+One call of `derivative` takes 17 operations: 3 add, 1 sub, 10 mul, 1 div, 1 sin, 1 cos; 18 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (4, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (4, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (5, k) and (1, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -76,27 +77,27 @@ JOINTS = ('rail', 'pin')
 POINTS = ('tip',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 4, "mul": 10, "div": 1, "neg": 1, "sin": 1, "cos": 1, "total": 18, "parameters": 19},
-    "jacobian": {"add": 4, "sub": 3, "mul": 21, "div": 3, "neg": 2, "sin": 1, "cos": 1, "total": 35, "parameters": 22},
-    "input_jacobian": {"add": 1, "mul": 5, "div": 1, "neg": 1, "sin": 1, "cos": 1, "total": 10, "parameters": 14},
-    "parameter_jacobian": {"add": 15, "sub": 5, "mul": 45, "div": 6, "neg": 5, "sin": 1, "cos": 1, "total": 78, "parameters": 62},
-    "forward_dynamics": {"add": 4, "sub": 3, "mul": 13, "div": 1, "sin": 1, "cos": 1, "total": 23, "parameters": 19},
+    "derivative": {"add": 3, "sub": 1, "mul": 10, "div": 1, "sin": 1, "cos": 1, "total": 17, "parameters": 18},
+    "jacobian": {"add": 3, "sub": 4, "mul": 20, "div": 3, "sin": 1, "cos": 1, "total": 32, "parameters": 24},
+    "input_jacobian": {"add": 1, "mul": 5, "div": 1, "sin": 1, "cos": 1, "total": 9, "parameters": 13},
+    "parameter_jacobian": {"add": 13, "sub": 7, "mul": 41, "div": 6, "neg": 2, "sin": 1, "cos": 1, "total": 71, "parameters": 64},
+    "forward_dynamics": {"add": 4, "sub": 3, "mul": 12, "div": 1, "sin": 1, "cos": 1, "total": 22, "parameters": 17},
     "inverse_dynamics": {"add": 3, "sub": 2, "mul": 9, "sin": 1, "cos": 1, "total": 16, "parameters": 6},
     "mass_matrix": {"mul": 1, "cos": 1, "total": 2, "parameters": 5},
-    "velocity_force": {"mul": 3, "neg": 1, "sin": 1, "total": 5, "parameters": 1},
+    "velocity_force": {"mul": 3, "sin": 1, "total": 4, "parameters": 2},
     "gravity_force": {"mul": 1, "sin": 1, "total": 2, "parameters": 2},
-    "bias_force": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 2},
+    "bias_force": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 1},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 4, "mul": 12, "sin": 1, "cos": 1, "total": 18, "parameters": 0},
-    "potential_energy": {"mul": 2, "neg": 1, "cos": 1, "total": 4, "parameters": 1},
-    "effect_powers": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 1},
+    "kinetic_energy": {"add": 4, "mul": 11, "sin": 1, "cos": 1, "total": 17, "parameters": 0},
+    "potential_energy": {"mul": 1, "cos": 1, "total": 2, "parameters": 3},
+    "effect_powers": {"mul": 3, "sin": 1, "total": 4, "parameters": 3},
     "momentum": {"add": 4, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 3},
-    "centre_of_mass": {"add": 2, "mul": 5, "div": 2, "neg": 1, "sin": 1, "cos": 1, "total": 12, "parameters": 1},
-    "joint_forces": {"add": 10, "sub": 4, "mul": 22, "div": 1, "neg": 4, "sin": 1, "cos": 1, "total": 43, "parameters": 20},
-    "body_poses": {"add": 1, "mul": 2, "neg": 1, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
-    "body_velocities": {"add": 1, "mul": 4, "sin": 1, "cos": 1, "total": 7, "parameters": 0},
-    "point_positions": {"add": 1, "mul": 2, "neg": 1, "sin": 1, "cos": 1, "total": 6, "parameters": 1},
-    "point_velocities": {"add": 1, "mul": 4, "sin": 1, "cos": 1, "total": 7, "parameters": 1},
+    "centre_of_mass": {"add": 2, "mul": 4, "div": 2, "sin": 1, "cos": 1, "total": 10, "parameters": 3},
+    "joint_forces": {"add": 8, "sub": 6, "mul": 22, "div": 1, "neg": 2, "sin": 1, "cos": 1, "total": 41, "parameters": 20},
+    "body_poses": {"add": 1, "mul": 2, "sin": 1, "cos": 1, "total": 5, "parameters": 1},
+    "body_velocities": {"add": 1, "mul": 3, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
+    "point_positions": {"add": 1, "mul": 2, "sin": 1, "cos": 1, "total": 5, "parameters": 2},
+    "point_velocities": {"add": 1, "mul": 3, "sin": 1, "cos": 1, "total": 6, "parameters": 1},
     "point_jacobians": {"add": 1, "sub": 1, "mul": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 1},
 }
 
@@ -110,71 +111,87 @@ def _fixed(m_cart, m_pole, I_pole, l, g):
     if not I_pole >= 0.0:
         return "inertia_com of pole is negative"
     l_squared = l * l
-    pivot_theta_dot = I_pole + m_pole * l_squared
-    k34 = m_cart * m_pole
+    k45 = m_pole * l_squared
+    pivot_theta_dot = I_pole + k45
+    k46 = m_cart * I_pole
+    k47 = m_pole * I_pole
+    k48 = m_cart * k45
     m_pole_squared = m_pole * m_pole
     k1 = l_squared * m_pole_squared
-    k2 = m_pole * I_pole + (m_cart * I_pole + l_squared * k34)
+    k2 = k47 + (k46 + k48)
     k3 = 1.0 / pivot_theta_dot
     k4 = m_pole * l
-    k35 = g * l_squared
-    k5 = m_pole_squared * k35 / pivot_theta_dot
-    k29 = g * k4
-    k6 = k29 / pivot_theta_dot
-    k7 = k4 / pivot_theta_dot
-    k8 = k3 * (k1 * 2.0)
-    k9 = k4 * 2.0
-    k10 = pivot_theta_dot * k3
-    k36 = m_pole * 2.0
-    k11 = l_squared * k36
-    k12 = I_pole + m_cart * l_squared
-    k13 = l_squared * k3 / pivot_theta_dot
-    k14 = (k35 * k36 - l_squared * k5) / pivot_theta_dot
-    k15 = (l * g - l_squared * k6) / pivot_theta_dot
-    k16 = (l - l_squared * k7) / pivot_theta_dot
-    k30 = m_cart + m_pole
-    k17 = k3 / pivot_theta_dot
-    k18 = k3 * k30
-    k19 = k5 / pivot_theta_dot
-    k20 = k6 / pivot_theta_dot
-    k21 = k7 / pivot_theta_dot
-    k37 = l * 2.0
-    k38 = m_pole * k37
-    k22 = k34 * k37
-    k23 = m_pole_squared * k37
-    k24 = k3 * k38 / pivot_theta_dot
-    k25 = (m_pole_squared * (g * k37) - k5 * k38) / pivot_theta_dot
-    k31 = m_pole * g
-    k26 = (k31 - k6 * k38) / pivot_theta_dot
-    k27 = (m_pole - k7 * k38) / pivot_theta_dot
-    k28 = k1 / pivot_theta_dot
+    k5 = g * k1 / pivot_theta_dot
+    k35 = g * k4
+    k34 = k35 / pivot_theta_dot
+    k6 = k4 / pivot_theta_dot
+    k7 = -k34
+    k8 = m_pole * k45
+    k36 = m_cart + m_pole
+    k9 = k48 + I_pole * k36
+    k49 = g * l_squared
+    k10 = m_pole_squared * k49 / pivot_theta_dot
+    k11 = 2.0 * (m_pole * (l * (k3 * k4)))
+    k12 = k4 * 2.0
+    k13 = -k6
+    k50 = m_cart * m_pole
+    k14 = k47 + (k46 + l_squared * k50)
+    k15 = pivot_theta_dot * k3
+    k51 = m_pole * 2.0
+    k16 = l_squared * k51
+    k17 = I_pole + m_cart * l_squared
+    k18 = l_squared * k3 / pivot_theta_dot
+    k19 = (k49 * k51 - l_squared * k10) / pivot_theta_dot
+    k20 = (l - l_squared * k6) / pivot_theta_dot
+    k21 = -(l * g - l_squared * k34) / pivot_theta_dot
+    k22 = k3 / pivot_theta_dot
+    k23 = k3 * k36
+    k24 = k10 / pivot_theta_dot
+    k25 = k34 / pivot_theta_dot
+    k26 = k6 / pivot_theta_dot
+    k52 = l * 2.0
+    k53 = m_pole * k52
+    k27 = k50 * k52
+    k28 = m_pole_squared * k52
+    k29 = k3 * k53 / pivot_theta_dot
+    k30 = (g * k28 - k10 * k53) / pivot_theta_dot
+    k54 = m_pole * g
+    k31 = (m_pole - k6 * k53) / pivot_theta_dot
+    k32 = -(k54 - k34 * k53) / pivot_theta_dot
+    k33 = k1 / pivot_theta_dot
+    k37 = -k4
+    k38 = l * k54
+    k39 = -k38
     inertia_pole_zz = I_pole + l * k4
-    k32 = m_cart * g
-    k33 = l + l
+    k40 = -m_cart
+    k41 = -m_cart * g
+    k42 = -l
+    k43 = l + l
+    k44 = -k43
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
-        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9),
-        "input_jacobian": (k1, k2, k3, k7),
-        "parameter_jacobian": (m_pole, l, k1, k2, k3, k4, k5, k7, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28),
-        "forward_dynamics": (k1, k2, k3, k4, k5, k6, k7),
-        "inverse_dynamics": (pivot_theta_dot, k4, k29, k30),
-        "mass_matrix": (pivot_theta_dot, k4, k30),
-        "velocity_force": (k4,),
-        "gravity_force": (k29,),
-        "bias_force": (k4, k29),
+        "jacobian": (k3, k4, k6, k7, k8, k9, k10, k11, k12, k13),
+        "input_jacobian": (k2, k3, k8, k13),
+        "parameter_jacobian": (m_pole, l, k1, k3, k4, k6, k10, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33),
+        "forward_dynamics": (k1, k2, k3, k4, k5, k34, k6),
+        "inverse_dynamics": (pivot_theta_dot, k4, k35, k36),
+        "mass_matrix": (pivot_theta_dot, k4, k36),
+        "velocity_force": (k37,),
+        "gravity_force": (k38,),
+        "bias_force": (g, k4),
         "applied_force": (),
         "kinetic_energy": (m_cart, m_pole, I_pole, l),
-        "potential_energy": (l, k31),
-        "effect_powers": (l, k31),
+        "potential_energy": (k39,),
+        "effect_powers": (k39,),
         "momentum": (m_cart, m_pole, k4, inertia_pole_zz),
-        "centre_of_mass": (m_cart, m_pole, l, k30),
-        "joint_forces": (m_cart, m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k6, k7, k32),
-        "body_poses": (l,),
+        "centre_of_mass": (m_cart, m_pole, l, k36, k37),
+        "joint_forces": (m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k34, k6, k40, k41),
+        "body_poses": (l, k42),
         "body_velocities": (l,),
-        "point_positions": (k33,),
-        "point_velocities": (k33,),
-        "point_jacobians": (k33,),
+        "point_positions": (k43, k44),
+        "point_velocities": (k43,),
+        "point_jacobians": (k43,),
     }
 
 
@@ -218,7 +235,7 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """18 operations: 4 add, 10 mul, 1 div, 1 neg, 1 sin, 1 cos."""
+    """17 operations: 3 add, 1 sub, 10 mul, 1 div, 1 sin, 1 cos."""
     k1, k2, k3, k4, k5, k6, k7 = k
     _, theta, x_dot, theta_dot = y
     push, = u
@@ -229,23 +246,22 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
         x_dot,
         theta_dot,
         x_ddot,
-        -(sin_theta * k6 + k7 * (cos_theta * x_ddot)),
+        sin_theta * k7 - k6 * (cos_theta * x_ddot),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """35 operations: 4 add, 3 sub, 21 mul, 3 div, 2 neg, 1 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k8, k9 = k
+    """32 operations: 3 add, 4 sub, 20 mul, 3 div, 1 sin, 1 cos."""
+    k3, k4, k6, k7, k8, k9, k10, k11, k12, k13 = k
     _, theta, _, theta_dot = y
     push, = u
     sin_theta = sin(theta)
-    pivot_x_dot = (sin_theta * sin_theta * k1 + k2) * k3
     cos_theta = cos(theta)
-    s1 = theta_dot * theta_dot * k4 + cos_theta * k5
-    x_ddot = (push + sin_theta * s1) / pivot_x_dot
-    s2 = cos_theta * s1 - sin_theta * (sin_theta * k5) - x_ddot * (sin_theta * cos_theta * k8)
-    s3 = s2 / pivot_x_dot
-    s4 = sin_theta * (theta_dot * k9) / pivot_x_dot
+    pivot_x_dot = (sin_theta * sin_theta * k8 + k9) * k3
+    s1 = theta_dot * theta_dot * k4 + cos_theta * k10
+    s2 = sin_theta * ((push + sin_theta * s1) / pivot_x_dot)
+    s3 = (cos_theta * s1 - sin_theta * (sin_theta * k10) - s2 * (cos_theta * k11)) / pivot_x_dot
+    s4 = k12 * (theta_dot * sin_theta) / pivot_x_dot
     return (
         0.0,
         0.0,
@@ -260,46 +276,48 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         s4,
         0.0,
-        -(cos_theta * k6 + k7 * (cos_theta * s3 - sin_theta * x_ddot)),
+        cos_theta * k7 - k6 * (cos_theta * s3 - s2),
         0.0,
-        -k7 * (cos_theta * s4),
+        k13 * (cos_theta * s4),
     )
 
 
 def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """10 operations: 1 add, 5 mul, 1 div, 1 neg, 1 sin, 1 cos."""
-    k1, k2, k3, k7 = k
+    """9 operations: 1 add, 5 mul, 1 div, 1 sin, 1 cos."""
+    k2, k3, k8, k13 = k
     _, theta, _, _ = y
     sin_theta = sin(theta)
-    s5 = 1.0 / ((sin_theta * sin_theta * k1 + k2) * k3)
+    s5 = 1.0 / ((sin_theta * sin_theta * k8 + k2) * k3)
     return (
         0.0,
         0.0,
         s5,
-        -k7 * (cos(theta) * s5),
+        k13 * (cos(theta) * s5),
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """78 operations: 15 add, 5 sub, 45 mul, 6 div, 5 neg, 1 sin, 1 cos."""
-    m_pole, l, k1, k2, k3, k4, k5, k7, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28 = k
+    """71 operations: 13 add, 7 sub, 41 mul, 6 div, 2 neg, 1 sin, 1 cos."""
+    m_pole, l, k1, k3, k4, k6, k10, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33 = k
     _, theta, _, theta_dot = y
     push, = u
     sin_theta = sin(theta)
     s6 = sin_theta * sin_theta
-    s7 = s6 * k1 + k2
-    pivot_x_dot = s7 * k3
     theta_dot_squared = theta_dot * theta_dot
     cos_theta = cos(theta)
-    x_ddot = (push + sin_theta * (theta_dot_squared * k4 + cos_theta * k5)) / pivot_x_dot
-    s8 = cos_theta * x_ddot
-    s9 = x_ddot * k10 / pivot_x_dot
-    s10 = sin_theta * (l * theta_dot_squared + cos_theta * k14) - x_ddot * (k3 * (s6 * k11 + k12) - s7 * k13)
-    s11 = s10 / pivot_x_dot
-    s12 = (sin_theta * (cos_theta * k19) + x_ddot * (k18 - s7 * k17)) / pivot_x_dot
-    s13 = sin_theta * (m_pole * theta_dot_squared + cos_theta * k25) - x_ddot * (k3 * (k22 + s6 * k23) - s7 * k24)
-    s14 = s13 / pivot_x_dot
-    s15 = sin_theta * (cos_theta * k28) / pivot_x_dot
+    s7 = s6 * k1 + k14
+    pivot_x_dot_2 = s7 * k3
+    x_ddot_2 = (push + sin_theta * (theta_dot_squared * k4 + cos_theta * k10)) / pivot_x_dot_2
+    s8 = cos_theta * x_ddot_2
+    s9 = x_ddot_2 * k15 / pivot_x_dot_2
+    s10 = cos_theta * k6
+    s11 = sin_theta * (l * theta_dot_squared + cos_theta * k19) - x_ddot_2 * (k3 * (s6 * k16 + k17) - s7 * k18)
+    s12 = s11 / pivot_x_dot_2
+    s13 = sin_theta * cos_theta
+    s14 = (k24 * s13 + x_ddot_2 * (k23 - s7 * k22)) / pivot_x_dot_2
+    s15 = sin_theta * (m_pole * theta_dot_squared + cos_theta * k30) - x_ddot_2 * (k3 * (k27 + s6 * k28) - s7 * k29)
+    s16 = s15 / pivot_x_dot_2
+    s17 = s13 * k33 / pivot_x_dot_2
     return (
         0.0,
         0.0,
@@ -312,90 +330,91 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         -s9,
-        s11,
-        -s12,
-        s14,
-        s15,
-        k7 * (cos_theta * s9),
-        -(sin_theta * k15 + (s8 * k16 + k7 * (cos_theta * s11))),
-        sin_theta * k20 + (s8 * k21 + k7 * (cos_theta * s12)),
-        -(sin_theta * k26 + (s8 * k27 + k7 * (cos_theta * s14))),
-        -k7 * (sin_theta + cos_theta * s15),
+        s12,
+        -s14,
+        s16,
+        s17,
+        s9 * s10,
+        sin_theta * k21 - (s8 * k20 + s10 * s12),
+        sin_theta * k25 + (s8 * k26 + s10 * s14),
+        sin_theta * k32 - (s8 * k31 + s10 * s16),
+        k13 * (sin_theta + cos_theta * s17),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """23 operations: 4 add, 3 sub, 13 mul, 1 div, 1 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6, k7 = k
+    """22 operations: 4 add, 3 sub, 12 mul, 1 div, 1 sin, 1 cos."""
+    k1, k2, k3, k4, k5, k34, k6 = k
     _, theta, _, theta_dot = y
     push, = u
     tau__x_dot, tau__theta_dot = extra
     sin_theta = sin(theta)
     cos_theta = cos(theta)
-    s16 = sin_theta * (theta_dot * theta_dot * k4 + cos_theta * k5) + (push + tau__x_dot)
-    x_ddot_2 = (s16 - k7 * (cos_theta * tau__theta_dot)) / ((sin_theta * sin_theta * k1 + k2) * k3)
+    s10 = cos_theta * k6
+    s18 = sin_theta * (theta_dot * theta_dot * k4 + cos_theta * k5) + (push + tau__x_dot)
+    x_ddot_3 = (s18 - tau__theta_dot * s10) / ((sin_theta * sin_theta * k1 + k2) * k3)
     return (
-        x_ddot_2,
-        k3 * tau__theta_dot - sin_theta * k6 - k7 * (cos_theta * x_ddot_2),
+        x_ddot_3,
+        k3 * tau__theta_dot - sin_theta * k34 - s10 * x_ddot_3,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """16 operations: 3 add, 2 sub, 9 mul, 1 sin, 1 cos."""
-    pivot_theta_dot, k4, k29, k30 = k
+    pivot_theta_dot, k4, k35, k36 = k
     _, theta, _, theta_dot = y
     push, = u
     vd__x_dot, vd__theta_dot = extra
     sin_theta = sin(theta)
     cos_theta = cos(theta)
-    s17 = k30 * vd__x_dot + k4 * (cos_theta * vd__theta_dot - sin_theta * (theta_dot * theta_dot))
+    s19 = k36 * vd__x_dot + k4 * (cos_theta * vd__theta_dot - sin_theta * (theta_dot * theta_dot))
     return (
-        s17 - push,
-        k4 * (cos_theta * vd__x_dot) + (pivot_theta_dot * vd__theta_dot + sin_theta * k29),
+        s19 - push,
+        k4 * (cos_theta * vd__x_dot) + (pivot_theta_dot * vd__theta_dot + sin_theta * k35),
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     """2 operations: 1 mul, 1 cos."""
-    pivot_theta_dot, k4, k30 = k
+    pivot_theta_dot, k4, k36 = k
     _, theta, _, _ = y
-    s18 = k4 * cos(theta)
+    s20 = k4 * cos(theta)
     return (
-        k30,
-        s18,
-        s18,
+        k36,
+        s20,
+        s20,
         pivot_theta_dot,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin):
-    """5 operations: 3 mul, 1 neg, 1 sin."""
-    k4, = k
+    """4 operations: 3 mul, 1 sin."""
+    k37, = k
     _, theta, _, theta_dot = y
     return (
-        -k4 * (sin(theta) * (theta_dot * theta_dot)),
+        k37 * (theta_dot * (theta_dot * sin(theta))),
         0.0,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), sin=sin):
     """2 operations: 1 mul, 1 sin."""
-    k29, = k
+    k38, = k
     _, theta, _, _ = y
     return (
         0.0,
-        sin(theta) * k29,
+        sin(theta) * k38,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin):
     """6 operations: 4 mul, 1 neg, 1 sin."""
-    k4, k29 = k
+    g, k4 = k
     _, theta, _, theta_dot = y
-    sin_theta = sin(theta)
+    s21 = sin(theta) * k4
     return (
-        -k4 * (sin_theta * (theta_dot * theta_dot)),
-        sin_theta * k29,
+        -theta_dot * theta_dot * s21,
+        g * s21,
     )
 
 
@@ -409,33 +428,34 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """18 operations: 4 add, 12 mul, 1 sin, 1 cos."""
+    """17 operations: 4 add, 11 mul, 1 sin, 1 cos."""
     m_cart, m_pole, I_pole, l = k
     _, theta, x_dot, theta_dot = y
-    s19 = theta_dot * (l * sin(theta))
-    s20 = x_dot + theta_dot * (l * cos(theta))
-    s21 = m_cart * (x_dot * x_dot) + m_pole * (s20 * s20 + s19 * s19) + theta_dot * (I_pole * theta_dot)
+    s22 = l * theta_dot
+    s23 = sin(theta) * s22
+    s24 = x_dot + cos(theta) * s22
+    s25 = m_cart * (x_dot * x_dot) + m_pole * (s24 * s24 + s23 * s23) + theta_dot * (I_pole * theta_dot)
     return (
-        0.5 * s21,
+        0.5 * s25,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
-    """4 operations: 2 mul, 1 neg, 1 cos."""
-    l, k31 = k
+    """2 operations: 1 mul, 1 cos."""
+    k39, = k
     _, theta, _, _ = y
     return (
-        -k31 * (l * cos(theta)),
+        cos(theta) * k39,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), sin=sin):
-    """6 operations: 4 mul, 1 neg, 1 sin."""
-    l, k31 = k
+    """4 operations: 3 mul, 1 sin."""
+    k39, = k
     _, theta, x_dot, theta_dot = y
     push, = u
     return (
-        -k31 * (theta_dot * (l * sin(theta))),
+        k39 * (theta_dot * sin(theta)),
         x_dot * push,
     )
 
@@ -444,107 +464,109 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """15 operations: 4 add, 9 mul, 1 sin, 1 cos."""
     m_cart, m_pole, k4, inertia_pole_zz = k
     x, theta, x_dot, theta_dot = y
-    s18 = k4 * cos(theta)
-    s22 = theta_dot * (sin(theta) * k4)
+    s20 = k4 * cos(theta)
+    s26 = theta_dot * (sin(theta) * k4)
     return (
-        m_cart * x_dot + (m_pole * x_dot + theta_dot * s18),
-        s22,
-        theta_dot * inertia_pole_zz + x_dot * s18 + x * s22,
+        m_cart * x_dot + (m_pole * x_dot + theta_dot * s20),
+        s26,
+        theta_dot * inertia_pole_zz + x_dot * s20 + x * s26,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """12 operations: 2 add, 5 mul, 2 div, 1 neg, 1 sin, 1 cos."""
-    m_cart, m_pole, l, k30 = k
+    """10 operations: 2 add, 4 mul, 2 div, 1 sin, 1 cos."""
+    m_cart, m_pole, l, k36, k37 = k
     x, theta, _, _ = y
     return (
-        (m_cart * x + m_pole * (x + l * sin(theta))) / k30,
-        -m_pole * (l * cos(theta)) / k30,
+        (m_cart * x + m_pole * (x + l * sin(theta))) / k36,
+        cos(theta) * k37 / k36,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """43 operations: 10 add, 4 sub, 22 mul, 1 div, 4 neg, 1 sin, 1 cos."""
-    m_cart, m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k6, k7, k32 = k
+    """41 operations: 8 add, 6 sub, 22 mul, 1 div, 2 neg, 1 sin, 1 cos."""
+    m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k34, k6, k40, k41 = k
     x, theta, _, theta_dot = y
     push, = u
     sin_theta = sin(theta)
     theta_dot_squared = theta_dot * theta_dot
     cos_theta = cos(theta)
     x_ddot = (push + sin_theta * (theta_dot_squared * k4 + cos_theta * k5)) / ((sin_theta * sin_theta * k1 + k2) * k3)
-    s23 = sin_theta * k6 + k7 * (cos_theta * x_ddot)
-    s24 = l * sin_theta
-    s25 = l * cos_theta
-    s26 = m_pole * (x_ddot - (theta_dot_squared * s24 + s23 * s25))
-    s27 = m_pole * (g + (theta_dot_squared * s25 - s23 * s24))
-    s28 = I_pole * s23 - (s27 * (x + s24 - x) + s25 * s26)
+    s27 = l * sin_theta
+    s28 = sin_theta * k34 + k6 * (cos_theta * x_ddot)
+    s29 = l * cos_theta
+    s30 = m_pole * (x_ddot - (theta_dot_squared * s27 + s28 * s29))
+    s31 = m_pole * (g + (theta_dot_squared * s29 - s28 * s27))
+    s32 = I_pole * s28 - (s31 * (x + s27 - x) + s29 * s30)
     return (
-        -(m_cart * x_ddot + s26),
-        -(k32 + s27),
-        s28,
-        -s26,
-        -s27,
-        s28,
+        k40 * x_ddot - s30,
+        k41 - s31,
+        s32,
+        -s30,
+        -s31,
+        s32,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """6 operations: 1 add, 2 mul, 1 neg, 1 sin, 1 cos."""
-    l, = k
+    """5 operations: 1 add, 2 mul, 1 sin, 1 cos."""
+    l, k42 = k
     x, theta, _, _ = y
     return (
         x,
         0.0,
         0.0,
         x + l * sin(theta),
-        -l * cos(theta),
+        k42 * cos(theta),
         theta,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """7 operations: 1 add, 4 mul, 1 sin, 1 cos."""
+    """6 operations: 1 add, 3 mul, 1 sin, 1 cos."""
     l, = k
     _, theta, x_dot, theta_dot = y
+    s22 = l * theta_dot
     return (
         x_dot,
         0.0,
         0.0,
-        x_dot + theta_dot * (l * cos(theta)),
-        theta_dot * (l * sin(theta)),
+        x_dot + cos(theta) * s22,
+        sin(theta) * s22,
         theta_dot,
     )
 
 
 def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """6 operations: 1 add, 2 mul, 1 neg, 1 sin, 1 cos."""
-    k33, = k
+    """5 operations: 1 add, 2 mul, 1 sin, 1 cos."""
+    k43, k44 = k
     x, theta, _, _ = y
     return (
-        x + sin(theta) * k33,
-        -cos(theta) * k33,
+        x + sin(theta) * k43,
+        cos(theta) * k44,
     )
 
 
 def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """7 operations: 1 add, 4 mul, 1 sin, 1 cos."""
-    k33, = k
+    """6 operations: 1 add, 3 mul, 1 sin, 1 cos."""
+    k43, = k
     _, theta, x_dot, theta_dot = y
+    s33 = theta_dot * k43
     return (
-        x_dot + theta_dot * (cos(theta) * k33),
-        theta_dot * (sin(theta) * k33),
+        x_dot + cos(theta) * s33,
+        sin(theta) * s33,
     )
 
 
 def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     """6 operations: 1 add, 1 sub, 2 mul, 1 sin, 1 cos."""
-    k33, = k
+    k43, = k
     x, theta, _, _ = y
     return (
         1.0,
-        cos(theta) * k33,
+        cos(theta) * k43,
         0.0,
-        x + sin(theta) * k33 - x,
+        x + sin(theta) * k43 - x,
     )
 
 
@@ -570,17 +592,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -589,19 +630,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -616,7 +666,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 2
 _COLUMNS = {
     "sin": np.sin,
@@ -722,17 +772,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -801,7 +852,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (2, 2), ('cos',), y, p, u)
 
 

@@ -16,12 +16,13 @@ Parameters p, with the scene's values:
     g = 9.81   m/s^2  gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 28 operations: 7 add, 1 sub, 14 mul, 1 div, 1 neg, 1 sin, 3 cos; 23
-more on parameters alone are done once.
+One call of `derivative` takes 27 operations: 6 add, 2 sub, 14 mul, 1 div, 1 sin, 3 cos; 24 more on
+parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (4, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (4, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (5, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -71,24 +72,24 @@ JOINTS = ('shoulder', 'elbow')
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 7, "sub": 1, "mul": 14, "div": 1, "neg": 1, "sin": 1, "cos": 3, "total": 28, "parameters": 23},
-    "jacobian": {"add": 14, "sub": 7, "mul": 37, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 73, "parameters": 25},
+    "derivative": {"add": 6, "sub": 2, "mul": 14, "div": 1, "sin": 1, "cos": 3, "total": 27, "parameters": 24},
+    "jacobian": {"add": 10, "sub": 10, "mul": 35, "div": 5, "neg": 1, "sin": 3, "cos": 3, "total": 67, "parameters": 26},
     "forward_dynamics": {"add": 4, "sub": 7, "mul": 14, "div": 1, "sin": 1, "cos": 3, "total": 30, "parameters": 23},
-    "inverse_dynamics": {"add": 12, "sub": 1, "mul": 14, "sin": 1, "cos": 3, "total": 31, "parameters": 19},
+    "inverse_dynamics": {"add": 11, "sub": 1, "mul": 13, "sin": 1, "cos": 3, "total": 29, "parameters": 20},
     "mass_matrix": {"add": 2, "mul": 2, "cos": 1, "total": 5, "parameters": 12},
     "velocity_force": {"add": 1, "sub": 1, "mul": 5, "sin": 1, "total": 8, "parameters": 3},
-    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 9},
+    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 8},
     "bias_force": {"add": 5, "sub": 1, "mul": 7, "sin": 1, "cos": 2, "total": 16, "parameters": 11},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 11, "mul": 17, "sin": 2, "cos": 2, "total": 32, "parameters": 10},
+    "kinetic_energy": {"add": 11, "mul": 16, "sin": 2, "cos": 2, "total": 31, "parameters": 10},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 4},
-    "effect_powers": {"add": 5, "mul": 6, "neg": 1, "cos": 2, "total": 14, "parameters": 4},
-    "momentum": {"add": 17, "mul": 22, "neg": 1, "sin": 2, "cos": 2, "total": 44, "parameters": 8},
+    "effect_powers": {"add": 3, "sub": 2, "mul": 6, "cos": 2, "total": 13, "parameters": 5},
+    "momentum": {"add": 16, "sub": 1, "mul": 21, "sin": 2, "cos": 2, "total": 42, "parameters": 9},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 4},
     "joint_forces": {"add": 12, "sub": 5, "mul": 28, "div": 1, "sin": 3, "cos": 3, "total": 52, "parameters": 31},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 2},
-    "body_velocities": {"add": 6, "mul": 7, "neg": 2, "sin": 2, "cos": 2, "total": 19, "parameters": 2},
-    "parameter_jacobian": {"add": 29, "sub": 10, "mul": 63, "div": 6, "neg": 5, "sin": 1, "cos": 3, "total": 117, "parameters": 56},
+    "body_velocities": {"add": 6, "mul": 6, "neg": 2, "sin": 2, "cos": 2, "total": 18, "parameters": 2},
+    "parameter_jacobian": {"add": 27, "sub": 12, "mul": 62, "div": 6, "neg": 3, "sin": 1, "cos": 3, "total": 114, "parameters": 56},
 }
 
 
@@ -123,80 +124,85 @@ def _fixed(m_1, m_2, l_1, l_2, g):
     if not m_2 * (l_2 * l_2) / 12.0 >= 0.0:
         return "inertia_com of lower is negative"
     l_2_squared = l_2 * l_2
-    k43 = m_2 * l_2_squared
-    pivot_lower = k43 / 3.0
+    k47 = m_2 * l_2_squared
+    pivot_lower = k47 / 3.0
     l_1_squared = l_1 * l_1
-    k44 = m_2 * 3.0
-    k45 = k44 + m_1 * 4.0
-    k1 = l_1_squared * k45 / 12.0
-    k2 = l_1_squared * k44 / 4.0
-    k24 = m_2 * l_1
-    k11 = l_2 * k24
-    k3 = k11 / 2.0
-    k46 = m_2 * l_2
-    k4 = g * k46 / 2.0
+    k48 = m_2 * 3.0
+    k49 = k48 + m_1 * 4.0
+    k1 = l_1_squared * k49 / 12.0
+    k2 = l_1_squared * k48 / 4.0
+    k28 = m_2 * l_1
+    k10 = l_2 * k28
+    k3 = k10 / 2.0
+    k50 = m_2 * l_2
+    k4 = g * k50 / 2.0
     k5 = 1.0 / pivot_lower
-    k7 = g * k24
-    k47 = m_1 * l_1
-    k8 = g * k47 / 2.0
-    k6 = k7 + k8
-    k9 = k2 * 2.0
-    k10 = 2.0 * k3
-    k48 = m_1 * l_1_squared
-    k12 = k48 / 3.0 + (pivot_lower + m_2 * l_1_squared)
-    k13 = l_1 / 2.0
-    k14 = m_1 / 2.0
-    k15 = l_2 / 2.0
-    k16 = m_2 / 2.0
-    k17 = k48 / 24.0
-    k18 = k43 / 24.0
-    k19 = m_2 * g
-    k20 = m_1 * g
-    k21 = k43 / 12.0
-    k22 = k48 / 12.0
-    k49 = m_1 + m_2
-    k23 = 1.0 / k49
-    k25 = k46 / 2.0
-    k50 = m_2 * 2.0
-    k26 = l_1 * (m_1 + k50) / 2.0
-    k27 = g * k49
-    k28 = l_1_squared * 4.0 / 12.0
-    k29 = l_1 * g
-    k30 = k29 / 2.0
-    k51 = 3.0 * l_1_squared
-    k31 = k51 / 12.0
-    k32 = k51 / 4.0
-    k33 = l_1 * l_2 / 2.0
-    k34 = l_2 * g / 2.0
-    k35 = k5 * (l_2_squared / 3.0) / pivot_lower
-    k52 = l_1 * 2.0
-    k36 = k45 * k52 / 12.0
-    k37 = k44 * k52 / 4.0
-    k38 = k19 + k20 / 2.0
-    k39 = k24 / 2.0
-    k40 = k19 / 2.0
-    k41 = k5 * (l_2 * k50 / 3.0) / pivot_lower
-    k42 = k24 + k47 / 2.0
+    k51 = m_1 * l_1
+    k6 = g * k28 + g * k51 / 2.0
+    k7 = -k5
+    k8 = k2 * 2.0
+    k9 = 2.0 * k3
+    k52 = m_2 * l_1_squared
+    k53 = m_1 * l_1_squared
+    k54 = k53 / 3.0
+    k11 = k52 + (pivot_lower + k54)
+    k12 = k54 + (pivot_lower + k52)
+    k21 = m_2 * g
+    k13 = l_2 * k21 / 2.0
+    k32 = l_1 * g
+    k14 = l_1 * k21 + m_1 * k32 / 2.0
+    k15 = l_1 / 2.0
+    k16 = m_1 / 2.0
+    k17 = l_2 / 2.0
+    k18 = m_2 / 2.0
+    k19 = k53 / 24.0
+    k20 = k47 / 24.0
+    k22 = m_1 * g
+    k23 = -k17
+    k24 = -m_2
+    k25 = k47 / 12.0
+    k26 = k53 / 12.0
+    k55 = m_1 + m_2
+    k27 = 1.0 / k55
+    k29 = k50 / 2.0
+    k30 = l_1 * (m_1 + m_2 * 2.0) / 2.0
+    k31 = g * k55
+    k33 = l_1_squared * 4.0 / 12.0
+    k34 = k32 / 2.0
+    k56 = 3.0 * l_1_squared
+    k35 = k56 / 12.0
+    k36 = k56 / 4.0
+    k37 = l_1 * l_2 / 2.0
+    k38 = l_2 * g / 2.0
+    k39 = k5 * (l_2_squared / 3.0) / pivot_lower
+    k57 = l_1 * 2.0
+    k40 = k49 * k57 / 12.0
+    k41 = k48 * k57 / 4.0
+    k42 = k21 + k22 / 2.0
+    k43 = k28 / 2.0
+    k44 = k21 / 2.0
+    k45 = k5 * (2.0 * k50 / 3.0) / pivot_lower
+    k46 = k28 + k51 / 2.0
     return {
         "initial_state": (),
-        "derivative": (k1, k2, k3, k4, k5, k6),
-        "jacobian": (k1, k2, k3, k4, k5, k7, k8, k6, k9, k10),
+        "derivative": (k1, k2, k3, k4, k5, k6, k7),
+        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9),
         "forward_dynamics": (k1, k2, k3, k4, k5, k6),
-        "inverse_dynamics": (pivot_lower, k11, k3, k4, k7, k8, k12),
-        "mass_matrix": (pivot_lower, k11, k3, k12),
+        "inverse_dynamics": (pivot_lower, k10, k3, k4, k6, k11),
+        "mass_matrix": (pivot_lower, k10, k3, k12),
         "velocity_force": (k3,),
-        "gravity_force": (k4, k6),
+        "gravity_force": (k13, k14),
         "bias_force": (k3, k4, k6),
         "applied_force": (),
-        "kinetic_energy": (k13, k14, k15, k16, k17, k18),
-        "potential_energy": (k13, k15, k19, k20),
-        "effect_powers": (k13, k15, k19, k20),
-        "momentum": (m_1, m_2, k13, k15, k21, k22),
-        "centre_of_mass": (m_1, m_2, k13, k15, k23),
-        "joint_forces": (k1, k2, k24, k3, k4, k5, k6, k19, k25, k26, k27),
-        "body_poses": (k13, k15),
-        "body_velocities": (k13, k15),
-        "parameter_jacobian": (k1, k2, k3, k4, k5, k6, k25, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42),
+        "kinetic_energy": (k15, k16, k17, k18, k19, k20),
+        "potential_energy": (k21, k15, k17, k22),
+        "effect_powers": (k21, k15, k22, k23),
+        "momentum": (m_1, m_2, k15, k17, k24, k25, k26),
+        "centre_of_mass": (m_1, m_2, k15, k17, k27),
+        "joint_forces": (k1, k2, k28, k3, k4, k5, k6, k21, k29, k30, k31),
+        "body_poses": (k15, k17),
+        "body_velocities": (k15, k17),
+        "parameter_jacobian": (k1, k2, k3, k4, k5, k6, k7, k32, k29, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46),
     }
 
 
@@ -246,8 +252,8 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """28 operations: 7 add, 1 sub, 14 mul, 1 div, 1 neg, 1 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6 = k
+    """27 operations: 6 add, 2 sub, 14 mul, 1 div, 1 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k7 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
@@ -260,13 +266,13 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
         theta_1_dot,
         theta_2_dot,
         alpha_upper,
-        -(alpha_upper + k5 * (s2 + coupling_lower_upper * alpha_upper)),
+        k7 * (s2 + coupling_lower_upper * alpha_upper) - alpha_upper,
     )
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """73 operations: 14 add, 7 sub, 37 mul, 5 div, 4 neg, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k7, k8, k6, k9, k10 = k
+    """67 operations: 10 add, 10 sub, 35 mul, 5 div, 1 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k7, k8, k9 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     pivot_upper = k1 + sin_theta_2 * sin_theta_2 * k2
@@ -278,19 +284,17 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     s2 = cos(s3) * k4 + theta_1_dot_squared * s1
     omega_lower = theta_1_dot + theta_2_dot
     omega_lower_squared = omega_lower * omega_lower
-    load_upper = k5 * (coupling_lower_upper * s2) + s1 * omega_lower_squared - cos(theta_1) * k6
-    alpha_upper = load_upper / pivot_upper
-    s4 = k4 * sin(s3)
-    sin_theta_1 = sin(theta_1)
-    s5 = coupling_lower_upper * k5
-    s6 = (k8 * sin_theta_1 + (k7 * sin_theta_1 - s4 * s5)) / pivot_upper
-    s7 = coupling_lower_upper * theta_1_dot_squared - s4
+    s4 = coupling_lower_upper * k5
+    alpha_upper_2 = (s2 * s4 + s1 * omega_lower_squared - cos(theta_1) * k6) / pivot_upper
+    s5 = k4 * sin(s3)
+    s6 = (k6 * sin(theta_1) - s4 * s5) / pivot_upper
+    s7 = coupling_lower_upper * theta_1_dot_squared - s5
     s8 = k5 * (coupling_lower_upper * s7 - s1 * s2) + coupling_lower_upper * omega_lower_squared
-    s9 = (s8 - alpha_upper * (sin_theta_2 * cos_theta_2 * k9)) / pivot_upper
-    s10 = sin_theta_2 * k10
+    s9 = (s8 - alpha_upper_2 * (sin_theta_2 * cos_theta_2 * k8)) / pivot_upper
+    s10 = sin_theta_2 * k9
     s11 = theta_1_dot * s10
     s12 = omega_lower * s10
-    s13 = (s5 * s11 + s12) / pivot_upper
+    s13 = (s4 * s11 + s12) / pivot_upper
     s14 = s12 / pivot_upper
     return (
         0.0,
@@ -305,10 +309,10 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         s9,
         s13,
         s14,
-        -(s6 + k5 * (coupling_lower_upper * s6 - s4)),
-        -(s9 + k5 * (s7 + (coupling_lower_upper * s9 - s1 * alpha_upper))),
-        -(s13 + k5 * (s11 + coupling_lower_upper * s13)),
-        -(s14 + s5 * s14),
+        k7 * (coupling_lower_upper * s6 - s5) - s6,
+        k7 * (s7 + (coupling_lower_upper * s9 - s1 * alpha_upper_2)) - s9,
+        k7 * (s11 + coupling_lower_upper * s13) - s13,
+        -(s14 + s4 * s14),
     )
 
 
@@ -322,41 +326,40 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     s1 = sin_theta_2 * k3
     omega_lower = theta_1_dot + theta_2_dot
     load_lower = tau__theta_2 - cos(theta_1 + theta_2) * k4 - theta_1_dot * theta_1_dot * s1
-    s15 = tau__theta_1 + s1 * (omega_lower * omega_lower) - tau__theta_2 - coupling_lower_upper * k5 * load_lower
-    alpha_upper_2 = (s15 - cos(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
+    s15 = tau__theta_1 + s1 * (omega_lower * omega_lower) - tau__theta_2 - k5 * (coupling_lower_upper * load_lower)
+    alpha_upper_3 = (s15 - cos(theta_1) * k6) / (k1 + sin_theta_2 * sin_theta_2 * k2)
     return (
-        alpha_upper_2,
-        k5 * (load_lower - coupling_lower_upper * alpha_upper_2) - alpha_upper_2,
+        alpha_upper_3,
+        k5 * (load_lower - coupling_lower_upper * alpha_upper_3) - alpha_upper_3,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """31 operations: 12 add, 1 sub, 14 mul, 1 sin, 3 cos."""
-    pivot_lower, k11, k3, k4, k7, k8, k12 = k
+    """29 operations: 11 add, 1 sub, 13 mul, 1 sin, 3 cos."""
+    pivot_lower, k10, k3, k4, k6, k11 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     theta_1_ddot, theta_2_ddot = extra
     cos_theta_2 = cos(theta_2)
     theta_1_dot_squared = theta_1_dot * theta_1_dot
     s16 = cos(theta_1 + theta_2) * k4
     s1 = sin(theta_2) * k3
-    cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
     s17 = pivot_lower + cos_theta_2 * k3
-    s18 = cos_theta_1 * k7 + (theta_1_ddot * (cos_theta_2 * k11 + k12) + theta_2_ddot * s17)
+    s18 = cos(theta_1) * k6 + (theta_1_ddot * (cos_theta_2 * k10 + k11) + theta_2_ddot * s17)
     return (
-        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s16 + (cos_theta_1 * k8 + s18)),
+        s1 * (theta_1_dot_squared - omega_lower * omega_lower) + (s16 + s18),
         theta_1_dot_squared * s1 + (s16 + (theta_1_ddot * s17 + theta_2_ddot * pivot_lower)),
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     """5 operations: 2 add, 2 mul, 1 cos."""
-    pivot_lower, k11, k3, k12 = k
+    pivot_lower, k10, k3, k12 = k
     _, theta_2, _, _ = y
     cos_theta_2 = cos(theta_2)
     s17 = pivot_lower + cos_theta_2 * k3
     return (
-        cos_theta_2 * k11 + k12,
+        cos_theta_2 * k10 + k12,
         s17,
         s17,
         pivot_lower,
@@ -378,12 +381,12 @@ def _velocity_force(y, k, u=(), extra=(), sin=sin):
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
-    k4, k6 = k
+    k13, k14 = k
     theta_1, theta_2, _, _ = y
-    s16 = cos(theta_1 + theta_2) * k4
+    s19 = cos(theta_1 + theta_2) * k13
     return (
-        s16 + cos(theta_1) * k6,
-        s16,
+        s19 + cos(theta_1) * k14,
+        s19,
     )
 
 
@@ -410,85 +413,86 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """32 operations: 11 add, 17 mul, 2 sin, 2 cos."""
-    k13, k14, k15, k16, k17, k18 = k
+    """31 operations: 11 add, 16 mul, 2 sin, 2 cos."""
+    k15, k16, k17, k18, k19, k20 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s3 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s19 = theta_1_dot * k13
-    s20 = sin(theta_1) * s19
-    yd_upper = cos(theta_1) * s19
-    s21 = sin(s3) * (omega_lower * k15) + (s20 + s20)
-    yd_lower = omega_lower * (cos(s3) * k15) + (yd_upper + yd_upper)
-    s22 = (s20 * s20 + yd_upper * yd_upper) * k14 + (s21 * s21 + yd_lower * yd_lower) * k16
+    s20 = theta_1_dot * k15
+    s21 = sin(theta_1) * s20
+    yd_upper = cos(theta_1) * s20
+    s22 = omega_lower * k17
+    s23 = sin(s3) * s22 + (s21 + s21)
+    yd_lower = cos(s3) * s22 + (yd_upper + yd_upper)
+    s24 = (s21 * s21 + yd_upper * yd_upper) * k16 + (s23 * s23 + yd_lower * yd_lower) * k18
     return (
-        omega_lower * omega_lower * k18 + (theta_1_dot * theta_1_dot * k17 + s22),
+        omega_lower * omega_lower * k20 + (theta_1_dot * theta_1_dot * k19 + s24),
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    k13, k15, k19, k20 = k
+    k21, k15, k17, k22 = k
     theta_1, theta_2, _, _ = y
-    y_upper = sin(theta_1) * k13
+    y_upper = sin(theta_1) * k15
     return (
-        (sin(theta_1 + theta_2) * k15 + (y_upper + y_upper)) * k19 + y_upper * k20,
+        (sin(theta_1 + theta_2) * k17 + (y_upper + y_upper)) * k21 + y_upper * k22,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos):
-    """14 operations: 5 add, 6 mul, 1 neg, 2 cos."""
-    k13, k15, k19, k20 = k
+    """13 operations: 3 add, 2 sub, 6 mul, 2 cos."""
+    k21, k15, k22, k23 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
-    yd_upper = cos(theta_1) * (theta_1_dot * k13)
-    yd_lower = (theta_1_dot + theta_2_dot) * (cos(theta_1 + theta_2) * k15) + (yd_upper + yd_upper)
+    yd_upper_2 = k15 * (theta_1_dot * cos(theta_1))
+    s25 = k23 * (cos(theta_1 + theta_2) * (theta_1_dot + theta_2_dot)) - (yd_upper_2 + yd_upper_2)
     return (
-        -(yd_lower * k19 + yd_upper * k20),
+        s25 * k21 - yd_upper_2 * k22,
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """44 operations: 17 add, 22 mul, 1 neg, 2 sin, 2 cos."""
-    m_1, m_2, k13, k15, k21, k22 = k
+    """42 operations: 16 add, 1 sub, 21 mul, 2 sin, 2 cos."""
+    m_1, m_2, k15, k17, k24, k25, k26 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s3 = theta_1 + theta_2
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    sin_theta_1_theta_2 = sin(s3)
     sin_theta_1 = sin(theta_1)
-    s19 = theta_1_dot * k13
-    s20 = sin_theta_1 * s19
-    yd_upper = cos_theta_1 * s19
-    s21 = sin_theta_1_theta_2 * (omega_lower * k15) + (s20 + s20)
-    s23 = cos(s3) * k15
-    yd_lower = omega_lower * s23 + (yd_upper + yd_upper)
-    y_upper = sin_theta_1 * k13
-    x_upper = cos_theta_1 * k13
-    s24 = yd_lower * (s23 + (x_upper + x_upper)) + s21 * (sin_theta_1_theta_2 * k15 + (y_upper + y_upper))
-    s25 = omega_lower * k21 + (m_1 * (yd_upper * x_upper + s20 * y_upper) + m_2 * s24)
+    s20 = theta_1_dot * k15
+    s21 = sin_theta_1 * s20
+    yd_upper = cos_theta_1 * s20
+    y_upper = sin_theta_1 * k15
+    s26 = sin(s3) * k17
+    s27 = omega_lower * s26 + (s21 + s21)
+    s28 = cos(s3) * k17
+    yd_lower_2 = omega_lower * s28 + (yd_upper + yd_upper)
+    x_upper = cos_theta_1 * k15
+    s29 = yd_lower_2 * (s28 + (x_upper + x_upper)) + s27 * (s26 + (y_upper + y_upper))
+    s30 = omega_lower * k25 + (m_1 * (yd_upper * x_upper + s21 * y_upper) + m_2 * s29)
     return (
-        -(m_2 * s21 + m_1 * s20),
-        m_2 * yd_lower + m_1 * yd_upper,
-        theta_1_dot * k22 + s25,
+        k24 * s27 - m_1 * s21,
+        m_2 * yd_lower_2 + m_1 * yd_upper,
+        theta_1_dot * k26 + s30,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
     """21 operations: 7 add, 10 mul, 2 sin, 2 cos."""
-    m_1, m_2, k13, k15, k23 = k
+    m_1, m_2, k15, k17, k27 = k
     theta_1, theta_2, _, _ = y
     s3 = theta_1 + theta_2
-    y_upper = sin(theta_1) * k13
-    x_upper = cos(theta_1) * k13
+    y_upper = sin(theta_1) * k15
+    x_upper = cos(theta_1) * k15
     return (
-        (m_2 * (cos(s3) * k15 + (x_upper + x_upper)) + m_1 * x_upper) * k23,
-        k23 * (m_2 * (sin(s3) * k15 + (y_upper + y_upper)) + m_1 * y_upper),
+        (m_2 * (cos(s3) * k17 + (x_upper + x_upper)) + m_1 * x_upper) * k27,
+        k27 * (m_2 * (sin(s3) * k17 + (y_upper + y_upper)) + m_1 * y_upper),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """52 operations: 12 add, 5 sub, 28 mul, 1 div, 3 sin, 3 cos."""
-    k1, k2, k24, k3, k4, k5, k6, k19, k25, k26, k27 = k
+    k1, k2, k28, k3, k4, k5, k6, k21, k29, k30, k31 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
     coupling_lower_upper = cos(theta_2) * k3
@@ -502,97 +506,95 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     omega_lower_squared = omega_lower * omega_lower
     load_upper = k5 * (coupling_lower_upper * s2) + s1 * omega_lower_squared - cos_theta_1 * k6
     alpha_upper = load_upper / (k1 + sin_theta_2 * sin_theta_2 * k2)
-    s26 = k5 * (s2 + coupling_lower_upper * alpha_upper)
     sin_theta_1_theta_2 = sin(s3)
     sin_theta_1 = sin(theta_1)
-    s27 = k25 * (cos_theta_1_theta_2 * omega_lower_squared - s26 * sin_theta_1_theta_2)
-    s28 = alpha_upper * sin_theta_1 + theta_1_dot_squared * cos_theta_1
-    s29 = theta_1_dot_squared * sin_theta_1 - cos_theta_1 * alpha_upper
-    s30 = k25 * (omega_lower_squared * sin_theta_1_theta_2 + cos_theta_1_theta_2 * s26)
+    s31 = k5 * (s2 + coupling_lower_upper * alpha_upper)
+    s32 = k29 * (cos_theta_1_theta_2 * omega_lower_squared - s31 * sin_theta_1_theta_2)
+    s33 = alpha_upper * sin_theta_1 + theta_1_dot_squared * cos_theta_1
+    s34 = theta_1_dot_squared * sin_theta_1 - cos_theta_1 * alpha_upper
+    s35 = k29 * (omega_lower_squared * sin_theta_1_theta_2 + cos_theta_1_theta_2 * s31)
     return (
-        s27 + k26 * s28,
-        k26 * s29 + s30 - k27,
+        s32 + k30 * s33,
+        k30 * s34 + s35 - k31,
         0.0,
-        s27 + k24 * s28,
-        s30 + k24 * s29 - k19,
+        s32 + k28 * s33,
+        s35 + k28 * s34 - k21,
         0.0,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
     """13 operations: 5 add, 4 mul, 2 sin, 2 cos."""
-    k13, k15 = k
+    k15, k17 = k
     theta_1, theta_2, _, _ = y
     s3 = theta_1 + theta_2
-    y_upper = sin(theta_1) * k13
-    x_upper = cos(theta_1) * k13
+    y_upper = sin(theta_1) * k15
+    x_upper = cos(theta_1) * k15
     return (
         x_upper,
         y_upper,
         theta_1,
-        cos(s3) * k15 + (x_upper + x_upper),
-        sin(s3) * k15 + (y_upper + y_upper),
+        cos(s3) * k17 + (x_upper + x_upper),
+        sin(s3) * k17 + (y_upper + y_upper),
         s3,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """19 operations: 6 add, 7 mul, 2 neg, 2 sin, 2 cos."""
-    k13, k15 = k
+    """18 operations: 6 add, 6 mul, 2 neg, 2 sin, 2 cos."""
+    k15, k17 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     s3 = theta_1 + theta_2
     omega_lower = theta_1_dot + theta_2_dot
-    s19 = theta_1_dot * k13
-    s20 = sin(theta_1) * s19
-    yd_upper = cos(theta_1) * s19
+    s20 = theta_1_dot * k15
+    s21 = sin(theta_1) * s20
+    yd_upper = cos(theta_1) * s20
+    s22 = omega_lower * k17
     return (
-        -s20,
+        -s21,
         yd_upper,
         theta_1_dot,
-        -(sin(s3) * (omega_lower * k15) + (s20 + s20)),
-        omega_lower * (cos(s3) * k15) + (yd_upper + yd_upper),
+        -(sin(s3) * s22 + (s21 + s21)),
+        cos(s3) * s22 + (yd_upper + yd_upper),
         omega_lower,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """117 operations: 29 add, 10 sub, 63 mul, 6 div, 5 neg, 1 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k25, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42 = k
+    """114 operations: 27 add, 12 sub, 62 mul, 6 div, 3 neg, 1 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k7, k32, k29, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46 = k
     theta_1, theta_2, theta_1_dot, theta_2_dot = y
     sin_theta_2 = sin(theta_2)
-    s31 = sin_theta_2 * sin_theta_2
-    pivot_upper = k1 + s31 * k2
+    s36 = sin_theta_2 * sin_theta_2
+    pivot_upper = k1 + s36 * k2
     cos_theta_2 = cos(theta_2)
     coupling_lower_upper = cos_theta_2 * k3
     cos_theta_1_theta_2 = cos(theta_1 + theta_2)
-    theta_1_dot_squared = theta_1_dot * theta_1_dot
-    s32 = sin_theta_2 * theta_1_dot_squared
-    s1 = sin_theta_2 * k3
-    s2 = cos_theta_1_theta_2 * k4 + theta_1_dot_squared * s1
-    s33 = coupling_lower_upper * s2
     cos_theta_1 = cos(theta_1)
     omega_lower = theta_1_dot + theta_2_dot
-    omega_lower_squared = omega_lower * omega_lower
-    s34 = sin_theta_2 * omega_lower_squared
-    alpha_upper = (k5 * s33 + s1 * omega_lower_squared - cos_theta_1 * k6) / pivot_upper
-    s35 = s2 + coupling_lower_upper * alpha_upper
-    s5 = coupling_lower_upper * k5
-    s36 = (cos_theta_1 * k30 + alpha_upper * k28) / pivot_upper
-    s37 = cos_theta_2 * k33
-    s38 = cos_theta_1_theta_2 * k34 + s32 * k33
-    s39 = k5 * (s2 * s37 + coupling_lower_upper * s38) - s33 * k35 + s34 * k33 - cos_theta_1 * k29
-    s40 = (s39 - alpha_upper * (k31 + s31 * k32)) / pivot_upper
-    s41 = k5 * (s38 + (alpha_upper * s37 + coupling_lower_upper * s40)) - s35 * k35
-    s42 = cos_theta_2 * k25
-    s43 = s32 * k25
-    s44 = k5 * (s2 * s42 + coupling_lower_upper * s43) + s34 * k25 - cos_theta_1 * k38
-    s45 = (s44 - alpha_upper * (k36 + s31 * k37)) / pivot_upper
-    s46 = cos_theta_2 * k39
-    s47 = cos_theta_1_theta_2 * k40 + s32 * k39
-    s48 = (k5 * (s2 * s46 + coupling_lower_upper * s47) - s33 * k41 + s34 * k39) / pivot_upper
-    s49 = k5 * (s47 + (alpha_upper * s46 + coupling_lower_upper * s48)) - s35 * k41
-    s50 = cos_theta_1_theta_2 * k25
-    s51 = (s5 * s50 - cos_theta_1 * k42) / pivot_upper
+    s4 = coupling_lower_upper * k5
+    s37 = sin_theta_2 * (theta_1_dot * theta_1_dot)
+    s38 = cos_theta_1_theta_2 * k4 + k3 * s37
+    s39 = coupling_lower_upper * s38
+    s40 = sin_theta_2 * (omega_lower * omega_lower)
+    alpha_upper_4 = (k5 * s39 + k3 * s40 - cos_theta_1 * k6) / pivot_upper
+    s41 = s38 + coupling_lower_upper * alpha_upper_4
+    s42 = (cos_theta_1 * k34 + alpha_upper_4 * k33) / pivot_upper
+    s43 = cos_theta_2 * k37
+    s44 = cos_theta_1_theta_2 * k38 + s37 * k37
+    s45 = k5 * (s38 * s43 + coupling_lower_upper * s44) - s39 * k39 + s40 * k37 - cos_theta_1 * k32
+    s46 = (s45 - alpha_upper_4 * (k35 + s36 * k36)) / pivot_upper
+    s47 = k5 * (s44 + (alpha_upper_4 * s43 + coupling_lower_upper * s46)) - s41 * k39
+    s48 = cos_theta_2 * k29
+    s49 = s37 * k29
+    s50 = k5 * (s38 * s48 + coupling_lower_upper * s49) + s40 * k29 - cos_theta_1 * k42
+    s51 = (s50 - alpha_upper_4 * (k40 + s36 * k41)) / pivot_upper
+    s52 = cos_theta_2 * k43
+    s53 = cos_theta_1_theta_2 * k44 + s37 * k43
+    s54 = (k5 * (s38 * s52 + coupling_lower_upper * s53) - s39 * k45 + s40 * k43) / pivot_upper
+    s55 = k5 * (s53 + (alpha_upper_4 * s52 + coupling_lower_upper * s54)) - s41 * k45
+    s56 = cos_theta_1_theta_2 * k29
+    s57 = (s4 * s56 - cos_theta_1 * k46) / pivot_upper
     return (
         0.0,
         0.0,
@@ -604,16 +606,16 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s36,
-        s40,
-        s45,
-        s48,
+        -s42,
+        s46,
         s51,
-        s36 + s5 * s36,
-        -(s40 + s41),
-        -(s45 + k5 * (s43 + (alpha_upper * s42 + coupling_lower_upper * s45))),
-        -(s48 + s49),
-        -(s51 + k5 * (s50 + coupling_lower_upper * s51)),
+        s54,
+        s57,
+        s42 + s42 * s4,
+        -(s46 + s47),
+        k7 * (s49 + (alpha_upper_4 * s48 + coupling_lower_upper * s51)) - s51,
+        -(s54 + s55),
+        k7 * (s56 + coupling_lower_upper * s57) - s57,
     )
 
 
@@ -639,17 +641,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -658,19 +679,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -685,7 +715,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 2
 _COLUMNS = {
     "sin": np.sin,
@@ -791,17 +821,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -864,7 +895,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (2, 2), ('cos',), y, p, u)
 
 

@@ -21,12 +21,13 @@ Parameters p, with the scene's values:
     g = 9.81            m/s^2   gravitational acceleration
 
 Effects: gravity, motor.
-One call of `derivative` takes 26 operations: 3 add, 4 sub, 16 mul, 1 div, 1 sin, 1 cos; 29 more on
+One call of `derivative` takes 24 operations: 3 add, 4 sub, 14 mul, 1 div, 1 sin, 1 cos; 29 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (4, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (4, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (7, k) and (1, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -82,28 +83,28 @@ JOINTS = ('base', 'hinge')
 POINTS = ('tip',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 3, "sub": 4, "mul": 16, "div": 1, "sin": 1, "cos": 1, "total": 26, "parameters": 29},
-    "jacobian": {"add": 6, "sub": 9, "mul": 39, "div": 4, "neg": 2, "sin": 1, "cos": 1, "total": 62, "parameters": 30},
-    "input_jacobian": {"add": 1, "mul": 4, "div": 1, "neg": 1, "sin": 1, "cos": 1, "total": 9, "parameters": 18},
-    "parameter_jacobian": {"add": 10, "sub": 11, "mul": 50, "div": 8, "neg": 6, "sin": 1, "cos": 1, "total": 87, "parameters": 64},
-    "forward_dynamics": {"add": 5, "sub": 5, "mul": 18, "div": 1, "sin": 1, "cos": 1, "total": 31, "parameters": 32},
-    "inverse_dynamics": {"add": 5, "sub": 3, "mul": 17, "sin": 1, "cos": 1, "total": 27, "parameters": 20},
+    "derivative": {"add": 3, "sub": 4, "mul": 14, "div": 1, "sin": 1, "cos": 1, "total": 24, "parameters": 29},
+    "jacobian": {"add": 6, "sub": 9, "mul": 36, "div": 4, "neg": 2, "sin": 1, "cos": 1, "total": 59, "parameters": 31},
+    "input_jacobian": {"add": 1, "mul": 4, "div": 1, "sin": 1, "cos": 1, "total": 8, "parameters": 19},
+    "parameter_jacobian": {"add": 8, "sub": 13, "mul": 49, "div": 8, "neg": 4, "sin": 1, "cos": 1, "total": 84, "parameters": 65},
+    "forward_dynamics": {"add": 5, "sub": 5, "mul": 17, "div": 1, "sin": 1, "cos": 1, "total": 30, "parameters": 31},
+    "inverse_dynamics": {"add": 5, "sub": 3, "mul": 17, "sin": 1, "cos": 1, "total": 27, "parameters": 18},
     "mass_matrix": {"add": 1, "mul": 3, "sin": 1, "cos": 1, "total": 6, "parameters": 14},
-    "velocity_force": {"sub": 1, "mul": 10, "neg": 1, "sin": 1, "cos": 1, "total": 14, "parameters": 9},
+    "velocity_force": {"sub": 1, "mul": 10, "sin": 1, "cos": 1, "total": 13, "parameters": 9},
     "gravity_force": {"mul": 1, "sin": 1, "total": 2, "parameters": 3},
-    "bias_force": {"sub": 2, "mul": 11, "sin": 1, "cos": 1, "total": 15, "parameters": 12},
+    "bias_force": {"sub": 2, "mul": 11, "sin": 1, "cos": 1, "total": 15, "parameters": 10},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 8, "mul": 22, "sin": 1, "cos": 1, "total": 32, "parameters": 11},
-    "potential_energy": {"mul": 2, "neg": 1, "cos": 1, "total": 4, "parameters": 2},
-    "effect_powers": {"add": 3, "sub": 4, "mul": 20, "neg": 1, "sin": 2, "cos": 2, "total": 32, "parameters": 4},
+    "kinetic_energy": {"add": 8, "mul": 19, "sin": 1, "cos": 1, "total": 29, "parameters": 15},
+    "potential_energy": {"mul": 1, "cos": 1, "total": 2, "parameters": 4},
+    "effect_powers": {"add": 3, "sub": 4, "mul": 18, "sin": 2, "cos": 2, "total": 29, "parameters": 5},
     "momentum": {"add": 12, "sub": 4, "mul": 35, "neg": 1, "sin": 2, "cos": 2, "total": 56, "parameters": 20},
-    "centre_of_mass": {"add": 3, "sub": 1, "mul": 14, "div": 3, "neg": 1, "sin": 2, "cos": 2, "total": 26, "parameters": 4},
-    "joint_forces": {"add": 47, "sub": 35, "mul": 135, "div": 1, "neg": 9, "sin": 2, "cos": 2, "total": 231, "parameters": 36},
-    "body_poses": {"add": 1, "sub": 1, "mul": 11, "neg": 4, "sin": 2, "cos": 2, "total": 21, "parameters": 3},
-    "body_velocities": {"add": 6, "sub": 4, "mul": 29, "neg": 2, "sin": 2, "cos": 2, "total": 45, "parameters": 3},
-    "point_positions": {"add": 1, "sub": 1, "mul": 7, "neg": 1, "sin": 2, "cos": 2, "total": 14, "parameters": 4},
-    "point_velocities": {"add": 6, "sub": 4, "mul": 25, "neg": 1, "sin": 2, "cos": 2, "total": 40, "parameters": 4},
-    "point_jacobians": {"add": 1, "sub": 2, "mul": 11, "neg": 2, "sin": 2, "cos": 2, "total": 20, "parameters": 4},
+    "centre_of_mass": {"add": 3, "sub": 1, "mul": 10, "div": 3, "sin": 2, "cos": 2, "total": 21, "parameters": 7},
+    "joint_forces": {"add": 43, "sub": 39, "mul": 133, "div": 1, "neg": 6, "sin": 2, "cos": 2, "total": 226, "parameters": 37},
+    "body_poses": {"add": 1, "sub": 1, "mul": 11, "neg": 3, "sin": 2, "cos": 2, "total": 20, "parameters": 4},
+    "body_velocities": {"add": 6, "sub": 4, "mul": 27, "neg": 2, "sin": 2, "cos": 2, "total": 43, "parameters": 3},
+    "point_positions": {"add": 1, "sub": 1, "mul": 6, "sin": 2, "cos": 2, "total": 12, "parameters": 5},
+    "point_velocities": {"add": 6, "sub": 4, "mul": 24, "neg": 1, "sin": 2, "cos": 2, "total": 39, "parameters": 4},
+    "point_jacobians": {"add": 1, "sub": 2, "mul": 10, "neg": 2, "sin": 2, "cos": 2, "total": 19, "parameters": 4},
 }
 
 
@@ -148,108 +149,128 @@ def _refused(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
 
 def _fixed(m_arm, l_arm, m_pendulum, l_pendulum, J_rotor, gear, g):
     """The constants of each kernel, which depend on parameters only; or what is wrong, as text."""
-    k31 = m_arm * (l_arm * l_arm) / 12.0
-    k34 = m_pendulum * (l_pendulum * l_pendulum) / 12.0
+    k36 = m_arm * (l_arm * l_arm) / 12.0
+    k39 = m_pendulum * (l_pendulum * l_pendulum) / 12.0
     if not m_arm > 0.0:
         return "mass of arm is not positive"
-    if not k31 >= 0.0:
+    if not k36 >= 0.0:
         return "inertia_com yy of arm is negative"
-    if not k31 >= 0.0:
+    if not k36 >= 0.0:
         return "inertia_com zz of arm is negative"
     if not m_pendulum > 0.0:
         return "mass of pendulum is not positive"
-    if not k34 >= 0.0:
+    if not k39 >= 0.0:
         return "inertia_com xx of pendulum is negative"
-    if not k34 >= 0.0:
+    if not k39 >= 0.0:
         return "inertia_com yy of pendulum is negative"
     l_pendulum_squared = l_pendulum * l_pendulum
-    k41 = m_pendulum * l_pendulum_squared
-    pivot_phi_dot = k41 / 3.0
     gear_squared = gear * gear
-    k42 = J_rotor * gear_squared
+    k56 = J_rotor * gear_squared
     l_arm_squared = l_arm * l_arm
-    k43 = m_arm * l_arm_squared
-    k44 = k43 / 3.0
-    k45 = m_pendulum * l_arm_squared
-    k46 = l_pendulum_squared * 4.0 + l_arm_squared * 9.0
-    k1 = m_pendulum * k46 / 12.0
-    k2 = k44 + (k42 + k45 / 4.0)
-    k47 = l_arm * 3.0
-    k48 = m_pendulum * k47
-    k3 = g * k48 / 4.0
-    k4 = l_pendulum_squared * (m_pendulum * 2.0) / 3.0
-    k49 = l_arm * m_pendulum
-    k5 = l_pendulum * k49 / 2.0
-    k50 = l_pendulum * 2.0
-    k6 = g * 3.0 / k50
-    k7 = k47 / k50
-    k8 = 2.0 * k5
-    k9 = l_arm_squared / 3.0
-    k51 = l_arm * 2.0
-    k52 = m_pendulum * k51
-    k10 = 9.0 * k52 / 12.0
-    k11 = m_arm * k51 / 3.0 + k52 / 4.0
-    k36 = m_pendulum * g
-    k12 = 3.0 * k36 / 4.0
-    k53 = m_pendulum * l_pendulum
-    k13 = k53 / 2.0
-    k14 = 3.0 / k50
-    k15 = l_arm_squared / 4.0
-    k16 = k46 / 12.0
-    k17 = g * k47 / 4.0
-    k18 = l_pendulum_squared * 2.0 / 3.0
-    k19 = l_arm * l_pendulum / 2.0
-    k54 = m_pendulum * k50
-    k20 = 4.0 * k54 / 12.0
-    k21 = 2.0 * k54 / 3.0
-    k22 = k49 / 2.0
-    k23 = 2.0 * k6 / k50
-    k24 = 2.0 * k7 / k50
-    k25 = J_rotor * gear
-    k26 = k48 / 4.0
-    k27 = 1.0 / pivot_phi_dot
-    k28 = k45 + (k42 + k44)
-    k29 = g * k53 / 2.0
-    k30 = l_arm / 2.0
-    k32 = k30 + k30
-    k33 = l_pendulum / 2.0
-    moment_arm_x = m_arm * k30
-    inertia_arm_yy = k31 + k30 * moment_arm_x
-    moment_pendulum_x = m_pendulum * k32
-    k37 = m_pendulum * k33
-    inertia_pendulum_zz = k32 * moment_pendulum_x
-    k55 = k33 * k37
-    inertia_pendulum_xz = k33 * moment_pendulum_x
-    inertia_pendulum_xx = k34 + k55
-    inertia_pendulum_yy = k34 + (inertia_pendulum_zz + k55)
-    k35 = gear * k25
-    k39 = m_arm * g
-    k38 = m_arm + m_pendulum
-    k40 = k33 + k33
+    k57 = m_arm * l_arm_squared
+    k58 = k57 / 3.0
+    k59 = m_pendulum * l_arm_squared
+    k60 = k59 / 4.0
+    k61 = l_pendulum_squared * 4.0 + l_arm_squared * 9.0
+    k1 = m_pendulum * k61 / 12.0
+    k62 = k56 + k58
+    k2 = k60 + k62
+    k63 = l_arm * 3.0
+    k64 = m_pendulum * k63
+    k3 = g * k64 / 4.0
+    k65 = m_pendulum * 2.0
+    k4 = l_pendulum_squared * k65 / 3.0
+    k66 = l_arm * m_pendulum
+    k5 = l_pendulum * k66 / 2.0
+    k67 = l_pendulum * 2.0
+    k68 = g * 3.0
+    k6 = k68 / k67
+    k7 = k63 / k67
+    k8 = k58 + (k56 + k60)
+    k9 = k1 * 2.0
+    k10 = 2.0 * k5
+    k11 = -k7
+    k12 = l_arm_squared / 3.0
+    k69 = l_arm * 2.0
+    k70 = m_pendulum * k69
+    k13 = 9.0 * k70 / 12.0
+    k14 = m_arm * k69 / 3.0 + k70 / 4.0
+    k15 = m_pendulum * k68 / 4.0
+    k71 = m_pendulum * l_pendulum
+    k16 = k71 / 2.0
+    k17 = -3.0 / k67
+    k18 = l_arm_squared / 4.0
+    k19 = k61 / 12.0
+    k20 = g * k63 / 4.0
+    k21 = l_pendulum_squared * 2.0 / 3.0
+    k22 = l_arm * l_pendulum / 2.0
+    k23 = m_pendulum * (4.0 * k67) / 12.0
+    k24 = k65 * k67 / 3.0
+    k25 = k66 / 2.0
+    k26 = 2.0 * k6 / k67
+    k27 = 2.0 * k7 / k67
+    k72 = J_rotor * gear
+    k28 = 2.0 * k72
+    k29 = k64 / 4.0
+    k73 = m_pendulum * l_pendulum_squared
+    pivot_phi_dot = k73 / 3.0
+    k30 = k73 * 2.0 / 3.0
+    k31 = 1.0 / pivot_phi_dot
+    k32 = l_arm * k71 / 2.0
+    k33 = k59 + k62
+    k34 = g * k71 / 2.0
+    k35 = -pivot_phi_dot
+    k49 = l_arm / 2.0
+    k37 = k49 + k49
+    k38 = l_pendulum / 2.0
+    moment_arm_x = m_arm * k49
+    k40 = k49 * moment_arm_x
+    k41 = gear * k72
+    k42 = k38 * k38
+    k43 = k37 * k37
+    k74 = m_pendulum * g
+    k44 = -k38 * k74
+    k45 = -k74
+    inertia_arm_yy = k36 + k40
+    moment_pendulum_x = m_pendulum * k37
+    k46 = m_pendulum * k38
+    inertia_pendulum_zz = k37 * moment_pendulum_x
+    k75 = k38 * k46
+    inertia_pendulum_xz = k38 * moment_pendulum_x
+    inertia_pendulum_xx = k39 + k75
+    inertia_pendulum_yy = k39 + (inertia_pendulum_zz + k75)
+    k47 = m_arm + m_pendulum
+    k48 = -k46
+    k50 = m_arm * g
+    k51 = -k50
+    k52 = -k36
+    k53 = -k38
+    k54 = k38 + k38
+    k55 = -k54
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
-        "jacobian": (k1, k2, k3, k4, k5, k6, k7, k8),
-        "input_jacobian": (k1, k2, k7),
-        "parameter_jacobian": (gear_squared, k1, k2, k3, k4, k5, k7, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26),
-        "forward_dynamics": (k1, k2, k3, k4, k5, k6, k7, k27),
-        "inverse_dynamics": (pivot_phi_dot, k4, k5, k28, k29),
-        "mass_matrix": (pivot_phi_dot, k5, k28),
-        "velocity_force": (pivot_phi_dot, k4, k5),
-        "gravity_force": (k29,),
-        "bias_force": (pivot_phi_dot, k4, k5, k29),
+        "jacobian": (k1, k3, k4, k5, k6, k7, k8, k9, k10),
+        "input_jacobian": (k1, k8, k11),
+        "parameter_jacobian": (gear_squared, k1, k3, k4, k5, k7, k8, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29),
+        "forward_dynamics": (k1, k3, k5, k6, k7, k8, k30, k31),
+        "inverse_dynamics": (pivot_phi_dot, k30, k32, k33, k34),
+        "mass_matrix": (k5, pivot_phi_dot, k33),
+        "velocity_force": (k5, k30, k35),
+        "gravity_force": (k34,),
+        "bias_force": (pivot_phi_dot, k30, k32, k34),
         "applied_force": (),
-        "kinetic_energy": (m_arm, m_pendulum, k30, k31, k32, k33, k34, k35),
-        "potential_energy": (k36, k33),
-        "effect_powers": (k36, k32, k33),
-        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k37, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
-        "centre_of_mass": (m_arm, m_pendulum, k30, k32, k33, k38),
-        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k30, k31, k32, k33, k34, k39),
-        "body_poses": (k30, k32, k33),
-        "body_velocities": (k30, k32, k33),
-        "point_positions": (k32, k40),
-        "point_velocities": (k32, k40),
-        "point_jacobians": (k32, k40),
+        "kinetic_energy": (m_pendulum, k36, k37, k38, k39, k40, k41, k42, k43),
+        "potential_energy": (k44,),
+        "effect_powers": (k37, k38, k45),
+        "momentum": (moment_arm_x, inertia_arm_yy, moment_pendulum_x, k46, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy),
+        "centre_of_mass": (m_pendulum, k37, k38, moment_arm_x, k47, k48),
+        "joint_forces": (m_arm, m_pendulum, g, k1, k2, k3, k5, k6, k7, k30, k49, k37, k38, k39, k50, k51, k52),
+        "body_poses": (k49, k37, k38, k53),
+        "body_velocities": (k49, k37, k38),
+        "point_positions": (k37, k54, k55),
+        "point_velocities": (k37, k54),
+        "point_jacobians": (k37, k54),
     }
 
 
@@ -299,43 +320,45 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """26 operations: 3 add, 4 sub, 16 mul, 1 div, 1 sin, 1 cos."""
+    """24 operations: 3 add, 4 sub, 14 mul, 1 div, 1 sin, 1 cos."""
     k1, k2, k3, k4, k5, k6, k7 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
-    theta_dot_squared = theta_dot * theta_dot
     cos_phi = cos(phi)
-    s1 = cos_phi * (k3 - k4 * (theta_dot * phi_dot) - k5 * (theta_dot_squared * cos_phi))
-    theta_ddot = (tau + sin_phi * (s1 + k5 * (phi_dot * phi_dot))) / (sin_phi * sin_phi * k1 + k2)
+    s1 = theta_dot * theta_dot * cos_phi
+    s2 = cos_phi * (k3 - k4 * (theta_dot * phi_dot) - k5 * s1) + k5 * (phi_dot * phi_dot)
+    theta_ddot = (tau + sin_phi * s2) / (sin_phi * sin_phi * k1 + k2)
     return (
         theta_dot,
         phi_dot,
         theta_ddot,
-        theta_dot_squared * (sin_phi * cos_phi) - sin_phi * k6 - k7 * (cos_phi * theta_ddot),
+        sin_phi * (s1 - k6) - k7 * (cos_phi * theta_ddot),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """62 operations: 6 add, 9 sub, 39 mul, 4 div, 2 neg, 1 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k8 = k
+    """59 operations: 6 add, 9 sub, 36 mul, 4 div, 2 neg, 1 sin, 1 cos."""
+    k1, k3, k4, k5, k6, k7, k8, k9, k10 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
-    s2 = sin_phi * sin_phi
-    pivot_theta_dot = s2 * k1 + k2
+    s3 = sin_phi * sin_phi
     theta_dot_squared = theta_dot * theta_dot
     cos_phi = cos(phi)
-    s3 = k3 - k4 * (theta_dot * phi_dot) - k5 * (theta_dot_squared * cos_phi)
-    s4 = cos_phi * s3 + k5 * (phi_dot * phi_dot)
-    theta_ddot = (tau + sin_phi * s4) / pivot_theta_dot
-    s5 = sin_phi * cos_phi
-    s6 = cos_phi * s4 + sin_phi * (theta_dot_squared * (k5 * s5) - sin_phi * s3) - 2.0 * (k1 * (theta_ddot * s5))
-    s7 = s6 / pivot_theta_dot
-    s8 = theta_dot * 2.0
-    s9 = s5 * (phi_dot * k4 + s8 * (cos_phi * k5)) / pivot_theta_dot
-    s10 = cos_phi * k7
-    s11 = sin_phi * (phi_dot * k8 - k4 * (theta_dot * cos_phi)) / pivot_theta_dot
+    pivot_theta_dot = s3 * k1 + k8
+    s4 = theta_dot * k4
+    s5 = cos_phi * k5
+    s6 = k3 - phi_dot * s4 - theta_dot_squared * s5
+    s7 = cos_phi * s6 + k5 * (phi_dot * phi_dot)
+    theta_ddot_2 = (tau + sin_phi * s7) / pivot_theta_dot
+    s8 = sin_phi * cos_phi
+    s9 = cos_phi * s7 + sin_phi * (theta_dot_squared * (k5 * s8) - sin_phi * s6) - theta_ddot_2 * (s8 * k9)
+    s10 = s9 / pivot_theta_dot
+    s11 = theta_dot * 2.0
+    s12 = s8 * (phi_dot * k4 + s5 * s11) / pivot_theta_dot
+    s13 = cos_phi * k7
+    s14 = sin_phi * (phi_dot * k10 - cos_phi * s4) / pivot_theta_dot
     return (
         0.0,
         0.0,
@@ -346,56 +369,56 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         1.0,
         0.0,
-        s7,
-        -s9,
-        s11,
+        s10,
+        -s12,
+        s14,
         0.0,
-        theta_dot_squared * (cos_phi * cos_phi - s2) - cos_phi * k6 - k7 * (cos_phi * s7 - sin_phi * theta_ddot),
-        s5 * s8 + s9 * s10,
-        -s10 * s11,
+        theta_dot_squared * (cos_phi * cos_phi - s3) - cos_phi * k6 - k7 * (cos_phi * s10 - sin_phi * theta_ddot_2),
+        s8 * s11 + s12 * s13,
+        -s13 * s14,
     )
 
 
 def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """9 operations: 1 add, 4 mul, 1 div, 1 neg, 1 sin, 1 cos."""
-    k1, k2, k7 = k
+    """8 operations: 1 add, 4 mul, 1 div, 1 sin, 1 cos."""
+    k1, k8, k11 = k
     _, phi, _, _ = y
     sin_phi = sin(phi)
-    s12 = 1.0 / (sin_phi * sin_phi * k1 + k2)
+    s15 = 1.0 / (sin_phi * sin_phi * k1 + k8)
     return (
         0.0,
         0.0,
-        s12,
-        -cos(phi) * k7 * s12,
+        s15,
+        k11 * (cos(phi) * s15),
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """87 operations: 10 add, 11 sub, 50 mul, 8 div, 6 neg, 1 sin, 1 cos."""
-    gear_squared, k1, k2, k3, k4, k5, k7, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26 = k
+    """84 operations: 8 add, 13 sub, 49 mul, 8 div, 4 neg, 1 sin, 1 cos."""
+    gear_squared, k1, k3, k4, k5, k7, k8, k12, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
-    s2 = sin_phi * sin_phi
-    pivot_theta_dot = s2 * k1 + k2
-    s13 = theta_dot * phi_dot
+    s3 = sin_phi * sin_phi
+    s16 = theta_dot * phi_dot
     cos_phi = cos(phi)
-    s14 = theta_dot * theta_dot * cos_phi
+    s1 = theta_dot * theta_dot * cos_phi
     phi_dot_squared = phi_dot * phi_dot
-    drive_theta_dot = tau + sin_phi * (cos_phi * (k3 - k4 * s13 - k5 * s14) + k5 * phi_dot_squared)
-    theta_ddot = drive_theta_dot / pivot_theta_dot
-    s15 = cos_phi * theta_ddot
-    s10 = cos_phi * k7
-    s16 = theta_ddot * k9 / pivot_theta_dot
-    s17 = sin_phi * (cos_phi * (k12 - s14 * k13) + phi_dot_squared * k13) - theta_ddot * (s2 * k10 + k11)
-    s18 = s17 / pivot_theta_dot
-    s19 = sin_phi * (cos_phi * (k17 - s13 * k18 - s14 * k19) + phi_dot_squared * k19)
-    s20 = (s19 - theta_ddot * (k15 + s2 * k16)) / pivot_theta_dot
-    s21 = sin_phi * (phi_dot_squared * k22 - cos_phi * (s13 * k21 + s14 * k22)) - theta_ddot * (s2 * k20)
-    s22 = s21 / pivot_theta_dot
-    s23 = gear_squared * theta_ddot / pivot_theta_dot
-    s24 = k25 * (2.0 * theta_ddot) / pivot_theta_dot
-    s25 = sin_phi * cos_phi * k26 / pivot_theta_dot
+    drive_theta_dot = tau + sin_phi * (cos_phi * (k3 - k4 * s16 - k5 * s1) + k5 * phi_dot_squared)
+    pivot_theta_dot = s3 * k1 + k8
+    s13 = cos_phi * k7
+    theta_ddot_3 = drive_theta_dot / pivot_theta_dot
+    s17 = cos_phi * theta_ddot_3
+    s18 = theta_ddot_3 * k12 / pivot_theta_dot
+    s19 = sin_phi * (cos_phi * (k15 - s1 * k16) + phi_dot_squared * k16) - theta_ddot_3 * (s3 * k13 + k14)
+    s20 = s19 / pivot_theta_dot
+    s21 = sin_phi * (cos_phi * (k20 - s16 * k21 - s1 * k22) + phi_dot_squared * k22)
+    s22 = (s21 - theta_ddot_3 * (k18 + s3 * k19)) / pivot_theta_dot
+    s23 = sin_phi * (phi_dot_squared * k25 - cos_phi * (s16 * k24 + s1 * k25)) - theta_ddot_3 * (s3 * k23)
+    s24 = s23 / pivot_theta_dot
+    s25 = gear_squared * theta_ddot_3 / pivot_theta_dot
+    s26 = theta_ddot_3 * k28 / pivot_theta_dot
+    s27 = sin_phi * (cos_phi * k29) / pivot_theta_dot
     return (
         0.0,
         0.0,
@@ -411,105 +434,103 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s16,
-        s18,
+        -s18,
         s20,
         s22,
-        -s23,
-        -s24,
-        s25,
-        s10 * s16,
-        -(s15 * k14 + s10 * s18),
-        -s10 * s20,
-        sin_phi * k23 - (s10 * s22 - s15 * k24),
-        s10 * s23,
-        s10 * s24,
-        -(sin_phi * k14 + s10 * s25),
+        s24,
+        -s25,
+        -s26,
+        s27,
+        s18 * s13,
+        s17 * k17 - s13 * s20,
+        -s13 * s22,
+        sin_phi * k26 - (s13 * s24 - s17 * k27),
+        s13 * s25,
+        s13 * s26,
+        sin_phi * k17 - s13 * s27,
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """31 operations: 5 add, 5 sub, 18 mul, 1 div, 1 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k6, k7, k27 = k
+    """30 operations: 5 add, 5 sub, 17 mul, 1 div, 1 sin, 1 cos."""
+    k1, k3, k5, k6, k7, k8, k30, k31 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     tau__theta_dot, tau__phi_dot = extra
     sin_phi = sin(phi)
-    theta_dot_squared = theta_dot * theta_dot
     cos_phi = cos(phi)
-    s1 = cos_phi * (k3 - k4 * (theta_dot * phi_dot) - k5 * (theta_dot_squared * cos_phi))
-    s10 = cos_phi * k7
-    drive_theta_dot_2 = sin_phi * (s1 + k5 * (phi_dot * phi_dot)) + (tau + tau__theta_dot) - s10 * tau__phi_dot
-    theta_ddot_2 = drive_theta_dot_2 / (sin_phi * sin_phi * k1 + k2)
-    s26 = theta_dot_squared * (sin_phi * cos_phi) + tau__phi_dot * k27 - sin_phi * k6
+    s1 = theta_dot * theta_dot * cos_phi
+    s13 = cos_phi * k7
+    s28 = cos_phi * (k3 - k30 * (theta_dot * phi_dot) - k5 * s1) + k5 * (phi_dot * phi_dot)
+    theta_ddot_4 = (sin_phi * s28 + (tau + tau__theta_dot) - tau__phi_dot * s13) / (sin_phi * sin_phi * k1 + k8)
     return (
-        theta_ddot_2,
-        s26 - s10 * theta_ddot_2,
+        theta_ddot_4,
+        sin_phi * s1 + tau__phi_dot * k31 - sin_phi * k6 - s13 * theta_ddot_4,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """27 operations: 5 add, 3 sub, 17 mul, 1 sin, 1 cos."""
-    pivot_phi_dot, k4, k5, k28, k29 = k
+    pivot_phi_dot, k30, k32, k33, k34 = k
     _, phi, theta_dot, phi_dot = y
     tau, = u
     vd__theta_dot, vd__phi_dot = extra
     sin_phi = sin(phi)
     cos_phi = cos(phi)
-    s5 = sin_phi * cos_phi
-    s27 = vd__theta_dot * (pivot_phi_dot * (sin_phi * sin_phi) + k28) + k5 * (cos_phi * vd__phi_dot - sin_phi * (phi_dot * phi_dot))
-    s28 = pivot_phi_dot * (vd__phi_dot - theta_dot * theta_dot * s5) + sin_phi * k29
+    s8 = sin_phi * cos_phi
+    s29 = vd__theta_dot * (pivot_phi_dot * (sin_phi * sin_phi) + k33) + k32 * (cos_phi * vd__phi_dot - sin_phi * (phi_dot * phi_dot))
+    s30 = pivot_phi_dot * (vd__phi_dot - theta_dot * theta_dot * s8) + sin_phi * k34
     return (
-        theta_dot * (phi_dot * (k4 * s5)) + s27 - tau,
-        cos_phi * k5 * vd__theta_dot + s28,
+        k30 * (phi_dot * (theta_dot * s8)) + s29 - tau,
+        k32 * (cos_phi * vd__theta_dot) + s30,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), sin=sin, cos=cos):
     """6 operations: 1 add, 3 mul, 1 sin, 1 cos."""
-    pivot_phi_dot, k5, k28 = k
+    k5, pivot_phi_dot, k33 = k
     _, phi, _, _ = y
     sin_phi = sin(phi)
-    s29 = cos(phi) * k5
+    s5 = cos(phi) * k5
     return (
-        pivot_phi_dot * (sin_phi * sin_phi) + k28,
-        s29,
-        s29,
+        pivot_phi_dot * (sin_phi * sin_phi) + k33,
+        s5,
+        s5,
         pivot_phi_dot,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """14 operations: 1 sub, 10 mul, 1 neg, 1 sin, 1 cos."""
-    pivot_phi_dot, k4, k5 = k
+    """13 operations: 1 sub, 10 mul, 1 sin, 1 cos."""
+    k5, k30, k35 = k
     _, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
-    s5 = sin_phi * cos(phi)
+    s8 = sin_phi * cos(phi)
     return (
-        theta_dot * (phi_dot * (k4 * s5)) - k5 * (sin_phi * (phi_dot * phi_dot)),
-        -theta_dot * theta_dot * (pivot_phi_dot * s5),
+        k30 * (phi_dot * (theta_dot * s8)) - k5 * (sin_phi * (phi_dot * phi_dot)),
+        k35 * (theta_dot * theta_dot * s8),
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), sin=sin):
     """2 operations: 1 mul, 1 sin."""
-    k29, = k
+    k34, = k
     _, phi, _, _ = y
     return (
         0.0,
-        sin(phi) * k29,
+        sin(phi) * k34,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
     """15 operations: 2 sub, 11 mul, 1 sin, 1 cos."""
-    pivot_phi_dot, k4, k5, k29 = k
+    pivot_phi_dot, k30, k32, k34 = k
     _, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
-    s5 = sin_phi * cos(phi)
+    s8 = sin_phi * cos(phi)
     return (
-        theta_dot * (phi_dot * (k4 * s5)) - k5 * (sin_phi * (phi_dot * phi_dot)),
-        sin_phi * k29 - theta_dot * theta_dot * (pivot_phi_dot * s5),
+        k30 * (phi_dot * (theta_dot * s8)) - k32 * (sin_phi * (phi_dot * phi_dot)),
+        sin_phi * k34 - pivot_phi_dot * (theta_dot * theta_dot * s8),
     )
 
 
@@ -523,315 +544,316 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """32 operations: 8 add, 22 mul, 1 sin, 1 cos."""
-    m_arm, m_pendulum, k30, k31, k32, k33, k34, k35 = k
+    """29 operations: 8 add, 19 mul, 1 sin, 1 cos."""
+    m_pendulum, k36, k37, k38, k39, k40, k41, k42, k43 = k
     _, phi, theta_dot, phi_dot = y
+    theta_dot_squared = theta_dot * theta_dot
     omega_pendulum_y = theta_dot * sin(phi)
-    s30 = theta_dot * k30
-    s31 = m_arm * (s30 * s30) + theta_dot * (theta_dot * k31) + theta_dot * theta_dot * k35
-    s32 = k33 * omega_pendulum_y
-    s33 = theta_dot * cos(phi) * k32 + phi_dot * k33
-    s34 = k32 * omega_pendulum_y
-    s35 = s31 + m_pendulum * (s32 * s32 + s33 * s33 + s34 * s34) + (phi_dot * (phi_dot * k34) + omega_pendulum_y * (k34 * omega_pendulum_y))
+    s31 = theta_dot_squared * k40 + theta_dot * (theta_dot * k36) + theta_dot_squared * k41
+    s32 = k37 * (theta_dot * cos(phi)) + phi_dot * k38
+    omega_pendulum_y_squared = omega_pendulum_y * omega_pendulum_y
+    s33 = k42 * omega_pendulum_y_squared + s32 * s32 + omega_pendulum_y_squared * k43
+    s34 = s31 + m_pendulum * s33 + (phi_dot * (phi_dot * k39) + omega_pendulum_y * (k39 * omega_pendulum_y))
     return (
-        0.5 * s35,
+        0.5 * s34,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
-    """4 operations: 2 mul, 1 neg, 1 cos."""
-    k36, k33 = k
+    """2 operations: 1 mul, 1 cos."""
+    k44, = k
     _, phi, _, _ = y
     return (
-        -k36 * (cos(phi) * k33),
+        cos(phi) * k44,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """32 operations: 3 add, 4 sub, 20 mul, 1 neg, 2 sin, 2 cos."""
-    k36, k32, k33 = k
+    """29 operations: 3 add, 4 sub, 18 mul, 2 sin, 2 cos."""
+    k37, k38, k45 = k
     theta, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
-    cos_phi = cos(phi)
-    omega_pendulum_z = theta_dot * cos_phi
+    omega_pendulum_z = theta_dot * cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s36 = sin_phi * sin_theta
-    s37 = sin_phi * cos_theta
-    omega_pendulum_y = theta_dot * sin_phi
-    s38 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + omega_pendulum_z * s36
-    s39 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - omega_pendulum_z * s37
-    s40 = (k32 * sin_theta + k33 * s37) * s38 - (k32 * cos_theta - k33 * s36) * s39
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
+    s37 = sin_phi * omega_pendulum_z
+    s38 = (k37 * sin_theta + k38 * s36) * (phi_dot * cos_theta - sin_theta * s37 + s35 * omega_pendulum_z)
+    s39 = (k37 * cos_theta - k38 * s35) * (phi_dot * sin_theta + cos_theta * s37 - s36 * omega_pendulum_z)
     return (
-        -k36 * s40,
+        k45 * (s38 - s39),
         theta_dot * tau,
     )
 
 
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """56 operations: 12 add, 4 sub, 35 mul, 1 neg, 2 sin, 2 cos."""
-    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k37, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
+    moment_arm_x, inertia_arm_yy, moment_pendulum_x, k46, inertia_pendulum_zz, inertia_pendulum_xz, inertia_pendulum_xx, inertia_pendulum_yy = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
+    omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s41 = cos_phi * sin_theta
-    s36 = sin_phi * sin_theta
-    s42 = cos_phi * cos_theta
-    s37 = sin_phi * cos_theta
-    omega_pendulum_y = theta_dot * sin_phi
-    s43 = theta_dot * moment_arm_x
-    s44 = k37 * omega_pendulum_y
-    s45 = omega_pendulum_z * moment_pendulum_x + phi_dot * k37
-    s46 = moment_pendulum_x * omega_pendulum_y
-    s47 = phi_dot * inertia_pendulum_xx + omega_pendulum_z * inertia_pendulum_xz
-    s48 = inertia_pendulum_yy * omega_pendulum_y
-    s49 = phi_dot * inertia_pendulum_xz + omega_pendulum_z * inertia_pendulum_zz
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
+    s40 = cos_phi * sin_theta
+    s41 = cos_phi * cos_theta
+    s42 = theta_dot * moment_arm_x
+    s43 = k46 * omega_pendulum_y
+    s44 = moment_pendulum_x * omega_pendulum_z + phi_dot * k46
+    s45 = moment_pendulum_x * omega_pendulum_y
+    s46 = phi_dot * inertia_pendulum_xx + inertia_pendulum_xz * omega_pendulum_z
+    s47 = inertia_pendulum_yy * omega_pendulum_y
+    s48 = phi_dot * inertia_pendulum_xz + inertia_pendulum_zz * omega_pendulum_z
     return (
-        -(sin_theta * s43 + (cos_theta * s44 + s41 * s45 + s36 * s46)),
-        cos_theta * s43 + (s42 * s45 - sin_theta * s44 + s37 * s46),
-        sin_phi * s45 - cos_phi * s46,
-        cos_theta * s47 - s41 * s48 + s36 * s49,
-        sin_theta * s47 + s42 * s48 - s37 * s49,
-        theta_dot * inertia_arm_yy + (sin_phi * s48 + cos_phi * s49),
+        -(sin_theta * s42 + (cos_theta * s43 + s40 * s44 + s35 * s45)),
+        cos_theta * s42 + (s41 * s44 - sin_theta * s43 + s36 * s45),
+        sin_phi * s44 - cos_phi * s45,
+        cos_theta * s46 - s40 * s47 + s35 * s48,
+        sin_theta * s46 + s41 * s47 - s36 * s48,
+        theta_dot * inertia_arm_yy + (sin_phi * s47 + cos_phi * s48),
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """26 operations: 3 add, 1 sub, 14 mul, 3 div, 1 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, k30, k32, k33, k38 = k
+    """21 operations: 3 add, 1 sub, 10 mul, 3 div, 2 sin, 2 cos."""
+    m_pendulum, k37, k38, moment_arm_x, k47, k48 = k
     theta, phi, _, _ = y
-    sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s50 = m_arm * (k30 * cos_theta) + m_pendulum * (k32 * cos_theta - k33 * (sin_phi * sin_theta))
-    s51 = m_arm * (k30 * sin_theta) + m_pendulum * (k32 * sin_theta + k33 * (sin_phi * cos_theta))
+    s49 = sin(phi) * k38
+    s50 = cos_theta * moment_arm_x + m_pendulum * (k37 * cos_theta - sin_theta * s49)
+    s51 = sin_theta * moment_arm_x + m_pendulum * (k37 * sin_theta + cos_theta * s49)
     return (
-        s50 / k38,
-        s51 / k38,
-        -m_pendulum * (cos(phi) * k33) / k38,
+        s50 / k47,
+        s51 / k47,
+        cos(phi) * k48 / k47,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """231 operations: 47 add, 35 sub, 135 mul, 1 div, 9 neg, 2 sin, 2 cos."""
-    m_arm, m_pendulum, g, k1, k2, k3, k4, k5, k6, k7, k30, k31, k32, k33, k34, k39 = k
+    """226 operations: 43 add, 39 sub, 133 mul, 1 div, 6 neg, 2 sin, 2 cos."""
+    m_arm, m_pendulum, g, k1, k2, k3, k5, k6, k7, k30, k49, k37, k38, k39, k50, k51, k52 = k
     theta, phi, theta_dot, phi_dot = y
     tau, = u
     sin_phi = sin(phi)
     theta_dot_squared = theta_dot * theta_dot
     cos_phi = cos(phi)
-    s1 = cos_phi * (k3 - k4 * (theta_dot * phi_dot) - k5 * (theta_dot_squared * cos_phi))
+    s1 = theta_dot_squared * cos_phi
     phi_dot_squared = phi_dot * phi_dot
-    theta_ddot = (tau + sin_phi * (s1 + k5 * phi_dot_squared)) / (sin_phi * sin_phi * k1 + k2)
-    s15 = cos_phi * theta_ddot
-    phi_ddot = theta_dot_squared * (sin_phi * cos_phi) - sin_phi * k6 - k7 * s15
+    s28 = cos_phi * (k3 - k30 * (theta_dot * phi_dot) - k5 * s1) + k5 * phi_dot_squared
+    omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
+    omega_pendulum_y_squared = omega_pendulum_y * omega_pendulum_y
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s41 = cos_phi * sin_theta
-    s36 = sin_phi * sin_theta
-    s42 = cos_phi * cos_theta
-    s37 = sin_phi * cos_theta
-    omega_pendulum_y = theta_dot * sin_phi
-    s52 = k30 * cos_theta
-    s53 = k30 * sin_theta
-    s54 = k32 * cos_theta
-    s55 = k32 * sin_theta
-    s56 = cos_phi * k33
-    s38 = phi_dot * cos_theta - s41 * omega_pendulum_y + omega_pendulum_z * s36
-    s39 = phi_dot * sin_theta + s42 * omega_pendulum_y - omega_pendulum_z * s37
-    s57 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s58 = phi_dot * omega_pendulum_z
-    s59 = phi_dot * omega_pendulum_y
-    s60 = sin_phi * theta_ddot + s58
-    s61 = s15 - s59
-    omega_pendulum_y_squared = omega_pendulum_y * omega_pendulum_y
-    s62 = theta_dot_squared * k30
-    s63 = theta_ddot * k30
-    s64 = m_arm * (cos_theta * s62 + sin_theta * s63)
-    s65 = m_arm * (cos_theta * s63 - sin_theta * s62)
-    s66 = k32 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k33 * (s58 + s60)
-    s67 = k32 * (s59 + s61) - k33 * (omega_pendulum_z * omega_pendulum_y - phi_ddot)
-    s68 = g * sin_phi + s67
-    s69 = g * cos_phi + (k32 * (s58 - s60) + k33 * (phi_dot_squared + omega_pendulum_y_squared))
-    s70 = phi_ddot * cos_theta - s41 * s60 + s36 * s61
-    s71 = phi_ddot * sin_theta + s42 * s60 - s37 * s61
-    s72 = sin_phi * s60 + cos_phi * s61
-    s73 = k34 * cos_theta
-    s74 = k34 * s41
-    s75 = k34 * sin_theta
-    s76 = k34 * s42
-    s77 = sin_phi * k34
-    s78 = cos_theta * s73 + s41 * s74
-    s79 = sin_theta * s73 - s42 * s74
-    s80 = sin_phi * s74
-    s81 = cos_theta * s75 - s41 * s76
-    s82 = sin_theta * s75 + s42 * s76
-    s83 = sin_phi * s76
-    s84 = s41 * s77
-    s85 = s42 * s77
-    s86 = sin_phi * s77
-    s87 = m_pendulum * (s36 * s69 - (cos_theta * s66 + s41 * s68))
-    s88 = m_pendulum * (s42 * s68 - sin_theta * s66 - s37 * s69)
-    s89 = m_pendulum * (sin_phi * s68 + cos_phi * s69)
-    s90 = s38 * s78 + s39 * s79 - s57 * s80
-    s91 = s38 * s81 + s39 * s82 + s57 * s83
-    s92 = s39 * s85 - s38 * s84 + s57 * s86
-    s93 = s70 * s81 + s71 * s82 + s72 * s83 + (s57 * s90 - s38 * s92)
-    s94 = s54 - k33 * s36 - s54
-    s95 = s55 + k33 * s37 - s55
-    s96 = s56 * s87 + s89 * s94
-    s97 = s70 * s78 + s71 * s79 - s72 * s80 + (s39 * s92 - s57 * s91) + (s89 * s95 + s56 * s88)
-    s98 = s71 * s85 - s70 * s84 + s72 * s86 + (s38 * s91 - s39 * s90) + (s88 * s94 - s87 * s95)
-    s99 = theta_ddot * k31 + (s52 * s65 + s53 * s64) + (s98 + (s54 * s88 - s55 * s87))
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
+    s52 = k37 * cos_theta
+    s53 = k37 * sin_theta
+    s40 = cos_phi * sin_theta
+    s41 = cos_phi * cos_theta
+    theta_ddot_5 = (tau + sin_phi * s28) / (sin_phi * sin_phi * k1 + k2)
+    s54 = cos_phi * theta_ddot_5
+    phi_ddot = sin_phi * (s1 - k6) - k7 * s54
+    s55 = k49 * cos_theta
+    s56 = k49 * sin_theta
+    s57 = cos_phi * k38
+    s58 = phi_dot * cos_theta - s40 * omega_pendulum_y + s35 * omega_pendulum_z
+    s59 = phi_dot * sin_theta + s41 * omega_pendulum_y - s36 * omega_pendulum_z
+    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s61 = phi_dot * omega_pendulum_z
+    s62 = phi_dot * omega_pendulum_y
+    s63 = sin_phi * theta_ddot_5 + s61
+    s64 = s54 - s62
+    s65 = theta_dot_squared * k49
+    s66 = theta_ddot_5 * k49
+    s67 = m_arm * (cos_theta * s65 + sin_theta * s66)
+    s68 = m_arm * (cos_theta * s66 - sin_theta * s65)
+    s69 = k37 * (omega_pendulum_y_squared + omega_pendulum_z * omega_pendulum_z) + k38 * (s61 + s63)
+    s70 = k37 * (s62 + s64) - k38 * (omega_pendulum_y * omega_pendulum_z - phi_ddot)
+    s71 = g * sin_phi + s70
+    s72 = g * cos_phi + (k37 * (s61 - s63) + k38 * (phi_dot_squared + omega_pendulum_y_squared))
+    s73 = phi_ddot * cos_theta - s40 * s63 + s35 * s64
+    s74 = phi_ddot * sin_theta + s41 * s63 - s36 * s64
+    s75 = sin_phi * s63 + cos_phi * s64
+    s76 = k39 * cos_theta
+    s77 = k39 * s40
+    s78 = k39 * sin_theta
+    s79 = k39 * s41
+    s80 = sin_phi * k39
+    s81 = cos_theta * s76 + s40 * s77
+    s82 = sin_theta * s76 - s41 * s77
+    s83 = sin_phi * s77
+    s84 = cos_theta * s78 - s40 * s79
+    s85 = sin_theta * s78 + s41 * s79
+    s86 = sin_phi * s79
+    s87 = s40 * s80
+    s88 = s41 * s80
+    s89 = sin_phi * s80
+    s90 = m_pendulum * (s35 * s72 - (cos_theta * s69 + s40 * s71))
+    s91 = m_pendulum * (s41 * s71 - sin_theta * s69 - s36 * s72)
+    s92 = m_pendulum * (sin_phi * s71 + cos_phi * s72)
+    s93 = s58 * s81 + s59 * s82 - s60 * s83
+    s94 = s58 * s84 + s59 * s85 + s60 * s86
+    s95 = s59 * s88 - s58 * s87 + s60 * s89
+    s96 = s73 * s84 + s74 * s85 + s75 * s86 + (s60 * s93 - s58 * s95)
+    s97 = s52 - k38 * s35 - s52
+    s98 = s53 + k38 * s36 - s53
+    s99 = s57 * s90 + s92 * s97
+    s100 = s73 * s81 + s74 * s82 - s75 * s83 + (s59 * s95 - s60 * s94) + (s92 * s98 + s57 * s91)
+    s101 = s74 * s88 - s73 * s87 + s75 * s89 + (s58 * s94 - s59 * s93) + (s91 * s97 - s90 * s98)
     return (
-        s64 - s87,
-        -(s65 + s88),
-        -(k39 + s89),
-        -(k39 * s53 + (s97 + s55 * s89)),
-        k39 * s52 - (s93 - s96 - s54 * s89),
-        -s99,
-        -s87,
-        -s88,
-        -s89,
-        -s97,
-        s96 - s93,
-        -s98,
+        s67 - s90,
+        -(s68 + s91),
+        k51 - s92,
+        k51 * s56 - (s100 + s53 * s92),
+        k50 * s55 - (s96 - s99 - s52 * s92),
+        theta_ddot_5 * k52 - (s55 * s68 + s56 * s67) - (s101 + (s52 * s91 - s53 * s90)),
+        -s90,
+        -s91,
+        -s92,
+        -s100,
+        s99 - s96,
+        -s101,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """21 operations: 1 add, 1 sub, 11 mul, 4 neg, 2 sin, 2 cos."""
-    k30, k32, k33 = k
+    """20 operations: 1 add, 1 sub, 11 mul, 3 neg, 2 sin, 2 cos."""
+    k49, k37, k38, k53 = k
     theta, phi, _, _ = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s36 = sin_phi * sin_theta
-    s37 = sin_phi * cos_theta
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
     return (
         cos_theta,
         -sin_theta,
         0.0,
-        k30 * cos_theta,
+        k49 * cos_theta,
         sin_theta,
         cos_theta,
         0.0,
-        k30 * sin_theta,
+        k49 * sin_theta,
         0.0,
         0.0,
         1.0,
         0.0,
         cos_theta,
         -cos_phi * sin_theta,
-        s36,
-        k32 * cos_theta - k33 * s36,
+        s35,
+        k37 * cos_theta - k38 * s35,
         sin_theta,
         cos_phi * cos_theta,
-        -s37,
-        k32 * sin_theta + k33 * s37,
+        -s36,
+        k37 * sin_theta + k38 * s36,
         0.0,
         sin_phi,
         cos_phi,
-        -cos_phi * k33,
+        cos_phi * k53,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """45 operations: 6 add, 4 sub, 29 mul, 2 neg, 2 sin, 2 cos."""
-    k30, k32, k33 = k
+    """43 operations: 6 add, 4 sub, 27 mul, 2 neg, 2 sin, 2 cos."""
+    k49, k37, k38 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
+    omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s36 = sin_phi * sin_theta
-    s37 = sin_phi * cos_theta
-    omega_pendulum_y = theta_dot * sin_phi
-    s100 = k32 * cos_theta - k33 * s36
-    s101 = k32 * sin_theta + k33 * s37
-    s56 = cos_phi * k33
-    s38 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + omega_pendulum_z * s36
-    s39 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - omega_pendulum_z * s37
-    s57 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
+    s102 = k37 * cos_theta - k38 * s35
+    s103 = k37 * sin_theta + k38 * s36
+    s57 = cos_phi * k38
+    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s104 = theta_dot * k49
+    s105 = cos_phi * omega_pendulum_y
+    s106 = phi_dot * cos_theta - sin_theta * s105 + s35 * omega_pendulum_z
+    s107 = phi_dot * sin_theta + cos_theta * s105 - s36 * omega_pendulum_z
     return (
-        -theta_dot * (k30 * sin_theta),
-        theta_dot * (k30 * cos_theta),
+        -sin_theta * s104,
+        cos_theta * s104,
         0.0,
         0.0,
         0.0,
         theta_dot,
-        -(s56 * s39 + s101 * s57),
-        s100 * s57 + s56 * s38,
-        s101 * s38 - s100 * s39,
-        s38,
-        s39,
-        s57,
+        -(s57 * s107 + s103 * s60),
+        s102 * s60 + s57 * s106,
+        s103 * s106 - s102 * s107,
+        s106,
+        s107,
+        s60,
     )
 
 
 def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """14 operations: 1 add, 1 sub, 7 mul, 1 neg, 2 sin, 2 cos."""
-    k32, k40 = k
+    """12 operations: 1 add, 1 sub, 6 mul, 2 sin, 2 cos."""
+    k37, k54, k55 = k
     theta, phi, _, _ = y
-    sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
+    s108 = sin(phi) * k54
     return (
-        k32 * cos_theta - sin_phi * sin_theta * k40,
-        k32 * sin_theta + sin_phi * cos_theta * k40,
-        -cos(phi) * k40,
+        k37 * cos_theta - sin_theta * s108,
+        k37 * sin_theta + cos_theta * s108,
+        cos(phi) * k55,
     )
 
 
 def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """40 operations: 6 add, 4 sub, 25 mul, 1 neg, 2 sin, 2 cos."""
-    k32, k40 = k
+    """39 operations: 6 add, 4 sub, 24 mul, 1 neg, 2 sin, 2 cos."""
+    k37, k54 = k
     theta, phi, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     cos_phi = cos(phi)
+    omega_pendulum_y = theta_dot * sin_phi
     omega_pendulum_z = theta_dot * cos_phi
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s36 = sin_phi * sin_theta
-    s37 = sin_phi * cos_theta
-    omega_pendulum_y = theta_dot * sin_phi
-    s38 = phi_dot * cos_theta - cos_phi * sin_theta * omega_pendulum_y + omega_pendulum_z * s36
-    s39 = phi_dot * sin_theta + cos_phi * cos_theta * omega_pendulum_y - omega_pendulum_z * s37
-    s57 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
-    s102 = k32 * cos_theta - s36 * k40
-    s103 = k32 * sin_theta + s37 * k40
-    s104 = cos_phi * k40
+    s35 = sin_phi * sin_theta
+    s36 = sin_phi * cos_theta
+    s60 = sin_phi * omega_pendulum_y + cos_phi * omega_pendulum_z
+    s105 = cos_phi * omega_pendulum_y
+    s106 = phi_dot * cos_theta - sin_theta * s105 + s35 * omega_pendulum_z
+    s107 = phi_dot * sin_theta + cos_theta * s105 - s36 * omega_pendulum_z
+    s109 = k37 * cos_theta - s35 * k54
+    s110 = k37 * sin_theta + s36 * k54
+    s111 = cos_phi * k54
     return (
-        -(s39 * s104 + s57 * s103),
-        s57 * s102 + s38 * s104,
-        s38 * s103 - s39 * s102,
+        -(s107 * s111 + s60 * s110),
+        s60 * s109 + s106 * s111,
+        s106 * s110 - s107 * s109,
     )
 
 
 def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """20 operations: 1 add, 2 sub, 11 mul, 2 neg, 2 sin, 2 cos."""
-    k32, k40 = k
+    """19 operations: 1 add, 2 sub, 10 mul, 2 neg, 2 sin, 2 cos."""
+    k37, k54 = k
     theta, phi, _, _ = y
-    sin_phi = sin(phi)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s102 = k32 * cos_theta - sin_phi * sin_theta * k40
-    s103 = k32 * sin_theta + sin_phi * cos_theta * k40
-    s104 = cos(phi) * k40
+    s108 = sin(phi) * k54
+    s112 = k37 * cos_theta - sin_theta * s108
+    s113 = k37 * sin_theta + cos_theta * s108
+    s111 = cos(phi) * k54
     return (
-        -s103,
-        -sin_theta * s104,
-        s102,
-        cos_theta * s104,
+        -s113,
+        -sin_theta * s111,
+        s112,
+        cos_theta * s111,
         0.0,
-        cos_theta * s103 - sin_theta * s102,
+        cos_theta * s113 - sin_theta * s112,
     )
 
 
@@ -857,17 +879,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -876,19 +917,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -903,7 +953,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 2
 _COLUMNS = {
     "sin": np.sin,
@@ -1009,17 +1059,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -1088,7 +1139,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (2, 2), ('sin', 'cos'), y, p, u)
 
 

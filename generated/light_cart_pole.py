@@ -15,12 +15,13 @@ Parameters p, with the scene's values:
     g = 9.81   m/s^2  gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 17 operations: 3 add, 10 mul, 1 div, 1 neg, 1 sin, 1 cos; 2 more on
+One call of `derivative` takes 16 operations: 2 add, 1 sub, 10 mul, 1 div, 1 sin, 1 cos; 3 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (4, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (4, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (4, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -68,24 +69,24 @@ JOINTS = ('rail', 'pin')
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 3, "mul": 10, "div": 1, "neg": 1, "sin": 1, "cos": 1, "total": 17, "parameters": 2},
-    "jacobian": {"add": 3, "sub": 3, "mul": 22, "div": 3, "neg": 2, "sin": 1, "cos": 1, "total": 35, "parameters": 5},
-    "parameter_jacobian": {"add": 3, "sub": 3, "mul": 23, "div": 5, "neg": 3, "sin": 1, "cos": 1, "total": 39, "parameters": 4},
-    "forward_dynamics": {"add": 3, "sub": 3, "mul": 13, "div": 1, "sin": 1, "cos": 1, "total": 22, "parameters": 5},
-    "inverse_dynamics": {"add": 3, "sub": 1, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 5},
+    "derivative": {"add": 2, "sub": 1, "mul": 10, "div": 1, "sin": 1, "cos": 1, "total": 16, "parameters": 3},
+    "jacobian": {"add": 2, "sub": 4, "mul": 21, "div": 3, "sin": 1, "cos": 1, "total": 32, "parameters": 7},
+    "parameter_jacobian": {"add": 3, "sub": 3, "mul": 20, "div": 5, "neg": 2, "sin": 1, "cos": 1, "total": 35, "parameters": 5},
+    "forward_dynamics": {"add": 3, "sub": 3, "mul": 12, "div": 1, "sin": 1, "cos": 1, "total": 21, "parameters": 5},
+    "inverse_dynamics": {"add": 3, "sub": 1, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 4},
     "mass_matrix": {"mul": 1, "cos": 1, "total": 2, "parameters": 4},
-    "velocity_force": {"mul": 3, "neg": 1, "sin": 1, "total": 5, "parameters": 1},
+    "velocity_force": {"mul": 3, "sin": 1, "total": 4, "parameters": 2},
     "gravity_force": {"mul": 1, "sin": 1, "total": 2, "parameters": 2},
-    "bias_force": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 2},
+    "bias_force": {"mul": 4, "neg": 1, "sin": 1, "total": 6, "parameters": 1},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 3, "mul": 10, "sin": 1, "cos": 1, "total": 15, "parameters": 0},
-    "potential_energy": {"mul": 2, "neg": 1, "cos": 1, "total": 4, "parameters": 1},
-    "effect_powers": {"mul": 3, "neg": 1, "sin": 1, "total": 5, "parameters": 1},
-    "momentum": {"add": 4, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 2},
-    "centre_of_mass": {"add": 2, "mul": 5, "div": 2, "neg": 1, "sin": 1, "cos": 1, "total": 12, "parameters": 1},
-    "joint_forces": {"add": 9, "sub": 3, "mul": 21, "div": 1, "neg": 5, "sin": 1, "cos": 1, "total": 41, "parameters": 3},
-    "body_poses": {"add": 1, "mul": 2, "neg": 1, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
-    "body_velocities": {"add": 1, "mul": 4, "sin": 1, "cos": 1, "total": 7, "parameters": 0},
+    "kinetic_energy": {"add": 3, "mul": 9, "sin": 1, "cos": 1, "total": 14, "parameters": 0},
+    "potential_energy": {"mul": 1, "cos": 1, "total": 2, "parameters": 3},
+    "effect_powers": {"mul": 2, "sin": 1, "total": 3, "parameters": 3},
+    "momentum": {"add": 4, "mul": 9, "sin": 1, "cos": 1, "total": 15, "parameters": 1},
+    "centre_of_mass": {"add": 2, "mul": 4, "div": 2, "sin": 1, "cos": 1, "total": 10, "parameters": 3},
+    "joint_forces": {"add": 7, "sub": 5, "mul": 21, "div": 1, "neg": 3, "sin": 1, "cos": 1, "total": 39, "parameters": 5},
+    "body_poses": {"add": 1, "mul": 2, "sin": 1, "cos": 1, "total": 5, "parameters": 1},
+    "body_velocities": {"add": 1, "mul": 3, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
 }
 
 
@@ -95,39 +96,45 @@ def _fixed(M, m, l, g):
         return "mass of cart is not positive"
     if not m > 0.0:
         return "mass of pole is not positive"
-    pivot_theta_dot = m * (l * l)
-    k1 = g / l
-    k2 = 1.0 / l
+    k8 = g / l
+    k1 = 1.0 / l
+    k2 = -k8
     k3 = m * 2.0
-    k4 = m * (l * 2.0)
-    k5 = k1 / l
-    k6 = k2 / l
-    k7 = 1.0 / pivot_theta_dot
-    k8 = M + m
-    k9 = m * l
-    k10 = g * k9
-    inertia_pole_zz = l * k9
-    k12 = M * g
-    k11 = m * g
+    k10 = m * l
+    k4 = 2.0 * k10
+    k5 = -k1
+    k6 = k8 / l
+    k7 = k1 / l
+    pivot_theta_dot = m * (l * l)
+    k9 = 1.0 / pivot_theta_dot
+    k11 = M + m
+    k12 = g * k10
+    k13 = l * k10
+    k14 = -k10
+    k15 = l * (m * g)
+    k16 = -k12
+    k17 = -M
+    k18 = -M * g
+    k19 = -l
     return {
         "initial_state": (),
         "derivative": (M, m, l, g, k1, k2),
-        "jacobian": (M, m, l, g, k1, k2, k3, k4),
-        "parameter_jacobian": (M, m, l, g, k2, k5, k6),
-        "forward_dynamics": (M, m, l, g, k1, k2, k7),
-        "inverse_dynamics": (pivot_theta_dot, k8, k9, k10),
-        "mass_matrix": (pivot_theta_dot, k8, k9),
-        "velocity_force": (k9,),
-        "gravity_force": (k10,),
-        "bias_force": (k9, k10),
+        "jacobian": (M, m, l, g, k1, k2, k3, k4, k5),
+        "parameter_jacobian": (M, m, l, g, k1, k5, k6, k7),
+        "forward_dynamics": (M, m, l, g, k8, k1, k9),
+        "inverse_dynamics": (k10, k11, k12, k13),
+        "mass_matrix": (k10, pivot_theta_dot, k11),
+        "velocity_force": (k14,),
+        "gravity_force": (k15,),
+        "bias_force": (g, k10),
         "applied_force": (),
         "kinetic_energy": (M, m, l),
-        "potential_energy": (l, k11),
-        "effect_powers": (l, k11),
-        "momentum": (M, m, k9, inertia_pole_zz),
-        "centre_of_mass": (M, m, l, k8),
-        "joint_forces": (M, m, l, g, k1, k2, k12),
-        "body_poses": (l,),
+        "potential_energy": (k16,),
+        "effect_powers": (k16,),
+        "momentum": (M, m, l, k10),
+        "centre_of_mass": (M, m, l, k11, k14),
+        "joint_forces": (M, m, l, g, k8, k1, k17, k18),
+        "body_poses": (l, k19),
         "body_velocities": (l,),
     }
 
@@ -172,7 +179,7 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """17 operations: 3 add, 10 mul, 1 div, 1 neg, 1 sin, 1 cos."""
+    """16 operations: 2 add, 1 sub, 10 mul, 1 div, 1 sin, 1 cos."""
     M, m, l, g, k1, k2 = k
     _, theta, x_dot, theta_dot = y
     sin_theta = sin(theta)
@@ -182,22 +189,22 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
         x_dot,
         theta_dot,
         x_ddot,
-        -(sin_theta * k1 + k2 * (cos_theta * x_ddot)),
+        sin_theta * k2 - k1 * (cos_theta * x_ddot),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """35 operations: 3 add, 3 sub, 22 mul, 3 div, 2 neg, 1 sin, 1 cos."""
-    M, m, l, g, k1, k2, k3, k4 = k
+    """32 operations: 2 add, 4 sub, 21 mul, 3 div, 1 sin, 1 cos."""
+    M, m, l, g, k1, k2, k3, k4, k5 = k
     _, theta, _, theta_dot = y
     sin_theta = sin(theta)
     pivot_x_dot = M + m * (sin_theta * sin_theta)
     cos_theta = cos(theta)
     s1 = g * cos_theta + l * (theta_dot * theta_dot)
-    x_ddot = m * (sin_theta * s1) / pivot_x_dot
-    s2 = m * (cos_theta * s1 - sin_theta * (g * sin_theta)) - x_ddot * (sin_theta * cos_theta * k3)
-    s3 = s2 / pivot_x_dot
-    s4 = k4 * (theta_dot * sin_theta) / pivot_x_dot
+    s2 = sin_theta * (m * (sin_theta * s1) / pivot_x_dot)
+    s3 = m * (cos_theta * s1 - sin_theta * (g * sin_theta)) - k3 * (cos_theta * s2)
+    s4 = s3 / pivot_x_dot
+    s5 = theta_dot * sin_theta * k4 / pivot_x_dot
     return (
         0.0,
         0.0,
@@ -208,31 +215,33 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         1.0,
         0.0,
-        s3,
-        0.0,
         s4,
         0.0,
-        -(cos_theta * k1 + k2 * (cos_theta * s3 - sin_theta * x_ddot)),
+        s5,
         0.0,
-        -k2 * (cos_theta * s4),
+        cos_theta * k2 - k1 * (cos_theta * s4 - s2),
+        0.0,
+        k5 * (cos_theta * s5),
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """39 operations: 3 add, 3 sub, 23 mul, 5 div, 3 neg, 1 sin, 1 cos."""
-    M, m, l, g, k2, k5, k6 = k
+    """35 operations: 3 add, 3 sub, 20 mul, 5 div, 2 neg, 1 sin, 1 cos."""
+    M, m, l, g, k1, k5, k6, k7 = k
     _, theta, _, theta_dot = y
     sin_theta = sin(theta)
-    s5 = sin_theta * sin_theta
-    pivot_x_dot = M + m * s5
+    s6 = sin_theta * sin_theta
+    pivot_x_dot = M + m * s6
     cos_theta = cos(theta)
     theta_dot_squared = theta_dot * theta_dot
-    s6 = sin_theta * (g * cos_theta + l * theta_dot_squared)
-    x_ddot = m * s6 / pivot_x_dot
-    s7 = x_ddot / pivot_x_dot
-    s8 = (s6 - s5 * x_ddot) / pivot_x_dot
-    s9 = m * (sin_theta * theta_dot_squared) / pivot_x_dot
-    s10 = m * (sin_theta * cos_theta) / pivot_x_dot
+    s7 = sin_theta * (g * cos_theta + l * theta_dot_squared)
+    x_ddot = m * s7 / pivot_x_dot
+    s8 = x_ddot / pivot_x_dot
+    s9 = cos_theta * k1
+    s10 = (s7 - s6 * x_ddot) / pivot_x_dot
+    s11 = m * sin_theta
+    s12 = theta_dot_squared * s11 / pivot_x_dot
+    s13 = cos_theta * s11 / pivot_x_dot
     return (
         0.0,
         0.0,
@@ -242,86 +251,87 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        -s7,
-        s8,
-        s9,
+        -s8,
         s10,
-        k2 * (cos_theta * s7),
-        -k2 * (cos_theta * s8),
-        sin_theta * k5 - (k2 * (cos_theta * s9) - cos_theta * x_ddot * k6),
-        -k2 * (sin_theta + cos_theta * s10),
+        s12,
+        s13,
+        s8 * s9,
+        -s9 * s10,
+        sin_theta * k6 - (s9 * s12 - cos_theta * x_ddot * k7),
+        k5 * (sin_theta + cos_theta * s13),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """22 operations: 3 add, 3 sub, 13 mul, 1 div, 1 sin, 1 cos."""
-    M, m, l, g, k1, k2, k7 = k
+    """21 operations: 3 add, 3 sub, 12 mul, 1 div, 1 sin, 1 cos."""
+    M, m, l, g, k8, k1, k9 = k
     _, theta, _, theta_dot = y
     tau__x_dot, tau__theta_dot = extra
     sin_theta = sin(theta)
     cos_theta = cos(theta)
-    s11 = m * (sin_theta * (g * cos_theta + l * (theta_dot * theta_dot))) + tau__x_dot
-    x_ddot_2 = (s11 - k2 * (cos_theta * tau__theta_dot)) / (M + m * (sin_theta * sin_theta))
+    s9 = cos_theta * k1
+    s14 = m * (sin_theta * (g * cos_theta + l * (theta_dot * theta_dot))) + tau__x_dot
+    x_ddot_2 = (s14 - tau__theta_dot * s9) / (M + m * (sin_theta * sin_theta))
     return (
         x_ddot_2,
-        tau__theta_dot * k7 - sin_theta * k1 - k2 * (cos_theta * x_ddot_2),
+        tau__theta_dot * k9 - sin_theta * k8 - s9 * x_ddot_2,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """15 operations: 3 add, 1 sub, 9 mul, 1 sin, 1 cos."""
-    pivot_theta_dot, k8, k9, k10 = k
+    k10, k11, k12, k13 = k
     _, theta, _, theta_dot = y
     vd__x_dot, vd__theta_dot = extra
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     return (
-        vd__x_dot * k8 + k9 * (cos_theta * vd__theta_dot - sin_theta * (theta_dot * theta_dot)),
-        k9 * (cos_theta * vd__x_dot) + (pivot_theta_dot * vd__theta_dot + sin_theta * k10),
+        vd__x_dot * k11 + k10 * (cos_theta * vd__theta_dot - sin_theta * (theta_dot * theta_dot)),
+        k10 * (cos_theta * vd__x_dot) + (vd__theta_dot * k13 + sin_theta * k12),
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     """2 operations: 1 mul, 1 cos."""
-    pivot_theta_dot, k8, k9 = k
+    k10, pivot_theta_dot, k11 = k
     _, theta, _, _ = y
-    s12 = cos(theta) * k9
+    s15 = cos(theta) * k10
     return (
-        k8,
-        s12,
-        s12,
+        k11,
+        s15,
+        s15,
         pivot_theta_dot,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin):
-    """5 operations: 3 mul, 1 neg, 1 sin."""
-    k9, = k
+    """4 operations: 3 mul, 1 sin."""
+    k14, = k
     _, theta, _, theta_dot = y
     return (
-        -sin(theta) * (theta_dot * theta_dot) * k9,
+        k14 * (theta_dot * (theta_dot * sin(theta))),
         0.0,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), sin=sin):
     """2 operations: 1 mul, 1 sin."""
-    k10, = k
+    k15, = k
     _, theta, _, _ = y
     return (
         0.0,
-        sin(theta) * k10,
+        sin(theta) * k15,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin):
     """6 operations: 4 mul, 1 neg, 1 sin."""
-    k9, k10 = k
+    g, k10 = k
     _, theta, _, theta_dot = y
-    sin_theta = sin(theta)
+    s16 = sin(theta) * k10
     return (
-        -sin_theta * (theta_dot * theta_dot) * k9,
-        sin_theta * k10,
+        -theta_dot * theta_dot * s16,
+        g * s16,
     )
 
 
@@ -334,105 +344,108 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """15 operations: 3 add, 10 mul, 1 sin, 1 cos."""
+    """14 operations: 3 add, 9 mul, 1 sin, 1 cos."""
     M, m, l = k
     _, theta, x_dot, theta_dot = y
-    s13 = theta_dot * (l * sin(theta))
-    s14 = x_dot + theta_dot * (l * cos(theta))
+    s17 = l * theta_dot
+    s18 = sin(theta) * s17
+    s19 = x_dot + cos(theta) * s17
     return (
-        0.5 * (M * (x_dot * x_dot) + m * (s14 * s14 + s13 * s13)),
+        0.5 * (M * (x_dot * x_dot) + m * (s19 * s19 + s18 * s18)),
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
-    """4 operations: 2 mul, 1 neg, 1 cos."""
-    l, k11 = k
+    """2 operations: 1 mul, 1 cos."""
+    k16, = k
     _, theta, _, _ = y
     return (
-        -l * cos(theta) * k11,
+        cos(theta) * k16,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), sin=sin):
-    """5 operations: 3 mul, 1 neg, 1 sin."""
-    l, k11 = k
+    """3 operations: 2 mul, 1 sin."""
+    k16, = k
     _, theta, _, theta_dot = y
     return (
-        -theta_dot * (l * sin(theta)) * k11,
+        k16 * (theta_dot * sin(theta)),
     )
 
 
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
     """15 operations: 4 add, 9 mul, 1 sin, 1 cos."""
-    M, m, k9, inertia_pole_zz = k
+    M, m, l, k10 = k
     x, theta, x_dot, theta_dot = y
-    s12 = cos(theta) * k9
-    s15 = theta_dot * (sin(theta) * k9)
+    s15 = cos(theta) * k10
+    s20 = theta_dot * k10
+    s21 = sin(theta) * s20
     return (
-        M * x_dot + (m * x_dot + theta_dot * s12),
-        s15,
-        theta_dot * inertia_pole_zz + x_dot * s12 + x * s15,
+        M * x_dot + (m * x_dot + theta_dot * s15),
+        s21,
+        l * s20 + x_dot * s15 + x * s21,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """12 operations: 2 add, 5 mul, 2 div, 1 neg, 1 sin, 1 cos."""
-    M, m, l, k8 = k
+    """10 operations: 2 add, 4 mul, 2 div, 1 sin, 1 cos."""
+    M, m, l, k11, k14 = k
     x, theta, _, _ = y
     return (
-        (M * x + m * (x + l * sin(theta))) / k8,
-        -m * (l * cos(theta)) / k8,
+        (M * x + m * (x + l * sin(theta))) / k11,
+        cos(theta) * k14 / k11,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """41 operations: 9 add, 3 sub, 21 mul, 1 div, 5 neg, 1 sin, 1 cos."""
-    M, m, l, g, k1, k2, k12 = k
+    """39 operations: 7 add, 5 sub, 21 mul, 1 div, 3 neg, 1 sin, 1 cos."""
+    M, m, l, g, k8, k1, k17, k18 = k
     x, theta, _, theta_dot = y
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     theta_dot_squared = theta_dot * theta_dot
     x_ddot = m * (sin_theta * (g * cos_theta + l * theta_dot_squared)) / (M + m * (sin_theta * sin_theta))
-    s16 = sin_theta * k1 + k2 * (cos_theta * x_ddot)
-    s17 = l * sin_theta
-    s18 = l * cos_theta
-    s19 = m * (x_ddot - (theta_dot_squared * s17 + s16 * s18))
-    s20 = m * (g + (theta_dot_squared * s18 - s16 * s17))
-    s21 = -(s20 * (x + s17 - x) + s18 * s19)
+    s22 = l * sin_theta
+    s23 = sin_theta * k8 + k1 * (cos_theta * x_ddot)
+    s24 = l * cos_theta
+    s25 = m * (x_ddot - (theta_dot_squared * s22 + s23 * s24))
+    s26 = m * (g + (theta_dot_squared * s24 - s23 * s22))
+    s27 = -(s26 * (x + s22 - x) + s24 * s25)
     return (
-        -(M * x_ddot + s19),
-        -(k12 + s20),
-        s21,
-        -s19,
-        -s20,
-        s21,
+        k17 * x_ddot - s25,
+        k18 - s26,
+        s27,
+        -s25,
+        -s26,
+        s27,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """6 operations: 1 add, 2 mul, 1 neg, 1 sin, 1 cos."""
-    l, = k
+    """5 operations: 1 add, 2 mul, 1 sin, 1 cos."""
+    l, k19 = k
     x, theta, _, _ = y
     return (
         x,
         0.0,
         0.0,
         x + l * sin(theta),
-        -l * cos(theta),
+        k19 * cos(theta),
         theta,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """7 operations: 1 add, 4 mul, 1 sin, 1 cos."""
+    """6 operations: 1 add, 3 mul, 1 sin, 1 cos."""
     l, = k
     _, theta, x_dot, theta_dot = y
+    s17 = l * theta_dot
     return (
         x_dot,
         0.0,
         0.0,
-        x_dot + theta_dot * (l * cos(theta)),
-        theta_dot * (l * sin(theta)),
+        x_dot + cos(theta) * s17,
+        sin(theta) * s17,
         theta_dot,
     )
 
@@ -459,17 +472,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -478,19 +510,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -505,7 +546,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 2
 _COLUMNS = {
     "sin": np.sin,
@@ -611,17 +652,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -685,7 +727,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (2, 2), ('cos',), y, p, u)
 
 

@@ -15,8 +15,9 @@ Effects: gravity.
 One call of `derivative` takes 2 operations: 1 mul, 1 cos; 6 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (2, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (2, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (3, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -59,23 +60,23 @@ POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"mul": 1, "cos": 1, "total": 2, "parameters": 6},
-    "jacobian": {"mul": 1, "neg": 1, "sin": 1, "total": 3, "parameters": 6},
+    "jacobian": {"mul": 1, "sin": 1, "total": 2, "parameters": 7},
     "forward_dynamics": {"add": 1, "mul": 2, "cos": 1, "total": 4, "parameters": 5},
     "inverse_dynamics": {"sub": 1, "mul": 2, "cos": 1, "total": 4, "parameters": 4},
     "mass_matrix": {"total": 0, "parameters": 2},
     "velocity_force": {"total": 0, "parameters": 0},
-    "gravity_force": {"mul": 1, "neg": 1, "cos": 1, "total": 3, "parameters": 2},
-    "bias_force": {"mul": 1, "neg": 1, "cos": 1, "total": 3, "parameters": 2},
+    "gravity_force": {"mul": 1, "cos": 1, "total": 2, "parameters": 3},
+    "bias_force": {"mul": 1, "cos": 1, "total": 2, "parameters": 3},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 1, "mul": 7, "sin": 1, "cos": 1, "total": 10, "parameters": 1},
-    "potential_energy": {"mul": 2, "neg": 1, "sin": 1, "total": 4, "parameters": 1},
-    "effect_powers": {"mul": 3, "cos": 1, "total": 4, "parameters": 1},
-    "momentum": {"add": 1, "mul": 11, "neg": 1, "sin": 1, "cos": 1, "total": 15, "parameters": 0},
-    "centre_of_mass": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
-    "joint_forces": {"add": 1, "sub": 2, "mul": 8, "neg": 1, "sin": 1, "cos": 1, "total": 14, "parameters": 7},
-    "body_poses": {"mul": 2, "neg": 2, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
-    "body_velocities": {"mul": 4, "neg": 1, "sin": 1, "cos": 1, "total": 7, "parameters": 0},
-    "parameter_jacobian": {"mul": 3, "cos": 1, "total": 4, "parameters": 20},
+    "kinetic_energy": {"add": 1, "mul": 6, "sin": 1, "cos": 1, "total": 9, "parameters": 1},
+    "potential_energy": {"mul": 1, "sin": 1, "total": 2, "parameters": 3},
+    "effect_powers": {"mul": 2, "cos": 1, "total": 3, "parameters": 2},
+    "momentum": {"add": 1, "mul": 10, "sin": 1, "cos": 1, "total": 13, "parameters": 1},
+    "centre_of_mass": {"mul": 2, "sin": 1, "cos": 1, "total": 4, "parameters": 1},
+    "joint_forces": {"add": 1, "sub": 2, "mul": 8, "sin": 1, "cos": 1, "total": 13, "parameters": 8},
+    "body_poses": {"mul": 2, "sin": 1, "cos": 1, "total": 4, "parameters": 1},
+    "body_velocities": {"mul": 3, "neg": 1, "sin": 1, "cos": 1, "total": 6, "parameters": 0},
+    "parameter_jacobian": {"mul": 3, "cos": 1, "total": 4, "parameters": 18},
 }
 
 
@@ -85,36 +86,44 @@ def _fixed(bob_mass, pivot_r_child_x, gravity_g):
         return "mass of bob is not positive"
     pivot_r_child_x_squared = pivot_r_child_x * pivot_r_child_x
     pivot_bob = bob_mass * pivot_r_child_x_squared
-    k7 = bob_mass * pivot_r_child_x
-    k6 = bob_mass * gravity_g
-    k2 = pivot_r_child_x * k6
-    k3 = 1.0 / pivot_bob
-    k1 = k2 * k3
-    k4 = pivot_r_child_x * k7
-    k5 = bob_mass / 2.0
-    k8 = gravity_g * (pivot_r_child_x * k3) - k2 * (pivot_r_child_x_squared * k3 / pivot_bob)
-    k9 = k6 * k3 - k2 * (k3 * (bob_mass * (pivot_r_child_x * 2.0)) / pivot_bob)
-    k10 = pivot_r_child_x * (bob_mass * k3)
+    k12 = bob_mass * gravity_g
+    k3 = pivot_r_child_x * k12
+    k4 = 1.0 / pivot_bob
+    k1 = k3 * k4
+    k2 = -k4 * k3
+    k13 = bob_mass * pivot_r_child_x
+    k5 = pivot_r_child_x * k13
+    k6 = -k3
+    k7 = bob_mass / 2.0
+    k9 = gravity_g * k13
+    k8 = -k9
+    k10 = -bob_mass
+    k11 = -pivot_r_child_x
+    k14 = k9 * k4
+    k15 = -k13
+    k16 = gravity_g * (pivot_r_child_x * k4) - k9 * (pivot_r_child_x_squared * k4 / pivot_bob)
+    k17 = k13 * k4
+    k18 = gravity_g * (bob_mass * k4) - k9 * (2.0 * k17 / pivot_bob)
     return {
         "initial_state": (),
         "derivative": (k1,),
-        "jacobian": (k1,),
-        "forward_dynamics": (k2, k3),
-        "inverse_dynamics": (k2, k4),
+        "jacobian": (k2,),
+        "forward_dynamics": (k3, k4),
+        "inverse_dynamics": (k3, k5),
         "mass_matrix": (pivot_bob,),
         "velocity_force": (),
-        "gravity_force": (k2,),
-        "bias_force": (k2,),
+        "gravity_force": (k6,),
+        "bias_force": (k6,),
         "applied_force": (),
-        "kinetic_energy": (pivot_r_child_x, k5),
-        "potential_energy": (pivot_r_child_x, k6),
-        "effect_powers": (pivot_r_child_x, k6),
-        "momentum": (bob_mass, pivot_r_child_x),
-        "centre_of_mass": (pivot_r_child_x,),
-        "joint_forces": (k7, k6, k1),
-        "body_poses": (pivot_r_child_x,),
+        "kinetic_energy": (pivot_r_child_x, k7),
+        "potential_energy": (k8,),
+        "effect_powers": (k9,),
+        "momentum": (bob_mass, pivot_r_child_x, k10),
+        "centre_of_mass": (k11,),
+        "joint_forces": (k12, k13, k14, k15),
+        "body_poses": (k11,),
         "body_velocities": (pivot_r_child_x,),
-        "parameter_jacobian": (k8, k9, k10),
+        "parameter_jacobian": (k16, k17, k18),
     }
 
 
@@ -166,34 +175,34 @@ def _derivative(y, k, u=(), extra=(), cos=cos):
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin):
-    """3 operations: 1 mul, 1 neg, 1 sin."""
-    k1, = k
+    """2 operations: 1 mul, 1 sin."""
+    k2, = k
     theta, _ = y
     return (
         0.0,
         1.0,
-        -k1 * sin(theta),
+        sin(theta) * k2,
         0.0,
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), cos=cos):
     """4 operations: 1 add, 2 mul, 1 cos."""
-    k2, k3 = k
+    k3, k4 = k
     theta, _ = y
     tau__theta, = extra
     return (
-        k3 * (tau__theta + cos(theta) * k2),
+        k4 * (tau__theta + cos(theta) * k3),
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), cos=cos):
     """4 operations: 1 sub, 2 mul, 1 cos."""
-    k2, k4 = k
+    k3, k5 = k
     theta, _ = y
     theta_ddot, = extra
     return (
-        theta_ddot * k4 - cos(theta) * k2,
+        theta_ddot * k5 - cos(theta) * k3,
     )
 
 
@@ -213,20 +222,20 @@ def _velocity_force(y, k, u=(), extra=()):
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
-    """3 operations: 1 mul, 1 neg, 1 cos."""
-    k2, = k
+    """2 operations: 1 mul, 1 cos."""
+    k6, = k
     theta, _ = y
     return (
-        -cos(theta) * k2,
+        cos(theta) * k6,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), cos=cos):
-    """3 operations: 1 mul, 1 neg, 1 cos."""
-    k2, = k
+    """2 operations: 1 mul, 1 cos."""
+    k6, = k
     theta, _ = y
     return (
-        -cos(theta) * k2,
+        cos(theta) * k6,
     )
 
 
@@ -238,109 +247,112 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """10 operations: 1 add, 7 mul, 1 sin, 1 cos."""
-    pivot_r_child_x, k5 = k
+    """9 operations: 1 add, 6 mul, 1 sin, 1 cos."""
+    pivot_r_child_x, k7 = k
     theta, theta_dot = y
-    xd_bob = pivot_r_child_x * (theta_dot * sin(theta))
-    s1 = pivot_r_child_x * (theta_dot * cos(theta))
+    s1 = pivot_r_child_x * theta_dot
+    xd_bob = sin(theta) * s1
+    s2 = cos(theta) * s1
     return (
-        (xd_bob * xd_bob + s1 * s1) * k5,
+        (xd_bob * xd_bob + s2 * s2) * k7,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
-    """4 operations: 2 mul, 1 neg, 1 sin."""
-    pivot_r_child_x, k6 = k
+    """2 operations: 1 mul, 1 sin."""
+    k8, = k
     theta, _ = y
     return (
-        -k6 * (pivot_r_child_x * sin(theta)),
+        sin(theta) * k8,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos):
-    """4 operations: 3 mul, 1 cos."""
-    pivot_r_child_x, k6 = k
+    """3 operations: 2 mul, 1 cos."""
+    k9, = k
     theta, theta_dot = y
     return (
-        k6 * (pivot_r_child_x * (theta_dot * cos(theta))),
+        theta_dot * cos(theta) * k9,
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """15 operations: 1 add, 11 mul, 1 neg, 1 sin, 1 cos."""
-    bob_mass, pivot_r_child_x = k
+    """13 operations: 1 add, 10 mul, 1 sin, 1 cos."""
+    bob_mass, pivot_r_child_x, k10 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    xd_bob = pivot_r_child_x * (theta_dot * sin_theta)
-    s1 = pivot_r_child_x * (theta_dot * cos_theta)
-    s2 = s1 * (pivot_r_child_x * cos_theta) + xd_bob * (pivot_r_child_x * sin_theta)
+    s1 = pivot_r_child_x * theta_dot
+    xd_bob = sin_theta * s1
+    s2 = cos_theta * s1
+    s3 = s2 * (pivot_r_child_x * cos_theta) + xd_bob * (pivot_r_child_x * sin_theta)
     return (
         bob_mass * xd_bob,
-        -bob_mass * s1,
-        bob_mass * s2,
+        k10 * s2,
+        bob_mass * s3,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """6 operations: 2 mul, 2 neg, 1 sin, 1 cos."""
-    pivot_r_child_x, = k
+    """4 operations: 2 mul, 1 sin, 1 cos."""
+    k11, = k
     theta, _ = y
     return (
-        -pivot_r_child_x * cos(theta),
-        -pivot_r_child_x * sin(theta),
+        k11 * cos(theta),
+        k11 * sin(theta),
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """14 operations: 1 add, 2 sub, 8 mul, 1 neg, 1 sin, 1 cos."""
-    k7, k6, k1 = k
+    """13 operations: 1 add, 2 sub, 8 mul, 1 sin, 1 cos."""
+    k12, k13, k14, k15 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
-    alpha_bob = cos_theta * k1
     sin_theta = sin(theta)
+    alpha_bob = cos_theta * k14
     theta_dot_squared = theta_dot * theta_dot
     return (
-        -k7 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
-        k7 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k6,
+        k15 * (alpha_bob * sin_theta + cos_theta * theta_dot_squared),
+        k13 * (cos_theta * alpha_bob - sin_theta * theta_dot_squared) - k12,
         0.0,
     )
 
 
 def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """6 operations: 2 mul, 2 neg, 1 sin, 1 cos."""
-    pivot_r_child_x, = k
+    """4 operations: 2 mul, 1 sin, 1 cos."""
+    k11, = k
     theta, _ = y
     return (
-        -pivot_r_child_x * cos(theta),
-        -pivot_r_child_x * sin(theta),
+        k11 * cos(theta),
+        k11 * sin(theta),
         theta,
     )
 
 
 def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """7 operations: 4 mul, 1 neg, 1 sin, 1 cos."""
+    """6 operations: 3 mul, 1 neg, 1 sin, 1 cos."""
     pivot_r_child_x, = k
     theta, theta_dot = y
+    s1 = pivot_r_child_x * theta_dot
     return (
-        pivot_r_child_x * (theta_dot * sin(theta)),
-        -pivot_r_child_x * (theta_dot * cos(theta)),
+        sin(theta) * s1,
+        -cos(theta) * s1,
         theta_dot,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), cos=cos):
     """4 operations: 3 mul, 1 cos."""
-    k8, k9, k10 = k
+    k16, k17, k18 = k
     theta, _ = y
     cos_theta = cos(theta)
     return (
         0.0,
         0.0,
         0.0,
-        cos_theta * k8,
-        cos_theta * k9,
-        cos_theta * k10,
+        cos_theta * k16,
+        cos_theta * k18,
+        cos_theta * k17,
     )
 
 
@@ -366,17 +378,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -385,19 +416,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -412,7 +452,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 1
 _COLUMNS = {
     "sin": np.sin,
@@ -518,17 +558,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -591,7 +632,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (1, 1), (), y, p, u)
 
 

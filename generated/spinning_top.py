@@ -19,12 +19,13 @@ Parameters p, with the scene's values:
     g = 9.81        m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 48 operations: 10 add, 5 sub, 31 mul, 1 div, 1 neg; 12 more on
+One call of `derivative` takes 47 operations: 10 add, 5 sub, 30 mul, 1 div, 1 neg; 13 more on
 parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (7, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (7, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (5, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -80,22 +81,22 @@ JOINTS = ('tip',)
 POINTS = ('peg',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 10, "sub": 5, "mul": 31, "div": 1, "neg": 1, "total": 48, "parameters": 12},
-    "jacobian": {"add": 6, "sub": 7, "mul": 44, "div": 5, "neg": 8, "total": 70, "parameters": 12},
-    "parameter_jacobian": {"add": 9, "sub": 2, "mul": 29, "div": 1, "neg": 4, "total": 45, "parameters": 40},
-    "forward_dynamics": {"add": 7, "sub": 2, "mul": 19, "div": 1, "total": 29, "parameters": 14},
-    "inverse_dynamics": {"add": 7, "sub": 2, "mul": 20, "div": 1, "total": 30, "parameters": 9},
+    "derivative": {"add": 10, "sub": 5, "mul": 30, "div": 1, "neg": 1, "total": 47, "parameters": 13},
+    "jacobian": {"add": 6, "sub": 7, "mul": 44, "div": 5, "neg": 6, "total": 68, "parameters": 13},
+    "parameter_jacobian": {"add": 7, "sub": 4, "mul": 29, "div": 1, "total": 41, "parameters": 44},
+    "forward_dynamics": {"add": 7, "sub": 2, "mul": 18, "div": 1, "total": 28, "parameters": 15},
+    "inverse_dynamics": {"add": 7, "sub": 2, "mul": 18, "div": 1, "total": 28, "parameters": 10},
     "mass_matrix": {"total": 0, "parameters": 3},
     "velocity_force": {"mul": 4, "total": 4, "parameters": 6},
-    "gravity_force": {"add": 4, "sub": 1, "mul": 13, "div": 1, "neg": 1, "total": 20, "parameters": 2},
-    "bias_force": {"add": 5, "sub": 2, "mul": 17, "div": 1, "total": 25, "parameters": 8},
+    "gravity_force": {"add": 4, "sub": 1, "mul": 11, "div": 1, "neg": 1, "total": 18, "parameters": 3},
+    "bias_force": {"add": 5, "sub": 2, "mul": 15, "div": 1, "total": 23, "parameters": 9},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 4, "mul": 12, "total": 16, "parameters": 0},
-    "potential_energy": {"add": 4, "sub": 1, "mul": 10, "div": 1, "total": 16, "parameters": 1},
-    "effect_powers": {"add": 11, "sub": 5, "mul": 27, "div": 1, "neg": 1, "total": 45, "parameters": 1},
+    "kinetic_energy": {"add": 4, "mul": 11, "total": 15, "parameters": 1},
+    "potential_energy": {"add": 4, "sub": 1, "mul": 9, "div": 1, "total": 15, "parameters": 2},
+    "effect_powers": {"add": 11, "sub": 5, "mul": 27, "div": 1, "total": 44, "parameters": 2},
     "momentum": {"add": 15, "sub": 9, "mul": 36, "div": 1, "total": 61, "parameters": 3},
-    "centre_of_mass": {"add": 5, "sub": 2, "mul": 18, "div": 4, "total": 29, "parameters": 0},
-    "joint_forces": {"add": 66, "sub": 16, "mul": 132, "div": 2, "neg": 6, "total": 222, "parameters": 12},
+    "centre_of_mass": {"add": 5, "sub": 2, "mul": 15, "div": 4, "total": 26, "parameters": 1},
+    "joint_forces": {"add": 63, "sub": 19, "mul": 131, "div": 2, "total": 215, "parameters": 15},
     "body_poses": {"add": 9, "sub": 6, "mul": 19, "div": 1, "total": 35, "parameters": 0},
     "body_velocities": {"add": 15, "sub": 9, "mul": 34, "div": 1, "total": 59, "parameters": 0},
     "point_positions": {"add": 5, "sub": 2, "mul": 15, "div": 1, "total": 23, "parameters": 2},
@@ -128,54 +129,63 @@ def _fixed(m, h, I_1, I_3, g):
     if not I_3 >= 0.0:
         return "inertia_com zz of top is negative"
     h_squared = h * h
-    k21 = m * h_squared
-    pivot_tip_wy = I_1 + k21
-    k16 = k21 + (I_1 - I_3)
-    k1 = k16 / pivot_tip_wy
+    k28 = m * h_squared
+    pivot_tip_wy = I_1 + k28
+    k20 = k28 + (I_1 - I_3)
+    k1 = k20 / pivot_tip_wy
     moment_top_z = m * h
-    k2 = g * moment_top_z / pivot_tip_wy
-    k17 = I_3 - I_1 - k21
-    k3 = k17 / pivot_tip_wy
-    k4 = (h_squared - h_squared * k1) / pivot_tip_wy
-    k5 = (h * g - h_squared * k2) / pivot_tip_wy
-    k6 = (h_squared + h_squared * k3) / pivot_tip_wy
-    k22 = 2.0 * moment_top_z
-    k7 = (k22 - k1 * k22) / pivot_tip_wy
-    k19 = m * g
-    k8 = (k19 - k2 * k22) / pivot_tip_wy
-    k9 = (k22 + k3 * k22) / pivot_tip_wy
-    k10 = (1.0 - k1) / pivot_tip_wy
-    k11 = k2 / pivot_tip_wy
-    k12 = (-1.0 - k3) / pivot_tip_wy
-    k13 = 1.0 / pivot_tip_wy
-    k14 = moment_top_z / pivot_tip_wy
-    k15 = 1.0 / I_3
-    k18 = h * k19
+    k29 = g * moment_top_z
+    k4 = k29 / pivot_tip_wy
+    k2 = 2.0 * k4
+    k21 = I_3 - I_1 - k28
+    k3 = k21 / pivot_tip_wy
+    k5 = -k4
+    k6 = (h_squared - h_squared * k1) / pivot_tip_wy
+    k7 = (h * g - h_squared * k4) / pivot_tip_wy
+    k8 = -(h_squared + h_squared * k3) / pivot_tip_wy
+    k30 = 2.0 * moment_top_z
+    k9 = (k30 - k1 * k30) / pivot_tip_wy
+    k31 = m * g
+    k10 = (k31 - k4 * k30) / pivot_tip_wy
+    k11 = -(k30 + k3 * k30) / pivot_tip_wy
+    k12 = (1.0 - k1) / pivot_tip_wy
+    k13 = k4 / pivot_tip_wy
+    k14 = (-1.0 - k3) / pivot_tip_wy
+    k15 = 1.0 / pivot_tip_wy
+    k16 = -k15
+    k17 = moment_top_z / pivot_tip_wy
+    k18 = -k17
+    k19 = 1.0 / I_3
+    k22 = 2.0 * k29
+    k23 = h * k31
+    k24 = -k31
     inertia_top_xx = I_1 + h * moment_top_z
-    k20 = h + h * 0.9
+    k25 = -moment_top_z
+    k26 = -m
+    k27 = h + h * 0.9
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3),
-        "jacobian": (k1, k2, k3),
-        "parameter_jacobian": (k4, k5, k6, k7, k8, k9, k10, k11, k12, k13, k14),
-        "forward_dynamics": (k1, k2, k3, k13, k15),
-        "inverse_dynamics": (I_3, pivot_tip_wy, k16, k17, k18),
+        "jacobian": (k1, k4, k3, k5),
+        "parameter_jacobian": (k6, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18),
+        "forward_dynamics": (k1, k2, k3, k15, k19),
+        "inverse_dynamics": (I_3, pivot_tip_wy, k20, k21, k22),
         "mass_matrix": (I_3, pivot_tip_wy),
-        "velocity_force": (k16, k17),
-        "gravity_force": (k18,),
-        "bias_force": (k16, k17, k18),
+        "velocity_force": (k20, k21),
+        "gravity_force": (k22,),
+        "bias_force": (k20, k21, k22),
         "applied_force": (),
-        "kinetic_energy": (m, h, I_1, I_3),
-        "potential_energy": (h, k19),
-        "effect_powers": (h, k19),
+        "kinetic_energy": (m, I_1, I_3, h_squared),
+        "potential_energy": (k23,),
+        "effect_powers": (h, k24),
         "momentum": (I_3, moment_top_z, inertia_top_xx),
-        "centre_of_mass": (m, h),
-        "joint_forces": (m, h, I_1, I_3, g, k1, k2, k3),
+        "centre_of_mass": (m, moment_top_z),
+        "joint_forces": (h, I_1, I_3, g, k1, k2, k3, k25, k26),
         "body_poses": (h,),
         "body_velocities": (h,),
-        "point_positions": (k20,),
-        "point_velocities": (k20,),
-        "point_jacobians": (k20,),
+        "point_positions": (k27,),
+        "point_velocities": (k27,),
+        "point_jacobians": (k27,),
     }
 
 
@@ -228,11 +238,11 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=()):
-    """48 operations: 10 add, 5 sub, 31 mul, 1 div, 1 neg."""
+    """47 operations: 10 add, 5 sub, 30 mul, 1 div, 1 neg."""
     k1, k2, k3 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s2 = 2.0 * (1.0 / s1) * k2
+    s2 = 1.0 / s1 * k2
     s3 = tip_wx * 0.5
     s4 = tip_wy * 0.5
     s5 = tip_wz * 0.5
@@ -248,16 +258,16 @@ def _derivative(y, k, u=(), extra=()):
 
 
 def _jacobian(y, k, u=(), extra=()):
-    """70 operations: 6 add, 7 sub, 44 mul, 5 div, 8 neg."""
-    k1, k2, k3 = k
+    """68 operations: 6 add, 7 sub, 44 mul, 5 div, 6 neg."""
+    k1, k4, k3, k5 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    k_top = 2.0 * (1.0 / s1)
     s6 = tip_qx * tip_qz - tip_qw * tip_qy
     s7 = tip_qw * tip_qx + tip_qy * tip_qz
     s3 = tip_wx * 0.5
     s4 = tip_wy * 0.5
     s5 = tip_wz * 0.5
+    k_top = 2.0 * (1.0 / s1)
     s8 = tip_qw * k_top
     s9 = 2.0 * (s8 / s1)
     s10 = tip_qy * k_top
@@ -305,17 +315,17 @@ def _jacobian(y, k, u=(), extra=()):
         s24,
         s19,
         s21,
-        k2 * (s11 - s7 * s9),
-        k2 * (s8 - s7 * s12),
-        k2 * (s13 - s7 * s16),
-        k2 * (s10 - s7 * s18),
+        k4 * (s11 - s7 * s9),
+        k4 * (s8 - s7 * s12),
+        k4 * (s13 - s7 * s16),
+        k4 * (s10 - s7 * s18),
         0.0,
         tip_wz * k1,
         tip_wy * k1,
-        k2 * (s6 * s9 + s10),
-        -k2 * (s13 - s6 * s12),
-        k2 * (s8 + s6 * s16),
-        -k2 * (s11 - s6 * s18),
+        k4 * (s6 * s9 + s10),
+        k5 * (s13 - s6 * s12),
+        k4 * (s8 + s6 * s16),
+        k5 * (s11 - s6 * s18),
         tip_wz * k3,
         0.0,
         tip_wx * k3,
@@ -330,15 +340,15 @@ def _jacobian(y, k, u=(), extra=()):
 
 
 def _parameter_jacobian(y, k, u=(), extra=()):
-    """45 operations: 9 add, 2 sub, 29 mul, 1 div, 4 neg."""
-    k4, k5, k6, k7, k8, k9, k10, k11, k12, k13, k14 = k
+    """41 operations: 7 add, 4 sub, 29 mul, 1 div."""
+    k6, k7, k8, k9, k10, k11, k12, k13, k14, k15, k16, k17, k18 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
+    s26 = tip_wy * tip_wz
+    s27 = tip_wx * tip_wz
     k_top = 2.0 * (1.0 / s1)
     R_top_zx = k_top * (tip_qx * tip_qz - tip_qw * tip_qy)
     R_top_zy = k_top * (tip_qw * tip_qx + tip_qy * tip_qz)
-    s26 = tip_wy * tip_wz
-    s27 = tip_wx * tip_wz
     return (
         0.0,
         0.0,
@@ -360,16 +370,16 @@ def _parameter_jacobian(y, k, u=(), extra=()):
         0.0,
         0.0,
         0.0,
-        s26 * k4 + R_top_zy * k5,
-        s26 * k7 + R_top_zy * k8,
-        s26 * k10 - R_top_zy * k11,
-        -s26 * k13,
-        R_top_zy * k14,
-        -(s27 * k6 + R_top_zx * k5),
-        -(s27 * k9 + R_top_zx * k8),
-        s27 * k12 + R_top_zx * k11,
-        s27 * k13,
-        -R_top_zx * k14,
+        s26 * k6 + R_top_zy * k7,
+        s26 * k9 + R_top_zy * k10,
+        s26 * k12 - R_top_zy * k13,
+        s26 * k16,
+        R_top_zy * k17,
+        s27 * k8 - R_top_zx * k7,
+        s27 * k11 - R_top_zx * k10,
+        s27 * k14 + R_top_zx * k13,
+        s27 * k15,
+        R_top_zx * k18,
         0.0,
         0.0,
         0.0,
@@ -379,29 +389,29 @@ def _parameter_jacobian(y, k, u=(), extra=()):
 
 
 def _forward_dynamics(y, k, u=(), extra=()):
-    """29 operations: 7 add, 2 sub, 19 mul, 1 div."""
-    k1, k2, k3, k13, k15 = k
+    """28 operations: 7 add, 2 sub, 18 mul, 1 div."""
+    k1, k2, k3, k15, k19 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     tau__tip_wx, tau__tip_wy, tau__tip_wz = extra
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s2 = 2.0 * (1.0 / s1) * k2
+    s2 = 1.0 / s1 * k2
     return (
-        (tip_qw * tip_qx + tip_qy * tip_qz) * s2 + (k1 * (tip_wy * tip_wz) + k13 * tau__tip_wx),
-        k3 * (tip_wx * tip_wz) + k13 * tau__tip_wy - (tip_qx * tip_qz - tip_qw * tip_qy) * s2,
-        tau__tip_wz * k15,
+        (tip_qw * tip_qx + tip_qy * tip_qz) * s2 + (k1 * (tip_wy * tip_wz) + k15 * tau__tip_wx),
+        k3 * (tip_wx * tip_wz) + k15 * tau__tip_wy - (tip_qx * tip_qz - tip_qw * tip_qy) * s2,
+        tau__tip_wz * k19,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=()):
-    """30 operations: 7 add, 2 sub, 20 mul, 1 div."""
-    I_3, pivot_tip_wy, k16, k17, k18 = k
+    """28 operations: 7 add, 2 sub, 18 mul, 1 div."""
+    I_3, pivot_tip_wy, k20, k21, k22 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     vd__tip_wx, vd__tip_wy, vd__tip_wz = extra
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    k_top = 2.0 * (1.0 / s1)
+    s28 = 1.0 / s1 * k22
     return (
-        pivot_tip_wy * vd__tip_wx + tip_wy * tip_wz * k17 - k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k18,
-        k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k18 + (pivot_tip_wy * vd__tip_wy + k16 * (tip_wx * tip_wz)),
+        pivot_tip_wy * vd__tip_wx + tip_wy * tip_wz * k21 - (tip_qw * tip_qx + tip_qy * tip_qz) * s28,
+        (tip_qx * tip_qz - tip_qw * tip_qy) * s28 + (pivot_tip_wy * vd__tip_wy + k20 * (tip_wx * tip_wz)),
         I_3 * vd__tip_wz,
     )
 
@@ -424,37 +434,37 @@ def _mass_matrix(y, k, u=(), extra=()):
 
 def _velocity_force(y, k, u=(), extra=()):
     """4 operations: 4 mul."""
-    k16, k17 = k
+    k20, k21 = k
     _, _, _, _, tip_wx, tip_wy, tip_wz = y
     return (
-        tip_wy * tip_wz * k17,
-        k16 * (tip_wx * tip_wz),
+        tip_wy * tip_wz * k21,
+        k20 * (tip_wx * tip_wz),
         0.0,
     )
 
 
 def _gravity_force(y, k, u=(), extra=()):
-    """20 operations: 4 add, 1 sub, 13 mul, 1 div, 1 neg."""
-    k18, = k
+    """18 operations: 4 add, 1 sub, 11 mul, 1 div, 1 neg."""
+    k22, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    k_top = 2.0 * (1.0 / s1)
+    s28 = 1.0 / s1 * k22
     return (
-        -k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k18,
-        k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k18,
+        -(tip_qw * tip_qx + tip_qy * tip_qz) * s28,
+        (tip_qx * tip_qz - tip_qw * tip_qy) * s28,
         0.0,
     )
 
 
 def _bias_force(y, k, u=(), extra=()):
-    """25 operations: 5 add, 2 sub, 17 mul, 1 div."""
-    k16, k17, k18 = k
+    """23 operations: 5 add, 2 sub, 15 mul, 1 div."""
+    k20, k21, k22 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    k_top = 2.0 * (1.0 / s1)
+    s28 = 1.0 / s1 * k22
     return (
-        tip_wy * tip_wz * k17 - k_top * (tip_qw * tip_qx + tip_qy * tip_qz) * k18,
-        k16 * (tip_wx * tip_wz) + k_top * (tip_qx * tip_qz - tip_qw * tip_qy) * k18,
+        tip_wy * tip_wz * k21 - (tip_qw * tip_qx + tip_qy * tip_qz) * s28,
+        k20 * (tip_wx * tip_wz) + (tip_qx * tip_qz - tip_qw * tip_qy) * s28,
         0.0,
     )
 
@@ -469,46 +479,44 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=()):
-    """16 operations: 4 add, 12 mul."""
-    m, h, I_1, I_3 = k
+    """15 operations: 4 add, 11 mul."""
+    m, I_1, I_3, h_squared = k
     _, _, _, _, tip_wx, tip_wy, tip_wz = y
-    s28 = h * tip_wy
-    s29 = h * tip_wx
-    s30 = tip_wx * (I_1 * tip_wx) + tip_wy * (I_1 * tip_wy) + tip_wz * (I_3 * tip_wz)
+    s29 = tip_wx * (I_1 * tip_wx) + tip_wy * (I_1 * tip_wy) + tip_wz * (I_3 * tip_wz)
     return (
-        0.5 * (m * (s28 * s28 + s29 * s29) + s30),
+        0.5 * (m * (h_squared * (tip_wy * tip_wy + tip_wx * tip_wx)) + s29),
     )
 
 
 def _potential_energy(y, k, u=(), extra=()):
-    """16 operations: 4 add, 1 sub, 10 mul, 1 div."""
-    h, k19 = k
+    """15 operations: 4 add, 1 sub, 9 mul, 1 div."""
+    k23, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
+    s30 = 2.0 / s1
     return (
-        k19 * (h * (1.0 - (tip_qx * (tip_qx * s31) + tip_qy * (tip_qy * s31)))),
+        (1.0 - (tip_qx * (tip_qx * s30) + tip_qy * (tip_qy * s30))) * k23,
     )
 
 
 def _effect_powers(y, k, u=(), extra=()):
-    """45 operations: 11 add, 5 sub, 27 mul, 1 div, 1 neg."""
-    h, k19 = k
+    """44 operations: 11 add, 5 sub, 27 mul, 1 div."""
+    h, k24 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
-    s34 = tip_qz * s31
-    s35 = tip_qw * s34
-    s36 = tip_qz * s34
-    s37 = tip_qy * s32
-    s38 = tip_qw * s33 + tip_qz * s32
-    s39 = tip_qz * s33 - tip_qw * s32
-    s40 = tip_wx * (1.0 - (tip_qy * s33 + s36)) + tip_wy * (s37 - s35) + tip_wz * s38
-    s41 = tip_wx * (s35 + s37) + tip_wy * (1.0 - (tip_qx * s32 + s36)) + tip_wz * s39
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
+    s33 = tip_qz * s30
+    s34 = tip_qw * s33
+    s35 = tip_qz * s33
+    s36 = tip_qy * s31
+    s37 = tip_qw * s32 + tip_qz * s31
+    s38 = tip_qz * s32 - tip_qw * s31
+    s39 = tip_wx * (1.0 - (tip_qy * s32 + s35)) + tip_wy * (s36 - s34) + tip_wz * s37
+    s40 = tip_wx * (s34 + s36) + tip_wy * (1.0 - (tip_qx * s31 + s35)) + tip_wz * s38
     return (
-        -k19 * (h * s39 * s40 - h * s38 * s41),
+        k24 * (h * s38 * s39 - h * s37 * s40),
     )
 
 
@@ -517,133 +525,127 @@ def _momentum(y, k, u=(), extra=()):
     I_3, moment_top_z, inertia_top_xx = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
-    s34 = tip_qz * s31
-    s42 = tip_qw * s32
-    s43 = tip_qw * s33
-    s35 = tip_qw * s34
-    s44 = tip_qx * s32
-    s45 = tip_qy * s33
-    s36 = tip_qz * s34
-    s37 = tip_qy * s32
-    s46 = tip_qz * s32
-    s47 = tip_qz * s33
-    s48 = 1.0 - (s45 + s36)
-    s49 = s37 - s35
-    s50 = s35 + s37
-    s51 = 1.0 - (s44 + s36)
-    s52 = s46 - s43
-    s53 = s42 + s47
-    s54 = I_3 * tip_wz
-    s55 = tip_wy * moment_top_z
-    s56 = tip_wx * moment_top_z
-    s57 = tip_wx * inertia_top_xx
-    s58 = tip_wy * inertia_top_xx
+    s41 = I_3 * tip_wz
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
+    s42 = tip_qx * s31
+    s43 = tip_qy * s32
+    s33 = tip_qz * s30
+    s44 = tip_qw * s31
+    s45 = tip_qw * s32
+    s34 = tip_qw * s33
+    s35 = tip_qz * s33
+    s36 = tip_qy * s31
+    s46 = tip_qz * s31
+    s47 = tip_qz * s32
+    s48 = 1.0 - (s43 + s35)
+    s49 = s36 - s34
+    s50 = s34 + s36
+    s51 = 1.0 - (s42 + s35)
+    s52 = s46 - s45
+    s53 = s44 + s47
+    s54 = tip_wy * moment_top_z
+    s55 = tip_wx * moment_top_z
+    s56 = tip_wx * inertia_top_xx
+    s57 = tip_wy * inertia_top_xx
     return (
-        s48 * s55 - s49 * s56,
-        s50 * s55 - s51 * s56,
-        s52 * s55 - s53 * s56,
-        s48 * s57 + s49 * s58 + (s43 + s46) * s54,
-        s50 * s57 + s51 * s58 + (s47 - s42) * s54,
-        s52 * s57 + s53 * s58 + (1.0 - (s44 + s45)) * s54,
+        s48 * s54 - s49 * s55,
+        s50 * s54 - s51 * s55,
+        s52 * s54 - s53 * s55,
+        s48 * s56 + s49 * s57 + (s45 + s46) * s41,
+        s50 * s56 + s51 * s57 + (s47 - s44) * s41,
+        s52 * s56 + s53 * s57 + (1.0 - (s42 + s43)) * s41,
     )
 
 
 def _centre_of_mass(y, k, u=(), extra=()):
-    """29 operations: 5 add, 2 sub, 18 mul, 4 div."""
-    m, h = k
+    """26 operations: 5 add, 2 sub, 15 mul, 4 div."""
+    m, moment_top_z = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
     return (
-        m * (h * (tip_qw * s33 + tip_qz * s32)) / m,
-        m * (h * (tip_qz * s33 - tip_qw * s32)) / m,
-        m * (h * (1.0 - (tip_qx * s32 + tip_qy * s33))) / m,
+        (tip_qw * s32 + tip_qz * s31) * moment_top_z / m,
+        (tip_qz * s32 - tip_qw * s31) * moment_top_z / m,
+        (1.0 - (tip_qx * s31 + tip_qy * s32)) * moment_top_z / m,
     )
 
 
 def _joint_forces(y, k, u=(), extra=()):
-    """222 operations: 66 add, 16 sub, 132 mul, 2 div, 6 neg."""
-    m, h, I_1, I_3, g, k1, k2, k3 = k
+    """215 operations: 63 add, 19 sub, 131 mul, 2 div."""
+    h, I_1, I_3, g, k1, k2, k3, k25, k26 = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
     s26 = tip_wy * tip_wz
-    s2 = 2.0 * (1.0 / s1) * k2
+    s2 = 1.0 / s1 * k2
     tip_wx_dot = k1 * s26 + (tip_qw * tip_qx + tip_qy * tip_qz) * s2
     s27 = tip_wx * tip_wz
     tip_wy_dot = k3 * s27 - (tip_qx * tip_qz - tip_qw * tip_qy) * s2
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
-    s34 = tip_qz * s31
-    s42 = tip_qw * s32
-    s43 = tip_qw * s33
-    s35 = tip_qw * s34
-    s44 = tip_qx * s32
-    s45 = tip_qy * s33
-    s36 = tip_qz * s34
-    s37 = tip_qy * s32
-    s46 = tip_qz * s32
-    s47 = tip_qz * s33
-    s48 = 1.0 - (s45 + s36)
-    s49 = s37 - s35
-    s38 = s43 + s46
-    s50 = s35 + s37
-    s51 = 1.0 - (s44 + s36)
-    s39 = s47 - s42
-    s52 = s46 - s43
-    s53 = s42 + s47
-    s59 = 1.0 - (s44 + s45)
-    s60 = h * s38
-    s61 = h * s39
-    s62 = h * s59
-    s40 = tip_wx * s48 + tip_wy * s49 + tip_wz * s38
-    s41 = tip_wx * s50 + tip_wy * s51 + tip_wz * s39
-    s63 = tip_wx * s52 + tip_wy * s53 + tip_wz * s59
-    s64 = g * s52 + h * (s27 + tip_wy_dot)
-    s65 = g * s53 + h * (s26 - tip_wx_dot)
-    s66 = g * s59 - h * (tip_wx * tip_wx + tip_wy * tip_wy)
-    s67 = tip_wx_dot * s48 + tip_wy_dot * s49
-    s68 = tip_wx_dot * s50 + tip_wy_dot * s51
-    s69 = tip_wx_dot * s52 + tip_wy_dot * s53
-    s70 = I_1 * s48
-    s71 = I_1 * s49
-    s72 = I_3 * s38
-    s73 = I_1 * s50
-    s74 = I_1 * s51
-    s75 = I_3 * s39
-    s76 = I_1 * s52
-    s77 = I_1 * s53
-    s78 = I_3 * s59
-    s79 = s48 * s70 + s49 * s71 + s38 * s72
-    s80 = s50 * s70 + s51 * s71 + s39 * s72
-    s81 = s52 * s70 + s53 * s71 + s59 * s72
-    s82 = s48 * s73 + s49 * s74 + s38 * s75
-    s83 = s50 * s73 + s51 * s74 + s39 * s75
-    s84 = s52 * s73 + s53 * s74 + s59 * s75
-    s85 = s48 * s76 + s49 * s77 + s38 * s78
-    s86 = s50 * s76 + s51 * s77 + s39 * s78
-    s87 = s52 * s76 + s53 * s77 + s59 * s78
-    s88 = m * (s48 * s64 + s49 * s65 + s38 * s66)
-    s89 = m * (s50 * s64 + s51 * s65 + s39 * s66)
-    s90 = m * (s52 * s64 + s53 * s65 + s59 * s66)
-    s91 = s40 * s79 + s41 * s80 + s63 * s81
-    s92 = s40 * s82 + s41 * s83 + s63 * s84
-    s93 = s40 * s85 + s41 * s86 + s63 * s87
-    s94 = s67 * s79 + s68 * s80 + s69 * s81 + (s41 * s93 - s63 * s92) + (s61 * s90 - s62 * s89)
-    s95 = s67 * s82 + s68 * s83 + s69 * s84 + (s63 * s91 - s40 * s93) + (s62 * s88 - s60 * s90)
-    s96 = s67 * s85 + s68 * s86 + s69 * s87 + (s40 * s92 - s41 * s91) + (s60 * s89 - s61 * s88)
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
+    s42 = tip_qx * s31
+    s43 = tip_qy * s32
+    s58 = 1.0 - (s42 + s43)
+    s33 = tip_qz * s30
+    s44 = tip_qw * s31
+    s45 = tip_qw * s32
+    s34 = tip_qw * s33
+    s35 = tip_qz * s33
+    s36 = tip_qy * s31
+    s46 = tip_qz * s31
+    s47 = tip_qz * s32
+    s48 = 1.0 - (s43 + s35)
+    s49 = s36 - s34
+    s37 = s45 + s46
+    s50 = s34 + s36
+    s51 = 1.0 - (s42 + s35)
+    s38 = s47 - s44
+    s39 = tip_wx * s48 + tip_wy * s49 + tip_wz * s37
+    s40 = tip_wx * s50 + tip_wy * s51 + tip_wz * s38
+    s52 = s46 - s45
+    s53 = s44 + s47
+    s59 = tip_wx * s52 + tip_wy * s53 + tip_wz * s58
+    s60 = g * s52 + h * (s27 + tip_wy_dot)
+    s61 = g * s53 + h * (s26 - tip_wx_dot)
+    s62 = g * s58 - h * (tip_wx * tip_wx + tip_wy * tip_wy)
+    s63 = s48 * s60 + s49 * s61 + s37 * s62
+    s64 = s50 * s60 + s51 * s61 + s38 * s62
+    s65 = s52 * s60 + s53 * s61 + s58 * s62
+    s66 = tip_wx_dot * s48 + tip_wy_dot * s49
+    s67 = tip_wx_dot * s50 + tip_wy_dot * s51
+    s68 = tip_wx_dot * s52 + tip_wy_dot * s53
+    s69 = I_1 * s48
+    s70 = I_1 * s49
+    s71 = I_3 * s37
+    s72 = I_1 * s50
+    s73 = I_1 * s51
+    s74 = I_3 * s38
+    s75 = I_1 * s52
+    s76 = I_1 * s53
+    s77 = I_3 * s58
+    s78 = s48 * s69 + s49 * s70 + s37 * s71
+    s79 = s50 * s69 + s51 * s70 + s38 * s71
+    s80 = s52 * s69 + s53 * s70 + s58 * s71
+    s81 = s48 * s72 + s49 * s73 + s37 * s74
+    s82 = s50 * s72 + s51 * s73 + s38 * s74
+    s83 = s52 * s72 + s53 * s73 + s58 * s74
+    s84 = s48 * s75 + s49 * s76 + s37 * s77
+    s85 = s50 * s75 + s51 * s76 + s38 * s77
+    s86 = s52 * s75 + s53 * s76 + s58 * s77
+    s87 = s39 * s78 + s40 * s79 + s59 * s80
+    s88 = s39 * s81 + s40 * s82 + s59 * s83
+    s89 = s39 * s84 + s40 * s85 + s59 * s86
     return (
-        -s88,
-        -s89,
-        -s90,
-        -s94,
-        -s95,
-        -s96,
+        k26 * s63,
+        k26 * s64,
+        k26 * s65,
+        k25 * (s38 * s65 - s58 * s64) - (s66 * s78 + s67 * s79 + s68 * s80 + (s40 * s89 - s59 * s88)),
+        k25 * (s58 * s63 - s37 * s65) - (s66 * s81 + s67 * s82 + s68 * s83 + (s59 * s87 - s39 * s89)),
+        k25 * (s37 * s64 - s38 * s63) - (s66 * s84 + s67 * s85 + s68 * s86 + (s39 * s88 - s40 * s87)),
     )
 
 
@@ -652,35 +654,35 @@ def _body_poses(y, k, u=(), extra=()):
     h, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
-    s34 = tip_qz * s31
-    s42 = tip_qw * s32
-    s43 = tip_qw * s33
-    s35 = tip_qw * s34
-    s44 = tip_qx * s32
-    s45 = tip_qy * s33
-    s36 = tip_qz * s34
-    s37 = tip_qy * s32
-    s46 = tip_qz * s32
-    s47 = tip_qz * s33
-    s38 = s43 + s46
-    s39 = s47 - s42
-    s59 = 1.0 - (s44 + s45)
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
+    s42 = tip_qx * s31
+    s43 = tip_qy * s32
+    s58 = 1.0 - (s42 + s43)
+    s33 = tip_qz * s30
+    s44 = tip_qw * s31
+    s45 = tip_qw * s32
+    s34 = tip_qw * s33
+    s35 = tip_qz * s33
+    s36 = tip_qy * s31
+    s46 = tip_qz * s31
+    s47 = tip_qz * s32
+    s37 = s45 + s46
+    s38 = s47 - s44
     return (
-        1.0 - (s45 + s36),
-        s37 - s35,
+        1.0 - (s43 + s35),
+        s36 - s34,
+        s37,
+        h * s37,
+        s34 + s36,
+        1.0 - (s42 + s35),
         s38,
         h * s38,
-        s35 + s37,
-        1.0 - (s44 + s36),
-        s39,
-        h * s39,
-        s46 - s43,
-        s42 + s47,
-        s59,
-        h * s59,
+        s46 - s45,
+        s44 + s47,
+        s58,
+        h * s58,
     )
 
 
@@ -689,127 +691,127 @@ def _body_velocities(y, k, u=(), extra=()):
     h, = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
-    s34 = tip_qz * s31
-    s42 = tip_qw * s32
-    s43 = tip_qw * s33
-    s35 = tip_qw * s34
-    s44 = tip_qx * s32
-    s45 = tip_qy * s33
-    s36 = tip_qz * s34
-    s37 = tip_qy * s32
-    s46 = tip_qz * s32
-    s47 = tip_qz * s33
-    s38 = s43 + s46
-    s39 = s47 - s42
-    s59 = 1.0 - (s44 + s45)
-    s60 = h * s38
-    s61 = h * s39
-    s62 = h * s59
-    s40 = tip_wx * (1.0 - (s45 + s36)) + tip_wy * (s37 - s35) + tip_wz * s38
-    s41 = tip_wx * (s35 + s37) + tip_wy * (1.0 - (s44 + s36)) + tip_wz * s39
-    s63 = tip_wx * (s46 - s43) + tip_wy * (s42 + s47) + tip_wz * s59
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
+    s42 = tip_qx * s31
+    s43 = tip_qy * s32
+    s58 = 1.0 - (s42 + s43)
+    s33 = tip_qz * s30
+    s44 = tip_qw * s31
+    s45 = tip_qw * s32
+    s34 = tip_qw * s33
+    s35 = tip_qz * s33
+    s36 = tip_qy * s31
+    s46 = tip_qz * s31
+    s47 = tip_qz * s32
+    s37 = s45 + s46
+    s38 = s47 - s44
+    s90 = h * s37
+    s91 = h * s38
+    s39 = tip_wx * (1.0 - (s43 + s35)) + tip_wy * (s36 - s34) + tip_wz * s37
+    s40 = tip_wx * (s34 + s36) + tip_wy * (1.0 - (s42 + s35)) + tip_wz * s38
+    s59 = tip_wx * (s46 - s45) + tip_wy * (s44 + s47) + tip_wz * s58
+    s92 = h * s58
     return (
-        s62 * s41 - s61 * s63,
-        s60 * s63 - s62 * s40,
-        s61 * s40 - s60 * s41,
+        s92 * s40 - s91 * s59,
+        s90 * s59 - s92 * s39,
+        s91 * s39 - s90 * s40,
+        s39,
         s40,
-        s41,
-        s63,
+        s59,
     )
 
 
 def _point_positions(y, k, u=(), extra=()):
     """23 operations: 5 add, 2 sub, 15 mul, 1 div."""
-    k20, = k
+    k27, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
     return (
-        (tip_qw * s33 + tip_qz * s32) * k20,
-        (tip_qz * s33 - tip_qw * s32) * k20,
-        (1.0 - (tip_qx * s32 + tip_qy * s33)) * k20,
+        (tip_qw * s32 + tip_qz * s31) * k27,
+        (tip_qz * s32 - tip_qw * s31) * k27,
+        (1.0 - (tip_qx * s31 + tip_qy * s32)) * k27,
     )
 
 
 def _point_velocities(y, k, u=(), extra=()):
     """59 operations: 15 add, 9 sub, 34 mul, 1 div."""
-    k20, = k
+    k27, = k
     tip_qw, tip_qx, tip_qy, tip_qz, tip_wx, tip_wy, tip_wz = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
-    s34 = tip_qz * s31
-    s42 = tip_qw * s32
-    s43 = tip_qw * s33
-    s35 = tip_qw * s34
-    s44 = tip_qx * s32
-    s45 = tip_qy * s33
-    s36 = tip_qz * s34
-    s37 = tip_qy * s32
-    s46 = tip_qz * s32
-    s47 = tip_qz * s33
-    s38 = s43 + s46
-    s39 = s47 - s42
-    s59 = 1.0 - (s44 + s45)
-    s40 = tip_wx * (1.0 - (s45 + s36)) + tip_wy * (s37 - s35) + tip_wz * s38
-    s41 = tip_wx * (s35 + s37) + tip_wy * (1.0 - (s44 + s36)) + tip_wz * s39
-    s63 = tip_wx * (s46 - s43) + tip_wy * (s42 + s47) + tip_wz * s59
-    s97 = s38 * k20
-    s98 = s39 * k20
-    s99 = s59 * k20
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
+    s42 = tip_qx * s31
+    s43 = tip_qy * s32
+    s58 = 1.0 - (s42 + s43)
+    s33 = tip_qz * s30
+    s44 = tip_qw * s31
+    s45 = tip_qw * s32
+    s34 = tip_qw * s33
+    s35 = tip_qz * s33
+    s36 = tip_qy * s31
+    s46 = tip_qz * s31
+    s47 = tip_qz * s32
+    s37 = s45 + s46
+    s38 = s47 - s44
+    s39 = tip_wx * (1.0 - (s43 + s35)) + tip_wy * (s36 - s34) + tip_wz * s37
+    s40 = tip_wx * (s34 + s36) + tip_wy * (1.0 - (s42 + s35)) + tip_wz * s38
+    s59 = tip_wx * (s46 - s45) + tip_wy * (s44 + s47) + tip_wz * s58
+    s93 = s37 * k27
+    s94 = s38 * k27
+    s95 = s58 * k27
     return (
-        s41 * s99 - s63 * s98,
-        s63 * s97 - s40 * s99,
-        s40 * s98 - s41 * s97,
+        s40 * s95 - s59 * s94,
+        s59 * s93 - s39 * s95,
+        s39 * s94 - s40 * s93,
     )
 
 
 def _point_jacobians(y, k, u=(), extra=()):
     """62 operations: 9 add, 15 sub, 37 mul, 1 div."""
-    k20, = k
+    k27, = k
     tip_qw, tip_qx, tip_qy, tip_qz, _, _, _ = y
     s1 = tip_qz * tip_qz + (tip_qy * tip_qy + (tip_qw * tip_qw + tip_qx * tip_qx))
-    s31 = 2.0 / s1
-    s32 = tip_qx * s31
-    s33 = tip_qy * s31
-    s34 = tip_qz * s31
-    s42 = tip_qw * s32
-    s43 = tip_qw * s33
-    s35 = tip_qw * s34
-    s44 = tip_qx * s32
-    s45 = tip_qy * s33
-    s36 = tip_qz * s34
-    s37 = tip_qy * s32
-    s46 = tip_qz * s32
-    s47 = tip_qz * s33
-    s48 = 1.0 - (s45 + s36)
-    s49 = s37 - s35
-    s38 = s43 + s46
-    s50 = s35 + s37
-    s51 = 1.0 - (s44 + s36)
-    s39 = s47 - s42
-    s52 = s46 - s43
-    s53 = s42 + s47
-    s59 = 1.0 - (s44 + s45)
-    s97 = s38 * k20
-    s98 = s39 * k20
-    s99 = s59 * k20
+    s30 = 2.0 / s1
+    s31 = tip_qx * s30
+    s32 = tip_qy * s30
+    s42 = tip_qx * s31
+    s43 = tip_qy * s32
+    s58 = 1.0 - (s42 + s43)
+    s33 = tip_qz * s30
+    s44 = tip_qw * s31
+    s45 = tip_qw * s32
+    s34 = tip_qw * s33
+    s35 = tip_qz * s33
+    s36 = tip_qy * s31
+    s46 = tip_qz * s31
+    s47 = tip_qz * s32
+    s48 = 1.0 - (s43 + s35)
+    s49 = s36 - s34
+    s37 = s45 + s46
+    s50 = s34 + s36
+    s51 = 1.0 - (s42 + s35)
+    s38 = s47 - s44
+    s52 = s46 - s45
+    s53 = s44 + s47
+    s93 = s37 * k27
+    s94 = s38 * k27
+    s95 = s58 * k27
     return (
-        s50 * s99 - s52 * s98,
-        s51 * s99 - s53 * s98,
-        s39 * s99 - s59 * s98,
-        s52 * s97 - s48 * s99,
-        s53 * s97 - s49 * s99,
-        s59 * s97 - s38 * s99,
-        s48 * s98 - s50 * s97,
-        s49 * s98 - s51 * s97,
-        s38 * s98 - s39 * s97,
+        s50 * s95 - s52 * s94,
+        s51 * s95 - s53 * s94,
+        s38 * s95 - s58 * s94,
+        s52 * s93 - s48 * s95,
+        s53 * s93 - s49 * s95,
+        s58 * s93 - s37 * s95,
+        s48 * s94 - s50 * s93,
+        s49 * s94 - s51 * s93,
+        s37 * s94 - s38 * s93,
     )
 
 
@@ -835,17 +837,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -854,19 +875,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -881,7 +911,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 3
 _COLUMNS = {
 }
@@ -990,17 +1020,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -1064,7 +1095,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (3, 3), (), y, p, u)
 
 

@@ -29,8 +29,9 @@ One call of `derivative` takes 30 operations: 5 add, 3 sub, 21 mul, 1 neg; 9 mor
 alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (13, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (13, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (5, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -100,7 +101,7 @@ COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 5, "sub": 3, "mul": 21, "neg": 1, "total": 30, "parameters": 9},
     "jacobian": {"mul": 13, "neg": 6, "total": 19, "parameters": 9},
-    "parameter_jacobian": {"mul": 9, "neg": 6, "total": 15, "parameters": 12},
+    "parameter_jacobian": {"mul": 9, "neg": 3, "total": 12, "parameters": 15},
     "forward_dynamics": {"add": 3, "mul": 12, "total": 15, "parameters": 7},
     "inverse_dynamics": {"add": 3, "mul": 12, "total": 15, "parameters": 3},
     "mass_matrix": {"total": 0, "parameters": 0},
@@ -116,7 +117,7 @@ COST = {
     "joint_forces": {"total": 0, "parameters": 0},
     "body_poses": {"add": 9, "sub": 6, "mul": 16, "div": 1, "total": 32, "parameters": 0},
     "body_velocities": {"add": 27, "sub": 6, "mul": 43, "div": 1, "total": 77, "parameters": 0},
-    "point_positions": {"add": 8, "sub": 2, "mul": 16, "div": 1, "total": 27, "parameters": 0},
+    "point_positions": {"add": 8, "sub": 2, "mul": 15, "div": 1, "total": 26, "parameters": 0},
     "point_velocities": {"add": 30, "sub": 9, "mul": 52, "div": 1, "total": 92, "parameters": 0},
     "point_jacobians": {"add": 12, "sub": 18, "mul": 37, "div": 1, "total": 68, "parameters": 0},
 }
@@ -150,9 +151,9 @@ def _fixed(m, I_1, I_2, I_3, stem_at_y):
     k12 = I_1 - I_2
     k6 = 1.0 / I_3
     k3 = k12 * k6
-    k7 = k10 * (k4 / I_1)
-    k8 = k11 * (k5 / I_2)
-    k9 = k12 * (k6 / I_3)
+    k7 = -k10 * (k4 / I_1)
+    k8 = -k11 * (k5 / I_2)
+    k9 = -k12 * (k6 / I_3)
     k13 = 1.0 / m
     k14 = I_3 - I_2
     k15 = I_1 - I_3
@@ -163,16 +164,16 @@ def _fixed(m, I_1, I_2, I_3, stem_at_y):
         "jacobian": (k1, k2, k3),
         "parameter_jacobian": (k4, k5, k6, k7, k8, k9),
         "forward_dynamics": (k10, k4, k11, k5, k12, k6, k13),
-        "inverse_dynamics": (m, I_1, I_2, I_3, k14, k15, k16),
-        "mass_matrix": (m, I_1, I_2, I_3),
+        "inverse_dynamics": (I_1, I_2, I_3, m, k14, k15, k16),
+        "mass_matrix": (I_1, I_2, I_3, m),
         "velocity_force": (k14, k15, k16),
         "gravity_force": (),
         "bias_force": (k14, k15, k16),
         "applied_force": (),
-        "kinetic_energy": (m, I_1, I_2, I_3),
+        "kinetic_energy": (I_1, I_2, I_3, m),
         "potential_energy": (),
         "effect_powers": (),
-        "momentum": (m, I_1, I_2, I_3),
+        "momentum": (I_1, I_2, I_3, m),
         "centre_of_mass": (m,),
         "joint_forces": (),
         "body_poses": (),
@@ -452,7 +453,7 @@ def _jacobian(y, k, u=(), extra=()):
 
 
 def _parameter_jacobian(y, k, u=(), extra=()):
-    """15 operations: 9 mul, 6 neg."""
+    """12 operations: 9 mul, 3 neg."""
     k4, k5, k6, k7, k8, k9 = k
     _, _, _, _, _, _, _, _, _, _, nut_wx, nut_wy, nut_wz = y
     s14 = nut_wy * nut_wz
@@ -513,19 +514,19 @@ def _parameter_jacobian(y, k, u=(), extra=()):
         0.0,
         0.0,
         0.0,
-        -s14 * k7,
+        s14 * k7,
         s19,
         -s19,
         0.0,
         0.0,
         -s17,
-        -s15 * k8,
+        s15 * k8,
         s17,
         0.0,
         0.0,
         s18,
         -s18,
-        -s16 * k9,
+        s16 * k9,
         0.0,
     )
 
@@ -547,7 +548,7 @@ def _forward_dynamics(y, k, u=(), extra=()):
 
 def _inverse_dynamics(y, k, u=(), extra=()):
     """15 operations: 3 add, 12 mul."""
-    m, I_1, I_2, I_3, k14, k15, k16 = k
+    I_1, I_2, I_3, m, k14, k15, k16 = k
     _, _, _, _, _, _, _, _, _, _, nut_wx, nut_wy, nut_wz = y
     vd__nut_x_dot, vd__nut_y_dot, vd__nut_z_dot, vd__nut_wx, vd__nut_wy, vd__nut_wz = extra
     return (
@@ -562,7 +563,7 @@ def _inverse_dynamics(y, k, u=(), extra=()):
 
 def _mass_matrix(y, k, u=(), extra=()):
     """0 operations."""
-    m, I_1, I_2, I_3 = k
+    I_1, I_2, I_3, m = k
     return (
         m,
         0.0,
@@ -657,7 +658,7 @@ def _applied_force(y, k, u=(), extra=()):
 
 def _kinetic_energy(y, k, u=(), extra=()):
     """63 operations: 20 add, 6 sub, 36 mul, 1 div."""
-    m, I_1, I_2, I_3 = k
+    I_1, I_2, I_3, m = k
     _, _, _, nut_qw, nut_qx, nut_qy, nut_qz, nut_x_dot, nut_y_dot, nut_z_dot, nut_wx, nut_wy, nut_wz = y
     s20 = 2.0 / (nut_qw * nut_qw + nut_qx * nut_qx + nut_qy * nut_qy + nut_qz * nut_qz)
     s21 = nut_qx * s20
@@ -697,7 +698,7 @@ def _effect_powers(y, k, u=(), extra=()):
 
 def _momentum(y, k, u=(), extra=()):
     """95 operations: 30 add, 9 sub, 55 mul, 1 div."""
-    m, I_1, I_2, I_3 = k
+    I_1, I_2, I_3, m = k
     nut_x, nut_y, nut_z, nut_qw, nut_qx, nut_qy, nut_qz, nut_x_dot, nut_y_dot, nut_z_dot, nut_wx, nut_wy, nut_wz = y
     s20 = 2.0 / (nut_qw * nut_qw + nut_qx * nut_qx + nut_qy * nut_qy + nut_qz * nut_qz)
     s21 = nut_qx * s20
@@ -828,7 +829,7 @@ def _body_velocities(y, k, u=(), extra=()):
 
 
 def _point_positions(y, k, u=(), extra=()):
-    """27 operations: 8 add, 2 sub, 16 mul, 1 div."""
+    """26 operations: 8 add, 2 sub, 15 mul, 1 div."""
     stem_at_y, = k
     nut_x, nut_y, nut_z, nut_qw, nut_qx, nut_qy, nut_qz, _, _, _, _, _, _ = y
     s20 = 2.0 / (nut_qw * nut_qw + nut_qx * nut_qx + nut_qy * nut_qy + nut_qz * nut_qz)
@@ -837,7 +838,7 @@ def _point_positions(y, k, u=(), extra=()):
     return (
         nut_x + stem_at_y * (nut_qy * s21 - nut_qw * s23),
         nut_y + stem_at_y * (1.0 - (nut_qx * s21 + nut_qz * s23)),
-        nut_z + stem_at_y * (nut_qw * s21 + nut_qz * (nut_qy * s20)),
+        nut_z + stem_at_y * (nut_qw * s21 + nut_qy * s23),
     )
 
 
@@ -956,17 +957,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -975,19 +995,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -1002,7 +1031,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 6
 _COLUMNS = {
 }
@@ -1111,17 +1140,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -1185,7 +1215,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (6, 6), (), y, p, u)
 
 

@@ -22,12 +22,13 @@ Parameters p, with the scene's values:
     g = 9.81    m/s^2   gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 46 operations: 10 add, 3 sub, 25 mul, 1 div, 1 neg, 3 sin, 3 cos; 35
+One call of `derivative` takes 45 operations: 10 add, 3 sub, 24 mul, 1 div, 1 neg, 3 sin, 3 cos; 35
 more on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (8, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (8, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (7, k) and (0, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -89,24 +90,24 @@ JOINTS = ('hinge',)
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 10, "sub": 3, "mul": 25, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 46, "parameters": 35},
-    "jacobian": {"add": 24, "sub": 13, "mul": 79, "div": 4, "neg": 3, "sin": 3, "cos": 3, "total": 129, "parameters": 36},
-    "forward_dynamics": {"add": 12, "sub": 10, "mul": 33, "div": 1, "sin": 3, "cos": 3, "total": 62, "parameters": 36},
-    "inverse_dynamics": {"add": 19, "sub": 8, "mul": 37, "sin": 3, "cos": 3, "total": 70, "parameters": 20},
-    "mass_matrix": {"add": 5, "mul": 6, "neg": 2, "sin": 2, "cos": 3, "total": 18, "parameters": 15},
-    "velocity_force": {"add": 4, "sub": 1, "mul": 14, "neg": 2, "sin": 3, "cos": 2, "total": 26, "parameters": 3},
+    "derivative": {"add": 10, "sub": 3, "mul": 24, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 45, "parameters": 35},
+    "jacobian": {"add": 24, "sub": 13, "mul": 69, "div": 4, "neg": 3, "sin": 3, "cos": 3, "total": 119, "parameters": 36},
+    "forward_dynamics": {"add": 12, "sub": 10, "mul": 32, "div": 1, "sin": 3, "cos": 3, "total": 61, "parameters": 36},
+    "inverse_dynamics": {"add": 19, "sub": 8, "mul": 37, "sin": 3, "cos": 3, "total": 70, "parameters": 18},
+    "mass_matrix": {"add": 4, "sub": 1, "mul": 6, "neg": 1, "sin": 2, "cos": 3, "total": 17, "parameters": 16},
+    "velocity_force": {"add": 4, "sub": 1, "mul": 11, "neg": 2, "sin": 3, "cos": 2, "total": 23, "parameters": 3},
     "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 5},
-    "bias_force": {"add": 6, "sub": 3, "mul": 16, "neg": 1, "sin": 3, "cos": 2, "total": 31, "parameters": 8},
+    "bias_force": {"add": 6, "sub": 3, "mul": 13, "neg": 1, "sin": 3, "cos": 2, "total": 28, "parameters": 8},
     "applied_force": {"total": 0, "parameters": 0},
-    "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
+    "kinetic_energy": {"add": 9, "sub": 2, "mul": 16, "sin": 2, "cos": 2, "total": 31, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
-    "effect_powers": {"add": 5, "mul": 6, "neg": 1, "cos": 2, "total": 14, "parameters": 2},
-    "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
+    "effect_powers": {"add": 4, "sub": 1, "mul": 6, "cos": 2, "total": 13, "parameters": 3},
+    "momentum": {"add": 13, "sub": 4, "mul": 21, "sin": 2, "cos": 2, "total": 42, "parameters": 0},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
-    "joint_forces": {"add": 9, "sub": 2, "mul": 25, "div": 1, "sin": 3, "cos": 3, "total": 43, "parameters": 34},
+    "joint_forces": {"add": 9, "sub": 2, "mul": 24, "div": 1, "sin": 3, "cos": 3, "total": 42, "parameters": 34},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 0},
-    "body_velocities": {"add": 4, "sub": 2, "mul": 8, "sin": 2, "cos": 2, "total": 18, "parameters": 0},
-    "parameter_jacobian": {"add": 45, "sub": 27, "mul": 140, "div": 7, "neg": 6, "sin": 3, "cos": 3, "total": 231, "parameters": 129},
+    "body_velocities": {"add": 4, "sub": 2, "mul": 6, "sin": 2, "cos": 2, "total": 16, "parameters": 0},
+    "parameter_jacobian": {"add": 44, "sub": 28, "mul": 117, "div": 7, "neg": 5, "sin": 3, "cos": 3, "total": 207, "parameters": 133},
 }
 
 
@@ -122,26 +123,27 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g):
         return "inertia_com of B is negative"
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
-    k48 = m_A * m_B
-    k49 = l_B_squared * k48
-    k50 = k49 / mass_A
-    pivot_B = I_B + k50
-    k51 = k49 + I_B * mass_A
-    k52 = m_A * I_A
-    k53 = I_A * m_B
-    k54 = m_B * k52
+    k61 = m_A * m_B
+    k62 = l_B_squared * k61
+    k63 = k62 / mass_A
+    pivot_B = I_B + k63
+    k64 = k62 + I_B * mass_A
+    k65 = m_A * I_A
+    k66 = I_A * m_B
+    k67 = m_B * k65
     l_A_squared = l_A * l_A
-    k55 = I_B * k48
-    k56 = k52 + k53
-    k1 = (l_A_squared * k55 + (l_B_squared * k54 + I_B * k56)) / k51
+    k68 = I_B * k61
+    k69 = k65 + k66
+    k70 = l_A_squared * k68 + (l_B_squared * k67 + I_B * k69)
+    k1 = k70 / k64
     m_A_squared = m_A * m_A
     m_B_squared = m_B * m_B
-    k57 = l_B_squared * l_A_squared
-    k58 = m_A_squared * k57
-    k59 = mass_A * k51
-    k2 = m_B_squared * k58 / k59
-    k60 = l_A * k48
-    k3 = l_B * k60 / mass_A
+    k71 = l_B_squared * l_A_squared
+    k72 = m_A_squared * k71
+    k73 = m_B_squared * k72
+    k2 = k73 / (mass_A * k64)
+    k74 = l_A * k61
+    k3 = l_B * k74 / mass_A
     k4 = 1.0 / pivot_B
     k9 = m_B * l_A
     k5 = k9 / mass_A
@@ -149,71 +151,88 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g):
     k6 = k10 / mass_A
     k7 = k2 * 2.0
     k8 = 1.0 / mass_A
-    k22 = m_A * g
-    k23 = m_B * g
-    k11 = k22 + k23
-    k61 = m_B * l_B_squared
+    k11 = g * mass_A
+    k75 = m_B * l_B_squared
     k12 = l_B * k9
-    k13 = I_B + k61
-    k62 = m_B * 2.0
-    k14 = k62 * (l_A * l_B)
-    k15 = I_B + (I_A + (k61 + m_B * l_A_squared))
-    k16 = l_A * k23
-    k17 = l_B * k23
-    k18 = I_A / 2.0
-    k19 = I_B / 2.0
-    k20 = m_A / 2.0
-    k21 = m_B / 2.0
-    k24 = k60 / mass_A
-    k25 = l_B * k48 / mass_A
-    k63 = I_A * I_B
-    k26 = (m_B * I_B * l_A_squared + (k63 + l_B_squared * k53) - k1 * k13) / k51
-    k27 = (m_B_squared * (k57 * (m_A * 2.0)) - k2 * (k51 + mass_A * k13)) / k59
-    k28 = (k12 - k3) / mass_A
-    k29 = k4 * ((k61 - k50) / mass_A) / pivot_B
-    k30 = k5 / mass_A
-    k31 = k6 / mass_A
-    k32 = k51 / k51
-    k64 = m_A * l_B_squared
-    k65 = I_B + k64
-    k33 = (m_A * I_B * l_A_squared + (k63 + l_B_squared * k52) - k1 * k65) / k51
-    k34 = (k58 * k62 - k2 * (k51 + mass_A * k65)) / k59
-    k35 = (l_B * (m_A * l_A) - k3) / mass_A
-    k36 = k4 * ((k64 - k50) / mass_A) / pivot_B
-    k37 = (l_A - k5) / mass_A
-    k38 = (l_B - k6) / mass_A
-    k39 = (k56 + k48 * l_A_squared - mass_A * k1) / k51
-    k40 = k2 * (mass_A * mass_A) / k59
-    k41 = k4 / pivot_B
-    k66 = l_A * 2.0
-    k42 = k55 * k66 / k51
-    k43 = m_B_squared * (m_A_squared * (l_B_squared * k66)) / k59
-    k44 = m_B / mass_A
-    k67 = l_B * 2.0
-    k68 = k48 * k67
-    k45 = (k54 * k67 - k1 * k68) / k51
-    k46 = (m_B_squared * (m_A_squared * (l_A_squared * k67)) - k2 * (mass_A * k68)) / k59
-    k47 = k4 * (k68 / mass_A) / pivot_B
+    k13 = I_B + k75
+    k14 = 2.0 * (m_B * (l_A * l_B))
+    k15 = I_B + (I_A + (k75 + m_B * l_A_squared))
+    k16 = g * k9
+    k17 = g * k10
+    k18 = -k9
+    k27 = m_A * g
+    k28 = m_B * g
+    k19 = k27 + k28
+    k20 = l_A * k28
+    k21 = l_B * k28
+    k22 = l_A * k10
+    k23 = I_A / 2.0
+    k24 = I_B / 2.0
+    k25 = m_A / 2.0
+    k26 = m_B / 2.0
+    k29 = -k27
+    k30 = k74 / mass_A
+    k31 = l_B * k61 / mass_A
+    k76 = m_A * I_B
+    k77 = m_B * I_B
+    k78 = k62 + (k76 + k77)
+    k32 = k70 / k78
+    k79 = mass_A * k78
+    k33 = k73 / k79
+    k34 = k3 * k3
+    k35 = k3 * k4
+    k80 = I_A * I_B
+    k36 = (k77 * l_A_squared + (k80 + l_B_squared * k66) - k32 * k13) / k78
+    k37 = (m_B_squared * (k71 * (m_A * 2.0)) - k33 * (k78 + mass_A * k13)) / k79
+    k38 = (k12 - k3) / mass_A
+    k39 = k4 * ((k75 - k63) / mass_A) / pivot_B
+    k40 = k5 / mass_A
+    k41 = k6 / mass_A
+    k42 = k78 / k78
+    k43 = k35 * k6
+    k81 = m_A * l_B_squared
+    k82 = I_B + k81
+    k44 = (k76 * l_A_squared + (k80 + l_B_squared * k65) - k32 * k82) / k78
+    k45 = (k72 * (m_B * 2.0) - k33 * (k78 + mass_A * k82)) / k79
+    k46 = (l_B * (m_A * l_A) - k3) / mass_A
+    k47 = k4 * ((k81 - k63) / mass_A) / pivot_B
+    k48 = (l_A - k5) / mass_A
+    k49 = (l_B - k6) / mass_A
+    k50 = (k69 + k61 * l_A_squared - mass_A * k32) / k78
+    k51 = k33 * (mass_A * mass_A) / k79
+    k52 = k4 / pivot_B
+    k83 = l_A * 2.0
+    k53 = k68 * k83 / k78
+    k84 = m_A_squared * m_B_squared
+    k54 = k83 * (l_B_squared * k84) / k79
+    k55 = m_B / mass_A
+    k56 = k4 * k6
+    k57 = -k4
+    k85 = l_B * 2.0
+    k86 = k61 * k85
+    k58 = (k67 * k85 - k32 * k86) / k78
+    k59 = (k85 * (l_A_squared * k84) - k33 * (mass_A * k86)) / k79
+    k60 = k4 * (k86 / mass_A) / pivot_B
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6),
         "jacobian": (k1, k2, k3, k4, k5, k6, k7),
         "forward_dynamics": (g, k1, k2, k3, k4, k5, k6, k8),
         "inverse_dynamics": (mass_A, k9, k10, k11, k12, k13, k14, k15, k16, k17),
-        "mass_matrix": (mass_A, k9, k10, k12, k13, k14, k15),
+        "mass_matrix": (mass_A, k9, k10, k12, k13, k14, k15, k18),
         "velocity_force": (k9, k10, k12),
-        "gravity_force": (k11, k16, k17),
-        "bias_force": (k9, k10, k11, k12, k16, k17),
+        "gravity_force": (k19, k20, k21),
+        "bias_force": (k9, k10, k11, k20, k21, k22),
         "applied_force": (),
-        "kinetic_energy": (l_A, l_B, k18, k19, k20, k21),
-        "potential_energy": (l_A, l_B, k22, k23),
-        "effect_powers": (l_A, l_B, k22, k23),
+        "kinetic_energy": (l_A, l_B, k23, k24, k25, k26),
+        "potential_energy": (l_A, l_B, k27, k28),
+        "effect_powers": (l_A, l_B, k28, k29),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
         "centre_of_mass": (m_A, m_B, l_A, l_B, k8),
-        "joint_forces": (k1, k2, k3, k4, k24, k25),
+        "joint_forces": (k1, k2, k3, k4, k30, k31),
         "body_poses": (l_A, l_B),
         "body_velocities": (l_A, l_B),
-        "parameter_jacobian": (k1, k2, k3, k4, k5, k6, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47),
+        "parameter_jacobian": (k3, k4, k5, k6, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60),
     }
 
 
@@ -261,7 +280,7 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """46 operations: 10 add, 3 sub, 25 mul, 1 div, 1 neg, 3 sin, 3 cos."""
+    """45 operations: 10 add, 3 sub, 24 mul, 1 div, 1 neg, 3 sin, 3 cos."""
     g, k1, k2, k3, k4, k5, k6 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     sin_phi = sin(phi)
@@ -270,28 +289,29 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta_phi = sin(s1)
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = k3 * (sin_phi * theta_dot_squared)
+    s2 = sin_phi * k3
+    s3 = theta_dot_squared * s2
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    alpha_A = (k4 * (coupling_B_A * s2) + k3 * (sin_phi * omega_B_squared)) / (k1 + sin_phi * sin_phi * k2)
-    s3 = k4 * (s2 + coupling_B_A * alpha_A)
-    s4 = k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A) + k6 * (sin_theta_phi * omega_B_squared + cos_theta_phi * s3)
+    alpha_A = (k4 * (coupling_B_A * s3) + s2 * omega_B_squared) / (k1 + sin_phi * sin_phi * k2)
+    s4 = k4 * (s3 + coupling_B_A * alpha_A)
+    s5 = k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A) + k6 * (sin_theta_phi * omega_B_squared + cos_theta_phi * s4)
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
         phi_dot,
-        k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (cos_theta_phi * omega_B_squared - sin_theta_phi * s3),
-        s4 - g,
+        k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (cos_theta_phi * omega_B_squared - sin_theta_phi * s4),
+        s5 - g,
         alpha_A,
-        -(alpha_A + s3),
+        -(alpha_A + s4),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """129 operations: 24 add, 13 sub, 79 mul, 4 div, 3 neg, 3 sin, 3 cos."""
+    """119 operations: 24 add, 13 sub, 69 mul, 4 div, 3 neg, 3 sin, 3 cos."""
     k1, k2, k3, k4, k5, k6, k7 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
@@ -302,32 +322,35 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta_phi = sin(s1)
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = k3 * (sin_phi * theta_dot_squared)
+    s2 = sin_phi * k3
+    s3 = theta_dot_squared * s2
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    alpha_A = (k4 * (coupling_B_A * s2) + k3 * (sin_phi * omega_B_squared)) / pivot_A
-    s3 = k4 * (s2 + coupling_B_A * alpha_A)
-    s5 = sin_theta_phi * s3
     s6 = cos_theta_phi * omega_B_squared
     s7 = sin_theta_phi * omega_B_squared
-    s8 = cos_theta_phi * s3
-    s9 = sin_phi * k3
-    s10 = k3 * (cos_phi * theta_dot_squared)
-    s11 = k4 * (coupling_B_A * s10 - s2 * s9) + k3 * (cos_phi * omega_B_squared) - alpha_A * (sin_phi * cos_phi * k7)
-    s12 = s11 / pivot_A
-    s13 = k4 * (s10 + (coupling_B_A * s12 - alpha_A * s9))
-    s14 = theta_dot * 2.0
-    s15 = k3 * (sin_phi * s14)
-    s16 = omega_B * 2.0
-    s17 = k3 * (sin_phi * s16)
-    s18 = (k4 * (coupling_B_A * s15) + s17) / pivot_A
-    s19 = k4 * (s15 + coupling_B_A * s18)
-    s20 = cos_theta_phi * s16
-    s21 = sin_theta_phi * s16
-    s22 = s17 / pivot_A
-    s23 = k4 * (coupling_B_A * s22)
+    s8 = coupling_B_A * k4
+    alpha_A_2 = (s3 * s8 + s2 * omega_B_squared) / pivot_A
+    s9 = k4 * (s3 + coupling_B_A * alpha_A_2)
+    s10 = sin_theta_phi * s9
+    s11 = cos_theta_phi * s9
+    s12 = coupling_B_A * theta_dot_squared
+    s13 = k4 * (coupling_B_A * s12 - s2 * s3) + coupling_B_A * omega_B_squared - alpha_A_2 * (sin_phi * cos_phi * k7)
+    s14 = s13 / pivot_A
+    s15 = k4 * (s12 + (coupling_B_A * s14 - s2 * alpha_A_2))
+    s16 = sin_theta * k5
+    s17 = cos_theta * k5
+    s18 = theta_dot * 2.0
+    s19 = s2 * s18
+    s20 = omega_B * 2.0
+    s21 = s2 * s20
+    s22 = (s8 * s19 + s21) / pivot_A
+    s23 = k4 * (s19 + coupling_B_A * s22)
+    s24 = cos_theta_phi * s20
+    s25 = sin_theta_phi * s20
+    s26 = s21 / pivot_A
+    s27 = s8 * s26
     return (
         0.0,
         0.0,
@@ -363,41 +386,41 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         1.0,
         0.0,
         0.0,
-        k5 * (cos_theta * alpha_A - theta_dot_squared * sin_theta) - k6 * (s7 + s8),
-        k5 * (sin_theta * s12) - k6 * (s7 + (s8 + sin_theta_phi * s13)),
+        k5 * (cos_theta * alpha_A_2 - theta_dot_squared * sin_theta) - k6 * (s7 + s11),
+        s14 * s16 - k6 * (s7 + (s11 + sin_theta_phi * s15)),
         0.0,
         0.0,
-        k5 * (sin_theta * s18 + cos_theta * s14) + k6 * (s20 - sin_theta_phi * s19),
-        k5 * (sin_theta * s22) + k6 * (s20 - sin_theta_phi * s23),
+        k5 * (sin_theta * s22 + cos_theta * s18) + k6 * (s24 - sin_theta_phi * s23),
+        s16 * s26 + k6 * (s24 - sin_theta_phi * s27),
         0.0,
         0.0,
-        k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (s6 - s5),
-        k6 * (s6 + (cos_theta_phi * s13 - s5)) - k5 * (cos_theta * s12),
+        k5 * (sin_theta * alpha_A_2 + theta_dot_squared * cos_theta) + k6 * (s6 - s10),
+        k6 * (s6 + (cos_theta_phi * s15 - s10)) - s14 * s17,
         0.0,
         0.0,
-        k5 * (sin_theta * s14 - cos_theta * s18) + k6 * (s21 + cos_theta_phi * s19),
-        k6 * (s21 + cos_theta_phi * s23) - k5 * (cos_theta * s22),
+        k5 * (sin_theta * s18 - cos_theta * s22) + k6 * (s25 + cos_theta_phi * s23),
+        k6 * (s25 + cos_theta_phi * s27) - s17 * s26,
         0.0,
         0.0,
         0.0,
-        s12,
+        s14,
         0.0,
         0.0,
-        s18,
         s22,
+        s26,
         0.0,
         0.0,
         0.0,
-        -(s12 + s13),
+        -(s14 + s15),
         0.0,
         0.0,
-        -(s18 + s19),
         -(s22 + s23),
+        -(s26 + s27),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """62 operations: 12 add, 10 sub, 33 mul, 1 div, 3 sin, 3 cos."""
+    """61 operations: 12 add, 10 sub, 32 mul, 1 div, 3 sin, 3 cos."""
     g, k1, k2, k3, k4, k5, k6, k8 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     tau__x_A, tau__y_A, tau__theta, tau__phi = extra
@@ -407,21 +430,22 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta_phi = sin(s1)
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
+    s2 = sin_phi * k3
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    load_B = tau__phi + k6 * (tau__x_A * sin_theta_phi - tau__y_A * cos_theta_phi) - k3 * (sin_phi * theta_dot_squared)
-    s24 = k3 * (sin_phi * omega_B_squared) + (tau__theta + k5 * (tau__x_A * sin_theta - tau__y_A * cos_theta))
-    alpha_A_2 = (s24 - tau__phi - k4 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
-    alpha_B = k4 * (load_B - coupling_B_A * alpha_A_2)
-    s25 = tau__x_A * k8 + k5 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_2)
-    s26 = tau__y_A * k8 + k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_2)
+    load_B = tau__phi + k6 * (tau__x_A * sin_theta_phi - tau__y_A * cos_theta_phi) - theta_dot_squared * s2
+    s28 = s2 * omega_B_squared + (tau__theta + k5 * (tau__x_A * sin_theta - tau__y_A * cos_theta))
+    alpha_A_3 = (s28 - tau__phi - k4 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
+    alpha_B = k4 * (load_B - coupling_B_A * alpha_A_3)
+    s29 = tau__x_A * k8 + k5 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_3)
+    s30 = tau__y_A * k8 + k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_3)
     return (
-        k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B) + s25,
-        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s26 - g,
-        alpha_A_2,
-        alpha_B - alpha_A_2,
+        k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B) + s29,
+        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s30 - g,
+        alpha_A_3,
+        alpha_B - alpha_A_3,
     )
 
 
@@ -440,104 +464,106 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s27 = sin_theta * k9 + sin_theta_phi * k10
-    s28 = x_A_ddot * mass_A - theta_ddot * s27 - k9 * (theta_dot_squared * cos_theta)
-    s29 = cos_theta * k9 + cos_theta_phi * k10
-    s30 = k10 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s29 + k11))
-    s31 = cos_phi * k12 + k13
-    s32 = y_A_ddot * s29 + (phi_ddot * s31 + theta_ddot * (cos_phi * k14 + k15)) - x_A_ddot * s27
-    s33 = cos_theta_phi * k17
-    s34 = k10 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s33 + (theta_ddot * s31 + phi_ddot * k13))
+    s31 = sin_phi * theta_dot_squared
+    s32 = sin_theta * k9 + sin_theta_phi * k10
+    s33 = x_A_ddot * mass_A - theta_ddot * s32 - k9 * (theta_dot_squared * cos_theta)
+    s34 = cos_theta * k9 + cos_theta_phi * k10
+    s35 = k10 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (theta_ddot * s34 + y_A_ddot * mass_A)
+    s36 = cos_phi * k12 + k13
+    s37 = cos_theta_phi * k17
+    s38 = y_A_ddot * s34 + (phi_ddot * s36 + theta_ddot * (cos_phi * k14 + k15)) + cos_theta * k16
+    s39 = k10 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s37 + (theta_ddot * s36 + phi_ddot * k13))
     return (
-        s28 - k10 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
-        s30 - k9 * (theta_dot_squared * sin_theta),
-        k12 * (sin_phi * (theta_dot_squared - omega_B_squared)) + (s33 + (s32 + cos_theta * k16)),
-        sin_phi * theta_dot_squared * k12 + s34,
+        s33 - k10 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
+        k11 + s35 - k9 * (theta_dot_squared * sin_theta),
+        k12 * (s31 - sin_phi * omega_B_squared) + (s37 + s38) - x_A_ddot * s32,
+        s31 * k12 + s39,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """18 operations: 5 add, 6 mul, 2 neg, 2 sin, 3 cos."""
-    mass_A, k9, k10, k12, k13, k14, k15 = k
+    """17 operations: 4 add, 1 sub, 6 mul, 1 neg, 2 sin, 3 cos."""
+    mass_A, k9, k10, k12, k13, k14, k15, k18 = k
     _, _, theta, phi, _, _, _, _ = y
     cos_phi = cos(phi)
     s1 = theta + phi
-    s35 = sin(s1) * k10
-    s36 = -s35
-    s37 = -(sin(theta) * k9 + s35)
-    s38 = cos(s1) * k10
-    s29 = cos(theta) * k9 + s38
-    s31 = cos_phi * k12 + k13
+    s40 = sin(s1) * k10
+    s41 = cos(s1) * k10
+    s34 = cos(theta) * k9 + s41
+    s36 = cos_phi * k12 + k13
+    s42 = -s40
+    s43 = sin(theta) * k18 - s40
     return (
         mass_A,
         0.0,
-        s37,
-        s36,
+        s43,
+        s42,
         0.0,
         mass_A,
-        s29,
-        s38,
-        s37,
-        s29,
+        s34,
+        s41,
+        s43,
+        s34,
         cos_phi * k14 + k15,
-        s31,
         s36,
-        s38,
-        s31,
+        s42,
+        s41,
+        s36,
         k13,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """26 operations: 4 add, 1 sub, 14 mul, 2 neg, 3 sin, 2 cos."""
+    """23 operations: 4 add, 1 sub, 11 mul, 2 neg, 3 sin, 2 cos."""
     k9, k10, k12 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
-    sin_phi = sin(phi)
     s1 = theta + phi
     theta_dot_squared = theta_dot * theta_dot
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s39 = k9 * (theta_dot_squared * cos(theta)) + k10 * (cos(s1) * omega_B_squared)
-    s40 = k9 * (theta_dot_squared * sin(theta)) + k10 * (sin(s1) * omega_B_squared)
+    s44 = theta_dot_squared * k9
+    s45 = sin(phi) * k12
+    s46 = omega_B_squared * k10
     return (
-        -s39,
-        -s40,
-        k12 * (sin_phi * (theta_dot_squared - omega_B_squared)),
-        sin_phi * theta_dot_squared * k12,
+        -(cos(theta) * s44 + cos(s1) * s46),
+        -(sin(theta) * s44 + sin(s1) * s46),
+        (theta_dot_squared - omega_B_squared) * s45,
+        theta_dot_squared * s45,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
-    k11, k16, k17 = k
+    k19, k20, k21 = k
     _, _, theta, phi, _, _, _, _ = y
-    s33 = cos(theta + phi) * k17
+    s47 = cos(theta + phi) * k21
     return (
         0.0,
-        k11,
-        cos(theta) * k16 + s33,
-        s33,
+        k19,
+        cos(theta) * k20 + s47,
+        s47,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """31 operations: 6 add, 3 sub, 16 mul, 1 neg, 3 sin, 2 cos."""
-    k9, k10, k11, k12, k16, k17 = k
+    """28 operations: 6 add, 3 sub, 13 mul, 1 neg, 3 sin, 2 cos."""
+    k9, k10, k11, k20, k21, k22 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
-    sin_phi = sin(phi)
     s1 = theta + phi
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s33 = cos_theta_phi * k17
-    s39 = k9 * (theta_dot_squared * cos_theta) + k10 * (cos_theta_phi * omega_B_squared)
+    s44 = theta_dot_squared * k9
+    s46 = omega_B_squared * k10
+    s47 = cos_theta_phi * k21
+    s48 = sin(phi) * k22
     return (
-        -s39,
-        k11 - k9 * (theta_dot_squared * sin(theta)) - k10 * (sin(s1) * omega_B_squared),
-        k12 * (sin_phi * (theta_dot_squared - omega_B_squared)) + (cos_theta * k16 + s33),
-        s33 + sin_phi * theta_dot_squared * k12,
+        -(cos_theta * s44 + cos_theta_phi * s46),
+        k11 - sin(theta) * s44 - sin(s1) * s46,
+        (theta_dot_squared - omega_B_squared) * s48 + (cos_theta * k20 + s47),
+        s47 + theta_dot_squared * s48,
     )
 
 
@@ -552,56 +578,59 @@ def _applied_force(y, k, u=(), extra=()):
 
 
 def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """33 operations: 9 add, 2 sub, 18 mul, 2 sin, 2 cos."""
-    l_A, l_B, k18, k19, k20, k21 = k
+    """31 operations: 9 add, 2 sub, 16 mul, 2 sin, 2 cos."""
+    l_A, l_B, k23, k24, k25, k26 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
-    xd_B = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
-    yd_B = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
-    s41 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k20 + (theta_dot * theta_dot * k18 + omega_B * omega_B * k19)
+    s49 = l_A * theta_dot
+    s50 = l_B * omega_B
+    xd_B = x_A_dot - sin(theta) * s49 - sin(s1) * s50
+    yd_B = cos(s1) * s50 + (y_A_dot + cos(theta) * s49)
+    s51 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k25 + (theta_dot * theta_dot * k23 + omega_B * omega_B * k24)
     return (
-        (xd_B * xd_B + yd_B * yd_B) * k21 + s41,
+        (xd_B * xd_B + yd_B * yd_B) * k26 + s51,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    l_A, l_B, k22, k23 = k
+    l_A, l_B, k27, k28 = k
     _, y_A, theta, phi, _, _, _, _ = y
     return (
-        y_A * k22 + k23 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
+        y_A * k27 + k28 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos):
-    """14 operations: 5 add, 6 mul, 1 neg, 2 cos."""
-    l_A, l_B, k22, k23 = k
+    """13 operations: 4 add, 1 sub, 6 mul, 2 cos."""
+    l_A, l_B, k28, k29 = k
     _, _, theta, phi, _, y_A_dot, theta_dot, phi_dot = y
-    yd_B = l_B * (cos(theta + phi) * (theta_dot + phi_dot)) + (y_A_dot + l_A * (theta_dot * cos(theta)))
+    yd_B_2 = l_B * (cos(theta + phi) * (theta_dot + phi_dot)) + (y_A_dot + l_A * (theta_dot * cos(theta)))
     return (
-        -(y_A_dot * k22 + k23 * yd_B),
+        y_A_dot * k29 - k28 * yd_B_2,
     )
 
 
 def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """45 operations: 13 add, 4 sub, 24 mul, 2 sin, 2 cos."""
+    """42 operations: 13 add, 4 sub, 21 mul, 2 sin, 2 cos."""
     m_A, I_A, m_B, I_B, l_A, l_B = k
     x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
-    sin_theta_phi = sin(s1)
-    cos_theta_phi = cos(s1)
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
-    xd_B = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
-    yd_B = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
-    s42 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
-    s43 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
+    s49 = l_A * theta_dot
+    s52 = l_B * sin(s1)
+    xd_B_2 = x_A_dot - sin_theta * s49 - omega_B * s52
+    s53 = l_B * cos(s1)
+    yd_B_3 = omega_B * s53 + (y_A_dot + cos_theta * s49)
+    s54 = yd_B_3 * (s53 + (x_A + l_A * cos_theta)) - xd_B_2 * (s52 + (y_A + l_A * sin_theta))
+    s55 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
-        m_A * x_A_dot + m_B * xd_B,
-        m_A * y_A_dot + m_B * yd_B,
-        m_B * s42 + s43,
+        m_A * x_A_dot + m_B * xd_B_2,
+        m_A * y_A_dot + m_B * yd_B_3,
+        m_B * s54 + s55,
     )
 
 
@@ -617,8 +646,8 @@ def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """43 operations: 9 add, 2 sub, 25 mul, 1 div, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k24, k25 = k
+    """42 operations: 9 add, 2 sub, 24 mul, 1 div, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k30, k31 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
     coupling_B_A = cos(phi) * k3
@@ -626,16 +655,17 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta_phi = sin(s1)
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = k3 * (sin_phi * theta_dot_squared)
+    s2 = sin_phi * k3
+    s3 = theta_dot_squared * s2
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    alpha_A = (k4 * (coupling_B_A * s2) + k3 * (sin_phi * omega_B_squared)) / (k1 + sin_phi * sin_phi * k2)
-    s3 = k4 * (s2 + coupling_B_A * alpha_A)
+    alpha_A = (k4 * (coupling_B_A * s3) + s2 * omega_B_squared) / (k1 + sin_phi * sin_phi * k2)
+    s4 = k4 * (s3 + coupling_B_A * alpha_A)
     return (
-        (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k24 + (cos_theta_phi * omega_B_squared - sin_theta_phi * s3) * k25,
-        (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k24 + (sin_theta_phi * omega_B_squared + cos_theta_phi * s3) * k25,
+        (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k30 + (cos_theta_phi * omega_B_squared - sin_theta_phi * s4) * k31,
+        (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k30 + (sin_theta_phi * omega_B_squared + cos_theta_phi * s4) * k31,
         0.0,
     )
 
@@ -656,73 +686,75 @@ def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """18 operations: 4 add, 2 sub, 8 mul, 2 sin, 2 cos."""
+    """16 operations: 4 add, 2 sub, 6 mul, 2 sin, 2 cos."""
     l_A, l_B = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
+    s49 = l_A * theta_dot
+    s50 = l_B * omega_B
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
-        x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B),
-        l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta))),
+        x_A_dot - sin(theta) * s49 - sin(s1) * s50,
+        cos(s1) * s50 + (y_A_dot + cos(theta) * s49),
         omega_B,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """231 operations: 45 add, 27 sub, 140 mul, 7 div, 6 neg, 3 sin, 3 cos."""
-    k1, k2, k3, k4, k5, k6, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47 = k
+    """207 operations: 44 add, 28 sub, 117 mul, 7 div, 5 neg, 3 sin, 3 cos."""
+    k3, k4, k5, k6, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     sin_phi = sin(phi)
-    s44 = sin_phi * sin_phi
-    pivot_A = k1 + s44 * k2
+    s56 = sin_phi * sin_phi
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k3
     s1 = theta + phi
     sin_theta_phi = sin(s1)
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s45 = sin_phi * theta_dot_squared
-    s2 = k3 * s45
-    s46 = coupling_B_A * s2
     sin_theta = sin(theta)
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s47 = sin_phi * omega_B_squared
-    alpha_A = (k4 * s46 + k3 * s47) / pivot_A
-    s48 = s2 + coupling_B_A * alpha_A
-    s3 = k4 * s48
-    s49 = sin_theta * alpha_A + theta_dot_squared * cos_theta
-    s50 = cos_theta_phi * omega_B_squared - sin_theta_phi * s3
-    s51 = theta_dot_squared * sin_theta - cos_theta * alpha_A
-    s52 = sin_theta_phi * omega_B_squared + cos_theta_phi * s3
-    s53 = cos_phi * k28
-    s54 = s45 * k28
-    s55 = k4 * (s2 * s53 + coupling_B_A * s54) - s46 * k29 + s47 * k28 - alpha_A * (k26 + s44 * k27)
-    s56 = s55 / pivot_A
-    s57 = k4 * (s54 + (alpha_A * s53 + coupling_B_A * s56)) - s48 * k29
-    s58 = alpha_A * k32 / pivot_A
-    s59 = k4 * (coupling_B_A * s58)
-    s60 = cos_phi * k35
-    s61 = s45 * k35
-    s62 = k4 * (s2 * s60 + coupling_B_A * s61) - s46 * k36 + s47 * k35 - alpha_A * (k33 + s44 * k34)
-    s63 = s62 / pivot_A
-    s64 = k4 * (s61 + (alpha_A * s60 + coupling_B_A * s63)) - s48 * k36
-    s65 = (s46 * k41 + alpha_A * (k39 - s44 * k40)) / pivot_A
-    s66 = s48 * k41 + k4 * (coupling_B_A * s65)
-    s67 = cos_phi * k25
-    s68 = s45 * k25
-    s69 = k4 * (s2 * s67 + coupling_B_A * s68) + s47 * k25 - alpha_A * (k42 + s44 * k43)
-    s70 = s69 / pivot_A
-    s71 = k4 * (s68 + (alpha_A * s67 + coupling_B_A * s70))
-    s72 = cos_phi * k24
-    s73 = s45 * k24
-    s74 = k4 * (s2 * s72 + coupling_B_A * s73) - s46 * k47 + s47 * k24 - alpha_A * (k45 + s44 * k46)
-    s75 = s74 / pivot_A
-    s76 = k4 * (s73 + (alpha_A * s72 + coupling_B_A * s75)) - s48 * k47
+    s16 = sin_theta * k5
+    s17 = cos_theta * k5
+    s31 = sin_phi * theta_dot_squared
+    s57 = sin_phi * omega_B_squared
+    pivot_A_2 = k32 + s56 * k33
+    s58 = cos_phi * s31
+    s59 = k3 * s58
+    alpha_A_4 = (k35 * s59 + k3 * s57) / pivot_A_2
+    s60 = k3 * s31 + coupling_B_A * alpha_A_4
+    s61 = k4 * s60
+    s62 = sin_theta * alpha_A_4 + theta_dot_squared * cos_theta
+    s63 = cos_theta_phi * omega_B_squared - sin_theta_phi * s61
+    s64 = theta_dot_squared * sin_theta - cos_theta * alpha_A_4
+    s65 = sin_theta_phi * omega_B_squared + cos_theta_phi * s61
+    s66 = s59 * k38
+    s67 = k34 * s58
+    s68 = (k4 * (s66 + s66) - k39 * s67 + s57 * k38 - alpha_A_4 * (k36 + s56 * k37)) / pivot_A_2
+    s69 = cos_phi * alpha_A_4
+    s70 = k4 * (s31 * k38 + (k38 * s69 + coupling_B_A * s68)) - s60 * k39
+    s71 = sin_theta_phi * k6
+    s72 = cos_theta_phi * k6
+    s73 = alpha_A_4 * k42 / pivot_A_2
+    s74 = cos_phi * s73
+    s75 = s74 * k43
+    s76 = s59 * k46
+    s77 = (k4 * (s76 + s76) - s67 * k47 + s57 * k46 - alpha_A_4 * (k44 + s56 * k45)) / pivot_A_2
+    s78 = k4 * (s31 * k46 + (s69 * k46 + coupling_B_A * s77)) - s60 * k47
+    s79 = (s67 * k52 + alpha_A_4 * (k50 - s56 * k51)) / pivot_A_2
+    s80 = s60 * k52 + k35 * (cos_phi * s79)
+    s81 = s59 * k31
+    s82 = (k4 * (s81 + s81) + s57 * k31 - alpha_A_4 * (k53 + s56 * k54)) / pivot_A_2
+    s83 = s31 * k31 + (k31 * s69 + coupling_B_A * s82)
+    s84 = s83 * k56
+    s85 = s59 * k30
+    s86 = (k4 * (s85 + s85) - s67 * k60 + s57 * k30 - alpha_A_4 * (k58 + s56 * k59)) / pivot_A_2
+    s87 = k4 * (s31 * k30 + (k30 * s69 + coupling_B_A * s86)) - s60 * k60
     return (
         0.0,
         0.0,
@@ -752,33 +784,33 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        k5 * (sin_theta * s56) - s49 * k30 - (s50 * k31 + k6 * (sin_theta_phi * s57)),
-        k6 * (sin_theta_phi * s59) - k5 * (sin_theta * s58),
-        s49 * k37 + k5 * (sin_theta * s63) + (s50 * k38 - k6 * (sin_theta_phi * s64)),
-        k6 * (sin_theta_phi * s66) - k5 * (sin_theta * s65),
-        s49 * k44 + k5 * (sin_theta * s70) - k6 * (sin_theta_phi * s71),
-        k5 * (sin_theta * s75) + (s50 * k44 - k6 * (sin_theta_phi * s76)),
+        s68 * s16 - s62 * k40 - (s63 * k41 + s70 * s71),
+        sin_theta_phi * s75 - s16 * s73,
+        s62 * k48 + s16 * s77 + (s63 * k49 - s71 * s78),
+        s71 * s80 - s16 * s79,
+        s62 * k55 + s16 * s82 - sin_theta_phi * s84,
+        s16 * s86 + (s63 * k55 - s71 * s87),
         0.0,
-        k6 * (cos_theta_phi * s57) - s52 * k31 - (s51 * k30 + k5 * (cos_theta * s56)),
-        k5 * (cos_theta * s58) - k6 * (cos_theta_phi * s59),
-        s51 * k37 - k5 * (cos_theta * s63) + (s52 * k38 + k6 * (cos_theta_phi * s64)),
-        k5 * (cos_theta * s65) - k6 * (cos_theta_phi * s66),
-        s51 * k44 - k5 * (cos_theta * s70) + k6 * (cos_theta_phi * s71),
-        s52 * k44 + k6 * (cos_theta_phi * s76) - k5 * (cos_theta * s75),
+        s70 * s72 - s65 * k41 - (s64 * k40 + s68 * s17),
+        s17 * s73 - cos_theta_phi * s75,
+        s64 * k48 - s17 * s77 + (s65 * k49 + s72 * s78),
+        s17 * s79 - s72 * s80,
+        s64 * k55 - s17 * s82 + cos_theta_phi * s84,
+        s65 * k55 + s72 * s87 - s17 * s86,
         -1.0,
-        s56,
-        -s58,
-        s63,
-        -s65,
-        s70,
-        s75,
+        s68,
+        -s73,
+        s77,
+        -s79,
+        s82,
+        s86,
         0.0,
-        -(s56 + s57),
-        s58 + s59,
-        -(s63 + s64),
-        s65 + s66,
-        -(s70 + s71),
-        -(s75 + s76),
+        -(s68 + s70),
+        s73 + k35 * s74,
+        -(s77 + s78),
+        s79 + s80,
+        k57 * s83 - s82,
+        -(s86 + s87),
         0.0,
     )
 
@@ -805,17 +837,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -824,19 +875,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -851,7 +911,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 4
 _COLUMNS = {
     "sin": np.sin,
@@ -957,17 +1017,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -1031,7 +1092,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (4, 4), ('cos', 'sin'), y, p, u)
 
 

@@ -31,12 +31,13 @@ Parameters p, with the scene's values:
     g = 9.81    m/s^2   gravitational acceleration
 
 Effects: gravity, external_force, external_force, motor.
-One call of `derivative` takes 74 operations: 16 add, 11 sub, 40 mul, 1 div, 3 sin, 3 cos; 47 more
+One call of `derivative` takes 73 operations: 16 add, 11 sub, 39 mul, 1 div, 3 sin, 3 cos; 47 more
 on parameters alone are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
-None (all 0), a mapping by name, or an array in the order of INPUTS. Many states at once are the
-columns of an array (8, k); then every result has a last axis of length k.
+None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
+columns of an array (8, k); then every result has a last axis of length k, and `p` and `u` may have
+columns too: arrays (9, k) and (5, k), or arrays (k,) by name.
 
 Arguments must be 64-bit floats, or convert to them exactly. If a state or a result is not finite, a
 ValueError or ArithmeticError is raised that states the reason. Among columns, the results of such a
@@ -112,25 +113,25 @@ JOINTS = ('hinge',)
 POINTS = ()
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 16, "sub": 11, "mul": 40, "div": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 47},
-    "jacobian": {"add": 27, "sub": 34, "mul": 111, "div": 5, "neg": 2, "sin": 3, "cos": 3, "total": 185, "parameters": 47},
-    "forward_dynamics": {"add": 23, "sub": 12, "mul": 43, "div": 1, "sin": 3, "cos": 3, "total": 85, "parameters": 47},
-    "inverse_dynamics": {"add": 27, "sub": 14, "mul": 47, "sin": 3, "cos": 3, "total": 94, "parameters": 20},
-    "mass_matrix": {"add": 5, "mul": 6, "neg": 2, "sin": 2, "cos": 3, "total": 18, "parameters": 15},
-    "velocity_force": {"add": 4, "sub": 1, "mul": 14, "neg": 2, "sin": 3, "cos": 2, "total": 26, "parameters": 3},
-    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 6},
-    "bias_force": {"add": 6, "sub": 3, "mul": 16, "neg": 1, "sin": 3, "cos": 2, "total": 31, "parameters": 8},
-    "applied_force": {"add": 8, "sub": 3, "mul": 10, "sin": 2, "cos": 2, "total": 25, "parameters": 0},
-    "kinetic_energy": {"add": 9, "sub": 2, "mul": 18, "sin": 2, "cos": 2, "total": 33, "parameters": 4},
+    "derivative": {"add": 16, "sub": 11, "mul": 39, "div": 1, "sin": 3, "cos": 3, "total": 73, "parameters": 47},
+    "jacobian": {"add": 27, "sub": 34, "mul": 98, "div": 5, "neg": 2, "sin": 3, "cos": 3, "total": 172, "parameters": 43},
+    "forward_dynamics": {"add": 23, "sub": 12, "mul": 42, "div": 1, "sin": 3, "cos": 3, "total": 84, "parameters": 47},
+    "inverse_dynamics": {"add": 26, "sub": 13, "mul": 46, "sin": 3, "cos": 3, "total": 91, "parameters": 19},
+    "mass_matrix": {"add": 4, "sub": 1, "mul": 6, "neg": 1, "sin": 2, "cos": 3, "total": 17, "parameters": 16},
+    "velocity_force": {"add": 4, "sub": 1, "mul": 11, "neg": 2, "sin": 3, "cos": 2, "total": 23, "parameters": 3},
+    "gravity_force": {"add": 2, "mul": 2, "cos": 2, "total": 6, "parameters": 5},
+    "bias_force": {"add": 6, "sub": 3, "mul": 13, "neg": 1, "sin": 3, "cos": 2, "total": 28, "parameters": 8},
+    "applied_force": {"add": 6, "sub": 3, "mul": 9, "sin": 2, "cos": 2, "total": 22, "parameters": 1},
+    "kinetic_energy": {"add": 9, "sub": 2, "mul": 16, "sin": 2, "cos": 2, "total": 31, "parameters": 4},
     "potential_energy": {"add": 4, "mul": 4, "sin": 2, "total": 10, "parameters": 2},
-    "effect_powers": {"add": 9, "sub": 5, "mul": 19, "neg": 1, "sin": 2, "cos": 2, "total": 38, "parameters": 2},
-    "momentum": {"add": 13, "sub": 4, "mul": 24, "sin": 2, "cos": 2, "total": 45, "parameters": 0},
+    "effect_powers": {"add": 8, "sub": 5, "mul": 18, "sin": 2, "cos": 2, "total": 35, "parameters": 4},
+    "momentum": {"add": 13, "sub": 4, "mul": 21, "sin": 2, "cos": 2, "total": 42, "parameters": 0},
     "centre_of_mass": {"add": 7, "mul": 10, "sin": 2, "cos": 2, "total": 21, "parameters": 2},
-    "joint_forces": {"add": 14, "sub": 11, "mul": 42, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 75, "parameters": 50},
+    "joint_forces": {"add": 14, "sub": 11, "mul": 41, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 74, "parameters": 50},
     "body_poses": {"add": 5, "mul": 4, "sin": 2, "cos": 2, "total": 13, "parameters": 0},
-    "body_velocities": {"add": 4, "sub": 2, "mul": 8, "sin": 2, "cos": 2, "total": 18, "parameters": 0},
-    "input_jacobian": {"add": 15, "sub": 16, "mul": 70, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 116, "parameters": 47},
-    "parameter_jacobian": {"add": 52, "sub": 59, "mul": 193, "div": 9, "neg": 6, "sin": 3, "cos": 3, "total": 325, "parameters": 161},
+    "body_velocities": {"add": 4, "sub": 2, "mul": 6, "sin": 2, "cos": 2, "total": 16, "parameters": 0},
+    "input_jacobian": {"add": 15, "sub": 16, "mul": 48, "div": 5, "neg": 4, "sin": 3, "cos": 3, "total": 94, "parameters": 47},
+    "parameter_jacobian": {"add": 50, "sub": 61, "mul": 162, "div": 9, "neg": 5, "sin": 3, "cos": 3, "total": 293, "parameters": 161},
 }
 
 
@@ -146,116 +147,134 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, d_A, d_B, g):
         return "inertia_com of B is negative"
     mass_A = m_A + m_B
     l_B_squared = l_B * l_B
-    k63 = m_A * m_B
-    k64 = l_B_squared * k63
-    k65 = k64 / mass_A
-    pivot_B = I_B + k65
-    k66 = k64 + I_B * mass_A
-    k67 = m_A * I_A
-    k68 = I_A * m_B
-    k69 = m_B * k67
+    k74 = m_A * m_B
+    k75 = l_B_squared * k74
+    k76 = k75 / mass_A
+    pivot_B = I_B + k76
+    k77 = I_B * mass_A
+    k78 = k75 + k77
+    k79 = m_A * I_A
+    k80 = I_A * m_B
+    k81 = m_B * k79
     l_A_squared = l_A * l_A
-    k70 = I_B * k63
-    k71 = k67 + k68
-    k1 = (l_A_squared * k70 + (l_B_squared * k69 + I_B * k71)) / k66
+    k82 = I_B * k74
+    k83 = l_A_squared * k82
+    k84 = k79 + k80
+    k85 = k83 + (l_B_squared * k81 + I_B * k84)
+    k1 = k85 / k78
     m_A_squared = m_A * m_A
     m_B_squared = m_B * m_B
-    k72 = l_B_squared * l_A_squared
-    k73 = m_A_squared * k72
-    k74 = mass_A * k66
-    k2 = m_B_squared * k73 / k74
+    k86 = l_B_squared * l_A_squared
+    k87 = m_A_squared * k86
+    k88 = m_B_squared * k87
+    k2 = k88 / (mass_A * k78)
     k3 = 1.0 / mass_A
-    k75 = l_A * k63
-    k4 = l_B * k75 / mass_A
+    k89 = l_A * k74
+    k4 = l_B * k89 / mass_A
     k5 = (m_A * l_B + d_B * mass_A) / mass_A
-    k13 = m_B * l_B
-    k6 = k13 / mass_A
+    k14 = m_B * l_B
+    k6 = k14 / mass_A
     k7 = 1.0 / pivot_B
-    k14 = m_B * l_A
-    k76 = d_A * mass_A
-    k8 = (k76 - k14) / mass_A
-    k9 = (k14 - k76) / mass_A
-    k77 = m_A * l_A
-    k10 = k77 / mass_A
-    k11 = k14 / mass_A
-    k12 = k2 * 2.0
-    k26 = m_A * g
-    k27 = m_B * g
-    k15 = k26 + k27
-    k78 = m_B * l_B_squared
-    k16 = l_B * k14
-    k17 = I_B + k78
-    k79 = m_B * 2.0
-    k18 = k79 * (l_A * l_B)
-    k19 = I_B + (I_A + (k78 + m_B * l_A_squared))
-    k20 = g * k14
-    k21 = l_B * k27
-    k22 = I_A / 2.0
-    k23 = I_B / 2.0
-    k24 = m_A / 2.0
-    k25 = m_B / 2.0
-    k28 = m_A / mass_A
-    k29 = m_B / mass_A
-    k30 = k75 / mass_A
-    k31 = l_B * k63 / mass_A
-    k80 = I_A * I_B
-    k32 = (m_B * I_B * l_A_squared + (k80 + l_B_squared * k68) - k1 * k17) / k66
-    k33 = (m_B_squared * (k72 * (m_A * 2.0)) - k2 * (k66 + mass_A * k17)) / k74
-    k34 = k3 / mass_A
-    k35 = (k16 - k4) / mass_A
-    k36 = (l_B + d_B - k5) / mass_A
-    k37 = k6 / mass_A
-    k38 = k7 * ((k78 - k65) / mass_A) / pivot_B
-    k39 = (d_A - k8) / mass_A
-    k40 = (d_A + k9) / mass_A
-    k41 = (l_A - k10) / mass_A
-    k42 = k11 / mass_A
-    k43 = k66 / k66
-    k81 = m_A * l_B_squared
-    k82 = I_B + k81
-    k44 = (m_A * I_B * l_A_squared + (k80 + l_B_squared * k67) - k1 * k82) / k66
-    k45 = (k73 * k79 - k2 * (k66 + mass_A * k82)) / k74
-    k46 = (l_B * k77 - k4) / mass_A
-    k47 = (d_B - k5) / mass_A
-    k48 = (l_B - k6) / mass_A
-    k49 = k7 * ((k81 - k65) / mass_A) / pivot_B
-    k50 = (d_A - l_A - k8) / mass_A
-    k51 = (l_A - d_A - k9) / mass_A
-    k52 = k10 / mass_A
-    k53 = (l_A - k11) / mass_A
-    k54 = (k71 + k63 * l_A_squared - mass_A * k1) / k66
-    k55 = k2 * (mass_A * mass_A) / k74
-    k56 = k7 / pivot_B
-    k83 = l_A * 2.0
-    k57 = k70 * k83 / k66
-    k58 = m_B_squared * (m_A_squared * (l_B_squared * k83)) / k74
-    k84 = l_B * 2.0
-    k85 = k63 * k84
-    k59 = (k69 * k84 - k1 * k85) / k66
-    k60 = (m_B_squared * (m_A_squared * (l_A_squared * k84)) - k2 * (mass_A * k85)) / k74
-    k61 = k7 * (k85 / mass_A) / pivot_B
-    k62 = mass_A / mass_A
+    k15 = m_B * l_A
+    k90 = d_A * mass_A
+    k8 = (k90 - k15) / mass_A
+    k9 = (k15 - k90) / mass_A
+    k91 = m_A * l_A
+    k10 = k91 / mass_A
+    k11 = k15 / mass_A
+    k12 = (k83 + (I_A * k75 + I_A * k77)) / k78
+    k13 = k2 * 2.0
+    k16 = g * mass_A
+    k92 = m_B * l_B_squared
+    k17 = l_B * k15
+    k18 = I_B + k92
+    k19 = 2.0 * (m_B * (l_A * l_B))
+    k20 = I_B + (I_A + (k92 + m_B * l_A_squared))
+    k21 = g * k15
+    k22 = g * k14
+    k23 = l_B + d_B
+    k24 = -k15
+    k33 = m_A * g
+    k34 = m_B * g
+    k25 = k33 + k34
+    k26 = l_A * k34
+    k27 = l_B * k34
+    k28 = l_A * k14
+    k29 = I_A / 2.0
+    k30 = I_B / 2.0
+    k31 = m_A / 2.0
+    k32 = m_B / 2.0
+    k35 = -k33
+    k36 = m_A / mass_A
+    k37 = m_B / mass_A
+    k38 = k89 / mass_A
+    k39 = l_B * k74 / mass_A
+    k93 = m_A * I_B
+    k94 = m_B * I_B
+    k95 = k75 + (k93 + k94)
+    k40 = k85 / k95
+    k96 = mass_A * k95
+    k41 = k88 / k96
+    k97 = I_A * I_B
+    k42 = (k94 * l_A_squared + (k97 + l_B_squared * k80) - k40 * k18) / k95
+    k43 = (m_B_squared * (k86 * (m_A * 2.0)) - k41 * (k95 + mass_A * k18)) / k96
+    k44 = k3 / mass_A
+    k45 = (k17 - k4) / mass_A
+    k46 = (k23 - k5) / mass_A
+    k47 = k6 / mass_A
+    k48 = k7 * ((k92 - k76) / mass_A) / pivot_B
+    k49 = (d_A - k8) / mass_A
+    k50 = (d_A + k9) / mass_A
+    k51 = (l_A - k10) / mass_A
+    k52 = k11 / mass_A
+    k53 = -k47
+    k54 = k95 / k95
+    k98 = m_A * l_B_squared
+    k99 = I_B + k98
+    k55 = (k93 * l_A_squared + (k97 + l_B_squared * k79) - k40 * k99) / k95
+    k56 = (k87 * (m_B * 2.0) - k41 * (k95 + mass_A * k99)) / k96
+    k57 = (l_B * k91 - k4) / mass_A
+    k58 = (d_B - k5) / mass_A
+    k59 = (l_B - k6) / mass_A
+    k60 = k7 * ((k98 - k76) / mass_A) / pivot_B
+    k61 = (d_A - l_A - k8) / mass_A
+    k62 = (l_A - d_A - k9) / mass_A
+    k63 = k10 / mass_A
+    k64 = (l_A - k11) / mass_A
+    k65 = (k84 + k74 * l_A_squared - mass_A * k40) / k95
+    k66 = k41 * (mass_A * mass_A) / k96
+    k67 = k7 / pivot_B
+    k100 = l_A * 2.0
+    k68 = k82 * k100 / k95
+    k101 = m_A_squared * m_B_squared
+    k69 = k100 * (l_B_squared * k101) / k96
+    k102 = l_B * 2.0
+    k103 = k74 * k102
+    k70 = (k81 * k102 - k40 * k103) / k95
+    k71 = (k102 * (l_A_squared * k101) - k41 * (mass_A * k103)) / k96
+    k72 = k7 * (k103 / mass_A) / pivot_B
+    k73 = mass_A / mass_A
     return {
         "initial_state": (),
         "derivative": (g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
-        "jacobian": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k12),
+        "jacobian": (k2, k4, k5, k6, k7, k8, k9, k10, k11, k12, k13),
         "forward_dynamics": (g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
-        "inverse_dynamics": (l_A, l_B, d_A, d_B, mass_A, k13, k14, k15, k16, k17, k18, k19, k20, k21),
-        "mass_matrix": (mass_A, k13, k14, k16, k17, k18, k19),
-        "velocity_force": (k13, k14, k16),
-        "gravity_force": (k15, k20, k21),
-        "bias_force": (k13, k14, k15, k16, k20, k21),
-        "applied_force": (l_A, l_B, d_A, d_B),
-        "kinetic_energy": (l_A, l_B, k22, k23, k24, k25),
-        "potential_energy": (l_A, l_B, k26, k27),
-        "effect_powers": (l_A, l_B, d_A, d_B, k26, k27),
+        "inverse_dynamics": (l_A, d_A, mass_A, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23),
+        "mass_matrix": (mass_A, k14, k15, k17, k18, k19, k20, k24),
+        "velocity_force": (k14, k15, k17),
+        "gravity_force": (k25, k26, k27),
+        "bias_force": (k14, k15, k16, k26, k27, k28),
+        "applied_force": (l_A, d_A, k23),
+        "kinetic_energy": (l_A, l_B, k29, k30, k31, k32),
+        "potential_energy": (l_A, l_B, k33, k34),
+        "effect_powers": (l_A, l_B, d_A, d_B, k23, k34, k35),
         "momentum": (m_A, I_A, m_B, I_B, l_A, l_B),
         "centre_of_mass": (m_A, m_B, l_A, l_B, k3),
-        "joint_forces": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k28, k29, k30, k31),
+        "joint_forces": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k36, k37, k38, k39),
         "body_poses": (l_A, l_B),
         "body_velocities": (l_A, l_B),
         "input_jacobian": (k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11),
-        "parameter_jacobian": (k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62),
+        "parameter_jacobian": (k4, k5, k6, k7, k8, k9, k10, k11, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73),
     }
 
 
@@ -303,7 +322,7 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """74 operations: 16 add, 11 sub, 40 mul, 1 div, 3 sin, 3 cos."""
+    """73 operations: 16 add, 11 sub, 39 mul, 1 div, 3 sin, 3 cos."""
     g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
@@ -313,76 +332,80 @@ def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta_phi = cos(s1)
     sin_theta_phi = sin(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
-    load_B = s2 - k4 * (sin_phi * theta_dot_squared)
+    s2 = sin_phi * k4
+    s3 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
+    load_B = s3 - theta_dot_squared * s2
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s3 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
-    load_A = k4 * (sin_phi * omega_B_squared) + s3 - tau - k7 * (coupling_B_A * load_B)
-    alpha_A = load_A / (k1 + sin_phi * sin_phi * k2)
+    s4 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
+    alpha_A = (s2 * omega_B_squared + s4 - tau - k7 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s4 = k3 * (f_A_x + f_B_x) + k11 * (sin_theta * alpha_A + theta_dot_squared * cos_theta)
-    s5 = k3 * (f_A_y + f_B_y) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A)
+    s5 = k3 * (f_A_x + f_B_x) + k11 * (sin_theta * alpha_A + theta_dot_squared * cos_theta)
+    s6 = k3 * (f_A_y + f_B_y) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A)
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
         phi_dot,
-        k6 * (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) + s4,
-        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s5 - g,
+        k6 * (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) + s5,
+        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) + s6 - g,
         alpha_A,
         alpha_B - alpha_A,
     )
 
 
 def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """185 operations: 27 add, 34 sub, 111 mul, 5 div, 2 neg, 3 sin, 3 cos."""
-    k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k12 = k
+    """172 operations: 27 add, 34 sub, 98 mul, 5 div, 2 neg, 3 sin, 3 cos."""
+    k2, k4, k5, k6, k7, k8, k9, k10, k11, k12, k13 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
-    pivot_A = k1 + sin_phi * sin_phi * k2
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k4
     s1 = theta + phi
     cos_theta_phi = cos(s1)
     sin_theta_phi = sin(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
-    load_B = s2 - k4 * (sin_phi * theta_dot_squared)
+    s2 = sin_phi * k4
+    s3 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
+    load_B = s3 - theta_dot_squared * s2
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s3 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
-    load_A = k4 * (sin_phi * omega_B_squared) + s3 - tau - k7 * (coupling_B_A * load_B)
-    alpha_A = load_A / pivot_A
-    alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s6 = sin_theta_phi * alpha_B
     s7 = cos_theta_phi * omega_B_squared
-    s8 = cos_theta_phi * alpha_B
-    s9 = k6 * (f_A_x * cos_theta_phi + f_A_y * sin_theta_phi) - k5 * (f_B_y * sin_theta_phi + f_B_x * cos_theta_phi)
-    s10 = k9 * (f_A_x * cos_theta) - k8 * (f_A_y * sin_theta) - k10 * (f_B_y * sin_theta + f_B_x * cos_theta)
-    s11 = (s10 - k7 * (coupling_B_A * s9)) / pivot_A
-    s12 = k7 * (s9 - coupling_B_A * s11)
-    s13 = k11 * (theta_dot_squared * cos_theta - (cos_theta * s11 - sin_theta * alpha_A))
-    s14 = sin_phi * k4
-    s15 = s9 - k4 * (cos_phi * theta_dot_squared)
-    s16 = k4 * (cos_phi * omega_B_squared) - k7 * (coupling_B_A * s15 - load_B * s14)
-    s17 = (s16 - alpha_A * (sin_phi * cos_phi * k12)) / pivot_A
-    s18 = k7 * (s15 - (coupling_B_A * s17 - alpha_A * s14))
-    s19 = theta_dot * 2.0
-    s20 = k4 * (sin_phi * s19)
-    s21 = omega_B * 2.0
-    s22 = k4 * (sin_phi * s21)
-    s23 = (k7 * (coupling_B_A * s20) + s22) / pivot_A
-    s24 = k7 * (s20 + coupling_B_A * s23)
-    s25 = cos_theta_phi * s21
-    s26 = sin_theta_phi * s21
-    s27 = s22 / pivot_A
-    s28 = k7 * (coupling_B_A * s27)
+    pivot_A = k12 + sin_phi * sin_phi * k2
+    s8 = coupling_B_A * k7
+    s9 = f_A_y * k8
+    s10 = f_A_x * k9
+    s11 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (cos_theta * s9 + sin_theta * s10)
+    alpha_A_2 = (s2 * omega_B_squared + s11 - tau - load_B * s8) / pivot_A
+    alpha_B_2 = k7 * (load_B - coupling_B_A * alpha_A_2)
+    s12 = sin_theta_phi * alpha_B_2
+    s13 = cos_theta_phi * alpha_B_2
+    s14 = k6 * (f_A_x * cos_theta_phi + f_A_y * sin_theta_phi) - k5 * (f_B_y * sin_theta_phi + f_B_x * cos_theta_phi)
+    s15 = cos_theta * s10 - sin_theta * s9 - k10 * (f_B_y * sin_theta + f_B_x * cos_theta)
+    s16 = (s15 - s8 * s14) / pivot_A
+    s17 = k7 * (s14 - coupling_B_A * s16)
+    s18 = theta_dot_squared * cos_theta - (cos_theta * s16 - sin_theta * alpha_A_2)
+    s19 = s14 - coupling_B_A * theta_dot_squared
+    s20 = coupling_B_A * omega_B_squared - k7 * (coupling_B_A * s19 - s2 * load_B) - k13 * (cos_phi * (sin_phi * alpha_A_2))
+    s21 = s20 / pivot_A
+    s22 = k7 * (s19 - (coupling_B_A * s21 - s2 * alpha_A_2))
+    s23 = sin_theta * k11
+    s24 = cos_theta * k11
+    s25 = theta_dot * 2.0
+    s26 = s2 * s25
+    s27 = omega_B * 2.0
+    s28 = s2 * s27
+    s29 = (s8 * s26 + s28) / pivot_A
+    s30 = k7 * (s26 + coupling_B_A * s29)
+    s31 = cos_theta_phi * s27
+    s32 = sin_theta_phi * s27
+    s33 = s28 / pivot_A
+    s34 = s8 * s33
     return (
         0.0,
         0.0,
@@ -418,41 +441,41 @@ def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         1.0,
         0.0,
         0.0,
-        k11 * (cos_theta * alpha_A + sin_theta * (s11 - theta_dot_squared)) + k6 * (s8 + sin_theta_phi * (s12 - omega_B_squared)),
-        k11 * (sin_theta * s17) + k6 * (s8 + sin_theta_phi * (s18 - omega_B_squared)),
+        k11 * (cos_theta * alpha_A_2 + sin_theta * (s16 - theta_dot_squared)) + k6 * (s13 + sin_theta_phi * (s17 - omega_B_squared)),
+        s21 * s23 + k6 * (s13 + sin_theta_phi * (s22 - omega_B_squared)),
         0.0,
         0.0,
-        k11 * (sin_theta * s23 + cos_theta * s19) + k6 * (s25 - sin_theta_phi * s24),
-        k11 * (sin_theta * s27) + k6 * (s25 - sin_theta_phi * s28),
+        k11 * (sin_theta * s29 + cos_theta * s25) + k6 * (s31 - sin_theta_phi * s30),
+        s23 * s33 + k6 * (s31 - sin_theta_phi * s34),
         0.0,
         0.0,
-        s13 + k6 * (s7 - (cos_theta_phi * s12 - s6)),
-        k6 * (s7 - (cos_theta_phi * s18 - s6)) - k11 * (cos_theta * s17),
+        k11 * s18 + k6 * (s7 - (cos_theta_phi * s17 - s12)),
+        k6 * (s7 - (cos_theta_phi * s22 - s12)) - s21 * s24,
         0.0,
         0.0,
-        k11 * (sin_theta * s19 - cos_theta * s23) + k6 * (s26 + cos_theta_phi * s24),
-        k6 * (s26 + cos_theta_phi * s28) - k11 * (cos_theta * s27),
+        k11 * (sin_theta * s25 - cos_theta * s29) + k6 * (s32 + cos_theta_phi * s30),
+        k6 * (s32 + cos_theta_phi * s34) - s24 * s33,
         0.0,
         0.0,
-        s11,
-        s17,
+        s16,
+        s21,
         0.0,
         0.0,
-        s23,
-        s27,
+        s29,
+        s33,
         0.0,
         0.0,
-        s12 - s11,
-        s18 - s17,
+        s17 - s16,
+        s22 - s21,
         0.0,
         0.0,
-        -(s23 + s24),
-        -(s27 + s28),
+        -(s29 + s30),
+        -(s33 + s34),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """85 operations: 23 add, 12 sub, 43 mul, 1 div, 3 sin, 3 cos."""
+    """84 operations: 23 add, 12 sub, 42 mul, 1 div, 3 sin, 3 cos."""
     g, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
@@ -463,30 +486,31 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta_phi = cos(s1)
     sin_theta_phi = sin(s1)
     theta_dot_squared = theta_dot * theta_dot
+    s2 = sin_phi * k4
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s29 = tau + tau__phi
-    s30 = k6 * (sin_theta_phi * (f_A_x + tau__x_A) - cos_theta_phi * (f_A_y + tau__y_A))
-    load_B_2 = s30 + (k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi) + s29) - k4 * (sin_phi * theta_dot_squared)
-    s31 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k9 * (f_A_x * sin_theta) + (tau__theta + k8 * (f_A_y * cos_theta)))
-    s32 = k4 * (sin_phi * omega_B_squared) + (k11 * (tau__x_A * sin_theta - tau__y_A * cos_theta) + s31)
-    alpha_A_2 = (s32 - s29 - k7 * (coupling_B_A * load_B_2)) / (k1 + sin_phi * sin_phi * k2)
-    alpha_B_2 = k7 * (load_B_2 - coupling_B_A * alpha_A_2)
-    s33 = k3 * (tau__x_A + (f_A_x + f_B_x)) + k11 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_2)
-    s34 = k3 * (tau__y_A + (f_A_y + f_B_y)) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_2)
+    s35 = tau + tau__phi
+    s36 = k6 * (sin_theta_phi * (f_A_x + tau__x_A) - cos_theta_phi * (f_A_y + tau__y_A))
+    load_B_2 = s36 + (k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi) + s35) - theta_dot_squared * s2
+    s37 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k9 * (f_A_x * sin_theta) + (tau__theta + k8 * (f_A_y * cos_theta)))
+    s38 = s2 * omega_B_squared + (k11 * (tau__x_A * sin_theta - tau__y_A * cos_theta) + s37)
+    alpha_A_3 = (s38 - s35 - k7 * (coupling_B_A * load_B_2)) / (k1 + sin_phi * sin_phi * k2)
+    alpha_B_3 = k7 * (load_B_2 - coupling_B_A * alpha_A_3)
+    s39 = k3 * (tau__x_A + (f_A_x + f_B_x)) + k11 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_3)
+    s40 = k3 * (tau__y_A + (f_A_y + f_B_y)) + k11 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_3)
     return (
-        k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B_2) + s33,
-        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B_2) + s34 - g,
-        alpha_A_2,
-        alpha_B_2 - alpha_A_2,
+        k6 * (cos_theta_phi * omega_B_squared + sin_theta_phi * alpha_B_3) + s39,
+        k6 * (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B_3) + s40 - g,
+        alpha_A_3,
+        alpha_B_3 - alpha_A_3,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """94 operations: 27 add, 14 sub, 47 mul, 3 sin, 3 cos."""
-    l_A, l_B, d_A, d_B, mass_A, k13, k14, k15, k16, k17, k18, k19, k20, k21 = k
+    """91 operations: 26 add, 13 sub, 46 mul, 3 sin, 3 cos."""
+    l_A, d_A, mass_A, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     x_A_ddot, y_A_ddot, theta_ddot, phi_ddot = extra
@@ -500,192 +524,191 @@ def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s35 = k14 * sin_theta + sin_theta_phi * k13
-    s36 = x_A_ddot * mass_A - (f_A_x + f_B_x) - theta_ddot * s35 - k14 * (theta_dot_squared * cos_theta)
-    s37 = k14 * cos_theta + cos_theta_phi * k13
-    s38 = k13 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (y_A_ddot * mass_A + (theta_ddot * s37 + k15))
-    s39 = cos_phi * k16 + k17
-    s40 = y_A_ddot * s37 + (phi_ddot * s39 + theta_ddot * (cos_phi * k18 + k19)) - x_A_ddot * s35
-    s41 = f_B_x * sin_theta_phi - f_B_y * cos_theta_phi
-    s42 = d_B * s41
-    s43 = l_B * s41
-    s44 = cos_theta_phi * k21
-    s45 = l_A * (f_B_x * sin_theta - f_B_y * cos_theta) + (s42 + (s40 + d_A * (f_A_x * sin_theta - f_A_y * cos_theta)))
-    s46 = k13 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s44 + (s43 + (s42 + (theta_ddot * s39 + phi_ddot * k17))))
+    s41 = sin_phi * theta_dot_squared
+    s42 = k15 * sin_theta + sin_theta_phi * k14
+    s43 = x_A_ddot * mass_A - (f_A_x + f_B_x + theta_ddot * s42) - k15 * (theta_dot_squared * cos_theta)
+    s44 = k15 * cos_theta + cos_theta_phi * k14
+    s45 = k14 * (phi_ddot * cos_theta_phi - sin_theta_phi * omega_B_squared) + (theta_ddot * s44 + y_A_ddot * mass_A)
+    s46 = cos_phi * k17 + k18
+    s47 = k23 * (f_B_x * sin_theta_phi - f_B_y * cos_theta_phi)
+    s48 = cos_theta_phi * k22
+    s49 = y_A_ddot * s44 + (phi_ddot * s46 + theta_ddot * (cos_phi * k19 + k20)) + d_A * (f_A_x * sin_theta - f_A_y * cos_theta)
+    s50 = cos_theta * k21 + (l_A * (f_B_x * sin_theta - f_B_y * cos_theta) + (s47 + s49))
+    s51 = k14 * (y_A_ddot * cos_theta_phi - x_A_ddot * sin_theta_phi) + (s48 + (s47 + (theta_ddot * s46 + phi_ddot * k18)))
     return (
-        s36 - k13 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
-        s38 - (f_A_y + f_B_y) - k14 * (theta_dot_squared * sin_theta),
-        k16 * (sin_phi * (theta_dot_squared - omega_B_squared)) + (s44 + (cos_theta * k20 + (s43 + s45))),
-        sin_phi * theta_dot_squared * k16 + s46 - tau,
+        s43 - k14 * (cos_theta_phi * omega_B_squared + phi_ddot * sin_theta_phi),
+        k16 + s45 - (f_A_y + f_B_y) - k15 * (theta_dot_squared * sin_theta),
+        k17 * (s41 - sin_phi * omega_B_squared) + (s48 + s50) - x_A_ddot * s42,
+        s41 * k17 + s51 - tau,
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """18 operations: 5 add, 6 mul, 2 neg, 2 sin, 3 cos."""
-    mass_A, k13, k14, k16, k17, k18, k19 = k
+    """17 operations: 4 add, 1 sub, 6 mul, 1 neg, 2 sin, 3 cos."""
+    mass_A, k14, k15, k17, k18, k19, k20, k24 = k
     _, _, theta, phi, _, _, _, _ = y
     cos_phi = cos(phi)
     s1 = theta + phi
-    s47 = sin(s1) * k13
-    s48 = -s47
-    s49 = -(k14 * sin(theta) + s47)
-    s50 = cos(s1) * k13
-    s37 = k14 * cos(theta) + s50
-    s39 = cos_phi * k16 + k17
+    s52 = sin(s1) * k14
+    s53 = cos(s1) * k14
+    s44 = k15 * cos(theta) + s53
+    s46 = cos_phi * k17 + k18
+    s54 = -s52
+    s55 = k24 * sin(theta) - s52
     return (
         mass_A,
         0.0,
-        s49,
-        s48,
+        s55,
+        s54,
         0.0,
         mass_A,
-        s37,
-        s50,
-        s49,
-        s37,
-        cos_phi * k18 + k19,
-        s39,
-        s48,
-        s50,
-        s39,
-        k17,
+        s44,
+        s53,
+        s55,
+        s44,
+        cos_phi * k19 + k20,
+        s46,
+        s54,
+        s53,
+        s46,
+        k18,
     )
 
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """26 operations: 4 add, 1 sub, 14 mul, 2 neg, 3 sin, 2 cos."""
-    k13, k14, k16 = k
+    """23 operations: 4 add, 1 sub, 11 mul, 2 neg, 3 sin, 2 cos."""
+    k14, k15, k17 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
-    sin_phi = sin(phi)
     s1 = theta + phi
     theta_dot_squared = theta_dot * theta_dot
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s51 = k14 * (theta_dot_squared * cos(theta)) + k13 * (cos(s1) * omega_B_squared)
-    s52 = k14 * (theta_dot_squared * sin(theta)) + k13 * (sin(s1) * omega_B_squared)
+    s56 = theta_dot_squared * k15
+    s57 = sin(phi) * k17
+    s58 = k14 * omega_B_squared
     return (
-        -s51,
-        -s52,
-        k16 * (sin_phi * (theta_dot_squared - omega_B_squared)),
-        sin_phi * theta_dot_squared * k16,
+        -(cos(theta) * s56 + cos(s1) * s58),
+        -(sin(theta) * s56 + sin(s1) * s58),
+        (theta_dot_squared - omega_B_squared) * s57,
+        theta_dot_squared * s57,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), cos=cos):
     """6 operations: 2 add, 2 mul, 2 cos."""
-    k15, k20, k21 = k
+    k25, k26, k27 = k
     _, _, theta, phi, _, _, _, _ = y
-    s44 = cos(theta + phi) * k21
+    s59 = cos(theta + phi) * k27
     return (
         0.0,
-        k15,
-        cos(theta) * k20 + s44,
-        s44,
+        k25,
+        cos(theta) * k26 + s59,
+        s59,
     )
 
 
 def _bias_force(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """31 operations: 6 add, 3 sub, 16 mul, 1 neg, 3 sin, 2 cos."""
-    k13, k14, k15, k16, k20, k21 = k
+    """28 operations: 6 add, 3 sub, 13 mul, 1 neg, 3 sin, 2 cos."""
+    k14, k15, k16, k26, k27, k28 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
-    sin_phi = sin(phi)
     s1 = theta + phi
     cos_theta_phi = cos(s1)
     theta_dot_squared = theta_dot * theta_dot
     cos_theta = cos(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s44 = cos_theta_phi * k21
-    s51 = k14 * (theta_dot_squared * cos_theta) + k13 * (cos_theta_phi * omega_B_squared)
+    s56 = theta_dot_squared * k15
+    s58 = k14 * omega_B_squared
+    s59 = cos_theta_phi * k27
+    s60 = sin(phi) * k28
     return (
-        -s51,
-        k15 - k14 * (theta_dot_squared * sin(theta)) - k13 * (sin(s1) * omega_B_squared),
-        k16 * (sin_phi * (theta_dot_squared - omega_B_squared)) + (cos_theta * k20 + s44),
-        s44 + sin_phi * theta_dot_squared * k16,
+        -(cos_theta * s56 + cos_theta_phi * s58),
+        k16 - sin(theta) * s56 - sin(s1) * s58,
+        (theta_dot_squared - omega_B_squared) * s60 + (cos_theta * k26 + s59),
+        s59 + theta_dot_squared * s60,
     )
 
 
 def _applied_force(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """25 operations: 8 add, 3 sub, 10 mul, 2 sin, 2 cos."""
-    l_A, l_B, d_A, d_B = k
+    """22 operations: 6 add, 3 sub, 9 mul, 2 sin, 2 cos."""
+    l_A, d_A, k23 = k
     _, _, theta, phi, _, _, _, _ = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     s1 = theta + phi
-    s53 = f_B_y * cos(s1) - f_B_x * sin(s1)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s54 = d_B * s53
-    s55 = l_B * s53
-    s56 = l_A * (f_B_y * cos_theta - f_B_x * sin_theta) + (d_A * (f_A_y * cos_theta - f_A_x * sin_theta) + s54)
+    s61 = (f_B_y * cos(s1) - f_B_x * sin(s1)) * k23
     return (
         f_A_x + f_B_x,
         f_A_y + f_B_y,
-        s55 + s56,
-        s55 + (tau + s54),
+        l_A * (f_B_y * cos_theta - f_B_x * sin_theta) + (d_A * (f_A_y * cos_theta - f_A_x * sin_theta) + s61),
+        tau + s61,
     )
 
 
 def _kinetic_energy(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """33 operations: 9 add, 2 sub, 18 mul, 2 sin, 2 cos."""
-    l_A, l_B, k22, k23, k24, k25 = k
+    """31 operations: 9 add, 2 sub, 16 mul, 2 sin, 2 cos."""
+    l_A, l_B, k29, k30, k31, k32 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
-    xd_B = x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B)
-    yd_B = l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta)))
-    s57 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k24 + (theta_dot * theta_dot * k22 + omega_B * omega_B * k23)
+    s62 = l_A * theta_dot
+    s63 = l_B * omega_B
+    xd_B = x_A_dot - sin(theta) * s62 - sin(s1) * s63
+    yd_B = cos(s1) * s63 + (y_A_dot + cos(theta) * s62)
+    s64 = (x_A_dot * x_A_dot + y_A_dot * y_A_dot) * k31 + (theta_dot * theta_dot * k29 + omega_B * omega_B * k30)
     return (
-        (xd_B * xd_B + yd_B * yd_B) * k25 + s57,
+        (xd_B * xd_B + yd_B * yd_B) * k32 + s64,
     )
 
 
 def _potential_energy(y, k, u=(), extra=(), sin=sin):
     """10 operations: 4 add, 4 mul, 2 sin."""
-    l_A, l_B, k26, k27 = k
+    l_A, l_B, k33, k34 = k
     _, y_A, theta, phi, _, _, _, _ = y
     return (
-        y_A * k26 + k27 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
+        y_A * k33 + k34 * (l_B * sin(theta + phi) + (y_A + l_A * sin(theta))),
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """38 operations: 9 add, 5 sub, 19 mul, 1 neg, 2 sin, 2 cos."""
-    l_A, l_B, d_A, d_B, k26, k27 = k
+    """35 operations: 8 add, 5 sub, 18 mul, 2 sin, 2 cos."""
+    l_A, l_B, d_A, d_B, k23, k34, k35 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
-    s58 = theta_dot * sin(theta)
-    s59 = sin(s1) * omega_B
-    s60 = theta_dot * cos(theta)
-    s61 = cos(s1) * omega_B
-    yd_B = l_B * s61 + (y_A_dot + l_A * s60)
+    s65 = theta_dot * sin(theta)
+    s66 = theta_dot * cos(theta)
+    s67 = cos(s1) * omega_B
+    yd_B_2 = l_B * s67 + (y_A_dot + l_A * s66)
     return (
-        -(y_A_dot * k26 + k27 * yd_B),
-        f_A_x * (x_A_dot - d_A * s58) + f_A_y * (y_A_dot + d_A * s60),
-        f_B_x * (x_A_dot - l_A * s58 - l_B * s59 - d_B * s59) + f_B_y * (yd_B + d_B * s61),
+        y_A_dot * k35 - k34 * yd_B_2,
+        f_A_x * (x_A_dot - d_A * s65) + f_A_y * (y_A_dot + d_A * s66),
+        f_B_x * (x_A_dot - l_A * s65 - sin(s1) * omega_B * k23) + f_B_y * (yd_B_2 + d_B * s67),
         tau * (omega_B - theta_dot),
     )
 
 
 def _momentum(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """45 operations: 13 add, 4 sub, 24 mul, 2 sin, 2 cos."""
+    """42 operations: 13 add, 4 sub, 21 mul, 2 sin, 2 cos."""
     m_A, I_A, m_B, I_B, l_A, l_B = k
     x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
-    cos_theta_phi = cos(s1)
-    sin_theta_phi = sin(s1)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
-    xd_B = x_A_dot - l_A * (theta_dot * sin_theta) - l_B * (sin_theta_phi * omega_B)
-    yd_B = l_B * (cos_theta_phi * omega_B) + (y_A_dot + l_A * (theta_dot * cos_theta))
-    s62 = yd_B * (l_B * cos_theta_phi + (x_A + l_A * cos_theta)) - xd_B * (l_B * sin_theta_phi + (y_A + l_A * sin_theta))
-    s63 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
+    s62 = l_A * theta_dot
+    s68 = l_B * sin(s1)
+    xd_B_2 = x_A_dot - sin_theta * s62 - omega_B * s68
+    s69 = l_B * cos(s1)
+    yd_B_3 = omega_B * s69 + (y_A_dot + cos_theta * s62)
+    s70 = yd_B_3 * (s69 + (x_A + l_A * cos_theta)) - xd_B_2 * (s68 + (y_A + l_A * sin_theta))
+    s71 = m_A * (x_A * y_A_dot - y_A * x_A_dot) + (I_A * theta_dot + I_B * omega_B)
     return (
-        m_A * x_A_dot + m_B * xd_B,
-        m_A * y_A_dot + m_B * yd_B,
-        m_B * s62 + s63,
+        m_A * x_A_dot + m_B * xd_B_2,
+        m_A * y_A_dot + m_B * yd_B_3,
+        m_B * s70 + s71,
     )
 
 
@@ -701,8 +724,8 @@ def _centre_of_mass(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """75 operations: 14 add, 11 sub, 42 mul, 1 div, 1 neg, 3 sin, 3 cos."""
-    k1, k2, k4, k5, k6, k7, k8, k9, k10, k28, k29, k30, k31 = k
+    """74 operations: 14 add, 11 sub, 41 mul, 1 div, 1 neg, 3 sin, 3 cos."""
+    k1, k2, k4, k5, k6, k7, k8, k9, k10, k36, k37, k38, k39 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
@@ -711,21 +734,21 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta_phi = cos(s1)
     sin_theta_phi = sin(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s2 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
-    load_B = s2 - k4 * (sin_phi * theta_dot_squared)
+    s2 = sin_phi * k4
+    s3 = k6 * (f_A_x * sin_theta_phi - f_A_y * cos_theta_phi) + (tau + k5 * (f_B_y * cos_theta_phi - f_B_x * sin_theta_phi))
+    load_B = s3 - theta_dot_squared * s2
     cos_theta = cos(theta)
     sin_theta = sin(theta)
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s3 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
-    load_A = k4 * (sin_phi * omega_B_squared) + s3 - tau - k7 * (coupling_B_A * load_B)
-    alpha_A = load_A / (k1 + sin_phi * sin_phi * k2)
+    s4 = k10 * (f_B_y * cos_theta - f_B_x * sin_theta) + (k8 * (f_A_y * cos_theta) + k9 * (f_A_x * sin_theta))
+    alpha_A = (s2 * omega_B_squared + s4 - tau - k7 * (coupling_B_A * load_B)) / (k1 + sin_phi * sin_phi * k2)
     alpha_B = k7 * (load_B - coupling_B_A * alpha_A)
-    s64 = f_B_x * k28 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k30
-    s65 = f_B_y * k28 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k30
+    s72 = f_B_x * k36 + (sin_theta * alpha_A + theta_dot_squared * cos_theta) * k38
+    s73 = f_B_y * k36 + (theta_dot_squared * sin_theta - cos_theta * alpha_A) * k38
     return (
-        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k31 + s64 - f_A_x * k29,
-        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k31 + s65 - f_A_y * k29,
+        (sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared) * k39 + s72 - f_A_x * k37,
+        (sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B) * k39 + s73 - f_A_y * k37,
         -tau,
     )
 
@@ -746,47 +769,52 @@ def _body_poses(y, k, u=(), extra=(), cos=cos, sin=sin):
 
 
 def _body_velocities(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """18 operations: 4 add, 2 sub, 8 mul, 2 sin, 2 cos."""
+    """16 operations: 4 add, 2 sub, 6 mul, 2 sin, 2 cos."""
     l_A, l_B = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     s1 = theta + phi
     omega_B = theta_dot + phi_dot
+    s62 = l_A * theta_dot
+    s63 = l_B * omega_B
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
-        x_A_dot - l_A * (theta_dot * sin(theta)) - l_B * (sin(s1) * omega_B),
-        l_B * (cos(s1) * omega_B) + (y_A_dot + l_A * (theta_dot * cos(theta))),
+        x_A_dot - sin(theta) * s62 - sin(s1) * s63,
+        cos(s1) * s63 + (y_A_dot + cos(theta) * s62),
         omega_B,
     )
 
 
 def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """116 operations: 15 add, 16 sub, 70 mul, 5 div, 4 neg, 3 sin, 3 cos."""
+    """94 operations: 15 add, 16 sub, 48 mul, 5 div, 4 neg, 3 sin, 3 cos."""
     k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11 = k
     _, _, theta, phi, _, _, _, _ = y
     sin_phi = sin(phi)
-    pivot_A = k1 + sin_phi * sin_phi * k2
+    pivot_A_2 = k1 + sin_phi * sin_phi * k2
     coupling_B_A = cos(phi) * k4
     s1 = theta + phi
     cos_theta_phi = cos(s1)
     sin_theta_phi = sin(s1)
     cos_theta = cos(theta)
     sin_theta = sin(theta)
-    s66 = sin_theta_phi * k6
-    s67 = (sin_theta * k9 - k7 * (coupling_B_A * s66)) / pivot_A
-    s68 = k7 * (s66 - coupling_B_A * s67)
-    s69 = cos_theta_phi * k6
-    s70 = (k7 * (coupling_B_A * s69) + cos_theta * k8) / pivot_A
-    s71 = k7 * (s69 + coupling_B_A * s70)
-    s72 = k5 * sin_theta_phi
-    s73 = (k7 * (coupling_B_A * s72) - sin_theta * k10) / pivot_A
-    s74 = k7 * (s72 + coupling_B_A * s73)
-    s75 = cos_theta_phi * k5
-    s76 = (cos_theta * k10 - k7 * (coupling_B_A * s75)) / pivot_A
-    s77 = k7 * (s75 - coupling_B_A * s76)
-    s78 = (-1.0 - coupling_B_A * k7) / pivot_A
-    s79 = k7 * (1.0 - coupling_B_A * s78)
+    s8 = coupling_B_A * k7
+    s23 = sin_theta * k11
+    s24 = cos_theta * k11
+    s74 = sin_theta_phi * k6
+    s75 = (sin_theta * k9 - s74 * s8) / pivot_A_2
+    s76 = k7 * (s74 - coupling_B_A * s75)
+    s77 = cos_theta_phi * k6
+    s78 = (s8 * s77 + cos_theta * k8) / pivot_A_2
+    s79 = k7 * (s77 + coupling_B_A * s78)
+    s80 = k5 * sin_theta_phi
+    s81 = (s8 * s80 - sin_theta * k10) / pivot_A_2
+    s82 = k7 * (s80 + coupling_B_A * s81)
+    s83 = cos_theta_phi * k5
+    s84 = (cos_theta * k10 - s8 * s83) / pivot_A_2
+    s85 = k7 * (s83 - coupling_B_A * s84)
+    s86 = (-1.0 - s8) / pivot_A_2
+    s87 = k7 * (1.0 - coupling_B_A * s86)
     return (
         0.0,
         0.0,
@@ -808,95 +836,99 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        k6 * (sin_theta_phi * s68) + (k3 + k11 * (sin_theta * s67)),
-        k11 * (sin_theta * s70) - k6 * (sin_theta_phi * s71),
-        k3 + k11 * (sin_theta * s73) - k6 * (sin_theta_phi * s74),
-        k11 * (sin_theta * s76) + k6 * (sin_theta_phi * s77),
-        k11 * (sin_theta * s78) + k6 * (sin_theta_phi * s79),
-        -(k11 * (cos_theta * s67) + k6 * (cos_theta_phi * s68)),
-        k6 * (cos_theta_phi * s71) + (k3 - k11 * (cos_theta * s70)),
-        k6 * (cos_theta_phi * s74) - k11 * (cos_theta * s73),
-        k3 - k11 * (cos_theta * s76) - k6 * (cos_theta_phi * s77),
-        -(k11 * (cos_theta * s78) + k6 * (cos_theta_phi * s79)),
-        s67,
-        s70,
-        s73,
-        s76,
+        s74 * s76 + (k3 + s75 * s23),
+        s23 * s78 - s74 * s79,
+        k3 + s23 * s81 - s74 * s82,
+        s23 * s84 + s74 * s85,
+        s23 * s86 + s74 * s87,
+        -(s75 * s24 + s76 * s77),
+        s77 * s79 + (k3 - s24 * s78),
+        s77 * s82 - s24 * s81,
+        k3 - s24 * s84 - s77 * s85,
+        -(s24 * s86 + s77 * s87),
+        s75,
         s78,
-        s68 - s67,
-        -(s70 + s71),
-        -(s73 + s74),
-        s77 - s76,
-        s79 - s78,
+        s81,
+        s84,
+        s86,
+        s76 - s75,
+        -(s78 + s79),
+        -(s81 + s82),
+        s85 - s84,
+        s87 - s86,
     )
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """325 operations: 52 add, 59 sub, 193 mul, 9 div, 6 neg, 3 sin, 3 cos."""
-    k1, k2, k4, k5, k6, k7, k8, k9, k10, k11, k28, k29, k30, k31, k32, k33, k34, k35, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62 = k
+    """293 operations: 50 add, 61 sub, 162 mul, 9 div, 5 neg, 3 sin, 3 cos."""
+    k4, k5, k6, k7, k8, k9, k10, k11, k36, k37, k38, k39, k40, k41, k42, k43, k44, k45, k46, k47, k48, k49, k50, k51, k52, k53, k54, k55, k56, k57, k58, k59, k60, k61, k62, k63, k64, k65, k66, k67, k68, k69, k70, k71, k72, k73 = k
     _, _, theta, phi, _, _, theta_dot, phi_dot = y
     f_A_x, f_A_y, f_B_x, f_B_y, tau = u
     sin_phi = sin(phi)
-    s80 = sin_phi * sin_phi
-    pivot_A = k1 + s80 * k2
+    s88 = sin_phi * sin_phi
     cos_phi = cos(phi)
     coupling_B_A = cos_phi * k4
     s1 = theta + phi
     cos_theta_phi = cos(s1)
     sin_theta_phi = sin(s1)
     theta_dot_squared = theta_dot * theta_dot
-    s81 = sin_phi * theta_dot_squared
-    s53 = f_B_y * cos_theta_phi - f_B_x * sin_theta_phi
-    s82 = f_A_x * sin_theta_phi - f_A_y * cos_theta_phi
-    load_B = k6 * s82 + (tau + k5 * s53) - k4 * s81
-    s83 = coupling_B_A * load_B
+    s89 = f_B_y * cos_theta_phi - f_B_x * sin_theta_phi
+    s90 = f_A_x * sin_theta_phi - f_A_y * cos_theta_phi
     cos_theta = cos(theta)
-    s84 = f_A_y * cos_theta
+    s91 = f_A_y * cos_theta
     sin_theta = sin(theta)
-    s85 = f_A_x * sin_theta
+    s92 = f_A_x * sin_theta
     omega_B = theta_dot + phi_dot
     omega_B_squared = omega_B * omega_B
-    s86 = sin_phi * omega_B_squared
-    s87 = f_B_y * cos_theta - f_B_x * sin_theta
-    alpha_A = (k4 * s86 + (k10 * s87 + (k8 * s84 + k9 * s85)) - tau - k7 * s83) / pivot_A
-    s88 = load_B - coupling_B_A * alpha_A
-    alpha_B = k7 * s88
-    s89 = sin_theta * alpha_A + theta_dot_squared * cos_theta
-    s90 = sin_theta_phi * alpha_B + cos_theta_phi * omega_B_squared
-    s91 = theta_dot_squared * sin_theta - cos_theta * alpha_A
-    s92 = sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B
-    s93 = cos_phi * k35
-    s94 = s53 * k36 - s82 * k37 - s81 * k35
-    s95 = s86 * k35 + (s87 * k41 + (s84 * k39 - s85 * k40)) - (k7 * (load_B * s93 + coupling_B_A * s94) - s83 * k38)
-    s96 = (s95 - alpha_A * (k32 + s80 * k33)) / pivot_A
-    s97 = k7 * (s94 - (alpha_A * s93 + coupling_B_A * s96)) - s88 * k38
-    s98 = (f_A_x + f_B_x) * k34
-    s99 = (f_A_y + f_B_y) * k34
-    s100 = s92 * k37 + k6 * (cos_theta_phi * s97) + (s99 + (s91 * k42 + k11 * (cos_theta * s96)))
-    s101 = alpha_A * k43 / pivot_A
-    s102 = k7 * (coupling_B_A * s101)
-    s103 = cos_phi * k46
-    s104 = s53 * k47 + s82 * k48 - s81 * k46
-    s105 = s86 * k46 + (s84 * k50 + s85 * k51 - s87 * k52) - (k7 * (load_B * s103 + coupling_B_A * s104) - s83 * k49)
-    s106 = (s105 - alpha_A * (k44 + s80 * k45)) / pivot_A
-    s107 = k7 * (s104 - (alpha_A * s103 + coupling_B_A * s106)) - s88 * k49
-    s108 = (s83 * k56 - alpha_A * (k54 - s80 * k55)) / pivot_A
-    s109 = s88 * k56 + k7 * (coupling_B_A * s108)
-    s110 = cos_phi * k31
-    s111 = s81 * k31
-    s112 = s86 * k31 + (s87 * k28 + (s85 - s84) * k29) - k7 * (load_B * s110 - coupling_B_A * s111)
-    s113 = (s112 - alpha_A * (k57 + s80 * k58)) / pivot_A
-    s114 = k7 * (s111 + (alpha_A * s110 + coupling_B_A * s113))
-    s115 = cos_phi * k30
-    s116 = s53 * k28 + s82 * k29 - s81 * k30
-    s117 = s86 * k30 - (k7 * (load_B * s115 + coupling_B_A * s116) - s83 * k61) - alpha_A * (k59 + s80 * k60)
-    s118 = s117 / pivot_A
-    s119 = k7 * (s116 - (alpha_A * s115 + coupling_B_A * s118)) - s88 * k61
-    s120 = (s84 - s85) * k62 / pivot_A
-    s121 = k7 * (coupling_B_A * s120)
-    s122 = s53 * k62
-    s123 = k7 * (coupling_B_A * s122) / pivot_A
-    s124 = k7 * (s122 + coupling_B_A * s123)
+    s93 = f_B_y * cos_theta - f_B_x * sin_theta
+    s8 = coupling_B_A * k7
+    s23 = sin_theta * k11
+    s24 = cos_theta * k11
+    s41 = sin_phi * theta_dot_squared
+    s94 = sin_phi * omega_B_squared
+    s74 = sin_theta_phi * k6
+    s77 = cos_theta_phi * k6
+    pivot_A_3 = k40 + s88 * k41
+    load_B_3 = k6 * s90 + (tau + k5 * s89) - k4 * s41
+    s95 = coupling_B_A * load_B_3
+    alpha_A_4 = (k4 * s94 + (k10 * s93 + (k8 * s91 + k9 * s92)) - tau - k7 * s95) / pivot_A_3
+    s96 = load_B_3 - coupling_B_A * alpha_A_4
+    alpha_B_4 = k7 * s96
+    s97 = sin_theta * alpha_A_4 + theta_dot_squared * cos_theta
+    s98 = sin_theta_phi * alpha_B_4 + cos_theta_phi * omega_B_squared
+    s99 = theta_dot_squared * sin_theta - cos_theta * alpha_A_4
+    s100 = sin_theta_phi * omega_B_squared - cos_theta_phi * alpha_B_4
+    s101 = cos_phi * k45
+    s102 = s89 * k46 - s90 * k47 - s41 * k45
+    s103 = s94 * k45 + (s93 * k51 + (s91 * k49 - s92 * k50)) - (k7 * (load_B_3 * s101 + coupling_B_A * s102) - s95 * k48)
+    s104 = (s103 - alpha_A_4 * (k42 + s88 * k43)) / pivot_A_3
+    s105 = k7 * (s102 - (alpha_A_4 * s101 + coupling_B_A * s104)) - s96 * k48
+    s106 = (f_A_x + f_B_x) * k44
+    s107 = (f_A_y + f_B_y) * k44
+    s108 = alpha_A_4 * k54 / pivot_A_3
+    s109 = s108 * s8
+    s110 = cos_phi * k57
+    s111 = s89 * k58 + s90 * k59 - s41 * k57
+    s112 = s94 * k57 + (s91 * k61 + s92 * k62 - s93 * k63) - (k7 * (load_B_3 * s110 + coupling_B_A * s111) - s95 * k60)
+    s113 = (s112 - alpha_A_4 * (k55 + s88 * k56)) / pivot_A_3
+    s114 = k7 * (s111 - (alpha_A_4 * s110 + coupling_B_A * s113)) - s96 * k60
+    s115 = (s95 * k67 - alpha_A_4 * (k65 - s88 * k66)) / pivot_A_3
+    s116 = s96 * k67 + s8 * s115
+    s117 = cos_phi * k39
+    s118 = s41 * k39
+    s119 = s94 * k39 + (s93 * k36 + k37 * (s92 - s91)) - k7 * (load_B_3 * s117 - coupling_B_A * s118)
+    s120 = (s119 - alpha_A_4 * (k68 + s88 * k69)) / pivot_A_3
+    s121 = k7 * (s118 + (alpha_A_4 * s117 + coupling_B_A * s120))
+    s122 = cos_phi * k38
+    s123 = s89 * k36 + s90 * k37 - s41 * k38
+    s124 = s94 * k38 - (k7 * (load_B_3 * s122 + coupling_B_A * s123) - s95 * k72) - alpha_A_4 * (k70 + s88 * k71)
+    s125 = s124 / pivot_A_3
+    s126 = k7 * (s123 - (alpha_A_4 * s122 + coupling_B_A * s125)) - s96 * k72
+    s127 = k73 * (s91 - s92) / pivot_A_3
+    s128 = s8 * s127
+    s129 = s89 * k73
+    s130 = s8 * s129 / pivot_A_3
+    s131 = k7 * (s129 + coupling_B_A * s130)
     return (
         0.0,
         0.0,
@@ -934,41 +966,41 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         0.0,
         0.0,
         0.0,
-        k6 * (sin_theta_phi * s97) - s90 * k37 + (k11 * (sin_theta * s96) - s89 * k42 - s98),
-        k6 * (sin_theta_phi * s102) - k11 * (sin_theta * s101),
-        s90 * k48 + k6 * (sin_theta_phi * s107) + (s89 * k53 + k11 * (sin_theta * s106) - s98),
-        k11 * (sin_theta * s108) - k6 * (sin_theta_phi * s109),
-        s89 * k29 + k11 * (sin_theta * s113) - k6 * (sin_theta_phi * s114),
-        k11 * (sin_theta * s118) + (s90 * k29 + k6 * (sin_theta_phi * s119)),
-        k11 * (sin_theta * s120) - k6 * (sin_theta_phi * s121),
-        k6 * (sin_theta_phi * s124) - k11 * (sin_theta * s123),
+        s105 * s74 - s98 * k47 + (s104 * s23 - s97 * k52 - s106),
+        s74 * s109 - s23 * s108,
+        s98 * k59 + s74 * s114 + (s97 * k64 + s23 * s113 - s106),
+        s23 * s115 - s74 * s116,
+        s97 * k37 + s23 * s120 - s74 * s121,
+        s23 * s125 + (s98 * k37 + s74 * s126),
+        s23 * s127 - s74 * s128,
+        s74 * s131 - s23 * s130,
         0.0,
-        -s100,
-        k11 * (cos_theta * s101) - k6 * (cos_theta_phi * s102),
-        s92 * k48 - k6 * (cos_theta_phi * s107) + (s91 * k53 - k11 * (cos_theta * s106) - s99),
-        k6 * (cos_theta_phi * s109) - k11 * (cos_theta * s108),
-        s91 * k29 - k11 * (cos_theta * s113) + k6 * (cos_theta_phi * s114),
-        s92 * k29 - k6 * (cos_theta_phi * s119) - k11 * (cos_theta * s118),
-        k6 * (cos_theta_phi * s121) - k11 * (cos_theta * s120),
-        k11 * (cos_theta * s123) - k6 * (cos_theta_phi * s124),
+        s100 * k53 - s105 * s77 - (s107 + (s99 * k52 + s104 * s24)),
+        s24 * s108 - s77 * s109,
+        s100 * k59 - s77 * s114 + (s99 * k64 - s24 * s113 - s107),
+        s77 * s116 - s24 * s115,
+        s99 * k37 - s24 * s120 + s77 * s121,
+        s100 * k37 - s77 * s126 - s24 * s125,
+        s77 * s128 - s24 * s127,
+        s24 * s130 - s77 * s131,
         -1.0,
-        s96,
-        -s101,
-        s106,
-        s108,
+        s104,
+        -s108,
         s113,
-        s118,
+        s115,
         s120,
-        -s123,
+        s125,
+        s127,
+        -s130,
         0.0,
-        s97 - s96,
-        s101 + s102,
-        s107 - s106,
-        -(s108 + s109),
-        -(s113 + s114),
-        s119 - s118,
+        s105 - s104,
+        s108 + s109,
+        s114 - s113,
+        -(s115 + s116),
         -(s120 + s121),
-        s123 + s124,
+        s126 - s125,
+        -(s127 + s128),
+        s130 + s131,
         0.0,
     )
 
@@ -995,17 +1027,36 @@ def _numbers(values, what):
     return array.astype(float)
 
 
-def _named(values, defaults, what, most=inf):
-    """Values by name or in order as an array; raises an error for a wrong name, shape or value."""
+def _by_name(values, defaults, what, columns):
+    """Values by name in the order of the defaults; as rows if some are arrays beside columns."""
+    for name in values.keys():
+        if name not in defaults:
+            raise ValueError(f"unknown {what} {name!r}; known: {', '.join(defaults) or 'none'}")
+    values = {name: values.get(name, default) for name, default in defaults.items()}
+    if not columns or not any(np.ndim(value) for value in values.values()):
+        return list(values.values())
+    rows = np.empty((len(values), *columns))
+    for row, (name, value) in zip(rows, values.items()):
+        value = _numbers(value, f"{what} {name!r}")
+        if value.shape not in ((), columns):
+            raise ValueError(f"{what} {name!r} has shape {value.shape}, not () or {columns}")
+        row[:] = value
+    return rows
+
+
+def _named(values, defaults, what, most=inf, columns=()):
+    """Values by name or in order as an array, (n,), or (n, k) beside k columns; raises an error for a
+    wrong name or shape, or for a wrong value of (n,).
+    """
     names = tuple(defaults)
     if hasattr(values, "keys"):
-        for name in values.keys():
-            if name not in defaults:
-                raise ValueError(f"unknown {what} {name!r}; known: {', '.join(names) or 'none'}")
-        values = [values.get(name, default) for name, default in defaults.items()]
+        values = _by_name(values, defaults, what, columns)
     array = _numbers(values, f"{what}s")
+    if columns and array.shape == (len(names), *columns):
+        return array
     if array.shape != (len(names),):
-        raise ValueError(f"{what}s have shape {array.shape}, not ({len(names)},): {', '.join(names)}")
+        shapes = f"({len(names)},)" + (f" or ({len(names)}, {columns[0]})" if columns else "")
+        raise ValueError(f"{what}s have shape {array.shape}, not {shapes}: {', '.join(names)}")
     for name, value in zip(names, array.tolist()):
         if not isfinite(value):
             raise ValueError(f"{what} {name!r} is {value}, not a finite number")
@@ -1014,19 +1065,28 @@ def _named(values, defaults, what, most=inf):
     return array
 
 
-def _parameters(p):
-    return _constants(_named(p, PARAMETERS, "parameter", _LARGEST).tobytes())
+def _parameters(p, columns=()):
+    """The constants of parameters; beside k columns each may be an array (k,)."""
+    values = _named(p, PARAMETERS, "parameter", _LARGEST, columns)
+    if values.ndim == 1:
+        return _constants(values.tobytes())
+    return _constants_of_columns(values.tobytes(), *columns) if values.size else _DEFAULT
+
+
+@lru_cache(maxsize=4)
+def _constants_of_columns(key, columns):
+    """The constants of each column of parameters, as rows with as many columns."""
+    made = [_parameters(column) for column in np.frombuffer(key).reshape(-1, columns).T]
+    rows = {name: np.array([each[name] for each in made]).T for name in made[0] if name != "reach"}
+    return {**rows, "reach": min(each["reach"] for each in made)}
 
 
 def _inputs(u, columns):
-    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,)."""
-    if columns and not hasattr(u, "keys"):
-        u = _numbers(u, "inputs")
-        if u.ndim == 2:
-            if u.shape != (len(INPUTS), *columns):
-                raise ValueError(f"inputs have shape {u.shape}, not ({len(INPUTS)}, {columns[0]})")
-            return u
-    return tuple(_named(u, INPUTS, "input").tolist())
+    """Inputs of one state, where `columns` is (), or of k columns, where it is (k,) and each may be an
+    array (k,).
+    """
+    values = _named(u, INPUTS, "input", columns=columns)
+    return tuple(values.tolist()) if values.ndim == 1 else values
 
 
 def _beside(values, what, count, columns):
@@ -1041,7 +1101,7 @@ def _beside(values, what, count, columns):
 
 _DEFAULT = _constants(np.array(tuple(PARAMETERS.values()), dtype=float).tobytes())
 _DERIVATIVE, _REACH = _DEFAULT["derivative"], _DEFAULT["reach"]
-_NO_INPUT = (0.0,) * len(INPUTS)
+_NO_INPUT = tuple(INPUTS.values())
 _NO_FORCE = (0.0,) * 4
 _COLUMNS = {
     "sin": np.sin,
@@ -1147,17 +1207,18 @@ def _block(call, result, given, reach):
 def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
     """Any output of one state or of columns of states."""
     y = _states(y)
-    made = _DEFAULT if p is None else _parameters(p)
-    k, reach, columns, size = made[name], made["reach"], y.shape[1:], prod(shape)
+    columns, size = y.shape[1:], prod(shape)
+    made = _DEFAULT if p is None else _parameters(p, columns)
+    k, reach = made[name], made["reach"]
     u = _NO_INPUT if u is None else _inputs(u, columns)
     if not columns:
         values = _alone(lambda y: kernel(y, k, u, extra), y, name, reach)
         return _from(values, _FLOAT, size).reshape(shape)
     functions = {f: _COLUMNS[f] for f in functions}
     result = _together(
-        lambda y, u, extra: kernel(y, k, u, extra, **functions),
+        lambda y, k, u, extra: kernel(y, k, u, extra, **functions),
         np.empty((size, *columns)),
-        (y, u, extra),
+        (y, k, u, extra),
         reach,
     )
     return result.reshape(shape + columns)
@@ -1226,7 +1287,7 @@ def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
 
 
 def mass_matrix(t, y, p=None, u=None):
-    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v."""
+    """Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see `derive`."""
     return _evaluate(_mass_matrix, "mass_matrix", (4, 4), ('cos', 'sin'), y, p, u)
 
 

@@ -28,6 +28,7 @@ FLOORS = (
     "model",
     "derivation",
     "dynamics",
+    "telling",
     "templating",
     "program",
     "codegen",
@@ -48,6 +49,8 @@ FLOORS = (
     "results",
     "api",
     "commands",
+    "usage",
+    "options",
     "cli",
     "__main__",
 )

@@ -160,7 +160,9 @@ def test_tighter_tolerances_give_smaller_errors() -> None:
         assert all(r.atol == pytest.approx(2e-3 * (r.rtol or 0), rel=2e-3) for r in done)
         assert tightest.error < 1e-4 and tightest.error < loosest.error / 100, method
         assert tightest.derivatives > loosest.derivatives
-        assert (tightest.jacobians > 0) == (method in ("Radau", "BDF")) or method == "LSODA"
+        assert (tightest.jacobians > 0) == (
+            method in ("Rodas5P", "Radau", "BDF")
+        ) or method == "LSODA"
 
 
 def test_runs_that_are_wrong_or_fail_are_reported_and_stay() -> None:

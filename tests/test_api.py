@@ -120,11 +120,6 @@ def test_the_matrices_are_the_equations(scene: str) -> None:
     assert again.M == found.M and again.solution == found.solution
 
 
-def test_what_is_too_large_to_read_is_said() -> None:
-    with pytest.raises(eomgen.SceneError, match="derive: shows mechanisms of up to"):
-        eomgen.derive("human_figure")
-
-
 def test_a_module(tmp_path: Path) -> None:
     """The same bytes as by the command; loaded as a value or from its file, and no other file."""
     made = eomgen.generate("cart_pole", outputs=["mass_matrix"], route="aba")

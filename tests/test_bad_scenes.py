@@ -183,7 +183,7 @@ MISTAKES = [
         'name = "hand"',
         'name = "my hand"',
         "bodies[1].name: 'my hand' is not an identifier; "
-        "use letters a-z, digits and _, a letter first",
+        "use letters a-z, digits, _ and -, a letter first",
     ),
     (
         'name = "hand"',
@@ -355,7 +355,7 @@ MISTAKES = [
      "joints[1].motor_inertia: -1e-05 is negative; give a number >= 0 in kg m^2"),
     (WRIST, 'name = "wrist"\ntype = "weld"\nmotor_inertia = 1e-5',
      "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
-     "orientation_deg, type"),
+     "orientation_deg, orientation, type"),
     (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b"]',
      "joints[1].coordinates[2]: missing; the list is too short"),
     (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b", "a"]\n',
@@ -391,8 +391,8 @@ MISTAKES = [
      "chains[0].mass: -0.1 is negative; give a number >= 0 in kg"),
     (None, CHAIN + 'parent = "arn"\n',
      "chains[0].parent: no body is named 'arn' (did you mean 'arm'?)"),
-    (None, CHAIN.replace("links", "l" * 33),
-     f"chains[0].name: makes the name '{'l' * 33}_joint_3', which is longer than 40 characters; "
+    (None, CHAIN.replace("links", "l" * 93),
+     f"chains[0].name: makes the name '{'l' * 93}_joint_3', which is longer than 100 characters; "
      "choose a shorter name"),
     (None, CHAIN + CHAIN, "chains[1].name: 'links_1' is the name of chains[0] too; "
      "give each its own"),
@@ -590,10 +590,10 @@ MISTAKES_IN_SPACE = [
      "effects[1].joint: 'wrist' is a ball joint and has no angle"),
     (BALL, BALL + "\nmotor_inertia = 1e-5",
      "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
-     "orientation_deg, type"),
+     "orientation_deg, orientation, type"),
     (BALL, BALL + '\ncoordinate = "a"',
      "joints[1].coordinate: unknown key; known here: name, parent, child, r_parent, r_child, "
-     "orientation_deg, type"),
+     "orientation_deg, orientation, type"),
     (f'{BALL}\nparent = "arm"\nchild = "hand"\nr_parent = [0.5, 0, 0]\nr_child = [-0.1, 0, 0]',
      'name = "wrist"\ntype = "free"\nparent = "arm"\nchild = "hand"',
      "joints[1].parent: unknown value 'arm'; known: world"),
@@ -664,8 +664,15 @@ def test_one_mistake_one_line(
     assert main(["generate", str(scene), "-o", str(output)]) == 1
     assert time.process_time() - start < 60.0
     out, err = capsys.readouterr()
-    assert err == f"eomgen: swing.toml: {message}\n"
+    line = re.match(r"eomgen: swing\.toml:(\d+): ", err)
+    without = re.sub(r"^(eomgen: swing\.toml):\d+: ", r"\1: ", err)
+    assert without == f"eomgen: swing.toml: {message}\n"
     assert out == ""
+    location = re.match(r"[a-z_]+(?:\[\d+\]|\.\w+)+: ", message)
+    if location and "hundreds of digits" not in message:
+        assert line  # of its key, or of the table where it is missing
+        key = re.findall(r"[a-z]\w*", location[0])[-1]
+        assert re.search(rf"\b{key}\b|\[\[", scene.read_text().split("\n")[int(line[1]) - 1])
     if message.startswith(("body '", "route: '", "form: '")):  # found in a scene that reads well
         assert not output.exists() or not list(output.iterdir())
     else:
@@ -705,7 +712,8 @@ def test_what_is_put_right_is_said(
         assert math.hypot(*parts) == pytest.approx(1.0, rel=1e-15)
     scene.write_text(text)
     assert main(["check", str(scene)]) == 0
-    assert capsys.readouterr().err == f"eomgen: note: swing.toml: {notice}\n"
+    said = re.sub(r"swing\.toml:\d+: ", "swing.toml: ", capsys.readouterr().err)
+    assert said == f"eomgen: note: swing.toml: {notice}\n"
 
 
 @pytest.mark.parametrize("good", [GOOD, SPACE])
@@ -801,7 +809,8 @@ def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: 
             ["--integrator", "rk5"],
             "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
             "semi_implicit_euler, leapfrog, rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, gragg_bulirsch_stoer, Radau, Radau_differences, BDF, BDF_differences, LSODA",
+            "DOP853, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
+            "BDF_differences, LSODA",
         ),
         (
             ["--integrator", "rk4", "--dt", "0"],
@@ -886,7 +895,7 @@ def test_a_refusal_stops_no_other_scene(scene: Path, capsys: pytest.CaptureFixtu
         assert main([*command, *option]) == 1
         out, err = capsys.readouterr()
         refusals = err.splitlines()
-        assert refusals[0].startswith("eomgen: bad.toml: bodies[1].mass: ")
+        assert refusals[0].startswith("eomgen: bad.toml:10: bodies[1].mass: ")
         assert refusals[1].startswith("eomgen: no_such: no such file")
         assert len(refusals) == 2 + (state == "missing")
         assert [line.partition(",")[0] for line in out.splitlines()] == [
@@ -906,11 +915,11 @@ def test_all_unknown_keys_are_reported(scene: Path, capsys: pytest.CaptureFixtur
     scene.write_text(text.replace('type = "gravity"', 'type = "gravity"\ngg = 1'))
     assert main(["check", str(scene)]) == 1
     assert capsys.readouterr().err.splitlines() == [
-        "eomgen: swing.toml: bodies[1].mas: unknown key (did you mean 'mass'?)",
-        "eomgen: swing.toml: bodies[1].colour: unknown key; known here: name, mass, inertia_com, "
-        "shapes",
-        "eomgen: swing.toml: bodies[1].inertia: unknown key (did you mean 'inertia_com'?)",
-        "eomgen: swing.toml: effects[0].gg: unknown key (did you mean 'g'?)",
+        "eomgen: swing.toml:11: bodies[1].mas: unknown key (did you mean 'mass'?)",
+        "eomgen: swing.toml:12: bodies[1].colour: unknown key; known here: name, mass, "
+        "inertia_com, com, inertia_check, shapes",
+        "eomgen: swing.toml:13: bodies[1].inertia: unknown key (did you mean 'inertia_com'?)",
+        "eomgen: swing.toml:30: effects[0].gg: unknown key (did you mean 'g'?)",
     ]
     many = "".join(f"key_{k} = {k}\n" for k in range(5000))
     scene.write_text(GOOD.replace("mass = 0.5\n", f"mass = 0.5\n{many}"))
@@ -928,7 +937,7 @@ def test_a_tree_too_large_for_the_closed_form(
     scene.write_text('name = "swing"\nroute = "closed"\n' + CHAIN.replace("= 3", "= 13"))
     assert main(["generate", str(scene), "-o", str(scene.parent / "made")]) == 1
     assert capsys.readouterr().err == (
-        "eomgen: swing.toml: route: 'closed' needs the closed form, and it is for 6 bodies at "
+        "eomgen: swing.toml:2: route: 'closed' needs the closed form, and it is for 6 bodies at "
         "most, or 12 in a tree of pins and free bodies in the plane; leave it out\n"
     )
 

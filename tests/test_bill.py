@@ -300,15 +300,22 @@ def test_time_runs_out() -> None:
         assert item.change.ended
 
 
-def test_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ctrl-C ends it all, not one of the motions."""
+def test_interrupted(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Ctrl-C ends all motions, not one of them; the costs, which are known, are kept."""
 
     def interrupt(*_: object, **__: object) -> Run:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("eomgen.run.integrate._is_finite", interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        costed(STONE)
+    found = costed(STONE)
+    assert found.stopped and found.extent is None and found.operations > 0
+    assert all(item.change is None for item in found.items)
+    assert main(["effects", "pendulum", "-o", str(tmp_path)]) == 130
+    out, err = capsys.readouterr()
+    assert "one derivative takes" in out and "pendulum_effects.png" in out
+    assert err == "eomgen: pendulum: interrupted; motions are not compared\n"
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,7 @@
 """The closed form of any small tree: what SymPy derives is what the recursions compute."""
 
 import ast
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -404,7 +405,7 @@ def test_route_closed_and_auto() -> None:
         assert choice.system.route == "closed", name
     puma = elaborate(read_scene("puma560"))
     assert why_not_closed(puma) == "" and "velocities" not in why_not_tried(puma)
-    assert compile_program(puma).system.route == "aba"
+    assert compile_program(puma).system.route == "ldl"
     figure = elaborate(read_scene("quadruped"))
     assert why_not_closed(figure).startswith(f"it is for {MOST_GENERAL_BODIES} bodies at most")
     floating = tree(1, SPACE, 4)
@@ -512,6 +513,6 @@ def test_what_is_reported_is_true(name: str) -> None:
 def test_derive(format_: str, capsys: pytest.CaptureFixture[str]) -> None:
     """The command writes it in every format."""
     assert main(["derive", "furuta_pendulum", "--format", format_]) == 0
-    text = capsys.readouterr().out
+    text = re.sub(r"</?code>|\\texttt|[{}]", "", capsys.readouterr().out)
     for words in ("Joint hinge: revolute, arm to pendulum", "Virtual power", "Closed form"):
         assert words in text

@@ -1,5 +1,6 @@
 """Functions in compiled code in runs whose steps are made in Python: the bits of Python's."""
 
+import ctypes
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,15 @@ from test_compiled_steps import FALL, assert_same, both, compiler
 import eomgen
 from eomgen.api.generating import compiled as generated
 from eomgen.api.given import check, read
-from eomgen.api.simulating import plan_run
+from eomgen.api.planning import plan_run
+from eomgen.codegen import jacobians
+from eomgen.codegen.backends import c, c_directions
+from eomgen.codegen.interface import interface_of
 from eomgen.model.model import Model
 from eomgen.native import accelerator, functions
 from eomgen.native.accelerator import Accelerator
+from eomgen.native.library import built
+from eomgen.pipeline import compile_program
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import Problem
 from eomgen.scene.built_in import built_in_names
@@ -132,8 +138,53 @@ def test_each_function_is_that_of_its_module(name: str) -> None:
                 assert values[0].tobytes() == values[1].tobytes(), what
                 compared.add((what, python is plain))
     assert len(compared) == (12 if plain.contacts else 4)
+    assert ours.compiled is not None and ours.compiled.steps("rodas_5p", ()) is not None
     y = plain.initial
     assert plain.derivative(0.3, y).tobytes() != perturbed.derivative(0.3, y).tobytes()
+
+
+ROPE = """
+name = "rope"
+dimensions = 2
+[[chains]]
+name = "link"
+count = 5
+mass = 1.0
+inertia_com = 0.1
+r_parent = [0, 0.5]
+r_child = [0, -0.5]
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "motor"
+name = "stop"
+joint = "link_joint_2"
+torque = "-50*max(link_joint_2_angle - 0.1*sin(t), 0) if t < 0.2 else -abs(link_joint_2_angle)"
+"""
+"""Five links: the derivatives of some forces depend on which branch applies."""
+
+
+def test_directions_together_have_the_bits_of_one_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Jacobian along ten directions, in C for eight at once and for one after the other."""
+    monkeypatch.setattr(jacobians, "LARGEST_JACOBIAN", 10)
+    system = compile_program(check(read(ROPE))).system
+    assert "jacobian" in system.tangents
+    given = functions.restricted(system.program, interface_of(system), ("jacobian",))
+    texts = [backend.library(*given) for backend in (c_directions, c)]
+    assert texts[0] != texts[1]
+    found, random = [], np.random.default_rng(2)
+    cases = [(t, random.normal(size=10)) for t in (0.1, 0.3) for _ in range(8)]
+    for text in texts:
+        library = built(text)
+        k, out = np.zeros(100), np.zeros((10, 10))
+        library.constants_of(np.array(list(system.model.defaults.values())).ctypes, k.ctypes)
+        for t, y in cases:
+            arrays = (array.ctypes for array in (y, k, k, k, out))
+            assert library.checked_jacobian(ctypes.c_double(t), *arrays) == 1
+            found.append(out.tobytes())
+    half = len(cases)
+    assert found[:half] == found[half:] and len(set(found)) == half
 
 
 def _calls(python: Problem, ours: Problem) -> dict[str, tuple[Any, Any]]:

@@ -1,5 +1,6 @@
 """Conditions on parameters: what a scene is refused for, --set and a module's p are refused for."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -182,3 +183,42 @@ def test_inertias_by_minors_and_by_moments() -> None:
         conditions = of_inertia("bodies[0].inertia_com", "b", Constant(1.0), given, {})
         found = any(condition.problem({}) for condition in conditions)
         assert found == (slack < 0 and slack <= -1e-8), (moments, slack)
+
+
+def spun(inertia: str, more: str = "") -> str:
+    """A free body in space with an inertia."""
+    body = f'{{ name = "nut", mass = 1.0, inertia_com = {inertia}{more} }}'
+    joint = '{ name = "flight", type = "free", child = "nut" }'
+    return f'name = "spun"\ndimensions = 3\nbodies = [{body}]\njoints = [{joint}]\n'
+
+
+@pytest.mark.parametrize(
+    ("inertia", "kind"),
+    [
+        ("[0.333, 0.333, 0.666]", "exact"),
+        ("[0.333, 0.333, 0.6665]", "printed"),
+        ("[0.333, 0.333, 0.668]", "wrong"),
+        # The same, turned by 45 degrees.
+        ("[0.333, 0.4995, 0.4995, 0, 0, 0.1665]", "exact"),
+        ("[0.333, 0.49975, 0.49975, 0, 0, 0.16675]", "printed"),
+        ("[0.333, 0.5005, 0.5005, 0, 0, 0.1675]", "wrong"),
+    ],
+)
+def test_inertias_as_printed_are_taken_with_a_notice(inertia: str, kind: str) -> None:
+    """Up to 0.1 % beyond what a body can have; more is refused unless the body says so."""
+    moments = np.array([float(x) for x in re.findall(r"-?[\d.]+", inertia)])
+    xx, yy, zz, xy, xz, yz = [*moments, 0, 0, 0][:6]
+    principal = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    beyond = (principal[2] - principal[0] - principal[1]) / principal[2]
+    assert {"exact": beyond < 1e-9, "printed": 1e-9 < beyond < 1e-3, "wrong": beyond > 1e-3}[kind]
+    if kind == "wrong":
+        with pytest.raises(SceneError, match="principal moments"):
+            elaborate(parse_scene(spun(inertia)))
+    else:
+        notices = elaborate(parse_scene(spun(inertia))).notices
+        assert len(notices) == (kind == "printed")
+        assert all("bodies[0].inertia_com: a principal moment of" in line for line in notices)
+    model = elaborate(parse_scene(spun(inertia, ', inertia_check = "off"')))
+    assert not model.notices
+    with pytest.raises(SceneError, match="unknown value 'of'"):
+        parse_scene(spun(inertia, ', inertia_check = "of"'))

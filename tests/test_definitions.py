@@ -160,8 +160,8 @@ MISTAKES = [
     (defined('u = "p.real"'),
      "definitions.u: 'p.real' has '.real' at column 2, which is not allowed"),
     (defined('u = true'), "definitions.u: True is neither a number nor a formula; give one"),
-    (defined('_u = "p"'), "definitions._u: '_u' is not an identifier; use letters a-z, digits "
-     "and _, a letter first"),
+    (defined('_u = "p"'), "definitions._u: '_u' is not an identifier; use letters a-z, digits, "
+     "_ and -, a letter first"),
     (defined('u = "1/(a - 2)"', torque='"p*u"'),
      "effects[0].torque: its part '(1.0 / (a - 2.0))' is not a finite number; change it or its "
      "parameters"),

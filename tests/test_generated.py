@@ -425,7 +425,7 @@ STATES = "x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot"
         ((0.0, Y, None, {"tau": np.inf}), "input 'tau' is inf, not a finite number"),
         (
             (0.0, np.zeros((8, 3)), None, np.zeros((5, 2))),
-            "inputs have shape (5, 2), not (5, 3)",
+            f"inputs have shape (5, 2), not (5,) or (5, 3): {INPUTS}",
         ),
         ((0.0, np.zeros(7)), f"y has shape (7,), not (8,) or (8, k): {STATES}"),
         ((0.0, np.zeros((7, 2))), f"y has shape (7, 2), not (8,) or (8, k): {STATES}"),

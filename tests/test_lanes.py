@@ -14,7 +14,7 @@ from campaign import some
 
 import eomgen
 from eomgen.api.given import check, read
-from eomgen.codegen.backends import c, c_lanes
+from eomgen.codegen.backends import c
 from eomgen.model.elaborate import in_order
 from eomgen.native import lanes
 from eomgen.native.lanes import Lanes
@@ -51,8 +51,8 @@ def usable() -> list[int]:
 
 @cache
 def trigonometry(width: int) -> Any:
-    each = {"each": [(name, c.C_NAMES.get(name, name)) for name in c_lanes.EACH]}
-    texts = {"vector.c": render(c.TEMPLATES, "vector.c.jinja", each), "both.c": WRAPPER}
+    each = {"each": [(name, c.C_NAMES.get(name, name)) for name in c.EACH]}
+    texts = {"vector.c": render(c.TEMPLATES, "sine.c.jinja", each), "both.c": WRAPPER}
     flags = (f"-DWIDTH={width}", *lanes.FLAGS[width])
     return compiled_library(f"trigonometry {width} {texts}", lambda: texts, "both.c", *flags)
 

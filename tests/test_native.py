@@ -57,7 +57,7 @@ def pair(scene: str) -> tuple[Any, Any]:
         python = load_module(python_module(system), scene)
         outputs = {"derivative": system.program.outputs["derivative"]}
         program = replace(system.program, outputs=outputs)
-        sources = c.library(program, interface_of(replace(system, program=program)))
+        sources = c.library(program, interface_of(replace(system, program=program)), vectors=True)
     else:
         made = eomgen.generate(scene, backend="c")
         python, sources = load_module(made.reference, made.name), made.library
@@ -100,6 +100,7 @@ def test_the_bits_are_those_of_the_python_module(scene: str) -> None:
         together = ours(0.7, y.T)
         for k, state in enumerate(y):
             assert same(together[..., k], theirs(0.7, state)), name
+        assert same(ours(0.7, np.tile(y.T, 7)), np.tile(together, 7)), name  # of whole registers
 
 
 @pytest.mark.parametrize("level", ["-O1", "-O2", "-O3"])

@@ -2,9 +2,10 @@
 
 import ast
 import math
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 from math import cos, sin, sqrt
 from types import ModuleType
 from typing import Any
@@ -21,7 +22,8 @@ from eomgen.codegen.system import optimised
 from eomgen.pipeline import compile_scene
 from eomgen.program.differentiate import jacobian
 from eomgen.program.extended import evaluator
-from eomgen.program.passes import PASSES, optimise_and_report
+from eomgen.program.ordering import ordered
+from eomgen.program.passes import PASSES, optimise_and_report, parts_of
 from eomgen.program.program import Output, Program, cost, finish, interpret, live_steps
 from eomgen.program.tape import Node, Stage, Tape, power, total
 from eomgen.scene.reader import parse_scene
@@ -200,23 +202,26 @@ def test_passes_keep_values_and_save_work(case: str | int) -> None:
     """After each pass every output has its value to 45 digits, and no more to do than before."""
     program = lowered(case)
     reports = compiled(case if isinstance(case, str) else random_tree(case)).system.reports
-    assert [report.name for report in reports[1:]] == [p.__name__.replace("_", " ") for p in PASSES]
+    names = [run.__name__.replace("_", " ") for run in PASSES]
+    assert [report.name for report in reports] == ["as lowered", *names]
     rng = np.random.default_rng(52)
     inputs = some_inputs(program, rng)
     before = {o: evaluator(program, o)(inputs) for o in program.outputs}
+    parts = parts_of(program)
+    assert [o for part in parts for o in part.outputs] == list(before)
     for run, earlier, report in zip(PASSES, reports, reports[1:], strict=False):
-        costs = {output: cost(program, output)["total"] for output in program.outputs}
-        assert earlier.steps == len(program.steps)
-        program = run(program)
-        assert report.steps == len(program.steps)
-        assert report.derivative == cost(program, "derivative")["total"] <= earlier.derivative
-        assert report.jacobian == cost(program, "jacobian")["total"] <= earlier.jacobian
-        assert all(cost(program, o)["total"] <= costs[o] for o in program.outputs)
-        assert list(program.outputs) == list(before)
-        for output, expected in before.items():
-            values = evaluator(program, output)(inputs)
-            for value, wanted in zip(values, expected, strict=True):
-                assert abs(value - wanted) <= MP.mpf("1e-45") * (1 + abs(wanted))
+        costs = [dict(part.operations) for part in parts]
+        parts = [run(part) for part in parts]
+        assert report.steps == sum(len(part.steps) for part in parts)
+        for part, old in zip(parts, costs, strict=True):
+            for output, count in old.items():
+                assert cost(part, output)["total"] == part.operations[output] <= count
+                if output in ("derivative", "jacobian"):
+                    assert part.operations[output] == getattr(report, output)
+                    assert count == getattr(earlier, output)
+                values = evaluator(part, output)(inputs)
+                for value, wanted in zip(values, before[output], strict=True):
+                    assert abs(value - wanted) <= MP.mpf("1e-45") * (1 + abs(wanted))
     assert reports[-1].steps < reports[0].steps
 
 
@@ -269,6 +274,19 @@ def test_sums_that_go_on_are_factored() -> None:
         inputs = {"a": 3.0, "s": 2.0, "k": 5.0, "l": 7.0}
         (found,) = interpret(better, "derivative", inputs, DoubleScalars())
         assert found == 2.0 + first * 15.0 + second * 21.0
+
+
+def test_absorbed_minus_signs() -> None:
+    """-(x + k·y) becomes (-k)·y - x, with -k from parameters; not where k·y is needed elsewhere."""
+    for shared in (False, True):
+        tape, x, y = fresh()
+        k = tape.input("k", Stage.PARAMETERS)
+        entries = (-(x + k * y), -(x / k), *([k * y] * shared))
+        outputs = {"derivative": Output((len(entries),), tuple(n.index for n in entries))}
+        better, reports = optimise_and_report(finish(tape, outputs, ()))
+        assert (reports[0].derivative, reports[-1].derivative) == (5, 4 if shared else 3)
+        found = interpret(better, "derivative", {"k": 2.0, "x": 3.0, "y": 5.0}, DoubleScalars())
+        assert found == [-13.0, -1.5, 10.0][: len(entries)]
 
 
 def test_shared_factors() -> None:
@@ -576,3 +594,41 @@ def test_digits_at_mass_ratios(ratio: float) -> None:
             expected = np.array([float(value) for value in values])
             actual = np.ravel(getattr(c.module, output)(0.0, y, p))
             assert np.max(np.abs(actual - expected)) <= 1e-13 * np.max(np.abs(expected))
+
+
+def test_an_order_for_registers_and_short_waits() -> None:
+    """A long sum takes up what was computed for it at once; two long chains advance together. The
+    steps are the same, operands come before what uses them, and results keep their bits.
+    """
+    tape, x, y = fresh()
+    terms = [(x + tape.constant(i)) * y for i in range(100)]
+    one, other = x, y
+    for i in range(100):
+        one = one * x + tape.constant(i)
+    for i in range(100):
+        other = other * y + tape.constant(i)
+    nodes = (total(terms, tape).index, (one / other).index)
+    program = finish(tape, {"f": Output((2,), nodes)}, [])
+    made = ordered(program)
+    before, after = (Counter(s.operation for s in p.steps if s.operands) for p in (program, made))
+    assert before == after
+    assert all(o < i for i, step in enumerate(made.steps) for o in step.operands)
+    given = {"x": 0.3, "y": -0.7}
+    results = [interpret(p, "f", given, DoubleScalars()) for p in (program, made)]
+    assert results[0] == results[1]
+    assert most_in_use(program) > 100 and most_in_use(made) < 70
+    of_y = [step.stage is Stage.VELOCITIES for step in made.steps if step.operation == "mul"]
+    changes = sum(a != b for a, b in pairwise(of_y[100:]))
+    assert changes > 50, "the two chains are not interleaved"
+
+
+def most_in_use(program: Program) -> int:
+    """The largest number of computed values that wait for a use."""
+    last = {o: i for i, step in enumerate(program.steps) for o in step.operands}
+    computed = [i for i, step in enumerate(program.steps) if step.operands]
+    ends = Counter(last.get(i, len(program.steps)) for i in computed)
+    in_use = most = 0
+    for i in range(len(program.steps)):
+        in_use += bool(program.steps[i].operands) - ends[i]
+        most = max(most, in_use)
+    return most

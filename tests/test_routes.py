@@ -24,6 +24,7 @@ from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random
 from eomgen.dynamics import observables
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.reactions import reactions
+from eomgen.dynamics.regrouping import RegroupedDynamics
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import generate
@@ -89,6 +90,32 @@ def test_accelerations(dimensions: int, seed: int) -> None:
     ):
         if find_spec(name) is not None:
             assert apart(judge(tree, q, v, u)[place], expected) < CLOSE
+
+
+@pytest.mark.parametrize(("dimensions", "seed"), [*product((PLANE, SPACE), SMALL)])
+def test_regrouped_inertias(dimensions: int, seed: int) -> None:
+    """They give the same mass matrix, bias and gravity forces; no body on a hinge has a mass."""
+    tree, text = drawn(seed, dimensions, MOST[1])
+    model = elaborate(parse_scene(text))
+    rng = np.random.default_rng(seed)
+    (q, v), u = random_state(tree, rng), tree.random_inputs(rng)
+    vd = rng.normal(size=len(model.velocities))
+    for axes in ("own", "world"):
+        plain = in_floats(tree, model, q, v, u, axes)
+        fewer = RegroupedDynamics(model, plain.values, FloatScalars(), axes)
+        for d in (fewer, plain):
+            assert (d is plain) == (d.inertias is d.kinematics) == (d.weights is d.kinematics)
+        found, expected = (
+            [*d.mass_entries.values(), *d.inverse(vd), *d.bias(still=True), *d.factored_forward()]
+            for d in (fewer, plain)
+        )
+        assert apart(found, expected) < ROUNDING
+        for link in fewer.weights.links if axes == "own" else ():
+            k, body, hinge = link.axes[0].unit, link.rigid, link.axes[0].angular
+            assert hinge <= (body.mass == 0.0)
+            if hinge and len(link.axes) == 1:
+                across = [body.inertia[i][i] for i in range(3) if i != k]
+                assert body.first_moment[k] == 0.0 == min(across) <= max(across)
 
 
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])

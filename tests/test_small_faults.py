@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from eomgen.cli import main
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
@@ -82,12 +81,6 @@ def test_routes_are_counted_alike(name: str) -> None:
         system = compile_program(replace(model, route=route), jacobian=False).system
         assert told[route] == cost(system.program, "derivative")["total"], route
     assert told["closed"] and told["aba"]
-
-
-def test_derive_takes_no_form_that_would_change_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["derive", "pendulum", "--form", "momentum"])
-    assert stop.value.code == 2 and "invalid choice: 'momentum'" in capsys.readouterr().err
 
 
 def test_the_licence_is_packaged() -> None:

@@ -16,10 +16,12 @@ import pytest
 from matplotlib.figure import Figure
 
 import eomgen
+from eomgen.api import saving
+from eomgen.api.saving import save_statistics, save_sweep
 from eomgen.cli import main
 from eomgen.errors import RunError
 from eomgen.show.sweep import draw_sweep
-from eomgen.sweep import execute, together
+from eomgen.sweep import ensemble, execute, storage, together
 from eomgen.sweep.design import Law
 from eomgen.sweep.ensemble import Ensemble
 
@@ -73,65 +75,88 @@ def test_states_are_varied() -> None:
 
 
 def test_nothing_depends_on_who_runs_it(tmp_path: Path) -> None:
-    """Python or C, one process or two, kept in a folder or not: the same bytes."""
-    design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, 10), "theta": np.linspace(-1.0, 1.0, 10)})
+    """In Python, one process or two, kept in a folder or not: the same bytes."""
+    design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, 5), "theta": np.linspace(-1.0, 1.0, 5)})
     runs = [
-        eomgen.ensemble("two_body", design, outputs=("momentum",), **QUICK, **options)
-        for options in (
-            {"backend": "numpy"},
-            {"backend": "auto", "workers": 2},
-            {"backend": "auto", "folder": tmp_path / "kept"},
-        )
+        eomgen.ensemble("two_body", design, outputs=("momentum",), backend="numpy", **QUICK, **own)
+        for own in ({}, {"workers": 2}, {"folder": tmp_path / "kept"})
     ]
     assert all(same(runs[0], run) for run in runs[1:])
-    assert runs[0].on_grid("theta").shape == (10, 10)
-    assert runs[0].on_grid("momentum").shape[:2] == (10, 10)
+    assert runs[0].on_grid("theta").shape == (5, 5)
+    assert runs[0].on_grid("momentum").shape[:2] == (5, 5)
 
 
 TOGETHER: dict[str, Any] = {"integrator": "rk4", "dt": 0.01, "t_end": 0.5, "backend": "c"}
+COMPILED = pytest.mark.skipif(CC is None, reason="there is no C compiler")
 
 
-@pytest.mark.skipif(CC is None, reason="there is no C compiler")
-def test_members_that_run_together(tmp_path: Path) -> None:
+@COMPILED
+@pytest.mark.parametrize("asked", [TOGETHER, {**QUICK, "backend": "c", "samples": 7}])
+def test_members_that_run_together(asked: Any, tmp_path: Path) -> None:
     """In one thread or two, kept in a folder or not: the same bytes."""
     design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, 30), "theta": np.linspace(-1.0, 1.0, 10)})
     runs = [
-        eomgen.ensemble("two_body", design, outputs=("momentum",), **TOGETHER, **options)
+        eomgen.ensemble("two_body", design, outputs=("momentum",), **asked, **options)
         for options in ({}, {"workers": 2}, {"folder": tmp_path / "kept"})
     ]
     assert all(same(runs[0], run) for run in runs[1:])
-    alone = eomgen.ensemble("two_body", {"m_A": [design.values[7, 0]]}, **TOGETHER)
+    alone = eomgen.ensemble("two_body", {"m_A": [design.values[7, 0]]}, **asked)
     assert alone.finished.all()
 
 
-@pytest.mark.parametrize(
-    "options", [{}, pytest.param(TOGETHER, marks=pytest.mark.skipif(CC is None, reason="no CC"))]
-)
+@pytest.mark.parametrize("asked", [QUICK, pytest.param(TOGETHER, marks=COMPILED)])
 def test_what_was_stopped_goes_on(
-    options: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    asked: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Chunks that are whole are not run again; lost, damaged and foreign ones are."""
-    asked = options or QUICK
-    design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, 40)})
-    folder = tmp_path / "kept"
-    whole = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **asked)
-    chunks = sorted(folder.glob("chunk_*.npz"))
-    assert len(chunks) == 40
-    before = [chunk.read_bytes() for chunk in chunks]
+    asked = {"backend": "numpy", **asked}
+    count = 40 if asked["backend"] == "numpy" else 1200
+    folder, angles = tmp_path / "kept", np.linspace(0, 1, count)
+    design = eomgen.grid({"m_A": np.linspace(0.5, 2.0, count)})
+    whole = eomgen.ensemble("pendulum", {"theta": angles}, folder=folder, **asked)
+    files = sorted(folder.iterdir())
+    before = {path.name: path.read_bytes() for path in files}
+    chunks = [path for path in files if path.name.startswith("chunk_")]
+    each = count // len(chunks)
+    assert len(chunks) in (38, 40)
     chunks[3].unlink()
-    chunks[5].write_bytes(before[5][:-40])
-    chunks[7].write_bytes(before[8])  # another chunk's
-    chunks[9].write_bytes(before[9].replace(b"final.npy", b"finam.npy"))
+    chunks[5].write_bytes(chunks[5].read_bytes()[:-40])
+    chunks[7].write_bytes(chunks[8].read_bytes())  # another chunk's
+    with (folder / "t.npy").open("r+b") as file:
+        file.seek(-8 * (count - 9 * each), os.SEEK_END)
+        file.write(b"1")
     ran: list[int] = []
     once = together.run_chunk
     monkeypatch.setattr(execute, "run_chunk", lambda *a: ran.append(1) or once(*a))
-    again = eomgen.ensemble("pendulum", {"theta": np.linspace(0, 1, 40)}, folder=folder, **asked)
+    again = eomgen.ensemble("pendulum", {"theta": angles}, folder=folder, **asked)
     assert len(ran) == 4 and same(whole, again)
-    assert [chunk.read_bytes() for chunk in chunks] == before
+    assert {path.name: path.read_bytes() for path in sorted(folder.iterdir())} == before
     with pytest.raises(RunError, match="holds another sweep; choose another folder"):
         eomgen.ensemble("two_body", design, folder=folder, **asked)
     with pytest.raises(RunError, match="is no empty folder"):
         eomgen.ensemble("two_body", design, folder=tmp_path, **asked)
+
+
+def test_a_full_disk_keeps_what_has_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line says so, and the sweep goes on when there is space."""
+    vary, asked = {"theta": np.linspace(0, 1, 6)}, {"backend": "numpy", **QUICK}
+    left, write = [3], storage.write_whole
+
+    def filling(path: Path, data: str, **options: Any) -> None:
+        left[0] -= path.name.startswith("chunk_")
+        if left[0] < 0:
+            raise RunError(f"{path}: cannot be written: No space left on device")
+        write(path, data, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(storage, "write_whole", filling)
+        said = "No space left on device; other chunks are kept, and the same sweep goes on"
+        with pytest.raises(RunError, match=said):
+            eomgen.ensemble("pendulum", vary, folder=tmp_path / "kept", **asked)
+    assert storage.kept_members(tmp_path / "kept") == 3
+    again = eomgen.ensemble("pendulum", vary, folder=tmp_path / "kept", **asked)
+    assert same(again, eomgen.ensemble("pendulum", vary, **asked))
+    assert storage.kept_members(tmp_path / "kept") == 6
 
 
 def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
@@ -155,7 +180,7 @@ def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
         sorted(p.relative_to(tmp_path / w) for p in (tmp_path / w).rglob("*.*") if p.name[0] != ".")
         for w in ("one", "two")
     ]
-    assert files[0] == files[1] and len(files[0]) == 63
+    assert files[0] == files[1] and len(files[0]) == 66
     for name in files[0]:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), (
             name
@@ -259,8 +284,8 @@ def test_figures_fit_what_is_varied() -> None:
 
     two = drawn(eomgen.grid({"bob_mass": (1.0, 2.0), "theta": (0.1, 0.2, 0.3)}))
     assert [axes.get_ylabel() for axes in two.axes] == [
-        "$\\mathrm{bob}_{\\mathrm{mass}}$",
-        "$\\theta$ at t = 1 s",
+        "$\\mathrm{bob}_{\\mathrm{mass}}$ in kg",
+        "$\\theta$ in rad at t = 1 s",
     ]
     one = drawn(eomgen.grid({"bob_mass": (2.0, 1.0)}), samples=5)
     assert one.axes[0].get_lines()[0].get_xdata().tolist() == [1.0, 2.0]
@@ -269,3 +294,67 @@ def test_figures_fit_what_is_varied() -> None:
         eomgen.sampled({"bob_mass": ("uniform", 1.0, 2.0), "gravity_g": ("normal", 9.8, 0.1)}, 30)
     )
     assert sum(bar.get_height() for bar in some.axes[0].patches) == 30
+
+
+def test_members_that_did_not_finish_are_seen() -> None:
+    """As grey cells, crosses on the border of a curve, and at the last rows of trajectories."""
+    vary = eomgen.grid({"bob_mass": (-1.0, 1.0, 2.0), "theta": (0.1, 0.2)})
+    cells = draw_sweep(eomgen.ensemble("pendulum", vary, **QUICK), "theta")
+    assert cells.axes[0].collections[0].get_array().mask.tolist() == [
+        [True] * 2,
+        *[[False] * 2] * 2,
+    ]
+    assert cells.axes[0].get_legend().get_texts()[0].get_text() == "not finished"
+    fixed: dict[str, Any] = {"t_end": 4.0, "integrator": "rk4", "dt": 0.05, "samples": 9}
+    found = eomgen.ensemble("pendulum", eomgen.grid({"theta_dot": (0.0, 1.0, 1e308)}), **fixed)
+    curve, fan = draw_sweep(found, "theta").axes
+    assert curve.get_lines()[1].get_xdata().tolist() == [1e308]
+    assert 0 < fan.get_lines()[-1].get_xdata()[0] < 4
+
+
+def test_statistics_are_those_of_members_with_a_value(tmp_path: Path) -> None:
+    """Of states and outputs at each time, computed in parts or not, and in the file."""
+    asked: dict[str, Any] = {"t_end": 4.0, "integrator": "rk4", "dt": 0.05, "samples": 9}
+    speeds = [0.0, 1.0, 1e308, 2.0, 3.0]
+    outputs = ("kinetic_energy", "momentum")
+    found = eomgen.ensemble("pendulum", {"theta_dot": speeds}, outputs=outputs, **asked)
+    for name, values in (
+        ("theta", found.rows[:, :, 0] if found.rows is not None else None),
+        ("kinetic_energy", found.outputs["kinetic_energy"]),
+    ):
+        assert values is not None
+        each = found.statistics(name, (0.0, 0.5))
+        good = values[[0, 1, 3, 4], 4:]
+        assert each.members[4:].tolist() == [4] * 5 and each.times.tolist() == found.times.tolist()
+        assert np.allclose(each.mean[4:], good.mean(axis=0), rtol=1e-14, atol=0)
+        assert np.allclose(each.deviation[4:], np.std(good, axis=0, ddof=1), rtol=1e-13, atol=0)
+        assert np.allclose(each.quantiles[1, 4:], np.median(good, axis=0), rtol=1e-15, atol=0)
+        assert each.quantiles[0, 4:].tolist() == good.min(axis=0).tolist()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(ensemble, "MOST_NUMBERS", 2 * len(speeds))
+            parts = found.statistics(name, (0.0, 0.5))
+        for one, other in zip(each[1:], parts[1:], strict=True):
+            assert np.array_equal(one, other, equal_nan=True)
+    # Speeds of 0, 1, 2, 3 and 1e308 rad/s deviate by 1e308/sqrt(5).
+    start = found.statistics("theta_dot")
+    assert start.members[0] == 5 and start.mean[0] == pytest.approx(2e307)
+    assert start.deviation[0] == pytest.approx(1e308 / math.sqrt(5))
+    with pytest.raises(RunError, match="momentum is not a state or an output with one number"):
+        found.statistics("momentum")
+    ends = eomgen.ensemble("pendulum", {"theta": [0.1, 0.2]}, **QUICK).statistics("theta")
+    assert ends.times.tolist() == [1.0] and ends.members.tolist() == [2]
+    path = tmp_path / "statistics.csv"
+    save_statistics(found, path)
+    rows = list(csv.DictReader(path.read_text("utf-8").splitlines()))
+    assert len(rows) == 9 * 3 and rows[5]["unit"] == "rad"
+    assert float(rows[5]["mean"]) == found.statistics("theta").mean[5]
+
+
+def test_a_table_in_parts_is_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = eomgen.ensemble("pendulum", {"bob_mass": [1.0, -1.0, 2.0, 3.0, 4.0]}, **QUICK)
+    for size in (4096, 2):
+        monkeypatch.setattr(saving, "TABLE_PART", size)
+        save_sweep(found, "theta", tmp_path / f"{size}.csv", tmp_path / "a.png", force=True)
+    assert (tmp_path / "2.csv").read_bytes() == (tmp_path / "4096.csv").read_bytes()
+    rows = list(csv.DictReader((tmp_path / "2.csv").read_text("utf-8").splitlines()))
+    assert [row["member"] for row in rows] == list("01234") and rows[1]["message"]

@@ -516,3 +516,23 @@ r_parent = [0.5, 0]
 r_child = [-0.5, 0]
 """
 """A tip of 1e12 kg on five links of 1 kg."""
+
+
+def test_an_interrupt_keeps_the_states_judged_so_far(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Their report is printed, nothing is written, and the exit code is that of an interrupt."""
+    seen: list[Any] = []
+
+    def some_time(*given: Any) -> Any:
+        if len(seen) == 3:
+            raise KeyboardInterrupt
+        seen.append(judged(*given))
+        return seen[-1]
+
+    monkeypatch.setattr("eomgen.study.verification.verify.judged", some_time)
+    assert main(["verify", "pendulum", "--save", str(tmp_path / "kept")]) == 130
+    out, err = capsys.readouterr()
+    assert "v̇" in out and "interrupted after 3 of " in out and "drift of" not in out
+    assert err.startswith("eomgen: pendulum: interrupted after 3 of ")
+    assert not list((tmp_path / "kept").iterdir())

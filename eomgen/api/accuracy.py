@@ -14,9 +14,9 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import (
     Source,
     Values,
-    check,
     check_states,
     check_time,
+    model_of,
     named,
     overridden,
     read,
@@ -126,7 +126,7 @@ def accuracy(
     """
     scene = read(source)
     plan = plan_measurement(
-        overridden(check(scene), form=form, route=route),
+        overridden(model_of(scene, source), form=form, route=route),
         scene.simulation,
         methods=None if methods is None else ",".join(methods),
         quick=quick,
@@ -364,7 +364,7 @@ def arithmetic(
     Raises `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)
-    model = check(scene)
+    model = model_of(scene, source)
     check_arithmetic(states, seed)
     model = model.with_parameters(named(parameters, model.defaults, "parameters", "parameter"))
     return arithmetic_of(model, scene.simulation, states=states, seed=seed, single=single)

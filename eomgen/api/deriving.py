@@ -4,20 +4,28 @@ from eomgen.api.given import Source, checked, modelled, read
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.model.model import Model
 from eomgen.results import Derivation
+from eomgen.scene.schema import Form
 
 
-def derive(source: Source) -> Derivation:
-    """Derive M v̇ + V + G = F as SymPy matrices, its solution for v̇, and the steps to it.
+def derive(source: Source, *, form: Form | None = None) -> Derivation:
+    """Derive M v̇ + V + G = F, and the steps to it, ending in the time derivative of a state.
 
-    Raises `SceneError` if the mechanism is too large to be read, or has no closed form.
+    form  "velocity" for [q, v], "momentum" or "redundant" for the handout's states; by default the
+          scene's. Trees of pins and free bodies in the plane have all three.
+
+    Small mechanisms have their equations and solution as SymPy matrices. Larger ones are told as
+    the articulated-body algorithm with their own bodies and joints. Raises `SceneError` for a form
+    that the mechanism does not have.
     """
-    return derivation_of(modelled(read(source)))
+    return derivation_of(modelled(read(source)), form=form)
 
 
-def derivation_of(model: Model, reporter: Reporter = SILENT) -> Derivation:
+def derivation_of(
+    model: Model, reporter: Reporter = SILENT, *, form: Form | None = None
+) -> Derivation:
     """The derivation of a model. Raises `SceneError` as `derive` does."""
-    from eomgen.derivation.matrices import matrices  # imports SymPy
+    from eomgen.telling.derivation import tell  # imports SymPy
 
     with reporter.located(), reporter.waiting(f"deriving {model.name} …"):
         checked(model)
-        return Derivation(model.name, model.title, matrices(model))
+        return Derivation(model, tell(model, form))

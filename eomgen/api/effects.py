@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from eomgen.api.given import Source, check, check_time, read
+from eomgen.api.given import Source, check_time, model_of, read
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.scene.schema import Route, Scene
 
@@ -31,7 +31,7 @@ def effects(
     """
     check_motion(motion)
     scene = read(source)
-    check(scene)
+    model_of(scene, source)
     return bill_of(scene.replaced(route=route or scene.route), each=each, motion=motion)
 
 

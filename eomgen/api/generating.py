@@ -107,7 +107,7 @@ def translated(module: Module, model: Model, backend: str) -> Module:
 
     program, interface = interfaced_program_of(model)
     if backend == "c":
-        library = c.library(program, interface)
+        library = c.library(program, interface, vectors=True)
         written = {name: text for name, text in library.items() if name != c.MAIN}
         module = replace(module, library=library, reference=module.source)
     else:

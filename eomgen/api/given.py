@@ -12,10 +12,11 @@ import numpy as np
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import RunError, SceneError, nearest
+from eomgen.language.base import identifier
 from eomgen.model.elaborate import elaborate, outputs_for
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
-from eomgen.scene.reader import parse_scene, read_scene, read_tables
+from eomgen.scene.reader import find_scene, parse_scene, read_scene, read_tables, scene_text
 from eomgen.scene.schema import Form, Route, Scene
 
 Source = str | PathLike[str] | Mapping[str, Any] | Scene
@@ -51,7 +52,19 @@ def check(source: Source) -> Model:
 
     Raises `SceneError` if the scene describes no mechanism or its mass matrix is singular.
     """
-    return checked(elaborate(read(source)))
+    return model_of(read(source), source)
+
+
+def model_of(scene: Scene, source: Source) -> Model:
+    """The checked model of a scene that was read from `source`. If that is a file, errors state it
+    and the line.
+    """
+    reporter = SILENT
+    if isinstance(source, PathLike) or (isinstance(source, str) and "\n" not in source):
+        path = find_scene(source) if isinstance(source, str) else Path(source)
+        reporter = Reporter(scene=path.name, text=lambda: scene_text(path))
+    with reporter.located():
+        return checked(elaborate(scene))
 
 
 def checked(model: Model, reporter: Reporter = SILENT) -> Model:
@@ -124,6 +137,7 @@ def named(
     """
     found = {}
     for name, value in (values or {}).items():
+        name = identifier(name)
         check_name(name, known, argument, what)
         try:
             number = float(value)

@@ -1,15 +1,13 @@
 """Linearisation about an equilibrium or a state: `linearise`."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, named, values_of
+from eomgen.api.given import Source, Values, check, values_of
 from eomgen.api.reporter import SILENT, Reporter
+from eomgen.api.states import initial_with, state_names, values_by_index
 from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
@@ -20,8 +18,6 @@ if TYPE_CHECKING:
     from eomgen.linear.linearise import Linearisation
 
 Place = Literal["equilibrium", "rest", "initial"]
-UNIT_TOLERANCE = 1e-9
-"""Deviations of a quaternion's length from 1 above this are reported."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +102,10 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
         u: Mapping[str, float] | FloatArray = inputs
         if at != "initial":
             settle = at == "rest"
-            y, u = equilibrium(module, y, inputs, parameters, hold=hold, trim=trim, settle=settle)
+            with reporter.waiting(f"searching an equilibrium of {model.name} …"):
+                y, u = equilibrium(
+                    module, y, inputs, parameters, hold=hold, trim=trim, settle=settle
+                )
         elif hold or trim:
             raise RunError(
                 f"{reporter.argument('hold')}, {reporter.argument('trim')}: are for finding an "
@@ -117,36 +116,14 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
     return Linearised(module, start, found, steady)
 
 
-def state_names(model: Model) -> tuple[str, ...]:
-    """The names by which a state can be given: those of [q, v, x], then `<name>_deg` of angles."""
-    known = (*model.coordinates, *model.velocities)
-    names = [*(c.name for c in known), *(state.name for state in model.states)]
-    return (*names, *(f"{c.name}_deg" for c in known if "rad" in c.unit))
-
-
 def _start(model: Model, initial: FloatArray, point: Point, reporter: Reporter) -> FloatArray:
-    """The initial state with the given values; quaternions are scaled to length 1, with a note."""
-    option, names = reporter.argument("state"), state_names(model)
+    """The initial state with the given values."""
+    given = values_by_index(model, point.state, reporter)
     nq, nv = len(model.coordinates), len(model.velocities)
-    y = initial.copy()
-    for name, value in named(point.state, names, option, "state").items():
-        index = names.index(name)
-        if index >= len(y):
-            index, value = names.index(name.removesuffix("_deg")), math.radians(value)
+    for index in given:
         if point.at != "initial" and nq <= index < nq + nv:
             raise RunError(
-                f"{option} {name}: an equilibrium is at rest; leave it out, or give "
-                f"{reporter.argument('at')} initial"
+                f"{reporter.argument('state')} {state_names(model)[index]}: an equilibrium is at "
+                f"rest; leave it out, or give {reporter.argument('at')} initial"
             )
-        y[index] = value
-    for indices in map(list, model.quaternions):
-        length = float(np.linalg.norm(y[indices]))
-        if not length:
-            raise RunError(f"{option}: the quaternion from {names[indices[0]]} on has no length")
-        if abs(length - 1) > UNIT_TOLERANCE:
-            reporter.note_scene(
-                f"{option}: the quaternion from {names[indices[0]]} on has length {length:g}; "
-                "scaled to 1"
-            )
-        y[indices] /= length
-    return y
+    return initial_with(model, initial, given, reporter)

@@ -1,11 +1,12 @@
 """How a computation reports to its caller: notes, trial runs, progress. By default it is silent."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 
 from eomgen.errors import EomgenError, SceneError
 from eomgen.run.progress import Progress
+from eomgen.scene.lines import with_lines
 
 
 def _ignore(text: str) -> None:
@@ -25,6 +26,7 @@ class Reporter:
     """Callbacks of a caller, and the names that its messages use.
 
     scene     name of the scene, which starts messages about it; "" for none
+    text      the text of the scene's file, for the lines in messages
     argument  name of an argument in messages: `t_end` is `--t-end` on the command line
     note      receives notes, for example that the store cannot be used
     trial     receives a line for each trial run
@@ -33,6 +35,7 @@ class Reporter:
     """
 
     scene: str = ""
+    text: Callable[[], str] = str
     argument: Callable[[str], str] = str
     note: Callable[[str], None] = _ignore
     trial: Callable[[str], None] = _ignore
@@ -47,11 +50,15 @@ class Reporter:
         except EomgenError as error:
             if not self.scene:
                 raise
-            raise SceneError(*(f"{self.scene}: {line}" for line in error.lines)) from None
+            raise SceneError(*self._with_lines(error.lines)) from None
 
     def note_scene(self, text: str) -> None:
         """Note something about the scene."""
-        self.note(f"{self.scene}: {text}" if self.scene else text)
+        self.note(next(self._with_lines([text])) if self.scene else text)
+
+    def _with_lines(self, messages: Iterable[str]) -> Iterator[str]:
+        """Messages about the scene, each with the scene's name and, if known, the line."""
+        return with_lines((f"{self.scene}: {text}" for text in messages), self.scene, self.text())
 
 
 SILENT = Reporter()

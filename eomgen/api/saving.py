@@ -2,13 +2,14 @@
 
 import csv
 import io
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.files import check_folder, check_writable, remove_ours, write_whole
+from eomgen.files import check_folder, check_writable, remove_ours, write_pieces, write_whole
 from eomgen.results import Run
 from eomgen.run.trajectory import is_own_table, save_csv, save_npz
 
@@ -17,16 +18,25 @@ if TYPE_CHECKING:
 
 KINDS = ("py", "npz", "csv", "png", "html")
 PICTURES = ("png", "html")
+TABLE_PART = 4096
+"""Number of lines of a table that are in memory at once."""
 
 
 def output_paths(
-    folder: Path, name: str, *, figure: Path | None = None, force: bool = False
+    folder: Path,
+    name: str,
+    *,
+    figure: Path | None = None,
+    parquet: bool = False,
+    force: bool = False,
 ) -> dict[str, Path]:
-    """The paths of the files of a run, by kind; `figure` replaces the path of the figure.
+    """The paths of the files of a run, by kind; `figure` replaces the path of the figure, with
+    `parquet` there is a Parquet file.
 
     Makes the folders. Raises `RunError` for a path that cannot be written, before the run begins.
     """
-    paths = {kind: folder / f"{name}.{kind}" for kind in KINDS}
+    kinds = (*KINDS, *(("parquet",) if parquet else ()))
+    paths = {kind: folder / f"{name}.{kind}" for kind in kinds}
     if figure is not None:
         paths["png"] = figure
         from eomgen.show.style import check_figure  # it loads Matplotlib
@@ -34,9 +44,18 @@ def output_paths(
         check_figure(figure, force=force)
     for kind, path in paths.items():
         check_folder(path.parent)
-        own = kind == "csv" and path.is_file() and is_own_table(path)
+        own = path.is_file() and _is_own(kind, path)
         check_writable(path, force=force or own)
     return paths
+
+
+def _is_own(kind: str, path: Path) -> bool:
+    """Whether a table is ours, which has no mark of its own at its start."""
+    if kind == "parquet":
+        from eomgen.run.parquet import is_own_parquet
+
+        return is_own_parquet(path)
+    return kind == "csv" and is_own_table(path)
 
 
 def save_run(
@@ -49,6 +68,10 @@ def save_run(
     # The table first: the archive of the earlier run shows whether its table is ours to overwrite.
     save_csv(run.trajectory, paths["csv"], force=force)
     save_npz(run.trajectory, paths["npz"], force=force)
+    if "parquet" in paths:
+        from eomgen.run.parquet import save_parquet
+
+        save_parquet(run.trajectory, paths["parquet"], force=force)
     if pictures:
         return _save_pictures(run, paths, force)
     _remove_pictures(paths)
@@ -88,15 +111,55 @@ def save_sweep(
     """
     from eomgen.show.sweep import save_sweep_figure
 
+    write_pieces(table, _member_lines(found), force=force)
+    save_sweep_figure(found, of, figure, force=force)
+
+
+def _member_lines(found: "Ensemble") -> Iterator[str]:
+    """The table of a sweep, in pieces."""
+    from eomgen.sweep.members import WORDS
+
     single = [name for name in found.outputs if found.of(name).ndim == 1]
     names = [*found.design.names, *(f"{name} (end)" for name in (*found.states, *single))]
+    yield _csv([["member", "status", "t", *names, "message"]])
+    ends = [found.design.values, found.final, *(found.of(name)[:, None] for name in single)]
+    for start in range(0, len(found), TABLE_PART):
+        part = slice(start, start + TABLE_PART)
+        numbers = np.concatenate([columns[part] for columns in ends], axis=1).tolist()
+        status, times, messages = (
+            column[part].tolist() for column in (found.codes, found.t, found.messages)
+        )
+        yield _csv(
+            [start + i, WORDS[code], repr(t), *map(repr, values), message]
+            for i, (code, t, values, message) in enumerate(
+                zip(status, times, numbers, messages, strict=True)
+            )
+        )
+
+
+def save_statistics(found: "Ensemble", path: Path, *, force: bool = False) -> None:
+    """Write a table with a line for each state or output with one number, and each time that is
+    kept: number of members, mean, standard deviation and quantiles of them.
+
+    Raises `RunError` if the file cannot be written.
+    """
+    from eomgen.sweep.ensemble import SHARES
+
+    single = [name for name in found.outputs if found.of(name).ndim == 1]
+    lines: list[Sequence[object]] = [
+        ["name", "unit", "t", "members", "mean", "deviation", *(f"{s:.0%}" for s in SHARES)]
+    ]
+    for name in (*found.states, *single):
+        each = found.statistics(name)
+        numbers = np.array([each.mean, each.deviation, *each.quantiles]).T.tolist()
+        for t, count, values in zip(
+            each.times.tolist(), each.members.tolist(), numbers, strict=True
+        ):
+            lines.append([name, found.units.get(name, ""), repr(t), count, *map(repr, values)])
+    write_whole(path, _csv(lines), force=force)
+
+
+def _csv(rows: Iterable[Sequence[object]]) -> str:
     stream = io.StringIO(newline="")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["member", "status", "t", *names, "message"])
-    ends = [found.final, *(found.of(name)[:, None] for name in single)]
-    numbers = np.concatenate([found.design.values, *ends], axis=1).tolist()
-    rows = zip(found.status, found.t.tolist(), numbers, found.messages.tolist(), strict=True)
-    for i, (status, t, values, message) in enumerate(rows):
-        writer.writerow([i, status, repr(t), *map(repr, values), message])
-    write_whole(table, stream.getvalue(), force=force)
-    save_sweep_figure(found, of, figure, force=force)
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()

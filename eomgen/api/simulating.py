@@ -2,23 +2,24 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from os import PathLike
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, cast
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, overridden, read, values_of
+from eomgen.api.given import Source, Values, model_of, overridden, read
+from eomgen.api.inputs import Inputs, applied
+from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
+from eomgen.api.recording import recorded, unknown_forces
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.api.settings import setting_of
-from eomgen.errors import RunError
-from eomgen.model.elaborate import in_order
+from eomgen.api.states import initial_with, origin_from, split
 from eomgen.model.model import Model
 from eomgen.results import Run
+from eomgen.run.inputs import ModuleWithInputs, with_corners
 from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.problem import Problem
 from eomgen.scene.appearance import appearance_of
-from eomgen.scene.schema import SHOWN, Form, Route, Scene
+from eomgen.scene.schema import Form, Route
 from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
@@ -28,43 +29,7 @@ if TYPE_CHECKING:
     from eomgen.run.tally import Follow
     from eomgen.run.works import Powers
     from eomgen.study.accuracy.search import Choice
-    from eomgen.study.accuracy.trial import Case, Setting, Tried
-
-GuardMode = Literal["stop", "repair"]
-Backend = Literal["auto", "numpy", "c"]
-EarlierRun = str | PathLike[str] | Run
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Checked arguments of a run.
-
-    scene    its settings and appearance are used
-    model    with the outputs that the run and its pictures need
-    setting  method and tolerances or step; None if `accuracy` or `budget` choose them
-    outputs  those that the caller named
-
-    The other fields are arguments of `simulate`.
-    """
-
-    scene: Scene
-    model: Model
-    setting: "Setting | None"
-    t_end: float
-    parameters: Mapping[str, float]
-    inputs: Mapping[str, float]
-    outputs: Sequence[str] = ()
-    accuracy: float | None = None
-    budget: float | None = None
-    integrator: str | None = None
-    samples: int = 1001
-    max_step: float | None = None
-    works: bool = False
-    guard: GuardMode | None = None
-    unstable: bool = False
-    estimate: bool = False
-    resume: EarlierRun | None = None
-    backend: Backend = "auto"
+    from eomgen.study.accuracy.trial import Case, Tried
 
 
 def simulate(
@@ -78,12 +43,14 @@ def simulate(
     accuracy: float | None = None,
     budget: float | None = None,
     parameters: Values | None = None,
-    inputs: Values | None = None,
+    state: Values | None = None,
+    inputs: Inputs | None = None,
     form: Form | None = None,
     route: Route | None = None,
     samples: int = 1001,
     max_step: float | None = None,
     works: bool = False,
+    save: Sequence[str] = (),
     guard: GuardMode | None = None,
     unstable: bool = False,
     estimate: bool = False,
@@ -101,12 +68,19 @@ def simulate(
                 scale of the motion, is below this; they are found by trial runs of this scene
     budget      choose the most accurate run that takes about this time, s
     parameters  values that replace those of the scene, by name
-    inputs      constant values, by name; others are 0
+    state       values that replace those of the scene's initial state, by name; `<name>_deg` in
+                degrees
+    inputs      by name constant values; formulas of t, the motion and parameters, as "3*sin(t)",
+                which become part of the module; or functions of t. Or the path of a table with a
+                line t and names, then a line for each time; between them inputs are linear. With
+                tables and functions nothing is compiled. Others have their defaults
     form        state form; None: the scene's own
     route       to the equations; None: the scene's own
     samples     number of rows that are kept, about
     max_step    longest step of an adaptive method, s
     works       also compute the work of each effect, J
+    save        what results hold beside states: "energy", "points", "poses", "works", "inputs", or
+                outputs by name, "joint_forces" for example; see `Run.saved`
     guard       check rounding errors at each step, and "stop" where digits are lost, or "repair"
     unstable    allow steps of an explicit fixed-step method that are too long for stability
     estimate    estimate the error by a second run
@@ -120,10 +94,10 @@ def simulate(
     A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
     says why and what to change. Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene = read(source)
+    scene, constants, varying = applied(read(source), inputs)
     plan = plan_run(
         scene,
-        overridden(check(scene), form=form, route=route),
+        overridden(model_of(scene, source), form=form, route=route),
         t_end=t_end,
         integrator=integrator,
         dt=dt,
@@ -132,10 +106,13 @@ def simulate(
         accuracy=accuracy,
         budget=budget,
         parameters=parameters,
-        inputs=inputs,
+        state=state,
+        inputs=constants,
+        varying=varying,
         samples=samples,
         max_step=max_step,
         works=works,
+        save=save,
         guard=guard,
         unstable=unstable,
         estimate=estimate,
@@ -143,70 +120,6 @@ def simulate(
         backend=backend,
     )
     return run_plan(plan, follow=follow)
-
-
-def plan_run(
-    scene: Scene,
-    model: Model,
-    *,
-    outputs: Sequence[str] = (),
-    t_end: float | None = None,
-    integrator: str | None = None,
-    dt: float | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    accuracy: float | None = None,
-    budget: float | None = None,
-    parameters: Values | None = None,
-    inputs: Values | None = None,
-    samples: int = 1001,
-    max_step: float | None = None,
-    works: bool = False,
-    guard: GuardMode | None = None,
-    unstable: bool = False,
-    estimate: bool = False,
-    resume: EarlierRun | None = None,
-    backend: Backend = "auto",
-    reporter: Reporter = SILENT,
-) -> Plan:
-    """Check the arguments of `simulate`, which describes them, for a scene's model.
-
-    `outputs` must be in the module. Raises `RunError` for an invalid argument.
-    """
-    bounds = {"rtol": rtol, "atol": atol, "dt": dt}
-    aims = [n for n, x in (("accuracy", accuracy), ("budget", budget)) if x is not None]
-    _check_aims(aims, bounds, resume, reporter)
-    parameters, inputs = values_of(model, parameters, inputs, reporter)
-    if guard not in (None, "stop", "repair"):
-        raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
-    if backend not in ("auto", "numpy", "c"):
-        raise RunError(f"{reporter.argument('backend')}: '{backend}' is none of auto, numpy, c")
-    setting = None
-    if not aims:
-        setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
-    if unstable:
-        _check_unstable(setting, reporter)
-    needed = (*model.outputs, *SHOWN, *(("effect_powers",) if works else ()))
-    return Plan(
-        scene,
-        replace(model, outputs=in_order(needed)),
-        setting,
-        scene.simulation.t_end if t_end is None else t_end,
-        parameters,
-        inputs,
-        outputs,
-        accuracy=accuracy,
-        budget=budget,
-        integrator=integrator,
-        samples=samples,
-        max_step=max_step,
-        works=works,
-        guard=guard,
-        unstable=unstable,
-        estimate=estimate,
-        resume=resume,
-        backend=backend,
-    )
 
 
 def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
@@ -218,6 +131,8 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
     model = plan.model
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
+    if plan.varying:
+        functions = cast(GeneratedModule, ModuleWithInputs(functions, plan.varying))
     values = (plan.parameters or None, plan.inputs or None)
     options: dict[str, Any] = {
         "samples": plan.samples,
@@ -226,11 +141,11 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         "guard": _guard(plan, functions, values),
         "unstable": plan.unstable,
     }
-    problem = problem_of(functions, *values, model)
+    problem, model = _problem(plan, model, functions, values, reporter)
     accelerator = _accelerator(plan, functions, values, reporter)
     made = accelerator.of if accelerator else without_compiler(model, functions, values)
     problem = made(problem)
-    start = _start(plan, problem)
+    began, start = problem.initial, _start(plan, problem)
     if start is not None:
         problem = start.problem
         options |= start.options
@@ -238,20 +153,17 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     if plan.setting is None or plan.estimate:
         from eomgen.study.accuracy.moved import moved_problem
 
-        moved = moved_problem(functions, model, *values, compiled=made)
+        moved = moved_problem(functions, model, *values, start=began, compiled=made)
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
-    warnings, error = [*model.notices, *module.notices], math.nan
+    if powers and accelerator:
+        powers = accelerator.powers(powers)
+    warnings = [*model.notices, *module.notices]
     trial, choice = _run_case(plan, case, powers, follow, reporter)
     trajectory, estimate = trial.trajectory, None
-    if choice is not None:
-        from eomgen.study.accuracy.aimed import UNKNOWN
-
-        error = choice.error
-        if not choice.met:
-            why = choice.reason or UNKNOWN
-            warnings.append(f"accuracy: not reached, the estimate is {error:.1g}: {why}")
-    elif plan.estimate and trajectory.finished:
+    error, why = _error_of_choice(choice)
+    warnings += why
+    if choice is None and plan.estimate and trajectory.finished:
         from eomgen.study.accuracy.estimate import by_second_run
 
         estimate = by_second_run(case, trial)
@@ -259,12 +171,20 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     if told := _why_not_compiled(plan, accelerator):
         warnings.append(told)
         reporter.note(told)
+    trajectory = replace(
+        trajectory, saved=recorded(plan.save, model, functions, trajectory, values)
+    )
+    if told := unknown_forces(trajectory):
+        warnings.append(told)
+        reporter.note(told)
     model = model.with_parameters(plan.parameters)
+    # What varies is not 0.
+    pushing = dict.fromkeys(plan.varying.given, 1.0) if plan.varying else plan.inputs
     return Run(
         model,
         module,
         trajectory,
-        observe(model, functions, trajectory, appearance_of(plan.scene), plan.inputs),
+        observe(model, functions, trajectory, appearance_of(plan.scene), pushing),
         trial.setting.options,
         error,
         tuple(warnings),
@@ -275,6 +195,45 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     )
 
 
+def _error_of_choice(choice: "Choice | None") -> tuple[float, list[str]]:
+    """The estimated error of a run with a chosen method, and a warning if the aim was not met."""
+    if choice is None:
+        return math.nan, []
+    from eomgen.study.accuracy.aimed import UNKNOWN
+
+    if choice.met:
+        return choice.error, []
+    why = choice.reason or UNKNOWN
+    return choice.error, [f"accuracy: not reached, the estimate is {choice.error:.1g}: {why}"]
+
+
+def _problem(
+    plan: Plan,
+    model: Model,
+    module: GeneratedModule,
+    values: tuple[Mapping[str, float] | None, Mapping[str, float] | None],
+    reporter: Reporter,
+) -> tuple[Problem, Model]:
+    """The problem of a plan, and its model with the initial state of the plan."""
+    if not plan.state:
+        problem = problem_of(module, *values, model)
+    else:
+        with reporter.located():
+            problem = problem_of(
+                module, *values, model, lambda y: initial_with(model, y, plan.state, reporter)
+            )
+        problem = replace(problem, origin=origin_from(problem.origin, problem.initial))
+        q, v, x = split(model, problem.initial)
+        states = (
+            replace(state, initial=value) for state, value in zip(model.states, x, strict=True)
+        )
+        model = replace(model, initial_q=q, initial_v=v, states=tuple(states))
+    if plan.varying:
+        problem = with_corners(problem, module, values[0], plan.varying)
+        problem = replace(problem, origin=None)  # a file does not hold functions
+    return problem, model
+
+
 def _accelerator(
     plan: Plan,
     module: GeneratedModule,
@@ -282,7 +241,7 @@ def _accelerator(
     reporter: Reporter,
 ) -> "Accelerator | None":
     """The compiled steps and functions of a plan; None if it asks for none."""
-    if plan.backend == "numpy":
+    if plan.backend == "numpy" or plan.varying:
         return None
     from eomgen.native.accelerator import Accelerator
 
@@ -321,46 +280,6 @@ def _run_case(
         say=reporter.trial,
     )
     return made_again(case, choice, powers, follow), choice
-
-
-def _check_aims(
-    aims: Sequence[str],
-    bounds: Mapping[str, float | None],
-    resume: EarlierRun | None,
-    reporter: Reporter,
-) -> None:
-    """Raise `RunError` for two aims, or for an aim with a tolerance, a step or an earlier run."""
-    if len(aims) > 1:
-        both = ", ".join(map(reporter.argument, aims))
-        raise RunError(f"{both}: a run has one aim; give one of them")
-    for aim in map(reporter.argument, aims):
-        for name, value in bounds.items():
-            if value is not None:
-                option = reporter.argument(name)
-                raise RunError(f"{aim}, {option}: {aim} chooses {name} itself; leave one out")
-    if aims and resume is not None:
-        raise RunError(
-            f"{reporter.argument('resume')}: continues with a given method; leave "
-            f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
-        )
-
-
-def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
-    """Raise `RunError` for `unstable` unless the method is explicit with a given step."""
-    from eomgen.run.integrators import FixedStep, find_integrator
-
-    asked = reporter.argument("unstable")
-    if setting is None:
-        raise RunError(
-            f"{asked}: is for a given step; leave {reporter.argument('accuracy')}, "
-            f"{reporter.argument('budget')} out"
-        )
-    method = find_integrator(setting.integrator)
-    if not (isinstance(method, FixedStep) and method.explicit):
-        raise RunError(
-            f"{asked}: {setting.integrator} is stable at any step or chooses its own; leave "
-            f"it out, or take {reporter.argument('integrator')} euler, leapfrog or rk4"
-        )
 
 
 def _guard(

@@ -1,6 +1,7 @@
 """Many runs of one scene: `ensemble`."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -9,14 +10,16 @@ from typing import Any
 import numpy as np
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, check_name, check_time, read, values_of
+from eomgen.api.given import Source, Values, check_name, check_time, model_of, read, values_of
+from eomgen.api.planning import Backend
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
-from eomgen.api.simulating import Backend
+from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
+from eomgen.program.program import Program
 from eomgen.run.checks import check_samples, check_steps
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.fixed_step import count_steps
@@ -26,9 +29,10 @@ from eomgen.study.accuracy.trial import Setting
 from eomgen.sweep.design import Design, Law, grid, listed, sampled
 from eomgen.sweep.ensemble import Ensemble
 from eomgen.sweep.execute import chunk_size, execute
+from eomgen.sweep.layout import Memory, bytes_each, layout_of, worded
 from eomgen.sweep.members import Task
-from eomgen.sweep.storage import opened
-from eomgen.sweep.together import METHOD, build
+from eomgen.sweep.storage import Storage, opened
+from eomgen.sweep.together import METHODS, build
 
 __all__ = ["Design", "Ensemble", "Law", "ensemble", "grid", "plan_sweep", "run_sweep", "sampled"]
 
@@ -36,6 +40,8 @@ MANY = 20
 """Least number of members for which C steps are compiled that are not in the store."""
 DYNAMICS = ("forward_dynamics", "inverse_dynamics")
 """Outputs that take more than a time and a state."""
+UNITS = {"kinetic_energy": "J", "potential_energy": "J"}
+"""Units of the outputs with one number."""
 MOST_STEPS = 10_000_000
 
 
@@ -95,7 +101,7 @@ def ensemble(
     design = vary if isinstance(vary, Design) else listed(vary)
     plan = plan_sweep(
         scene,
-        check(scene),
+        model_of(scene, source),
         design,
         t_end=t_end,
         integrator=integrator,
@@ -176,12 +182,15 @@ def run_sweep(
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     state_names: tuple[str, ...] = functions.STATES
     times, dt, every = _times(plan)
-    key, kernels, vectors = _kernels(plan, functions, reporter)
+    program = _program(plan, reporter)
+    many = plan.backend == "c" or len(plan.design.values) >= MANY
+    together = program is not None and many and _run_together(plan.setting.integrator, functions)
     task = Task(
         model=model,
         source=module.source,
-        key=key,
-        kernels=kernels,
+        program=program,
+        at_once=program is not None and many,
+        together=together,
         names=plan.design.names,
         kinds=tuple(_kind(name, model, state_names, reporter) for name in plan.design.names),
         parameters=plan.parameters,
@@ -196,20 +205,27 @@ def run_sweep(
             "max_step": plan.max_step,
             "rest_speed": plan.scene.simulation.rest_speed,
         },
-        vectors=vectors,
         dt=dt,
         every=every,
     )
-    if (kernels or vectors) and not scheduler:
+    if not scheduler:
         task = _built(task, plan, reporter)
-    storage = None
-    if folder is not None:
-        size = chunk_size(len(plan.design.values), bool(task.vectors))
-        storage = opened(folder, task, plan.design, size)
-    with reporter.progress(f"sweeping {model.name}") as progress:
-        found = execute(
-            task, plan.design, storage, workers=workers, scheduler=scheduler, progress=progress
+    layout, members = layout_of(task), len(plan.design.values)
+    size = chunk_size(members, task.together, bytes_each(layout))
+    with ExitStack() as open_ones:
+        kept: Memory | Storage = (
+            Memory(layout, members, size)
+            if folder is None
+            else open_ones.enter_context(opened(folder, task, plan.design, layout, size))
         )
+        progress = open_ones.enter_context(reporter.progress(f"sweeping {model.name}"))
+        execute(
+            *(task, plan.design, kept, size),
+            workers=workers,
+            scheduler=scheduler,
+            progress=progress,
+        )
+        found, messages = kept.results()
     return Ensemble(
         model.name,
         plan.design,
@@ -217,10 +233,11 @@ def run_sweep(
         found["final"],
         found["t"],
         found["status"],
-        found["message"],
+        worded(messages, members),
         np.array(times),
         found.get("rows"),
         {name: found[name] for name in plan.outputs},
+        {**functions.UNITS, **UNITS},
     )
 
 
@@ -248,44 +265,34 @@ def _kind(name: str, model: Model, states: Sequence[str], reporter: Reporter) ->
     raise AssertionError(name)
 
 
-def _kernels(
-    plan: SweepPlan, functions: Any, reporter: Reporter
-) -> tuple[str, Mapping[str, str], Mapping[str, str]]:
-    """The key and the C sources of compiled steps, and those of kernels for several members at
-    once; none if they would not pay.
-    """
-    from eomgen.native import lanes
-    from eomgen.native.accelerator import library_key
+def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] | None:
+    """The program from which members are compiled; None if they run in Python."""
     from eomgen.native.compiler import find_compiler
-    from eomgen.native.library import kept_library
-    from eomgen.native.runs import sources
     from eomgen.store import interfaced_program_of
 
-    key = library_key(plan.model)
-    together = plan.setting.integrator == METHOD and not getattr(functions, "CONTACTS", ())
-    alone: Any = getattr(find_integrator(plan.setting.integrator), "compiled", "")
     if plan.backend == "numpy":
-        return key, {}, {}
-    if not (together or alone):
-        if plan.backend == "c":
-            reporter.note(
-                "the sweep is not compiled: only steps of DOP853 are, and of rk4 without contacts"
-            )
-        return key, {}, {}
+        return None
+    if plan.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
+        reporter.note(f"steps of {plan.setting.integrator} are not compiled, but their derivatives")
     try:
         find_compiler()
     except RunError as error:
         if plan.backend == "c":
             raise
         reporter.note(f"the sweep is not compiled: {error}")
-        return key, {}, {}
-    few = plan.backend == "auto" and len(plan.design.values) < MANY
-    if few and (together or kept_library(key) is None):
-        return key, {}, {}
-    program = interfaced_program_of(plan.model)
-    if together:
-        return key, {}, lanes.sources(*program, plan.outputs)
-    return key, sources(*program), {}
+        return None
+    return interfaced_program_of(plan.model)
+
+
+def _run_together(integrator: str, functions: Any) -> bool:
+    """Whether members run together: by a method that can do that, of a module without contacts,
+    and for adaptive methods without other one-sided forces.
+    """
+    contacts = bool(getattr(functions, "CONTACTS", False))
+    if integrator not in METHODS or not functions.STATES or contacts:
+        return False
+    switching = ("switching_functions", "_switching_functions_of_time")
+    return integrator == "rk4" or not any(hasattr(functions, name) for name in switching)
 
 
 def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:
@@ -298,5 +305,5 @@ def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:
         if plan.backend == "c":
             raise
         reporter.note(f"the sweep is not compiled: {error}")
-        return replace(task, kernels={}, vectors={})
+        return replace(task, program=None, at_once=False, together=False)
     return task

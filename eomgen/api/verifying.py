@@ -5,7 +5,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from eomgen.api.given import Source, check, check_states, check_time, read
+from eomgen.api.given import Source, check_states, check_time, model_of, read
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.model import Model
@@ -35,7 +35,9 @@ def verify(
     Raises `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)
-    return verified_model(check(scene), scene.simulation, states=states, seed=seed, bound=bound)
+    return verified_model(
+        model_of(scene, source), scene.simulation, states=states, seed=seed, bound=bound
+    )
 
 
 def horizon(source: Source, *, seconds: float = 60.0) -> "Horizon":
@@ -45,7 +47,7 @@ def horizon(source: Source, *, seconds: float = 60.0) -> "Horizon":
     `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)
-    return horizon_of(check(scene), scene.simulation, seconds=seconds)
+    return horizon_of(model_of(scene, source), scene.simulation, seconds=seconds)
 
 
 def check_verification(

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.codegen.derive import Derived, derive, record
-from eomgen.codegen.system import optimised
 from eomgen.derivation.supported import why_not_closed, why_not_tried
 from eomgen.dynamics.digits import ALL, Route, digits_lost
 from eomgen.dynamics.mechanism_state import Values
@@ -118,9 +117,7 @@ def _only(model: Model, route: str, words: str) -> Choice:
 def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _Attempt]]:
     """All routes except that of last resort as candidates, and the equations of those tried.
 
-    Operations are those of `derivative` after all passes. A symbolic route shares steps among the
-    outputs of its module, so it is counted in the whole module; if one is tried, the other routes
-    are counted in the same way.
+    Operations are those of `derivative` after all passes.
     """
     candidates, attempts = list[Candidate](), dict[str, _Attempt]()
     for name, spec in ROUTES.items():
@@ -129,11 +126,9 @@ def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _A
         if words := why_not_closed(model) or why_not_tried(model):
             candidates.append(Candidate(name, None, words))
         elif closed:
-            derived = derive(model, name)
-            program = _in_module(derived)
-            candidates.append(_candidate(name, _operations(program)))
-            attempts[name] = _Attempt(derived, _alone(program))
-    in_module, least, fewest = bool(attempts), least_factoring(model), math.inf
+            attempts[name] = _symbolic(derive(model, name))
+            candidates.append(_candidate(name, _operations(attempts[name].alone)))
+    least, fewest = least_factoring(model), math.inf
     # Routes that factor M come last, because a lower bound of their operations is known.
     others = [name for name, spec in ROUTES.items() if not (spec.symbolic or spec.last)]
     for name in sorted(others, key=_factors):
@@ -142,9 +137,9 @@ def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _A
             candidates.append(Candidate(name, None, words))
             continue
         attempts[name] = _recursive(derive(model, name))
-        program = _in_module(derive(model, name)) if in_module else attempts[name].alone
-        candidates.append(_candidate(name, _operations(program)))
-        fewest = min(fewest, _operations(program))
+        operations = _operations(attempts[name].alone)
+        candidates.append(_candidate(name, operations))
+        fewest = min(fewest, operations)
     return candidates, attempts
 
 
@@ -157,15 +152,10 @@ def _recursive(derived: Derived) -> _Attempt:
     return _Attempt(derived, derived.alone)
 
 
-def _in_module(derived: Derived) -> Program:
-    """The optimised program of all outputs except the Jacobian."""
-    return optimised(record(derived, jacobian=False)).program
-
-
-def _alone(program: Program) -> Program:
-    """The optimised program of the derivative and nothing else."""
+def _symbolic(derived: Derived) -> _Attempt:
+    program = record(derived, jacobian=False).program
     outputs = {"derivative": program.outputs["derivative"]}
-    return optimise(replace(program, outputs=outputs, checks=()))
+    return _Attempt(derived, optimise(replace(program, outputs=outputs, checks=())))
 
 
 def _operations(program: Program) -> int:

@@ -9,6 +9,7 @@ from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_s
 from eomgen.derivation.closed import Equations, written_out_forces
 from eomgen.derivation.forms import state_form
 from eomgen.derivation.free_bodies import SymbolicMechanism
+from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.symbols import Vec, rotate
 from eomgen.language.formula import evaluate
 from eomgen.model.model import Point, is_zero, off_centre
@@ -17,7 +18,7 @@ from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
-from eomgen.program.tape import Node, Stage, Tape
+from eomgen.program.tape import TIME, Node, Stage, Tape
 from eomgen.scene.effects.base import JointLoad
 
 
@@ -37,11 +38,12 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
     tau = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.tau}
     vd = {s: tape.input(s.name, Stage.INPUTS) for s in symbols.a}
     forces = written_out_forces(equations) if "joint_forces" in model.outputs else ()
-    definitions = (*equations.solution.definitions, *forces)
+    efforts = equations.free_bodies.efforts
+    definitions = (*efforts.items(), *equations.solution.definitions, *forces)
     defined = {
         s: e.xreplace(form.replaced) for s, e in {**dict(definitions), **form.defined}.items()
     }
-    given = parameters | states | inputs
+    given = parameters | states | inputs | {TIME_SYMBOL: tape.input(TIME, Stage.INPUTS)}
     zero = tape.constant(0.0)
     unforced = Lowering(tape, given | dict.fromkeys(tau, zero), defined)
     forced = Lowering(tape, given | tau, defined)

@@ -11,13 +11,14 @@ from eomgen.codegen.from_recursion import checks, output
 from eomgen.codegen.jacobians import matrices
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
+from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.language.formula import evaluate
 from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
-from eomgen.program.tape import Node
+from eomgen.program.tape import TIME, Node, Stage
 
 
 class Lowered:
@@ -35,6 +36,7 @@ class Lowered:
         self._given |= {symbol: self._tape.constant(float(x)) for x, symbol in s.numbers.items()}
         self._given |= dict(zip((*s.q, *s.v), (*record.q, *record.v), strict=True))
         self._given |= {symbol: record.inputs[name] for name, symbol in s.inputs.items()}
+        self._given[TIME_SYMBOL] = record.input(TIME, Stage.INPUTS)
 
     def forward(self, tau: Sequence[Node] | None = None) -> list[Node]:
         """v̇ under the effects and further generalised forces `tau`."""

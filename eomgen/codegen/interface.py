@@ -123,7 +123,7 @@ def interface_of(system: System) -> Interface:
         coordinates=len(model.coordinates),
         velocities=len(model.velocities),
         others=len(model.states),
-        inputs=tuple(Variable(i.name, i.unit, i.about) for i in model.inputs),
+        inputs=tuple(Variable(i.name, i.unit, i.about, i.default) for i in model.inputs),
         parameters=tuple(Variable(p.name, p.unit, p.about, p.default) for p in model.parameters),
         conditions=tuple(dict.fromkeys(_conditions(model))),
         functions=tuple(_function(system, name) for name in system.program.outputs),

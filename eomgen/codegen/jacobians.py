@@ -131,7 +131,7 @@ def _state_columns(record: Recording) -> list[list[Node]]:
     d, model, tape = record.dynamics, record.model, record.tape
     base = sub(zeros(record.scalars), d.down)
     twists, accelerating = d.motion_in_world(record.vd)
-    slopes = sensitivity(d.in_world, twists, accelerating, base, record.scalars)
+    slopes = sensitivity(d.inertias_in_world, twists, accelerating, base, record.scalars)
     nv, zero, two = len(record.v), tape.constant(0.0), tape.constant(2.0)
 
     def column(entries: Entries, j: int) -> list[Node]:

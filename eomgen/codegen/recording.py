@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Sequence
 
-from eomgen.dynamics.dynamics import Dynamics, Forward, Values
+from eomgen.dynamics.dynamics import Forward, Values
 from eomgen.dynamics.kinematics import Axes
+from eomgen.dynamics.regrouping import RegroupedDynamics
 from eomgen.model.model import Model
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import TIME, Node, Stage, Tape
@@ -50,7 +51,7 @@ class Recording:
         time = self.input(TIME, Stage.INPUTS)
         values = Values(self.parameters, self.inputs, self.q, self.v, extra, time)
         own: Axes | None = "own" if ROUTES[route].frame_axes else axes
-        self.dynamics = Dynamics(model, values, self.scalars, own)
+        self.dynamics = RegroupedDynamics(model, values, self.scalars, own)
         self.forward: Forward
         self.forward = self.dynamics.forward(route) if forward is None else forward(self)
         self.vd = self.dynamics.vd = self.forward(None)

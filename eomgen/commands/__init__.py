@@ -12,6 +12,34 @@ def list_scenes(given: Arguments) -> int:
     return listing.list_scenes(given)
 
 
+def show(given: Arguments) -> int:
+    """Print the file of a scene."""
+    from eomgen.commands import scene_files
+
+    return scene_files.show(given)
+
+
+def new(given: Arguments) -> int:
+    """Write a scene to begin with."""
+    from eomgen.commands import scene_files
+
+    return scene_files.new(given)
+
+
+def copy(given: Arguments) -> int:
+    """Copy a scene."""
+    from eomgen.commands import scene_files
+
+    return scene_files.copy(given)
+
+
+def completion(given: Arguments) -> int:
+    """Print the completion of a shell."""
+    from eomgen.commands import completing
+
+    return completing.completion(given)
+
+
 def print_schema(given: Arguments) -> int:
     """Print the JSON Schema of scenes."""
     from eomgen.commands import describing

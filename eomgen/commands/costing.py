@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from eomgen.api.effects import bill_of, check_motion
 from eomgen.api.reporter import Reporter
 from eomgen.commands.shared import OPTIONS, Arguments, print_wrapped, read_whole, reporter_of
+from eomgen.errors import InterruptedRunError
 from eomgen.files import check_folder
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ def effects(given: Arguments) -> int:
         _print_motion(found, found.extent)
     save_bill(found, path, force=given.force)
     print(f"    wrote {path}")
+    if found.stopped:
+        raise InterruptedRunError(f"{name}: {found.stopped}")
     return 0
 
 

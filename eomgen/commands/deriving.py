@@ -12,7 +12,7 @@ def derive(given: Arguments) -> int:
     model, _ = read_model(given.scene, given)
     if given.output is not None:
         check_writable(given.output, force=given.force)
-    found = derivation_of(model, reporter_of(given, given.scene))
+    found = derivation_of(model, reporter_of(given, given.scene), form=given.state_form)
     if given.format == "text":
         text = found.text(encoding="utf-8" if given.output else sys.stdout.encoding)
     else:

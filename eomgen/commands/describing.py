@@ -65,7 +65,8 @@ def check(given: Arguments) -> int:
     print_listed("effects     ", counted)
     for line in shortened(overlap_lines(model), most):
         print_wrapped("at start    ", line)
-    print_listed("inputs      ", shortened([i.name for i in model.inputs], most))
+    inputs = [f"{i.name} = {i.default:g}" if i.default else i.name for i in model.inputs]
+    print_listed("inputs      ", shortened(inputs, most))
     values = [f"{p.name} = {p.default:g}" for p in model.parameters]
     print_listed("parameters  ", shortened(values, most))
     if max(len(values), len(model.bodies), len(model.points), len(model.inputs)) > most:

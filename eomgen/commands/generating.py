@@ -5,10 +5,14 @@ from pathlib import Path
 
 from eomgen.api.generating import check_backend, compiled, freshness, translated
 from eomgen.commands.shared import Arguments, read_model, reporter_of, required
-from eomgen.errors import EomgenError, RunError, report_refusal
+from eomgen.errors import EomgenError, InterruptedRunError, RunError, report_refusal
 from eomgen.files import check_folder, check_writable
 from eomgen.results import Module
 from eomgen.scene.built_in import built_in_names
+from eomgen.show.terms import explained
+
+LONGEST_LINE = 64
+"""Letters of a line of code beside its term; the rest is cut off."""
 
 
 def generate(given: Arguments) -> int:
@@ -20,9 +24,14 @@ def generate(given: Arguments) -> int:
     paths: dict[Path, str] = {}
     stale: list[str] = []
     refused: dict[str, None] = {}
-    for scene in scenes:
+    for done, scene in enumerate(scenes):
         try:
             stale += [scene] if not _generate(scene, given, paths) else []
+        except KeyboardInterrupt:
+            what = "checked" if given.check else "written"
+            raise InterruptedRunError(
+                f"interrupted at {scene}; {done} of {len(scenes)} modules are {what}"
+            ) from None
         except EomgenError as error:
             # An error of the folder is reported once.
             new = [line for line in error.lines if line not in refused]
@@ -55,6 +64,7 @@ def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
     module, _ = compiled(
         model, asked=required(given, model), anew=given.check, reporter=reporter_of(given, scene)
     )
+    python = module
     if given.backend != "numpy":
         module = translated(module, model, given.backend)
     status = freshness(module, path)
@@ -69,6 +79,7 @@ def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
         print(f"{files}: written{'' if module.derived else ', not derived again'}")
     if given.explain:
         _print_explanation(module)
+        _print_terms(python)
     if given.report:
         _print_report(module)
     return fresh or not given.check
@@ -78,6 +89,17 @@ def _print_explanation(module: Module) -> None:
     print(f"    {'route':<10}{'cost':>6}  (operations of derivative)")
     for line in module.explanation:
         print(f"    {line}")
+
+
+def _print_terms(module: Module) -> None:
+    """Each line of the Python module with the term of the derivation that it came from."""
+    kernel = ""
+    for line in explained(module.source):
+        if line.kernel != kernel:
+            kernel = line.kernel
+            print(f"    {kernel}: line, and the term that it is or is part of")
+        text = line.line if len(line.line) <= LONGEST_LINE else f"{line.line[: LONGEST_LINE - 2]} …"
+        print(f"      {text:<{LONGEST_LINE}}  {line.term}")
 
 
 def _print_report(module: Module) -> None:

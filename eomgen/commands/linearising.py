@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eomgen.api.linearising import Point, linearisable, linearised_at, state_names
+from eomgen.api.linearising import Point, linearisable, linearised_at
+from eomgen.api.states import state_names
 from eomgen.commands.shared import (
     Arguments,
     assignments,

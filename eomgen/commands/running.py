@@ -5,12 +5,16 @@ import sys
 import webbrowser
 from pathlib import Path
 
+from eomgen.api.inputs import applied
+from eomgen.api.planning import plan_run
 from eomgen.api.saving import output_paths, save_run
-from eomgen.api.simulating import plan_run, run_plan
+from eomgen.api.simulating import run_plan
+from eomgen.api.states import state_names
 from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, warn_of_energy
 from eomgen.commands.shared import (
     Arguments,
-    given_values,
+    assignments,
+    given_inputs,
     overlap_lines,
     print_listed,
     print_wrapped,
@@ -21,7 +25,9 @@ from eomgen.commands.shared import (
 )
 from eomgen.errors import InterruptedRunError, RunError
 from eomgen.results import Run
+from eomgen.run.parquet import check_parquet
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.reader import read_scene
 
 
 def simulate(given: Arguments) -> int:
@@ -29,9 +35,12 @@ def simulate(given: Arguments) -> int:
     if given.no_pictures and (given.view or given.plot is not None):
         other = "--view" if given.view else "--plot"
         raise RunError(f"--no-pictures draws nothing, and {other} asks for a picture; drop one")
-    scene, model, name = read_whole(given.scene, given)
     reporter = reporter_of(given, given.scene)
-    parameters, inputs = given_values(given, model)
+    applied_to = applied(read_scene(given.scene), given_inputs(given.input), reporter)
+    scene, model, name = read_whole(given.scene, given, applied_to[0])
+    parameters = assignments(given.set, model.defaults, "--set")
+    with reporter.located():
+        state = assignments(given.state, state_names(model), "--state")
     plan = plan_run(
         scene,
         model,
@@ -44,10 +53,13 @@ def simulate(given: Arguments) -> int:
         accuracy=given.accuracy,
         budget=None if given.budget is None else seconds_of(given.budget),
         parameters=parameters,
-        inputs=inputs,
+        state=state,
+        inputs=applied_to[1],
+        varying=applied_to[2],
         samples=given.samples,
         max_step=given.max_step,
         works=given.works,
+        save=tuple(filter(None, (word.strip() for word in given.save.split(",")))),
         guard=given.guard,
         unstable=given.unstable,
         estimate=given.estimate,
@@ -55,11 +67,16 @@ def simulate(given: Arguments) -> int:
         backend=given.backend,
         reporter=reporter,
     )
-    paths = output_paths(given.output, name, figure=given.plot, force=given.force)
+    if given.parquet:
+        check_parquet("--parquet")
+    paths = output_paths(
+        given.output, name, figure=given.plot, parquet=given.parquet, force=given.force
+    )
     if given.resume is not None and given.resume.resolve() == paths["npz"].resolve():
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
     run = run_plan(plan, reporter=reporter)
-    drawing = save_run(run, paths, pictures=not given.no_pictures, force=given.force)
+    with reporter.waiting(f"writing {name} …"):
+        drawing = save_run(run, paths, pictures=not given.no_pictures, force=given.force)
     missed = _report(given, run)
     for path in paths.values():
         print(f"    wrote {path}")

@@ -6,14 +6,19 @@ import sys
 import textwrap
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from pathlib import Path
 
 from eomgen.api.given import Outputs, check_name, check_outputs, modelled
+from eomgen.api.inputs import Given, read_table
 from eomgen.api.overlaps import overlaps_at_start
 from eomgen.api.reporter import Reporter
+from eomgen.commands.durations import timed_notice
 from eomgen.errors import RunError
+from eomgen.language.angles import number_with_unit
+from eomgen.language.base import identifier
 from eomgen.model.model import Model
-from eomgen.run.progress import terminal_notice, terminal_progress
-from eomgen.scene.reader import find_scene, read_scene
+from eomgen.run.progress import terminal_progress
+from eomgen.scene.reader import find_scene, read_scene, scene_text
 from eomgen.scene.schema import Scene
 from eomgen.text import one_line
 
@@ -21,6 +26,7 @@ Arguments = argparse.Namespace
 
 OPTIONS = {
     "inputs": "--input",
+    "state": "--state",
     "motion": "--motion-time",
     "parameters": "--set",
     "resume": "--from",
@@ -35,8 +41,11 @@ def read_model(scene: str, given: Arguments) -> tuple[Model, str]:
     return read_whole(scene, given)[1:]
 
 
-def read_whole(scene: str, given: Arguments) -> tuple[Scene, Model, str]:
-    """A scene, its model with the options of the command line, and the name of files made from it.
+def read_whole(
+    scene: str, given: Arguments, tables: Scene | None = None
+) -> tuple[Scene, Model, str]:
+    """A scene, or the `tables` already read, its model with the options of the command line, and
+    the name of files made from it.
 
     The name ends in the form and the route if these are not the scene's own.
     """
@@ -44,7 +53,7 @@ def read_whole(scene: str, given: Arguments) -> tuple[Scene, Model, str]:
     outputs = named_outputs(given)
     if outputs is not None:
         check_outputs(outputs, reporter)
-    tables = read_scene(scene)
+    tables = read_scene(scene) if tables is None else tables
     form, route = getattr(given, "form", None), getattr(given, "route", None)
     model = modelled(tables, form=form, route=route, outputs=outputs, reporter=reporter)
     name = model.name
@@ -70,12 +79,14 @@ def required(given: Arguments, model: Model) -> Sequence[str]:
 
 def reporter_of(given: Arguments, scene: str) -> Reporter:
     """The reporter of the command line for a scene."""
+    path = find_scene(scene)
     return Reporter(
-        scene=find_scene(scene).name,
-        argument=lambda name: OPTIONS.get(name, f"--{name.replace('_', '-')}"),
+        scene=path.name,
+        text=lambda: scene_text(path),
+        argument=_option,
         note=lambda notice: note(given, notice),
         trial=lambda text: print(f"    trying {text}", flush=True),
-        waiting=terminal_notice,
+        waiting=timed_notice,
         progress=terminal_progress,
     )
 
@@ -89,7 +100,8 @@ def note(given: Arguments, notice: str) -> None:
 
 def located(scene: str) -> AbstractContextManager[None]:
     """A context that starts the messages of errors with the name of the scene's file."""
-    return Reporter(scene=find_scene(scene).name).located()
+    path = find_scene(scene)
+    return Reporter(scene=path.name, text=lambda: scene_text(path)).located()
 
 
 def assignments(
@@ -103,6 +115,10 @@ def assignments(
     values = {}
     for text in texts:
         name, sign, number = text.partition("=")
+        name = identifier(name)
+        angle = number_with_unit(number) if option == "--state" else None
+        if angle:
+            number, name = str(angle[0]), f"{name}_deg" if angle[1] else name
         check_name(name, known, option, what)
         try:
             value = float(number)
@@ -118,6 +134,19 @@ def given_values(given: Arguments, model: Model) -> tuple[dict[str, float], dict
     """The values of `--set` and of `--input`. Raises `RunError` as `assignments` does."""
     parameters = assignments(given.set, model.defaults, "--set")
     return parameters, assignments(given.input, [i.name for i in model.inputs], "--input")
+
+
+def given_inputs(texts: list[str]) -> dict[str, Given]:
+    """The inputs of `--input NAME=X`, where X is a number or a formula, and of `--input FILE`."""
+    found: dict[str, Given] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        found |= {name: value} if sign else read_table(Path(text), Reporter(argument=_option))
+    return found
+
+
+def _option(name: str) -> str:
+    return OPTIONS.get(name, f"--{name.replace('_', '-')}")
 
 
 def overlap_lines(model: Model) -> list[str]:

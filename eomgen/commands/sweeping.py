@@ -7,8 +7,19 @@ from functools import partial
 
 import numpy as np
 
-from eomgen.api.saving import save_sweep
-from eomgen.api.sweeping import Design, Ensemble, Law, grid, plan_sweep, run_sweep, sampled
+from eomgen.api.generating import compiled
+from eomgen.api.reporter import Reporter
+from eomgen.api.saving import save_statistics, save_sweep
+from eomgen.api.sweeping import (
+    Design,
+    Ensemble,
+    Law,
+    SweepPlan,
+    grid,
+    plan_sweep,
+    run_sweep,
+    sampled,
+)
 from eomgen.commands.shared import (
     Arguments,
     given_values,
@@ -17,11 +28,12 @@ from eomgen.commands.shared import (
     reporter_of,
     shortened,
 )
-from eomgen.errors import InterruptedRunError, RunError
+from eomgen.errors import InterruptedRunError, RunError, nearest
 from eomgen.files import check_folder, check_writable
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import terminal_progress
 from eomgen.sweep.design import MOST
+from eomgen.sweep.storage import kept_members
 
 FEW = 5
 """Number of members that did not finish of which the reason is printed."""
@@ -53,9 +65,11 @@ def sweep(given: Arguments) -> int:
         backend=given.backend,
         reporter=reporter,
     )
+    of = _shown(given, plan, reporter)
     table, figure = (given.output / f"{name}_sweep.{kind}" for kind in ("csv", "png"))
     check_folder(given.output)
-    for path in (table, figure):
+    statistics = given.output / f"{name}_sweep_statistics.csv"
+    for path in (table, figure, *([statistics] if given.statistics else [])):
         check_writable(path, force=given.force)
     folder = given.output / f"{name}_sweep"
     counting = replace(reporter, progress=partial(terminal_progress, countdown=True))
@@ -66,18 +80,28 @@ def sweep(given: Arguments) -> int:
         )
     except KeyboardInterrupt:
         raise InterruptedRunError(
-            f"{model.name}: interrupted; the same command goes on with what is in {folder}"
+            f"{model.name}: interrupted; {kept_members(folder)} of {len(plan.design.values)} "
+            f"members are kept in {folder}, and the same command goes on with the others"
         ) from None
-    of = given.of or found.states[0]
-    try:
-        found.of(of)
-    except RunError as error:
-        raise RunError(f"--{error}") from None
     save_sweep(found, of, table, figure, force=given.force)
+    written = [folder, table, figure]
+    if given.statistics:
+        save_statistics(found, statistics, force=given.force)
+        written.append(statistics)
     _report(found, of)
-    for path in (folder, table, figure):
+    for path in written:
         print(f"    wrote {path}")
     return 0
+
+
+def _shown(given: Arguments, plan: SweepPlan, reporter: Reporter) -> str:
+    """What the figure shows. Raises `RunError` for an unknown name."""
+    _, functions = compiled(plan.model, asked=plan.outputs, reporter=reporter)
+    known = dict.fromkeys((*functions.STATES, *plan.outputs, *plan.design.names))
+    of: str = given.of or next(iter(known))
+    if of not in known:
+        raise RunError(f"--of: unknown name '{of}'{nearest(of, known)}; known: {', '.join(known)}")
+    return of
 
 
 def _design(given: Arguments) -> Design:

@@ -3,7 +3,7 @@
 from eomgen.api.reporter import Reporter
 from eomgen.api.verifying import check_verification, digest, horizon_of, verified_model
 from eomgen.commands.shared import Arguments, read_whole, reporter_of
-from eomgen.errors import RunError
+from eomgen.errors import InterruptedRunError, RunError
 
 
 def verify(given: Arguments) -> int:
@@ -20,15 +20,17 @@ def verify(given: Arguments) -> int:
     reporter = reporter_of(given, given.scene)
     found = verified_model(model, scene.simulation, **options, name=name, reporter=reporter)
     horizon = None
-    if given.horizon is not None:
+    if given.horizon is not None and not found.stopped:
         settings = scene.simulation
         horizon = horizon_of(model, settings, seconds=given.horizon, name=name, reporter=reporter)
     lines = evidence.report(found, horizon)
     print("\n".join(lines))
-    if given.save is not None:
+    if given.save is not None and not found.stopped:
         data = evidence.evidence(found, horizon, digest(model))
         for path in evidence.save(given.save, name, lines, data, force=given.force):
             print(f"    wrote {path}")
+    if found.stopped:
+        raise InterruptedRunError(f"{name}: {found.stopped}; the report is of these")
     if found.missed:
         raise RunError(*(f"{name}: {line}" for line in evidence.missed(found)))
     return 0

@@ -5,40 +5,27 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.joint_loads import JointMechanism, joint_loads
 from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
-from eomgen.language.formula import Formula
 from eomgen.model.model import Model
-from eomgen.scene.effects.base import JointLoad, Load, Unmoved
+from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints import Free
 
 Wrench = tuple[Vec, Expr]
 """Force in world axes at the centre of mass, and torque about z."""
 
 
-class SymbolicMechanism(Unmoved):
-    """The model as effects see it, over SymPy expressions."""
+class SymbolicMechanism(JointMechanism):
+    """The model as effects see it, with the heights of its bodies."""
 
     def __init__(self, model: Model, symbols: Symbols) -> None:
-        self._symbols = symbols
-        self.dimensions = model.dimensions
-        self.bodies = tuple(body.name for body in model.bodies)
-
-    def mass(self, body: str) -> Expr:
-        """Mass symbol of a body."""
-        return self._symbols.mass[self.bodies.index(body)]
+        super().__init__(model, symbols)
+        self._heights = symbols.y
 
     def height(self, body: str) -> Expr:
         """World y symbol of a body."""
-        return self._symbols.y[self.bodies.index(body)]
-
-    def value(self, formula: Formula, **names: Expr) -> Expr:
-        """A quantity over parameter symbols."""
-        return self._symbols.value(formula)
-
-    def input(self, name: str) -> Expr:
-        """Symbol of an input."""
-        return self._symbols.inputs[name]
+        return self._heights[self.bodies.index(body)]
 
 
 @dataclass(frozen=True)
@@ -47,12 +34,14 @@ class FreeBodies:
 
     `gravity` and `applied` are the wrenches of the effects; `equations` are three a body: x, y and
     torque about the centre of mass, with the joint forces f_j as unknowns. `motor` is the torque at
-    each body's own joint, on the body.
+    each body's own joint, on the body. It is a symbol defined in `efforts` if it depends on the
+    motion.
     """
 
     gravity: tuple[Wrench, ...]
     applied: tuple[Wrench, ...]
     motor: tuple[Expr, ...]
+    efforts: dict[Expr, Expr]
     equations: tuple[tuple[Expr, Expr], ...]
     potential_energy: Expr
 
@@ -65,7 +54,9 @@ def draw_free_bodies(model: Model, symbols: Symbols, kinematics: Kinematics) -> 
     mechanism = SymbolicMechanism(model, symbols)
     loads = [load for effect in model.effects for load in effect.loads(mechanism)]
     forces = [load for load in loads if isinstance(load, Load)]
-    motor = _motors(model, [load for load in loads if isinstance(load, JointLoad)])
+    at_joints = [load for load in loads if isinstance(load, JointLoad)]
+    torques, efforts = joint_loads(model, symbols, at_joints)
+    motor = tuple(torques.get(last, sp.Integer(0)) for last in model.angle_index)
     still = (sp.Integer(0),) * len(model.bodies)
     gravity = _wrenches(model, kinematics, (f for f in forces if f.kind == "gravity"), still)
     applied = _wrenches(model, kinematics, (f for f in forces if f.kind == "applied"), motor)
@@ -86,15 +77,7 @@ def draw_free_bodies(model: Model, symbols: Symbols, kinematics: Kinematics) -> 
             (symbols.inertia[k] * kinematics.alpha[k], torque),
         ]
     potential = sum((e.potential_energy(mechanism) for e in model.effects), sp.Integer(0))
-    return FreeBodies(gravity, applied, motor, tuple(equations), potential)
-
-
-def _motors(model: Model, loads: Iterable[JointLoad]) -> tuple[Expr, ...]:
-    """The torque at each body's own joint: +τ on the body, -τ on its parent (35)."""
-    torque = {body.joint.name: sp.Integer(0) for body in model.bodies}
-    for load in loads:
-        torque[load.joint] += load.force
-    return tuple(torque.values())
+    return FreeBodies(gravity, applied, motor, efforts, tuple(equations), potential)
 
 
 def _wrenches(
@@ -103,11 +86,12 @@ def _wrenches(
     forces = {body.name: (sp.Integer(0), sp.Integer(0)) for body in model.bodies}
     torques = {body.name: torque for body, torque in zip(model.bodies, motor, strict=True)}
     angles = {body.name: kinematics.angle[k] for k, body in enumerate(model.bodies)}
-    for k, body in enumerate(model.bodies):
+    for k, body in enumerate(model.bodies):  # (35): +τ on the child, -τ on the parent
         if body.parent >= 0:
             torques[model.bodies[body.parent].name] -= motor[k]
     for load in loads:
         force, at = (load.force[0], load.force[1]), (load.at[0], load.at[1])
         forces[load.body] = add(forces[load.body], force)
         torques[load.body] += cross(rotate(at, angles[load.body]), force)
+        torques[load.body] += sum(load.torque, sp.Integer(0))
     return tuple((forces[body.name], torques[body.name]) for body in model.bodies)

@@ -5,16 +5,11 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.closed import Equations, derive
-from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected
-from eomgen.derivation.projected.steps import projected_steps
+from eomgen.derivation.closed import Equations
+from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.solution import Definition
-from eomgen.derivation.steps import Step, handout_steps
-from eomgen.derivation.supported import MOST_REPORTED, why_not_pins
 from eomgen.derivation.symbols import Expr
-from eomgen.errors import SceneError
 from eomgen.language.formula import Formula, written
-from eomgen.model.model import Model
 
 
 @dataclass(frozen=True)
@@ -25,7 +20,6 @@ class Matrices:
     M, V, G, F   mass matrix (nv, nv); forces of velocity, gravity and all else (nv, 1)
     definitions  the solution in order: each symbol over those before it, in the end all of `a`
     formulas     symbols that stand for formulas of the scene with functions in them, written out
-    steps        the derivation, to be read
     """
 
     q: tuple[Expr, ...]
@@ -37,22 +31,6 @@ class Matrices:
     F: Expr
     definitions: tuple[Definition, ...]
     formulas: dict[Expr, str]
-    steps: tuple[Step, ...]
-
-
-def matrices(model: Model) -> Matrices:
-    """Derive by the handout's steps where they cover the model, by projected constraints elsewhere.
-
-    Raises `SceneError` for a model that is too large to be read, or not for a closed form.
-    """
-    if len(model.bodies) > MOST_REPORTED:
-        raise SceneError(
-            f"derive: shows mechanisms of up to {MOST_REPORTED} bodies, and this has "
-            f"{len(model.bodies)}; generate writes the module of any"
-        )
-    if why_not_pins(model):
-        return _projected(derive_projected(model))
-    return _of_pins(derive(model))
 
 
 def written_out(expression: Expr, definitions: Iterable[Definition]) -> Expr:
@@ -62,17 +40,17 @@ def written_out(expression: Expr, definitions: Iterable[Definition]) -> Expr:
     return expression
 
 
-def _of_pins(equations: Equations) -> Matrices:
+def of_pins(equations: Equations) -> Matrices:
+    """The matrices of the handout's derivation, with symmetric M."""
     s, rows = equations.symbols, equations.symmetric
     still = dict.fromkeys(s.tau, sp.S.Zero)
-    poses = _poses(equations)
+    poses = [*_poses(equations), *equations.free_bodies.efforts.items()]
     solved = [(symbol, value.xreplace(still)) for symbol, value in equations.solution.definitions]
     M, V, G, F = (written_out(m, poses) for m in (rows.M, rows.V, rows.G, rows.F))
     return Matrices(
         *(s.q, s.v, s.a, M, V, G, F),
         (*poses, *solved),
         _formulas(s.formulas),
-        handout_steps(equations),
     )
 
 
@@ -90,7 +68,8 @@ def _poses(equations: Equations) -> list[Definition]:
     return [(symbol, value) for symbol, value in pairs if symbol != value]
 
 
-def _projected(equations: ProjectedEquations) -> Matrices:
+def of_projected(equations: ProjectedEquations) -> Matrices:
+    """The matrices of the derivation by projected constraints."""
     s, found = equations.symbols, equations.balance
     numbers = {symbol: sp.Float(float(x)) for x, symbol in s.numbers.items()}
     given = {**numbers, **dict.fromkeys(s.tau, sp.S.Zero)}
@@ -105,7 +84,6 @@ def _projected(equations: ProjectedEquations) -> Matrices:
         *(s.q, s.v, s.a, M, V, G, F),
         tuple(definitions),
         _formulas(s.formulas),
-        projected_steps(equations),
     )
 
 

@@ -54,11 +54,12 @@ class _Pair:
     weight: Expr
     entries: dict[int, Vec]
 
-    def rotated(self, angle: Expr) -> list[_Row]:
+    def rotated(self, angle: Expr, symbols: Symbols) -> list[_Row]:
         """The two rows in axes turned by `angle`."""
         c, s = sp.cos(angle), sp.sin(angle)
-        along = {k: tidy(c * x + s * y) for k, (x, y) in self.entries.items()}
-        across = {k: tidy(c * y - s * x) for k, (x, y) in self.entries.items()}
+        pairs = self.entries.items()
+        along = {k: gathered(c * x + s * y, symbols, {}) for k, (x, y) in pairs}
+        across = {k: gathered(c * y - s * x, symbols, {}) for k, (x, y) in pairs}
         rows = ({k: e for k, e in row.items() if e != 0} for row in (along, across))
         return [_Row(self.weight, row) for row in rows if row]
 
@@ -194,7 +195,12 @@ def _eliminate_angles(
     for k in reversed(tree.bodies):
         name = model.bodies[k].name
         inertia = [_Row(symbols.inertia[k], {k: sp.Integer(1)})] if symbols.inertia[k] != 0 else []
-        own = [row for pair in pairs if k in pair.entries for row in pair.rotated(symbols.angle[k])]
+        own = [
+            row
+            for pair in pairs
+            if k in pair.entries
+            for row in pair.rotated(symbols.angle[k], symbols)
+        ]
         pairs = [pair for pair in pairs if k not in pair.entries]
         here = [row for row in (*inertia, *own, *rows) if k in row.entries]
         rows = [row for row in (*own, *rows) if k not in row.entries]
@@ -311,6 +317,8 @@ def positive_form(pivot: Expr, notes: _Notes) -> Expr:
         parts[moving].append(coefficient)
     a, b, c = (sp.Add(*terms) for terms in parts.values())
     fixed, varying = sp.factor(sp.together(a + c)), sp.factor(sp.together(b - a))
+    if not is_sum_of_positive_terms(fixed):  # factoring may have expanded a square
+        fixed = a + c
     if not (is_sum_of_positive_terms(fixed) and is_sum_of_positive_terms(varying)):
         return pivot
     return fixed + varying * sp.sin(angle) ** 2

@@ -11,6 +11,9 @@ from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
 from eomgen.scene.joints import Free
 
+Definition = tuple[Expr, Expr]
+"""A symbol and what it stands for."""
+
 
 @dataclass(frozen=True)
 class Equation:
@@ -22,17 +25,22 @@ class Equation:
 
 @dataclass(frozen=True)
 class Step:
-    """One step: the handout's equation numbers, a title, an explanation, and its equations."""
+    """One step: the handout's equation numbers, a title, an explanation, and its equations.
+
+    In the words, blank lines divide paragraphs and backquotes enclose what is code. `figure` names
+    the sketch that belongs beside the words: "mechanism", "bodies", or none.
+    """
 
     number: str
     title: str
     words: str
     equations: tuple[Equation, ...]
+    figure: str = ""
 
 
 def handout_steps(equations: Equations) -> tuple[Step, ...]:
     """Every step from the state to the closed form, in symbols meant for reading."""
-    shown = _readable(equations)
+    shown = readable(equations)
     return tuple(
         Step(
             number,
@@ -52,6 +60,10 @@ def handout_steps(equations: Equations) -> tuple[Step, ...]:
     )
 
 
+NOT_SYMMETRIC = (
+    "Not symmetric: its rows are torques about the bodies' own centres. `mass_matrix()` of the "
+    "generated module is the symmetric one of (39)."
+)
 Pairs = list[tuple[Expr, Expr]]
 """Left and right sides, in the derivation's own symbols."""
 
@@ -72,10 +84,16 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
         ],
     )
     yield (
-        "(2)-(17)",
-        "Free bodies",
+        "(2)-(11)",
+        "Momenta and forces",
         "Force is dP/dt, torque is dL/dt. The joint force f_j acts on the parent, -f_j on the "
-        "child; both are unknown.",
+        "child; both are unknown. The forces of effects, (29) to (35), are among them.",
+        [pair for k in range(len(model.bodies)) for pair in _momenta(equations, k)],
+    )
+    yield (
+        "(12)-(17)",
+        "Free bodies",
+        "The same for the accelerations: three scalar equations a body.",
         list(equations.free_bodies.equations),
     )
     arms = []
@@ -83,7 +101,7 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
         name = model.bodies[k].joint.name
         for word, arm in (("parent", kin.arm_parent[k]), ("child", kin.arm_child[k])):
             for axis, component in zip("xy", arm, strict=True):
-                arms.append((sp.Symbol(f"r{axis}_{name},{word}"), component))
+                arms.append((sp.Symbol(f"r_{name},{word},{axis}"), component))
     yield (
         "(18), (19)",
         "Arms",
@@ -106,6 +124,19 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
             for pair in zip((s.xdd[k], s.ydd[k]), kin.acceleration[k], strict=True)
         ],
     )
+
+
+def _momenta(equations: Equations, k: int) -> Pairs:
+    """Rates of place and momentum of a body, as in (4) to (7): by its momenta, by its forces."""
+    s, name = equations.symbols, equations.model.bodies[k].name
+    (_, fx), (_, fy), (_, torque) = equations.free_bodies.equations[3 * k : 3 * k + 3]
+    px, py, spin = (sp.Symbol(f"{word}_{name}{axis}") for word, axis in
+                    (("P", ",x"), ("P", ",y"), ("L", "")))  # fmt: skip
+    dpx, dpy, dspin = (sp.Symbol(x.name.replace("_", "dot_", 1)) for x in (px, py, spin))
+    pairs = [(s.xd[k], px / s.mass[k]), (s.yd[k], py / s.mass[k]), (dpx, fx), (dpy, fy)]
+    if s.inertia[k] != 0:
+        pairs.append((s.omega[k], spin / s.inertia[k]))
+    return [*pairs, (dspin, torque)]
 
 
 def _redundant_state(equations: Equations) -> Expr:
@@ -132,15 +163,23 @@ def _equations_of_motion(equations: Equations) -> Iterator[tuple[str, str, str, 
         f"The joint force {force} side of its joint. Put into the torque equations, with the "
         "dependent accelerations replaced by (22) and (23), this leaves M a + V + G = F in the "
         f"accelerations a of the coordinates{sums}",
-        [(sp.Symbol("a"), sp.Matrix(equations.symbols.a))],
+        [_system(equations), (sp.Symbol("a"), sp.Matrix(equations.symbols.a))],
     )
-    rows = "Not symmetric: its rows are torques about the bodies' own centres."
     collected = equations.collected
+    rows = "" if collected.M == collected.M.T else NOT_SYMMETRIC
     yield "(26)", "Mass matrix", rows, [(sp.Symbol("M"), collected.M)]
     yield "(27)", "Velocity forces", "", [(sp.Symbol("V"), collected.V)]
     yield "(28)", "Gravity forces", "", [(sp.Symbol("G"), collected.G)]
     words = "External forces and joint torques, eliminated alike."
-    yield "(29)-(36)", "Applied forces", words, [(sp.Symbol("F"), collected.F)]
+    efforts = equations.free_bodies.efforts.items()
+    yield "(29)-(36)", "Applied forces", words, [(sp.Symbol("F"), collected.F), *efforts]
+
+
+def _system(equations: Equations) -> tuple[Expr, Expr]:
+    """M a + V + G = F, by its letters."""
+    n = len(equations.symbols.a)
+    M, (a, V, G, F) = sp.MatrixSymbol("M", n, n), (sp.MatrixSymbol(x, n, 1) for x in "aVGF")
+    return sp.MatAdd(sp.MatMul(M, a), V, G), F
 
 
 def _solution(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
@@ -165,7 +204,7 @@ def _solved(equations: Equations) -> list[tuple[Expr, Expr]]:
     ]
 
 
-def _readable(equations: Equations) -> dict[Expr, Expr]:
+def readable(equations: Equations) -> dict[Expr, Expr]:
     """Symbols by ones whose names SymPy's printers know how to write: `thetaddot` is θ̈."""
     s, model = equations.symbols, equations.model
     names = [body.name for body in model.bodies]
@@ -185,13 +224,14 @@ def _readable(equations: Equations) -> dict[Expr, Expr]:
         shown[fy] = sp.Symbol(f"f_{body.joint.name},y")
     for formula, symbol in s.formulas.items():
         shown[symbol] = sp.Symbol(written(formula))
-    short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j"}
+    short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j",
+             "effort": "tau"}  # fmt: skip
     for body in model.bodies:
         for field, letter in (("mass", "m"), ("inertia_com", "I")):
             named = s.parameters.get(f"{body.name}_{field}")
             if named is not None and f"{letter}_{body.name}" not in taken:
                 shown[named] = sp.Symbol(f"{letter}_{body.name}")
-    for symbol, _ in equations.solution.definitions:
+    for symbol in (*equations.free_bodies.efforts, *dict(equations.solution.definitions)):
         kind, _, rest = symbol.name.partition("__")
         if symbol not in shown and kind in short:
             rest = rest.replace("__", ",")

@@ -1,12 +1,12 @@
 """The symbols of a derivation, and the trigonometry it needs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 
-from eomgen.language.formula import Formula, Name, calls_function, evaluate
+from eomgen.language.formula import Formula, Name, calls_function, evaluate, names_in
 from eomgen.model.model import Model
 from eomgen.scalars.protocol import Scalars
 
@@ -74,6 +74,13 @@ class Symbols:
         return _quantity(formula, self.parameters, self.formulas)
 
 
+def functions_of_parameters(model: Model) -> Iterator[Formula]:
+    """The quantities of a model that call functions and depend on parameters alone."""
+    for formula in model.quantities():
+        if calls_function(formula) and all(n in model.defaults for n in names_in(formula)):
+            yield formula
+
+
 def make_symbols(model: Model) -> Symbols:
     """Symbols for a model; masses and inertias that are one parameter are positive symbols."""
     positive = {
@@ -87,7 +94,7 @@ def make_symbols(model: Model) -> Symbols:
         for p in model.parameters
     }
 
-    called = dict.fromkeys(f for f in model.quantities() if calls_function(f))
+    called = dict.fromkeys(functions_of_parameters(model))
     formulas = {formula: _real(f"formula__{i}") for i, formula in enumerate(called, 1)}
 
     def quantity(formula: Formula) -> Expr:

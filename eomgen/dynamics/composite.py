@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from eomgen.dynamics.forces import Wrench, at_parent
 from eomgen.dynamics.frames import Rigid, joined
-from eomgen.dynamics.kinematics import Link, TreeKinematics
+from eomgen.dynamics.kinematics import TreeKinematics
+from eomgen.dynamics.rotations import Rotation
 from eomgen.dynamics.vectors import (
     ENTRIES,
     Vec,
@@ -29,22 +30,24 @@ Entries = Mapping[tuple[int, int], Scalar]
 def composite_bodies(kinematics: TreeKinematics, scalars: Scalars) -> tuple[Rigid, ...]:
     """The composite-rigid-body inertia of each frame's subtree (Featherstone 2008, 6.2)."""
     sums = [link.rigid for link in kinematics.links]
+    planar = bool(kinematics.angles)
     for k in reversed(range(len(sums))):
         link = kinematics.links[k]
         if link.parent >= 0:
-            sums[link.parent] = joined(sums[link.parent], _at_parent(link, sums[k], scalars))
+            there = shifted(link.rotation, link.arm, sums[k], scalars, planar=planar)
+            sums[link.parent] = joined(sums[link.parent], there)
     return tuple(sums)
 
 
-def _at_parent(link: Link, body: Rigid, scalars: Scalars) -> Rigid:
+def shifted(rotation: Rotation, r: Vec, body: Rigid, scalars: Scalars, *, planar: bool) -> Rigid:
     """A rigid-body inertia at the parent's origin, in the parent's axes: h' = h + m r and
     J' = J + (r·h + r·h') 1 - r h'ᵀ - h rᵀ (parallel-axis theorem, without squares of r).
     """
-    r, h = link.arm, link.rotation.out(body.first_moment)
-    J = link.rotation.out_symmetric(body.inertia)
+    h = rotation.out(body.first_moment)
+    J = rotation.out_symmetric(body.inertia)
     moved = add(h, scale(body.mass, r))
     both = [r[i] * (h[i] + moved[i]) for i in range(3)]
-    if scalars.is_zero(J[0][0]) and scalars.is_zero(J[1][1]):  # a planar body
+    if planar:
         zero = scalars.number(0.0)
         entries = [zero, zero, J[2][2] + (both[0] + both[1]), zero, zero, zero]
         return Rigid(body.mass, moved, symmetric(entries))

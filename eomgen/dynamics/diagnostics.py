@@ -23,13 +23,13 @@ def values_at(
 ) -> Values:
     """The values of a model at time t (s) and state y = [q, v, x] (ny,) of form 'velocity'.
 
-    Parameters that are not given have their defaults, inputs are 0.
+    Parameters that are not given have their defaults, and so do inputs.
     """
     nq, nv = len(model.coordinates), len(model.velocities)
     states = {x.name: value for x, value in zip(model.states, y[nq + nv :], strict=True)}
     return Values(
         {**model.defaults, **parameters},
-        {**dict.fromkeys((i.name for i in model.inputs), 0.0), **inputs},
+        {**{i.name: i.default for i in model.inputs}, **inputs},
         list(y[:nq]),
         list(y[nq : nq + nv]),
         states,

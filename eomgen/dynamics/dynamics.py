@@ -1,8 +1,9 @@
 """Forward and inverse dynamics of a mechanism at a state, over any scalars.
 
 Each algorithm works in the axes in which it is cheapest. Forces and the articulated-body recursion
-use the frames' own axes in space, and the world's in the plane, where angles add. Composite bodies
-use the world's axes, where nothing is rotated repeatedly.
+use the frames' own axes in space, and the world's in the plane, where angles add. So do composite
+bodies, since about a coordinate axis most entries are 0. Derivatives of inverse dynamics use the
+world's axes, where nothing is rotated repeatedly.
 
 Driven frames move as prescribed. M v̇ + V + G = F has the rows of the free velocities only; V
 includes the inertial forces of driven accelerations. If a scene leaves the velocity forces out, all
@@ -24,6 +25,7 @@ from eomgen.dynamics.composite import (
     mass_entries,
     solved,
 )
+from eomgen.dynamics.kinematics import TreeKinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.mechanism_state import MechanismState, Values
 from eomgen.dynamics.motion import (
@@ -64,6 +66,23 @@ class Dynamics(MechanismState):
         base = nothing if weightless else sub(nothing, self.down)
         vd = vd if still else self.with_driven(vd)
         return accelerations(self.kinematics, twists, v, vd, base, self.scalars)
+
+    @property
+    def inertias(self) -> TreeKinematics:
+        """The links with the inertias that inverse dynamics and M take. A subclass may have others
+        that give the same generalised forces; likewise the next two.
+        """
+        return self.kinematics
+
+    @property
+    def weights(self) -> TreeKinematics:
+        """The links with the inertias that gravity forces take."""
+        return self.kinematics
+
+    @property
+    def inertias_in_world(self) -> TreeKinematics:
+        """The links with the inertias that derivatives of inverse dynamics take, in world axes."""
+        return self.in_world
 
     @cached_property
     def felt(self) -> tuple[Sequence[Scalar], tuple[Twist, ...]]:
@@ -160,7 +179,8 @@ class Dynamics(MechanismState):
     ) -> list[Scalar]:
         """`inverse` with the rows of driven velocities."""
         frame_accelerations = self.accelerating(vd, still=still, weightless=weightless)
-        inertial = fc.inertial(self.kinematics, frame_accelerations, self.scalars)
+        bodies = self.weights if still else self.inertias
+        inertial = fc.inertial(bodies, frame_accelerations, self.scalars)
         parts = fc.generalised(self.kinematics, fc.carried(self.kinematics, inertial), self.moved)
         if vd is None:
             return parts
@@ -218,14 +238,13 @@ class Dynamics(MechanismState):
     def articulated_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """v̇ (nv,) under the effects and generalised forces `tau`, by articulated bodies."""
         forces = self._generalised_forces(tau)
-        found = respond(
-            self.kinematics, self.articulated, self._bias_wrenches, forces, self.scalars
-        )
+        wrenches = self._bias_wrenches(self.kinematics)
+        found = respond(self.kinematics, self.articulated, wrenches, forces, self.scalars)
         return self._with_gravity(found)
 
     def factored_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by the LᵀDL factors of the mass matrix."""
-        carried = fc.carried(self.kinematics, self._bias_wrenches)
+        carried = fc.carried(self.kinematics, self._bias_wrenches(self.inertias))
         bias = fc.generalised(self.kinematics, carried, self.moved)[: self.nv]
         right = [a - b for a, b in zip(self._generalised_forces(tau), bias, strict=True)]
         return self._with_gravity(solved(self.factors, right))
@@ -287,10 +306,9 @@ class Dynamics(MechanismState):
         vd = self.with_driven(None)
         return accelerations(self.kinematics, twists, v, vd, base, self.scalars, falling)
 
-    @cached_property
-    def _bias_wrenches(self) -> list[fc.Wrench]:
-        """The wrenches that would make v̇ = 0."""
-        inertial = fc.inertial(self.kinematics, self._reference_accelerations, self.scalars)
+    def _bias_wrenches(self, links: TreeKinematics) -> list[fc.Wrench]:
+        """The wrenches that would make v̇ = 0, for the inertias of the given links."""
+        inertial = fc.inertial(links, self._reference_accelerations, self.scalars)
         return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
 
     def _with_gravity(self, vd: Sequence[Scalar]) -> list[Scalar]:
@@ -310,7 +328,7 @@ class Dynamics(MechanismState):
     @cached_property
     def mass_entries(self) -> Entries:
         """The entries of M that the tree's shape allows not to be 0."""
-        return mass_entries(self.in_world, self.scalars)
+        return mass_entries(self.inertias, self.scalars)
 
     @cached_property
     def factors(self) -> Factors:

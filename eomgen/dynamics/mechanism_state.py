@@ -153,6 +153,10 @@ class MechanismState:
         """A function of formulas."""
         return self.scalars.call(function, *arguments)
 
+    def called(self, letter: str, *values: Scalar) -> Vector:
+        """The values themselves."""
+        return values
+
     @cached_property
     def names(self) -> dict[str, Scalar]:
         """The values of all names that formulas may use."""

@@ -148,10 +148,7 @@ def moment_about_centre(inertia: Mat, a: Acceleration, scalars: Scalars) -> Vec:
     That is computed from J, since a small moment of inertia would be lost in the rounding of E.
     """
     w, (ax, ay, az), (wyz, wxz, wxy) = a.field, a.angular, a.mixed
-    zero = scalars.number(0.0)
     xx, yy, zz = inertia[0][0], inertia[1][1], inertia[2][2]
-    if scalars.is_zero(xx) and scalars.is_zero(yy):  # a planar body: J α
-        return (zero, zero, zz * w[1][0])
     exy, exz, eyz = -inertia[0][1], -inertia[0][2], -inertia[1][2]
     x = w[2][0] * exy - w[1][0] * exz + a.spread[0] * eyz + xx * ax + (zz - yy) * wyz
     y = w[0][1] * eyz - w[2][1] * exy + a.spread[1] * exz + yy * ay + (xx - zz) * wxz

@@ -3,20 +3,35 @@
 import keyword
 import re
 from itertools import zip_longest
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    Strict,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from eomgen.errors import nearest
+from eomgen.language.angles import by_unit, radians_of
 
-LONGEST_NAME = 40
+LONGEST_NAME = 100
 MOST_HINTS = 10
 """Greatest number of unknown keys with a hint; a table may have thousands."""
 
 
 class Table(BaseModel):
-    """A table of the scene. Unknown keys are errors; values are frozen."""
+    """A table of the scene. Unknown keys are errors; values are frozen.
+
+    example  an example in TOML, which the reference shows
+    """
+
+    example: ClassVar[str] = ""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, defer_build=True)
 
@@ -32,6 +47,8 @@ class Table(BaseModel):
             if unknown:
                 pairs = list(zip_longest(unknown, hints, fillvalue=""))
                 raise PydanticCustomError("unknown_keys", "unknown keys", {"keys": pairs})
+            for key, table in data.items():
+                _check_clashes(key, table)
         return data
 
     def replaced(self, **values: Any) -> Self:
@@ -39,9 +56,26 @@ class Table(BaseModel):
         return self.model_copy(update=values)
 
 
+def identifier(name: str) -> str:
+    """A name as it stands in formulas and in code: with _ for each -."""
+    return name.replace("-", "_")
+
+
+def _check_clashes(key: str, table: Any) -> None:
+    """Raise an error for two names in a table that are the same identifier."""
+    seen: dict[str, str] = {}
+    for name in table if isinstance(table, dict) else ():
+        other = seen.setdefault(identifier(str(name)), str(name))
+        if other != name:
+            raise PydanticCustomError(
+                "keys", "is the same name as '{other}'", {"key": f"{key}.{name}", "other": other}
+            )
+
+
 def _identifier(name: str) -> str:
+    name = identifier(name)
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise ValueError("is not an identifier; use letters a-z, digits and _, a letter first")
+        raise ValueError("is not an identifier; use letters a-z, digits, _ and -, a letter first")
     if keyword.iskeyword(name) or keyword.issoftkeyword(name):
         raise ValueError("is a Python keyword; choose another name")
     if len(name) > LONGEST_NAME:
@@ -52,7 +86,7 @@ def _identifier(name: str) -> str:
 
 
 Identifier = Annotated[str, AfterValidator(_identifier)]
-"""A name that is valid in Python, JavaScript and LaTeX."""
+"""A name that is valid in Python, JavaScript and LaTeX; a - in it is read as _."""
 
 LARGEST = 1e100
 """Largest absolute value of a number in a scene: its square does not overflow."""
@@ -74,5 +108,22 @@ def _line(text: str) -> str:
 Number = Annotated[float, Strict(), Field(allow_inf_nan=False), AfterValidator(_size)]
 """A finite number. Integers are accepted; text and booleans are not. Zero has no sign."""
 
+AngleOrNumber = Annotated[
+    Number,
+    BeforeValidator(radians_of),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
+]
+"""A number, or an angle with its unit, "90 deg", which becomes a number of rad."""
+ByName = Annotated[
+    dict[str, Number],
+    BeforeValidator(by_unit),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "additionalProperties": {"anyOf": [{"type": "number"}, {"type": "string"}]},
+        }
+    ),
+]
+"""Numbers by coordinate; an angle with its unit becomes a number of rad, or `<name>_deg`."""
 Positive = Annotated[Number, Field(gt=0)]
 Text = Annotated[str, Field(max_length=400), AfterValidator(_line)]

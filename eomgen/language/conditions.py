@@ -23,6 +23,10 @@ ROUNDING = 1e-9
 """Relative rounding error that is allowed in the numbers of a scene."""
 
 
+PRINTED = 1e-3
+"""The same of inertias printed with three digits."""
+
+
 @dataclass(frozen=True)
 class Condition:
     """A formula of parameters must be >= low (> low if `strict`) and <= high.
@@ -132,7 +136,12 @@ def can_meet(location: str, radii: Sequence[Formula]) -> Condition:
 
 
 def of_inertia(
-    location: str, body: str, mass: Formula, entries: Sequence[Formula], known: Mapping[str, float]
+    location: str,
+    body: str,
+    mass: Formula,
+    entries: Sequence[Formula],
+    known: Mapping[str, float],
+    rounding: float | None = ROUNDING,
 ) -> Iterator[Condition]:
     """Conditions that a body can have this inertia about its centre of mass.
 
@@ -143,13 +152,14 @@ def of_inertia(
     In space the principal moments are not negative and none exceeds the sum of the other two. This
     holds if and only if Σ = ½ tr(I) 1 - I, the integral of r rᵀ dm, is positive semidefinite:
     P. M. Wensing, S. Kim, J.-J. E. Slotine, IEEE Robotics and Automation Letters 3 (2018) 60-67.
-    For a lamina or a rod Σ is singular, so a tolerance of `ROUNDING` of the trace is allowed.
+    For a lamina or a rod Σ is singular, so a tolerance of `rounding` of the trace is allowed. With
+    None this is not required.
     """
     trace = _sum(*entries[:3])
     words = f"body '{body}' has inertia but no mass; give it a mass, or inertia_com = 0"
     if value_of(mass, known) == 0.0:
         yield Condition(location, Apply("select", (mass, Constant(1.0), _minus(trace))), words, ())
-    if len(entries) == 1:
+    if len(entries) == 1 or rounding is None:
         return
     xx, yy, zz, *products = entries
     if all(product == ZERO for product in products):
@@ -157,7 +167,7 @@ def of_inertia(
             f"body '{body}' has principal moments {{:.6g}}, {{:.6g}}, {{:.6g}}; no body has one "
             "larger than the other two together: change xx, yy or zz"
         )
-        allowed = _product(Constant(ROUNDING / 2), trace)
+        allowed = _product(Constant(rounding / 2), trace)
         excesses = (
             _difference(_sum(b, c, allowed), a)
             for a, b, c in ((xx, yy, zz), (yy, zz, xx), (zz, xx, yy))
@@ -169,12 +179,12 @@ def of_inertia(
         "{:.6g}; so one of its principal moments is negative, or larger than the other two "
         "together: make the products smaller, or change xx, yy or zz"
     )
-    least = _least(*_leading_minors(entries))
+    least = _least(*_leading_minors(entries, rounding))
     yield Condition(location, least, words, tuple(entries), strict=True)
 
 
-def _leading_minors(entries: Sequence[Formula]) -> tuple[Formula, ...]:
-    """Three numbers that are > 0 if and only if 2 Σ / s + `ROUNDING`/2 is positive definite.
+def _leading_minors(entries: Sequence[Formula], rounding: float) -> tuple[Formula, ...]:
+    """Three numbers that are > 0 if and only if 2 Σ / s + `rounding`/2 is positive definite.
 
     s is the sum of the absolute values of all entries, or 1 if that is 0. This is Sylvester's
     criterion; the determinant is multiplied by the first minor, which avoids a division by it
@@ -184,7 +194,7 @@ def _leading_minors(entries: Sequence[Formula]) -> tuple[Formula, ...]:
     size = _sum(*(Apply("abs", (entry,)) for entry in entries))
     size = Apply("select", (size, size, Constant(1.0)))
     xx, yy, zz, xy, xz, yz = (Apply("/", (entry, size)) for entry in entries)
-    one = _sum(xx, yy, zz, Constant(ROUNDING / 2))
+    one = _sum(xx, yy, zz, Constant(rounding / 2))
     a, b, c = (_difference(one, _product(Constant(2.0), x)) for x in (xx, yy, zz))
     p, q, r = (_product(Constant(-2.0), x) for x in (xy, xz, yz))
     second = _difference(_product(a, b), _product(p, p))

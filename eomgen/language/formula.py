@@ -53,6 +53,11 @@ class Constant:
 
 
 @dataclass(frozen=True)
+class Angle(Constant):
+    """A number that the scene gives as an angle with its unit; the value is in rad."""
+
+
+@dataclass(frozen=True)
 class Name:
     """A name: a parameter, a coordinate, `t` or another name that the field allows."""
 

@@ -14,10 +14,13 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from eomgen.errors import SceneError, nearest
+from eomgen.language.angles import radians_of
 from eomgen.language.base import Number, Table
 from eomgen.language.conditions import Condition, of_moving, of_quantity
 from eomgen.language.formula import (
     CONSTANTS,
+    ZERO,
+    Angle,
     Constant,
     Formula,
     FormulaError,
@@ -34,6 +37,8 @@ def _read_quantity(value: Any) -> Formula:
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise PydanticCustomError("quantity", "is neither a number nor a formula; give one")
     if isinstance(value, str):
+        if isinstance(angle := radians_of(value), float) and math.isfinite(angle):
+            return Angle(angle) if angle else ZERO
         try:
             return parse(value)
         except FormulaError as error:
@@ -183,6 +188,8 @@ def name_quantities(
             by_joint = isinstance(value, dict)
             slides = suffix[1:] in sliding if by_joint else bool(about_slides(table, sliding))
             unit = of_joint(str(extra["unit"]), slides)
+            if isinstance(formula, Angle) and unit != "rad":
+                raise SceneError(f"{where}: is an angle; give a number, in {unit or 'no unit'}")
             for name in names_in(formula):
                 if name in motion and name not in allowed and name not in known:
                     raise SceneError(

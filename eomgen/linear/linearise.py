@@ -181,7 +181,7 @@ def rate_unit(unit: str) -> str:
 
 
 def input_values(module: GeneratedModule, u: Any) -> FloatArray:
-    """Inputs as an array (nu,) in the module's order: from None (all 0), a mapping, or an array."""
+    """Inputs as an array (nu,) in the module's order: from None (defaults), a mapping, an array."""
     if u is None:
         u = {}
     if isinstance(u, Mapping):
@@ -189,7 +189,7 @@ def input_values(module: GeneratedModule, u: Any) -> FloatArray:
             if name not in module.INPUTS:
                 known = ", ".join(module.INPUTS) or "none"
                 raise RunError(f"inputs: no input '{name}'; known: {known}")
-        u = [u.get(name, 0.0) for name in module.INPUTS]
+        u = [u.get(name, default) for name, default in module.INPUTS.items()]
     values = np.array(u, dtype=np.float64)
     if values.shape != (len(module.INPUTS),):
         raise RunError(f"inputs: have shape {values.shape}, not ({len(module.INPUTS)},)")

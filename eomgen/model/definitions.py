@@ -131,5 +131,8 @@ def _expanded_table(
                     )
             return _substituted(value, expanded)
 
-        fields[field] = expand(getattr(table, field), f"{location}.{info.alias or field}")
+        value = getattr(table, field)
+        expanded_value = expand(value, f"{location}.{info.alias or field}")
+        if expanded_value != value:  # a field that is replaced counts as given
+            fields[field] = expanded_value
     return table.replaced(**fields)

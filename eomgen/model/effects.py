@@ -8,6 +8,8 @@ from eomgen.errors import SceneError, check_known
 from eomgen.language.conditions import require
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import about_slides, of_joint, with_components
+from eomgen.model.frames import effect_from_centres
+from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, dofs_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
@@ -32,10 +34,13 @@ def sliding_in(bodies: Sequence[Body], dimensions: int) -> frozenset[str]:
 
 
 def inputs_and_states(
-    effects: Iterable[Effect], scope: Scope, dimensions: int
+    scene: Scene, effects: Iterable[Effect], scope: Scope
 ) -> tuple[tuple[Input, ...], tuple[ExtraState, ...]]:
-    """The inputs and extra states of effects, in the units of the joints at which they act."""
-    inputs, states = [], []
+    """The inputs of a scene and its effects, and their extra states, in the units of the joints at
+    which they act.
+    """
+    dimensions = scene.dimensions
+    inputs, states = [*own_inputs(scene)], list[ExtraState]()
     for effect in effects:
         inputs += [_at_joint(x, effect, scope.sliding) for x in effect.inputs(dimensions)]
         states += [_at_joint(x, effect, scope.sliding) for x in effect.states(dimensions)]
@@ -63,6 +68,8 @@ def effects_in_force(
     dofs = dofs_of(bodies, scene.dimensions)
     names_of_dofs = {b.joint.name: [c.name for c in b.positions] for b in bodies}
     known = _known_names(scene, bodies, dofs)
+    names = [body.name for body in bodies]
+    centres = {body.name: body.com for body in bodies if body.com}
     types = {b.joint.name: b.joint.type for b in bodies}
     effects: list[Effect] = []
     found: list[Bindings] = []
@@ -70,6 +77,7 @@ def effects_in_force(
         location = f"effects[{i}]"
         if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
             raise SceneError(f"{location}.type: a second 'gravity'; give one")
+        given = effect.model_fields_set
         _check_names_in(effect, location, known, types)
         effect.check_dofs(dofs, names_of_dofs, location)
         vectors = {
@@ -81,6 +89,7 @@ def effects_in_force(
         if isinstance(effect, Driven):
             check_drive(effect, location, bodies, effects, scope)
         effect, bindings = bind(effect, effect.name, location, scope)
+        effect = effect_from_centres(effect, given, names, centres, location)
         conditions = tuple(effect.conditions(location))
         require(conditions, bindings.values(scope))
         found += [bindings, Bindings(conditions=conditions)]

@@ -1,26 +1,29 @@
 """Elaboration of a scene to a model: names are resolved, values checked, bodies put in a tree."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
 from eomgen.errors import SceneError, check_known
-from eomgen.language.conditions import of_inertia, require
-from eomgen.language.formula import ZERO
+from eomgen.language.conditions import PRINTED, ROUNDING, Condition, of_inertia, require
+from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model.definitions import with_definitions
 from eomgen.model.effects import check_contacts, effects_in_force, inputs_and_states, sliding_in
+from eomgen.model.frames import Centres, from_centre, joint_from_centres
 from eomgen.model.geometry import axis_notices, entries_of_inertia, normalised_joint
 from eomgen.model.initial import initial_state
+from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, Model, Point, prescribed_of, velocities_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
+from eomgen.model.orientation import oriented
 from eomgen.model.prescribed import locked_values
 from eomgen.model.tree import Link, links_of
 from eomgen.outputs import OUTPUTS
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.chains import written_out
 from eomgen.scene.effects import Effect
-from eomgen.scene.schema import Scene
+from eomgen.scene.schema import BodyTable, Scene
 
 
 def elaborate(scene: Scene) -> Model:
@@ -38,10 +41,10 @@ def elaborate(scene: Scene) -> Model:
     effects, of_effects = effects_in_force(scene, bodies, scope)
     points, of_points = _points(scene, bodies, scope)
     found = joined([Bindings(own), of_bodies, of_effects, of_points])
-    inputs, states = inputs_and_states(effects, scope, n)
+    inputs, states = inputs_and_states(scene, effects, scope)
     if not any(body.velocities for body in bodies):
         raise SceneError("joints: nothing can move; give at least one that is no weld")
-    _check_symbols(n, found.parameters, links, bodies, effects)
+    _check_symbols(n, found.parameters, links, bodies, effects, scene)
     check_contacts(effects, [body.name for body in bodies])
     locked = locked_values(scene.locked, bodies, effects)
     appearance_of(scene)  # raises SceneError if the mechanism cannot be drawn
@@ -76,7 +79,11 @@ def elaborate(scene: Scene) -> Model:
             (name, scene.locked[f"{name}_deg"]) for name in locked if name not in scene.locked
         ),
         leave_out=scene.leave_out,
-        notices=(*dict.fromkeys(lengths), *start.notices),
+        notices=(
+            *dict.fromkeys(lengths),
+            *dict.fromkeys(notice for body in bodies for notice in body.notices),
+            *start.notices,
+        ),
     )
 
 
@@ -135,6 +142,7 @@ def _moving(scene: Scene) -> tuple[str, ...]:
     for joint, _ in written_out(scene)[1]:
         both = (*joint.positions(scene.dimensions), *joint.velocities(scene.dimensions))
         names += [coordinate.name for coordinate in both]
+    names += [i.name for i in own_inputs(scene)]
     for effect in scene.effects:
         names += [i.name for i in effect.inputs(scene.dimensions)]
         names += [x.name for x in effect.states(scene.dimensions)]
@@ -145,19 +153,29 @@ def _bodies(
     links: Sequence[Link], scope: Scope, dimensions: int
 ) -> tuple[tuple[Body, ...], Bindings]:
     """The bodies of links, in their order, with their joints; and the bindings of both."""
-    pairs = [_body(link, scope, dimensions) for link in links]
-    return tuple(body for body, _ in pairs), joined(bindings for _, bindings in pairs)
+    bodies, found = list[Body](), list[Bindings]()
+    for link in links:
+        body, bindings = _body(link, scope, dimensions, {b.name: b.com for b in bodies if b.com})
+        bodies.append(body)
+        found.append(bindings)
+    return tuple(bodies), joined(found)
 
 
-def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
-    joint = normalised_joint(link.joint, link.joint_location, dimensions)
-    table, of_body = bind(link.body, link.body.name, link.location, scope)
+def _body(link: Link, scope: Scope, dimensions: int, centres: Centres) -> tuple[Body, Bindings]:
+    """A body with its joint; `centres` are those of the bodies before it."""
+    turned, kept = oriented(link.joint, link.joint_location, dimensions, scope)
+    joint = normalised_joint(turned, link.joint_location, dimensions)
+    given = link.body
+    if given.com:
+        at = f"{link.location}.com"
+        given = given.replaced(com=with_components(given.com, ZERO, dimensions, at))
+    table, of_body = bind(given, given.name, link.location, scope)
     inertia_com = entries_of_inertia(table, link.location, dimensions)
     values = of_body.values(scope)
     at = f"{link.location}.inertia_com"
-    conditions = tuple(of_inertia(at, table.name, table.mass, inertia_com, values))
-    require(conditions, values)
+    conditions, notice = _checked_inertia(table, inertia_com, at, values)
     joint, of_joint = bind(joint, joint.name, link.joint_location, scope)
+    joint = joint_from_centres(joint, {**centres, **({table.name: table.com} if table.com else {})})
     body = Body(
         name=table.name,
         mass=table.mass,
@@ -166,8 +184,35 @@ def _body(link: Link, scope: Scope, dimensions: int) -> tuple[Body, Bindings]:
         parent=link.parent,
         positions=joint.positions(dimensions),
         velocities=joint.velocities(dimensions),
+        com=table.com,
+        notices=notice,
     )
-    return body, joined([of_body, Bindings(conditions=conditions), of_joint])
+    return body, joined([of_body, Bindings(conditions=(*conditions, *kept)), of_joint])
+
+
+def _checked_inertia(
+    body: BodyTable, entries: tuple[Formula, ...], location: str, values: Mapping[str, float]
+) -> tuple[tuple[Condition, ...], tuple[str, ...]]:
+    """The conditions on an inertia, and a notice if it meets them only within printed digits.
+
+    Raises `SceneError` if it does not, unless the body says that it need not.
+    """
+
+    def conditions(rounding: float | None) -> tuple[Condition, ...]:
+        return tuple(of_inertia(location, body.name, body.mass, entries, values, rounding))
+
+    if body.inertia_check == "off":
+        return conditions(None), ()
+    found = conditions(ROUNDING)
+    if not any(condition.problem(values) for condition in found):
+        return found, ()
+    loose = conditions(PRINTED)
+    if any(condition.problem(values) for condition in loose):
+        require(found, values)
+    return loose, (
+        f"{location}: a principal moment of body '{body.name}' is larger than the other two "
+        "together, by less than 0.1 %; taken as rounding of printed digits",
+    )
 
 
 def _points(
@@ -176,13 +221,16 @@ def _points(
     """The named points and their bindings."""
     check_names([(point.name, f"points[{i}]") for i, point in enumerate(scene.points)])
     index = {body.name: k for k, body in enumerate(bodies)}
+    given = {point.name for point in scene.points if point.at}
     points, found = [], []
     for i, point in enumerate(scene.points):
         location = f"points[{i}]"
         check_known(point.body, f"{location}.body", index, "body")
         at = with_components(point.at, ZERO, scene.dimensions, f"{location}.at")
         point, bindings = bind(point.replaced(at=at), point.name, location, scope)
-        points.append(Point(point.name, index[point.body], point.at))
+        body = bodies[index[point.body]]
+        place = from_centre(point.at, body.com) if point.name in given else point.at
+        points.append(Point(point.name, index[point.body], place))
         found.append(bindings)
     return tuple(points), joined(found)
 
@@ -193,6 +241,7 @@ def _check_symbols(
     links: Sequence[Link],
     bodies: Sequence[Body],
     effects: Sequence[Effect],
+    scene: Scene,
 ) -> None:
     """Raise `SceneError`, with both locations, if a symbol of the equations would be ambiguous.
 
@@ -204,6 +253,8 @@ def _check_symbols(
     uses += [(c.name, "a coordinate", at) for body, at in joints for c in body.positions]
     uses += [(c.name, "a velocity", at) for body, at in joints for c in body.velocities]
     uses += [(c.acceleration, "an acceleration", at) for b, at in joints for c in b.velocities]
+    own = own_inputs(scene)
+    uses += [(own[k].name, "an input", f"inputs[{k}]") for k in range(len(own))]
     uses += [(i.name, "an input", at) for effect, at in located for i in effect.inputs(n)]
     uses += [(x.name, "a state", at) for effect, at in located for x in effect.states(n)]
     taken = {"t": ("time", ""), "pi": ("the number π", "")}

@@ -28,6 +28,9 @@ class Body:
                  xx, yy, zz, xy, xz, yz
     positions    all coordinates of the joint, whether states or prescribed
     velocities   all velocities of the joint, likewise
+    com          the centre of mass in the frame in which the scene gives points, m; () if that is
+                 its origin. All points of the model are from the centre of mass
+    notices      what elaboration accepted with a reservation
     """
 
     name: str
@@ -37,6 +40,8 @@ class Body:
     parent: int
     positions: tuple[Coordinate, ...]
     velocities: tuple[Coordinate, ...]
+    com: tuple[Formula, ...] = ()
+    notices: tuple[str, ...] = ()
 
     @property
     def plain(self) -> int:

@@ -10,21 +10,26 @@ import ctypes
 import hashlib
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
 from eomgen.codegen.backends import c
+from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import functions, heyoka, runs, taylor
+from eomgen.native import functions, heyoka, implicit, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
+from eomgen.program.program import Program
 from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
 from eomgen.run.problem import Problem
+from eomgen.run.works import Powers
 from eomgen.store import interfaced_program_of, key_of
+from eomgen.templating import templates_folder
 
 STARTING, AN_OPERATION = 0.2, 0.25e-3
 """Time to compile, s: a part for all, and a part for each operation. Measured from 11 to 24,500
@@ -40,6 +45,8 @@ class _Library:
     sources, main its sources, and the one that includes the others
     price         time to compile, s
     fail          called with the error of a compiler
+
+    `paid` is the time that Python took until it was compiled, and that of compiling, s.
     """
 
     def __init__(
@@ -47,7 +54,7 @@ class _Library:
     ) -> None:
         self._about, self._sources, self._main, self._price = about, sources, main, price
         self._fail = fail
-        self._looked, self._over = False, False
+        self._looked, self._over, self.paid = False, False, 0.0
         self._found: ctypes.CDLL | None = None
 
     def after(self, spent: float) -> ctypes.CDLL | None:
@@ -66,54 +73,103 @@ class _Library:
                 self._fail(str(error))
         return self._found
 
+    @property
+    def missing(self) -> float:
+        """Time to compile it, s; 0 if it is there."""
+        self.after(0.0)
+        return 0.0 if self._over else self._price
+
     def compile(self) -> None:
         """Compile it now, unless it is in the store. Raises `RunError`."""
-        self._over = True
+        self._over, begun = True, time.perf_counter()
         self._found = compiled_library(self._about, self._sources, self._main)
+        self.paid = self._price + time.perf_counter() - begun
 
 
 class Accelerator:
     """The compiled steps and functions of a model's module, at given parameters and inputs.
 
+    `program` is that of the model with its interface; None takes it from the store, or derives it.
     `used` tells whether a run has taken some. `notice` is why there are none although a run was
     long enough for them, or "".
     """
 
-    def __init__(self, model: Model, module: Any, parameters: Any, inputs: Any) -> None:
+    def __init__(
+        self,
+        model: Model,
+        module: Any,
+        parameters: Any,
+        inputs: Any,
+        *,
+        program: tuple[Program, Interface] | None = None,
+    ) -> None:
         self._model, self._module, self._values = model, module, (parameters, inputs)
+        self._program = program
         self._begun: float | None = None
         self._at_once = False
         self._libraries: dict[str, _Library] = {}
         self.used, self.notice = False, ""
 
+    def at(self, parameters: Any, inputs: Any) -> "Accelerator":
+        """The same at other values. Both have the same libraries, and the time that runs take is
+        that of both.
+        """
+        self._begun = self._begun or time.perf_counter()
+        made = copy(self)
+        made._values = (parameters, inputs)
+        return made
+
+    def function(self, name: str, python: functions.Value) -> functions.Value:
+        """An output as a function of time and state, which is compiled once that pays."""
+        compilable = functions.Compilable(
+            self._module, self._values, False, self._look, self._start
+        )
+        return compilable.function(name, python)
+
     def of(self, problem: Problem, module: Any = None) -> Problem:
         """The problem of the module, or of one with other constants, with its compiled steps and
         functions.
         """
-        perturbed, module = module is not None, module or self._module
-        made: list[runs.CompiledSteps] = []
-        compilable = functions.Compilable(module, self._values, perturbed, self._look, self._start)
-        problem = compilable.problem(problem)
+        origin, module = module and self._module, module or self._module
+        made: dict[tuple[str, ...], runs.CompiledSteps] = {}
+        stiff: list[implicit.CompiledImplicit] = []
+        problem = self._compilable(module, origin).problem(problem)
 
-        def compiled() -> runs.CompiledSteps | None:
-            library = self._of_steps(0.0)
-            if library is not None and not made:
-                made.append(runs.CompiledSteps(module, library, *self._values))
-            return made[0] if made else None
+        def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
+            if needed not in made:
+                libraries = self._all(("derivative", *needed))
+                if libraries is None:
+                    return None
+                own, beside = libraries["derivative"], {name: libraries[name] for name in needed}
+                made[needed] = runs.CompiledSteps(module, own, *self._values, beside)
+            return made[needed]
 
         @cache
         def series() -> taylor.CompiledTaylor | None:
             return self._taylor(module)
 
-        def steps(name: str) -> Steps | None:
+        def implicit_steps() -> implicit.CompiledImplicit | None:
+            if not stiff and (libraries := self._of_implicit_steps()):
+                given = (module, libraries, *self._values, origin)
+                stiff.append(implicit.CompiledImplicit(problem, *given))
+            return stiff[0] if stiff else None
+
+        def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
             if name == "taylor":
-                return of.steps if (of := series()) else None
-            found = held.named(name) if (held := compiled()) else None
+                return of.steps if not needed and (of := series()) else None
+            if name in implicit.METHODS:
+                other = None if needed else implicit_steps()
+                found = other.named(name) if other else None
+            else:
+                found = held.named(name, needed) if (held := compiled(needed)) else None
             self.used = self.used or found is not None
             return found
 
         def equal(name: str) -> EqualSteps | None:
-            found = held.equal(name) if (held := compiled()) else None
+            if name in implicit.GAUSS:
+                found = other.equal(name) if (other := implicit_steps()) else None
+            else:
+                found = held.equal(name, problem) if (held := compiled()) else None
             self.used = self.used or found is not None
             return found
 
@@ -125,6 +181,11 @@ class Accelerator:
         plain = problem.series["taylor"]
         made_of = {**problem.series, "taylor": of_solutions}
         return replace(problem, compiled=Compiled(problem.derivative, steps, equal), series=made_of)
+
+    def powers(self, powers: Powers) -> Powers:
+        """The same powers, which are compiled once that pays."""
+        compilable = self._compilable(self._module, None)
+        return replace(powers, powers=compilable.function("effect_powers", powers.powers))
 
     def compile(self) -> None:
         """Compile the steps now, unless they are in the store, and each function at its first call.
@@ -151,6 +212,9 @@ class Accelerator:
         self.used = True
         return taylor.CompiledTaylor(program, interface, module, found, self._values)
 
+    def _compilable(self, module: Any, origin: Any) -> functions.Compilable:
+        return functions.Compilable(module, self._values, origin, self._look, self._start)
+
     def _start(self) -> None:
         self.used = True
 
@@ -164,21 +228,69 @@ class Accelerator:
 
     def _of_steps(self, spent: float) -> ctypes.CDLL | None:
         """The library of the steps; they take as long as the run."""
+        return self._library("derivative").after(self._elapsed())
+
+    def _all(self, names: Sequence[str]) -> dict[str, ctypes.CDLL] | None:
+        """The libraries of steps and of the functions that check them. They are compiled one after
+        another, each once Python has taken as long as that takes.
+        """
+        left, found = math.inf if self._at_once else self._elapsed(), dict[str, ctypes.CDLL]()
+        for name in names:
+            of = self._library(name)
+            library = of.after(left)
+            if library is None:
+                return None
+            found[name] = library
+            left -= of.paid
+        return found
+
+    def _elapsed(self) -> float:
+        """The time since the first call, s."""
         now = time.perf_counter()
         if self._begun is None:
             self._begun = now
-        return self._library("derivative").after(now - self._begun)
+        return now - self._begun
+
+    def _of_implicit_steps(self) -> implicit.Libraries | None:
+        """The libraries of implicit steps, together: with fewer, Python makes all steps."""
+        now = time.perf_counter()
+        if self._begun is None:
+            self._begun = now
+        needed = [self._library(name) for name in implicit.NEEDED]
+        needed.append(self._methods)
+        pays = self._at_once or now - self._begun > sum(each.missing for each in needed)
+        found = [each.after(math.inf if pays else 0.0) for each in needed]
+        derivative, jacobian, methods = found
+        if derivative is None or jacobian is None or methods is None:
+            return None
+        return implicit.Libraries(derivative, jacobian, methods)
+
+    @cached_property
+    def _methods(self) -> _Library:
+        """The library of implicit methods, the same for all models."""
+        price = STARTING + AN_OPERATION * implicit.OPERATIONS
+        about = f"implicit methods {_digest()}"
+        return _Library(about, implicit.sources, implicit.MAIN, price, self._fail)
 
     def _library(self, name: str) -> _Library:
         if name not in self._libraries:
             self._libraries[name] = _Library(
                 library_key(self._model, name),
-                partial(_sources, self._model, name),
+                partial(self._sources, name),
                 {"derivative": runs.MAIN, "taylor": taylor.MAIN}.get(name, c.MAIN),
                 STARTING + AN_OPERATION * self._module.COST.get(name, {"total": 0})["total"],
                 self._fail,
             )
         return self._libraries[name]
+
+    def _sources(self, name: str) -> Mapping[str, str]:
+        """The sources of a function's library; with the derivative are the steps."""
+        program, interface = self._program or interfaced_program_of(self._model)
+        if name == "derivative":
+            return runs.sources(program, interface)
+        if name == "taylor":
+            return taylor.sources(program, interface)
+        return functions.sources(program, interface, name)
 
     def _fail(self, why: str) -> None:
         self.notice = why
@@ -213,16 +325,6 @@ _BY_HEYOKA: dict[str, Callable[[int], Any]] = {}
 """heyoka's integrators of each model so far, by its key."""
 
 
-def _sources(model: Model, name: str) -> Mapping[str, str]:
-    """The sources of a function's library; with the derivative are the steps."""
-    program, interface = interfaced_program_of(model)
-    if name == "derivative":
-        return runs.sources(program, interface)
-    if name == "taylor":
-        return taylor.sources(program, interface)
-    return functions.sources(program, interface, name)
-
-
 def library_key(model: Model, name: str = "derivative") -> str:
     """What determines these sources."""
     return f"{name} {key_of(model)} {_digest()}"
@@ -232,8 +334,11 @@ def library_key(model: Model, name: str = "derivative") -> str:
 def _digest() -> str:
     """A digest of the files that, beside the model, determine the sources of a library."""
     here = Path(__file__).resolve().parent
-    methods = here.parent / "run" / "integrators"
+    run = here.parent / "run"
     found = hashlib.sha256()
-    for path in (*sorted(here.glob("*.py")), *sorted(methods.glob("*.py"))):
+    checks = [run / f"{name}.py" for name in ("branches", "events", "roots")]
+    folders = (here, "*.py"), (run / "integrators", "*.py"), (templates_folder() / "c", "*.jinja")
+    listed = [path for folder, names in folders for path in sorted(folder.glob(names))]
+    for path in (*listed, *checks):
         found.update(path.name.encode() + b"\0" + path.read_bytes())
     return found.hexdigest()

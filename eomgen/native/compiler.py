@@ -21,10 +21,12 @@ FLAGS = ("-std=c99", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno",
 """No fast mathematics and no contraction: they would change the last bits of results."""
 TUNING = ("-march=native",)
 """Further flags for code that runs on this processor only."""
-TUNING_GCC = (*TUNING, "-fschedule-insns", "-fsched-pressure", "-fno-tree-slp-vectorize")
-"""The same for GCC, whose default on x86 is not to order instructions before registers are
-allocated. Long straight-line code gains 5 to 30 percent, and no bit changes. Where statements are
-joined into vectors, GCC 12 contracts a*b ± c in spite of `FLAGS`, so they are not joined."""
+ORDERED = ("-fschedule-insns", "-fsched-pressure")
+"""Flags of GCC, whose default on x86 is not to order instructions before registers are allocated.
+Long straight-line code gains 5 to 30 percent, and no bit changes."""
+NOT_JOINED = "-fno-tree-slp-vectorize"
+"""A flag of GCC, which 12 contracts a*b ± c where it joins statements into vectors, in spite of
+`FLAGS`."""
 KNOWN = ("cc", "gcc", "clang")
 ABSENT = (
     "no C compiler is found; install gcc or clang, name one in CC, or run: "
@@ -37,12 +39,13 @@ LONGEST = 600.0
 @dataclass(frozen=True)
 class Compiler:
     """A C compiler: its command, what it prints as its version and target with the processor that
-    it compiles for, and flags for that one.
+    it compiles for, flags for that one, and flags for the order of instructions.
     """
 
     command: tuple[str, ...]
     version: str
     tuning: tuple[str, ...] = ()
+    ordering: tuple[str, ...] = ()
 
     def shared_library(self, sources: Mapping[str, str], main: str, *flags: str) -> bytes:
         """Compile the file `main` of `sources` (name to text) into a shared library; return its
@@ -107,13 +110,16 @@ def _asked(command: tuple[str, ...]) -> Compiler:
         [*command, "--version"], capture_output=True, text=True, timeout=60, check=True
     )
     version, processor = done.stdout.strip(), _processor()
+    gcc = "Free Software Foundation" in version
+    ordering = ORDERED if gcc else ()
     tuning: tuple[str, ...] = ()
     if processor and "ziglang" not in command:  # zig compiles for this processor by default
-        if "Free Software Foundation" in version:
-            tuning = TUNING_GCC
+        if gcc:
+            tuning = (*TUNING, *ordering, NOT_JOINED)
         elif "clang" in version:
             tuning = TUNING
-    return Compiler(command, f"{version} {platform.machine()} {sys.platform} {processor}", tuning)
+    about = f"{version} {platform.machine()} {sys.platform} {processor}"
+    return Compiler(command, about, tuning, ordering)
 
 
 def _processor() -> str:

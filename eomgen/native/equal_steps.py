@@ -10,33 +10,42 @@ import numpy as np
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.run.compiled import Array, EqualSteps, EqualStride
+from eomgen.run.integrators.leapfrog import rates_of
 from eomgen.run.integrators.runge_kutta_4 import TABLEAU
 from eomgen.run.integrators.tableau import terms
+from eomgen.run.problem import Problem
 from eomgen.templating import render
 
-METHODS = {"euler": 1, "semi_implicit_euler": 2, "runge_kutta_4": len(TABLEAU.b)}
+METHODS = {"euler": 1, "semi_implicit_euler": 2, "runge_kutta_4": len(TABLEAU.b), "leapfrog": 1}
 """The derivatives in a step, by the name of the method."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _MADE_ALL = 0
 
 
-class _Stride(ctypes.Structure):
+class Stride(ctypes.Structure):
+    """See `templates/c/equal_stride.c.jinja`."""
+
     _fields_ = (
         *((name, _POINTER) for name in ("k", "u", "allowed")),
         *((name, _REAL) for name in ("t_start", "t_end", "dt")),
         ("before", _WHOLE),
         ("most", _WHOLE),
+        ("more", _POINTER),
         *((name, _POINTER) for name in ("rate", "place", "slope", "ends", "states", "losses")),
+        ("iterations", _POINTER),
     )
 
 
 def source(interface: Interface) -> str:
     """The C source of the methods, which follows that of `templates/c/runs.c.jinja`."""
     rows = zip(TABLEAU.a[1:], TABLEAU.c[1:], strict=True)
+    states = list(enumerate(interface.states))
     context = {
         "prefix": interface.name,
         "methods": list(METHODS),
-        "positions": [i for i, state in enumerate(interface.states) if state.position],
+        "unit": "unit(",
+        "positions": [i for i, state in states if state.position],
+        "others": [i for i, state in states if not state.position],
         "stages": [(i, repr(float(node)), _sum(row)) for i, (row, node) in enumerate(rows, 1)],
         "count": len(TABLEAU.b),
         "end_sum": _sum(TABLEAU.b),
@@ -48,19 +57,21 @@ def _sum(row: Sequence[float]) -> str:
     return " + ".join(f"{float(factor)!r} * k[{j}][j]" for j, factor in terms(row))
 
 
-def steps(library: ctypes.CDLL, name: str, constants: Any, inputs: Array) -> EqualSteps:
+def steps(
+    library: ctypes.CDLL, name: str, constants: Any, inputs: Array, problem: Problem
+) -> EqualSteps:
     """The steps of a method, at the constants of parameters and at inputs."""
-    call = library[f"steps_{name}"]
-    call.restype = ctypes.c_int
-    call.argtypes = [_REAL, *[_POINTER] * 4]
-    return partial(_made, call, METHODS[name], constants, inputs)
+    more = np.ascontiguousarray(rates_of(problem)) if name == "leapfrog" else None
+    held = ctypes.cast(constants, _POINTER), inputs, more
+    return partial(made, library[f"steps_{name}"], METHODS[name], *held)
 
 
-def _made(
+def made(
     call: Any,
     calls: int,
     constants: Any,
-    inputs: Array,
+    inputs: Array | None,
+    more: Any,
     t: float,
     y: Array,
     lost: Array,
@@ -71,24 +82,35 @@ def _made(
     made: int,
     most: int,
     limits: tuple[Array, Array],
+    iterates: bool = False,
 ) -> EqualStride:
-    """Make steps, with the arguments of `run.compiled.EqualSteps`."""
+    """Make steps, with the arguments of `run.compiled.EqualSteps`.
+
+    call   the method's function
+    calls  derivatives in a step, or in an iteration if it `iterates`
+    more   what only this method needs, an array or a structure
+    """
+    call.restype = ctypes.c_int
+    call.argtypes = [_REAL, *[_POINTER] * 4]
     ny, count = len(y), ctypes.c_int64()
     rate, allowed = np.array(limits[0]), np.ascontiguousarray(limits[1])
     start = [np.ascontiguousarray(array) for array in (y, lost)]
     place, slope = np.empty((2, ny))
     ends, (states, losses) = np.empty(most), np.empty((2, most, ny))
+    iterations = np.empty(most, np.int64) if iterates else None
     arrays = (rate, place, slope, ends, states, losses)
-    stride = _Stride(
-        ctypes.cast(constants, _POINTER),
-        inputs.ctypes.data,
+    stride = Stride(
+        constants,
+        None if inputs is None else inputs.ctypes.data,
         allowed.ctypes.data,
         t_start,
         t_end,
         dt,
         made,
         most,
+        more.ctypes.data if isinstance(more, np.ndarray) else more and ctypes.addressof(more),
         *(array.ctypes.data for array in arrays),
+        None if iterations is None else iterations.ctypes.data,
     )
     why = call(
         t,
@@ -99,5 +121,13 @@ def _made(
     )
     n = count.value
     return EqualStride(
-        ends[:n], states[:n], losses[:n], calls, rate, place, slope, usual=why == _MADE_ALL
+        ends[:n],
+        states[:n],
+        losses[:n],
+        calls,
+        rate,
+        place,
+        slope,
+        usual=why == _MADE_ALL,
+        iterations=None if iterations is None else iterations[:n],
     )

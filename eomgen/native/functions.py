@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.codegen.backends import c
+from eomgen.codegen.backends import c_directions
 from eomgen.codegen.interface import Interface
 from eomgen.native.beside import impact_numbers
 from eomgen.native.module import Kernels, outputs_of, usual_constants
@@ -44,24 +44,21 @@ def restricted(
 
 def sources(program: Program, interface: Interface, name: str) -> Mapping[str, str]:
     """The C sources of the library of one function."""
-    return c.library(*restricted(program, interface, (name,)))
+    return c_directions.library(*restricted(program, interface, (name,)))
 
 
 def compiled_function(
-    module: Any, library: ctypes.CDLL, name: str, p: Any, u: Any, *, perturbed: bool = False
+    module: Any, library: ctypes.CDLL, name: str, p: Any, u: Any, *, origin: Any = None
 ) -> Callable[..., FloatArray | None] | None:
     """A function (t, y, extra) at given parameters and inputs, which returns None for what the
     module must compute. None if that is all.
 
-    perturbed  whether the module has other constants than those of its parameters
+    origin  the module that had the constants of its parameters, if this one has perturbed ones
 
     The library must have no other function.
     """
     kernels = Kernels(module, library)
-    constants, inputs = usual_constants(module, name, p), kernels.given(u)
-    if constants is not None and len(constants) != max(1, kernels.constants):
-        # The module computes it in two parts, as Jacobians along directions.
-        constants = None if perturbed else kernels.held(p)
+    constants, inputs = constants_of(kernels, name, p, origin), kernels.given(u)
     if constants is None or inputs is None:
         return None
     shape = outputs_of(library)[name]
@@ -78,18 +75,38 @@ def compiled_function(
     return value
 
 
+def constants_of(kernels: Kernels, name: str, p: Any, origin: Any = None) -> Any:
+    """The constants of the only function of a library, a C array; None if it cannot be used.
+
+    origin  the module that had the constants of its parameters, if that of the kernels has
+            perturbed ones
+    """
+    constants = usual_constants(kernels.module, name, p)
+    if constants is None or len(constants) == max(1, kernels.constants):
+        return constants
+    # The module computes it in two parts, as Jacobians along directions.
+    held = kernels.held(p)
+    if not origin or held is None:
+        return held
+    true = usual_constants(origin, name, p)
+    moved = {} if true is None else dict(zip(true, constants, strict=True))
+    if not moved.keys() >= set(held):
+        return None
+    return type(held)(*(moved[value] for value in held))
+
+
 @dataclass(frozen=True)
 class Compilable:
     """What compiles single functions of a module, at given parameters and inputs.
 
-    perturbed  whether the module has other constants than those of its parameters
-    look       for the name of a function: see `Look`
-    started    called when a compiled function is used for the first time
+    origin   the module that had the constants of its parameters, if this one has perturbed ones
+    look     for the name of a function: see `Look`
+    started  called when a compiled function is used for the first time
     """
 
     module: Any
     values: tuple[Any, Any]
-    perturbed: bool
+    origin: Any
     look: Callable[[str], Look]
     started: Callable[[], None]
 
@@ -140,7 +157,7 @@ class Compilable:
                 library = look(spent)
                 if library is not None:
                     compiled = compiled_function(
-                        self.module, library, name, *self.values, perturbed=self.perturbed
+                        self.module, library, name, *self.values, origin=self.origin
                     )
                     if compiled is not None:
                         self.started()

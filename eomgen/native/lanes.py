@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c_lanes
 from eomgen.codegen.interface import Interface
+from eomgen.native.compiler import find_compiler
 from eomgen.native.library import compiled_library
 from eomgen.native.module import USUAL, USUAL_CONSTANT
 from eomgen.program.program import Program
@@ -60,7 +61,7 @@ def width() -> int:
     return int(probe.width())
 
 
-class _Columns(ctypes.Structure):
+class Columns(ctypes.Structure):
     _fields_ = (("values", _POINTER), ("many", _LONG))
 
 
@@ -68,6 +69,7 @@ class _Times(ctypes.Structure):
     _fields_ = (
         *((name, _REAL) for name in ("t_start", "t_end", "dt", "last")),
         *((name, _WHOLE) for name in ("steps", "every")),
+        *((name, _POINTER) for name in ("done", "stop")),
     )
 
 
@@ -78,11 +80,15 @@ class Lanes:
     all. Raises `RunError` if there is no compiler, or if it fails.
     """
 
+    main = c_lanes.MAIN
+    """The source that includes the others."""
+
     def __init__(self, texts: Mapping[str, str], lanes: int | None = None) -> None:
         lanes = lanes or width()
         about = f"lanes {lanes} {sorted(texts.items())!r}"
-        flags = (f"-DWIDTH={lanes}", *FLAGS[lanes])
-        self.library = compiled_library(about, lambda: texts, c_lanes.MAIN, *flags)
+        fused = ("-mfma",) if lanes == 2 < width() else ()  # as those that are wider
+        flags = (f"-DWIDTH={lanes}", *FLAGS[lanes], *fused, *find_compiler().ordering)
+        self.library = compiled_library(about, lambda: texts, self.main, *flags)
         sizes = (_LONG * 5).in_dll(self.library, "sizes")
         self.states, self.inputs, self.parameters, self.constants, self.lanes = sizes
         text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(self.library, "outputs")))
@@ -105,7 +111,7 @@ class Lanes:
     def function(self, name: str) -> Any:
         """The compiled function of an output, see `templates/c/lanes.c.jinja`."""
         call = self.library[f"columns_{name}"]
-        call.argtypes, call.restype = [_LONG, _REAL, *[_Columns] * 3, *[_POINTER] * 2], None
+        call.argtypes, call.restype = [_LONG, _REAL, *[Columns] * 3, *[_POINTER] * 2], None
         return call
 
     def output(
@@ -119,11 +125,22 @@ class Lanes:
         return out.reshape(*shape, n), sound != 0
 
     def rk4(
-        self, y: FloatArray, k: FloatArray, u: FloatArray, *, t_end: float, dt: float, every: int
+        self,
+        y: FloatArray,
+        k: FloatArray,
+        u: FloatArray,
+        *,
+        t_end: float,
+        dt: float,
+        every: int,
+        addresses: tuple[int, int] | None = None,
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Runs from states (ny, n) at 0 to `t_end` by the classical Runge-Kutta method, with steps
         of `dt`: rows (r, ny, n) after each `every`-th step and at the end, and which runs are
         valid: finite, and with steps that look short enough for stability.
+
+        Of two 64-bit integers at `addresses`, members that have ended are counted in the first, and
+        all runs end early once the second is not 0.
         """
         y = np.ascontiguousarray(y, dtype=float)
         n, steps = y.shape[1], int(count_steps(t_end, dt))
@@ -131,9 +148,11 @@ class Lanes:
         last = dt if whole else t_end - (steps - 1) * dt
         rows = np.empty((math.ceil(steps / every), self.states, n))
         sound = np.zeros(n, dtype=np.int8)
-        times = _Times(0.0, t_end, dt, last, steps, every)
+        idle = np.zeros(2, dtype=np.int64)
+        shared = addresses or (idle.ctypes.data, idle.ctypes.data + 8)
+        times = _Times(0.0, t_end, dt, last, steps, every, *shared)
         call = self.library.rk4
-        call.argtypes, call.restype = [_POINTER, _LONG, *[_Columns] * 3, *[_POINTER] * 2], None
+        call.argtypes, call.restype = [_POINTER, _LONG, *[Columns] * 3, *[_POINTER] * 2], None
         call(
             ctypes.byref(times),
             n,
@@ -144,12 +163,12 @@ class Lanes:
         return rows, sound != 0
 
 
-def columns_of(*arrays: FloatArray) -> list[_Columns]:
+def columns_of(*arrays: FloatArray) -> list[Columns]:
     """Arrays of one column, or of one for each state, as arguments of the library's functions; they
     must outlive the call.
     """
     assert all(array.flags.c_contiguous and array.dtype == np.float64 for array in arrays)
-    return [_Columns(array.ctypes.data, array.shape[1] > 1) for array in arrays]
+    return [Columns(array.ctypes.data, array.shape[1] > 1) for array in arrays]
 
 
 def _usual(p: FloatArray, k: FloatArray) -> NDArray[np.bool_]:

@@ -86,7 +86,7 @@ class Kernels:
     def given(self, u: Any, *columns: int) -> FloatArray | None:
         """Inputs as an array; None if the Python module must be used."""
         if u is None:
-            return np.zeros(self.inputs)
+            return np.array([*self.module.INPUTS.values()], dtype=np.float64)
         values = _ordered(u, self.module.INPUTS)
         if values is None or values.shape not in ((self.inputs,), (self.inputs, *columns)):
             return None
@@ -95,7 +95,7 @@ class Kernels:
     def output(self, name: str, shape: tuple[int, ...]) -> Callable[..., Any]:
         """The function of an output: (t, y, p=None, u=None), where y may have columns."""
         python, states = getattr(self.module, name), self.states
-        own, none = self.held(None), bytes(8 * self.inputs)
+        own, none = self.held(None), np.array([*self.module.INPUTS.values()], np.float64).tobytes()
         buffer = _REAL * math.prod(shape)
         one = self.library[f"checked_{name}"]
         one.argtypes = [_REAL, *[_POINTER] * 5]

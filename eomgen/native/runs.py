@@ -1,7 +1,7 @@
 """Whole steps of a method in compiled code, with the bits of the same steps made in Python."""
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -9,17 +9,19 @@ import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
-from eomgen.native import equal_steps
+from eomgen.native import checked, equal_steps
 from eomgen.native.functions import restricted
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
-from eomgen.run.compiled import Array, EqualSteps, Steps, Stride
+from eomgen.run.compiled import Array, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators import dormand_prince_8 as dop853
 from eomgen.run.integrators.dop853_coefficients import NODES, Row
-from eomgen.run.problem import USUAL_LENGTH
+from eomgen.run.problem import USUAL_LENGTH, Problem
 from eomgen.templating import render
 
 MAIN = "runs.c"
+METHODS = ("dop853", *equal_steps.METHODS)
+"""The methods whose steps this library makes."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _UNUSUAL = 2
 """What C returns before a step that Python must make."""
@@ -51,6 +53,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "smallest": repr(dop853.SMALLEST),
         "greatest": repr(dop853.GREATEST),
         "short_weight": repr(dop853.SHORT_WEIGHT),
+        **checked.context(),
     }
     main = render(c.TEMPLATES, "runs.c.jinja", context) + equal_steps.source(interface)
     return {**c.library(program, interface), MAIN: main}
@@ -65,13 +68,15 @@ class _Settings(ctypes.Structure):
     _fields_ = (
         *((name, _POINTER) for name in ("k", "u", "atol")),
         *((name, _REAL) for name in ("rtol", "longest", "t_end")),
+        ("dense", _WHOLE),
     )
 
 
 class _Records(ctypes.Structure):
     _fields_ = (
         *((name, _POINTER) for name in ("ends", "lengths", "states", "slopes", "losses")),
-        *((name, _POINTER) for name in ("derivatives", "sampled", "times", "rows")),
+        *((name, _POINTER) for name in ("switched", "values", "terms", "derivatives", "sampled")),
+        *((name, _POINTER) for name in ("switches", "gap_checks", "times", "rows")),
         ("count", _WHOLE),
     )
 
@@ -79,30 +84,43 @@ class _Records(ctypes.Structure):
 class CompiledSteps:
     """The compiled steps of a module at given parameters and inputs.
 
-    The constants are those that the module computes, also where it is a perturbed one.
+    The constants are those that the module computes, also where it is a perturbed one. `beside` are
+    the libraries of the functions that steps are checked with, by name.
     """
 
-    def __init__(self, module: Any, library: ctypes.CDLL, p: Any, u: Any) -> None:
+    def __init__(
+        self,
+        module: Any,
+        library: ctypes.CDLL,
+        p: Any,
+        u: Any,
+        beside: Mapping[str, ctypes.CDLL] | None = None,
+    ) -> None:
         kernels = Kernels(module, library)
+        self._checks = checked.functions(module, beside or {}, p)
         self._constants = usual_constants(module, "derivative", p)
         self._inputs = kernels.given(u)
         self._states = kernels.states
         self._library, self._call = library, library.dop853
         self._call.restype = ctypes.c_int
-        self._call.argtypes = [_POINTER, _WHOLE, _REAL, _REAL, *[_POINTER] * 5]
+        self._call.argtypes = [_POINTER, _POINTER, _WHOLE, _REAL, _REAL, *[_POINTER] * 5]
 
-    def named(self, name: str) -> Steps | None:
-        """The steps of a method; None if there are none for it, these parameters or inputs."""
+    def named(self, name: str, needed: Sequence[str] = ()) -> Steps | None:
+        """The steps of a method that are checked with some functions; None if there are none for
+        it, for these functions, parameters or inputs.
+        """
         if self._constants is None or self._inputs is None or name != "dop853":
+            return None
+        if not set(needed) <= self._checks.keys():
             return None
         held = ctypes.cast(self._constants, _POINTER), self._inputs.ctypes.data
         return partial(self._dop853, held)
 
-    def equal(self, name: str) -> EqualSteps | None:
+    def equal(self, name: str, problem: Problem) -> EqualSteps | None:
         """The same for methods with equal steps."""
         if self._constants is None or self._inputs is None or name not in equal_steps.METHODS:
             return None
-        return equal_steps.steps(self._library, name, self._constants, self._inputs)
+        return equal_steps.steps(self._library, name, self._constants, self._inputs, problem)
 
     def _dop853(
         self,
@@ -117,19 +135,27 @@ class CompiledSteps:
         longest: float,
         times: Array,
         most: int,
+        watched: Watched | None = None,
+        sizes: Array | None = None,
+        dense: bool = False,
     ) -> Stride:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
         ends, lengths = np.empty((2, most))
         states, slopes, losses = np.empty((3, most, ny))
-        derivatives, sampled = np.empty((2, most), np.int64)
+        derivatives, sampled, switches, gap_checks = np.empty((4, most), np.int64)
+        watch, pointed = checked.watch(self._checks, watched, sizes)
+        switched, values = np.empty(most), np.empty((most, watch.switching.count))
         rows, made = np.empty((len(times), ny)), ctypes.c_int64()
-        arrays = (ends, lengths, states, slopes, losses, derivatives, sampled, times, rows)
+        terms = np.empty((most if dense else 0, 7, ny))
+        arrays: list[Any] = [ends, lengths, states, slopes, losses, switched, values, terms]
+        arrays += [derivatives, sampled, switches, gap_checks, times, rows]
         records = _Records(*(array.ctypes.data for array in arrays), len(times))
-        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end)
+        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end, dense)
         start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
         why = self._call(
             ctypes.byref(settings),
+            ctypes.byref(watch),
             most,
             t,
             float(memory["h_abs"]),
@@ -137,6 +163,7 @@ class CompiledSteps:
             ctypes.byref(records),
             ctypes.byref(made),
         )
+        del pointed
         n = made.value
         passed = int(sampled[n - 1]) if n else 0
         return Stride(
@@ -146,5 +173,18 @@ class CompiledSteps:
             derivatives[:n],
             sampled[:n],
             rows[:passed].copy(),  # the array for all rows to come is not kept with them
+            switched[:n],
+            values[:n],
+            switches[:n],
+            gap_checks[:n],
             usual=why != _UNUSUAL,
+            within=partial(_within, t, y, ends, states, terms) if dense else None,
         )
+
+
+def _within(
+    t: float, y: Array, ends: Array, states: Array, terms: Array, i: int, time: float
+) -> Array:
+    """The state at a time in step number i of those that begin at t with the state y."""
+    start, first = (float(ends[i - 1]), states[i - 1]) if i else (t, y)
+    return dop853.interpolated(start, float(ends[i]) - start, first, terms[i], time)

@@ -14,7 +14,7 @@ from eomgen.program.program import Program, live_steps
 from eomgen.program.series import coefficients
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 from eomgen.program.taylor import NoSeriesError, Recurrences, recurrences
-from eomgen.run.compiled import Array, Series, Stride
+from eomgen.run.compiled import Array, Series, Stride, Watched
 from eomgen.run.integrators.taylor import HIGHEST, order_of
 from eomgen.run.module import given_values
 from eomgen.run.problem import USUAL_LENGTH
@@ -139,8 +139,12 @@ class CompiledTaylor:
         longest: float,
         times: Array,
         most: int,
+        watched: Watched | None = None,
+        sizes: Array | None = None,
+        dense: bool = False,
     ) -> Stride:
-        """Steps, with the arguments of `run.compiled.Steps`."""
+        """Steps, with the arguments of `run.compiled.Steps`; they are not checked for branches."""
+        assert watched is None and sizes is None and not dense
         ny = self._states
         # Numbers and counts are parts of one array each: to ask for an address takes a microsecond.
         numbers, counts = np.empty((2 + 2 * ny) * most), np.empty(2 * most, np.int64)
@@ -168,6 +172,10 @@ class CompiledTaylor:
             derivatives[:n],
             sampled[:n],
             rows[:passed].copy(),  # the array for all rows to come is not kept with them
+            switched=np.empty(n),
+            values=np.empty((n, 0)),
+            switches=np.zeros(n, np.int64),
+            gap_checks=np.zeros(n, np.int64),
             usual=why != _UNUSUAL,
             ended=why == _AT_END,
         )

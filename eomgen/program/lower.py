@@ -2,9 +2,11 @@
 
 SymPy's sums and products have many operands in no particular order of evaluation. Lowering chooses
 one: factors that depend on parameters alone are multiplied first, so that their product is computed
-once, and terms with the same such coefficient are added before they are multiplied by it.
+once. Such coefficients of one product are added. Then terms with the same coefficient are added
+before they are multiplied by it.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -37,7 +39,7 @@ class Lowering:
 
     def _lower(self, expression: Any) -> Node:
         if expression.is_Number:
-            return self._tape.constant(float(expression))
+            return self._number(expression)
         if expression.is_Symbol:
             node = self.lower(self._defined[expression])
             if node.step.operation not in ("input", "constant", "neg"):
@@ -49,7 +51,14 @@ class Lowering:
             fixed, moving = self._factors(expression)
             return fixed * moving if fixed.step.stage <= Stage.PARAMETERS else moving
         name = type(expression).__name__
-        return self._tape.apply(name, self.lower(expression.args[0]))
+        return self._tape.apply(name, *[self.lower(part) for part in expression.args])
+
+    def _number(self, number: Any) -> Node:
+        """A number; if it is too large for a double, a product that overflows when computed."""
+        if math.isfinite(float(number)):
+            return self._tape.constant(float(number))
+        root = self._number(sp.sqrt(abs(number)))
+        return root * root if number > 0 else -(root * root)
 
     def _factors(self, expression: Any) -> tuple[Node, Node]:
         """A product split in two: the factors that depend on parameters alone, and the rest."""
@@ -78,13 +87,19 @@ class Lowering:
         return parts[0], parts[1]
 
     def _sum(self, expression: Any) -> Node:
-        groups: dict[int, tuple[Node, list[Node]]] = {}
+        coefficients: dict[int, tuple[Node, list[Node]]] = {}
         plain: list[Node] = []
         for term in expression.args:
             fixed, moving = self._factors(term)
             if moving.step.stage <= Stage.PARAMETERS:
                 plain.append(fixed * moving)
                 continue
+            if moving.step.operation == "neg":
+                fixed, moving = -fixed, -moving
+            coefficients.setdefault(moving.index, (moving, []))[1].append(fixed)
+        groups: dict[int, tuple[Node, list[Node]]] = {}
+        for moving, parts in coefficients.values():
+            fixed = _positive_first(parts, self._tape)
             if fixed.step.operation == "neg":
                 fixed, moving = -fixed, -moving
             groups.setdefault(fixed.index, (fixed, []))[1].append(moving)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import chain, count
 
 from eomgen.program.program import Program, live_steps
-from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
+from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage, Step
 
 SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 LONGEST_INLINE = 72
@@ -20,12 +20,15 @@ class Dialect:
     """How a language spells each function, its reserved words, and the format of a number.
 
     assigned  functions whose value is always assigned to a variable
+    fused     functions of (a, b, c) that compute a b + c, a b - c and c - a b with one rounding;
+              they are called for products that are used nowhere else; none if empty
     """
 
     functions: Mapping[str, str]
     reserved: frozenset[str]
     number: str = "{}"
     assigned: frozenset[str] = frozenset()
+    fused: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -151,6 +154,13 @@ def print_block(
     uses.update(chain.from_iterable(steps[i].operands for i in live if i not in given))
 
     results, kept = frozenset(nodes), frozenset(keep)
+    products = frozenset(
+        o
+        for i in live
+        if dialect.fused and i not in given and steps[i].operation in ("add", "sub")
+        for o in steps[i].operands
+        if steps[o].operation == "mul" and uses[o] == 1 and o not in given | kept
+    )
     text: dict[int, tuple[str, int]] = {}
     lines: list[tuple[str, str]] = []
     assigned: list[int] = []
@@ -166,7 +176,11 @@ def print_block(
         if step.operation in FUNCTIONS:
             functions[step.operation] = None
         source, level = _expression(step.operation, [text[o] for o in step.operands], dialect)
-        long = len(source) > LONGEST_INLINE and i not in results
+        product = next((o for o in step.operands if o in products), None)
+        if product is not None and step.operation in ("add", "sub"):
+            factors = [text[o] for o in steps[product].operands]
+            source, level = _fused(step, product, factors, text, dialect)
+        long = len(source) > LONGEST_INLINE and i not in results and i not in products
         if i in kept or uses[i] > 1 or long or step.operation in dialect.assigned:
             lines.append((names[i], source))
             assigned.append(i)
@@ -186,6 +200,22 @@ def print_block(
         nodes=tuple(assigned),
         taken=tuple(i for i in live if i in known),
     )
+
+
+def _fused(
+    step: Step,
+    product: int,
+    factors: Sequence[tuple[str, int]],
+    text: Mapping[int, tuple[str, int]],
+    dialect: Dialect,
+) -> tuple[str, int]:
+    """The same for a sum or a difference of which one operand is a product of `factors`."""
+    a, b = factors
+    c = text[next(o for o in step.operands if o != product)]
+    add, less, from_other = dialect.fused
+    first = step.operands[0] == product
+    called = add if step.operation == "add" else less if first else from_other
+    return f"{called}({a[0]}, {b[0]}, {c[0]})", _ATOM
 
 
 def _expression(

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from operator import neg
 from typing import Any
 
@@ -50,6 +50,15 @@ class Program:
     outputs: Mapping[str, Output]
     names: Mapping[int, str]
     checks: tuple[Check, ...]
+
+    @cached_property
+    def operations(self) -> Mapping[str, int]:
+        """The operations of each output, without those on parameters alone: `cost` in total."""
+        counted = bytearray(s[2] > Stage.PARAMETERS and s[0] in COUNTED for s in self.steps)
+        found = {}
+        for name, output in self.outputs.items():
+            found[name] = sum([counted[i] for i in live_steps(self, output.nodes)])
+        return found
 
     def __str__(self) -> str:
         """The program as pseudo-code, one line for each step."""

@@ -24,7 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.run.compiled import Watched
 from eomgen.run.problem import FloatArray, Problem, Switching
+from eomgen.run.roots import root
 from eomgen.run.schedule import Schedule
 
 MOST_EVALUATIONS = 200
@@ -42,6 +44,8 @@ IRREGULAR = (0.3819660112501051, 0.7548776662466927)
 fraction of it, has other values there than at the ends."""
 TOGETHER = 1e-9
 """Fraction of a step within which switches count as one."""
+LOCATED = 1e-12
+"""Fraction of a step to which a switch is located."""
 INSIDE = 1 / 8
 """A step that ends at least this fraction of the time between two switches after the first one has
 evaluated the branch between them."""
@@ -54,6 +58,10 @@ _TO_BERNSTEIN = np.linalg.inv(
     np.array([[math.comb(_LAST, i) * x**i * (1 - x) ** (_LAST - i) for i in range(5)] for x in _AT])
 )
 _TO_CHEBYSHEV = np.linalg.inv(np.polynomial.chebyshev.chebvander(2 * _AT - 1, _LAST))
+INNER = _AT[1:-1]
+"""The inner ones of these points, (3,)."""
+FACTORS = np.vstack((_TO_BERNSTEIN, _TO_CHEBYSHEV[-2:]))
+"""(7, 5): from values at the points, the Bernstein and the last two Chebyshev coefficients."""
 
 States = Callable[[Any], FloatArray]
 """The states (n, ny) at times (n,) within a step, or the state (ny,) at a single time."""
@@ -125,6 +133,18 @@ class BranchMonitor:
         self.switched = float(memory["turned"])
         self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["checked"]]
 
+    def watched(self, t: float, length: float, most: int) -> Watched | None:
+        """What compiled steps from t on are checked with; None if the next step must be checked
+        here. Up to so many steps of about this length, s, are to be made.
+        """
+        functions = self.switching
+        if functions.of_state and (len(self._ends) < 2 or self._ends[-1][0] != t):
+            return None
+        clear = self._schedule.clear(t, length, most) if self._schedule else math.inf
+        if not t + length <= clear:
+            return None
+        return Watched(self._ends, self.switched, clear, functions.timed, functions.angles)
+
     def check(self, step: Step) -> Retry | None:
         """How a step must be repeated; None if it is accepted.
 
@@ -161,7 +181,7 @@ class BranchMonitor:
         if brackets:
             last = max(bracket.end for bracket in brackets)
             alone = len(brackets) + len(times) == 1 and _is_seen(self.switched, step.start, last)
-            times = sorted([*times, *(b.middle if alone else search.root(b) for b in brackets)])
+            times = sorted([*times, *(b.middle if alone else search.located(b) for b in brackets)])
         return times, whole and followed
 
     def _cut(self, step: Step, before: float, after: float) -> float | None:
@@ -303,10 +323,10 @@ class _Search:
         self, a: float, b: float, start: FloatArray, end: FloatArray, asked: Indices
     ) -> FloatArray:
         """Values (5, n) of some functions over a part, from those at its ends."""
-        within = self._at(a + (b - a) * _AT[1:-1])
+        within = self._at(a + (b - a) * INNER)
         return np.vstack((start, within[:, asked], end))
 
-    def root(self, bracket: _Bracket) -> float:
+    def located(self, bracket: _Bracket) -> float:
         """The time at which a function crosses 0 in a bracket, s."""
         step = self.step
 
@@ -316,9 +336,8 @@ class _Search:
         first, last = value(bracket.start), value(bracket.end)
         if not first * last < 0:  # 0 at an end, or not finite
             return bracket.start if first == 0 else bracket.end
-        from scipy.optimize import brentq  # here: few runs need it, and it loads slowly
-
-        return float(brentq(value, bracket.start, bracket.end, xtol=1e-12 * step.length))
+        ends = (first, last)
+        return root(value, bracket.start, bracket.end, ends, xtol=LOCATED * step.length)
 
     def _at(self, shares: FloatArray) -> FloatArray:
         """Values (n, ns) of the functions at fractions (n,) of the step."""
@@ -344,8 +363,11 @@ def _classified(values: FloatArray) -> tuple[Flags, Flags]:
     The error of the interpolating polynomial is taken to be less than `rest`, twice the magnitude
     of its last two Chebyshev coefficients.
     """
-    inner = _TO_BERNSTEIN @ values
-    rest = 2 * np.abs((_TO_CHEBYSHEV @ values)[-2:]).sum(axis=0)
+    sums = FACTORS[:, :1] * values[0]
+    for j in range(1, _LAST + 1):  # in this order also in compiled steps, for the same bits
+        sums += FACTORS[:, j : j + 1] * values[j]
+    inner, ends = sums[:-2], np.abs(sums[-2:])
+    rest = 2 * (ends[0] + ends[1])
     free = (inner > rest).all(axis=0) | (inner <= -rest).all(axis=0)
     steps = np.diff(inner, axis=0)
     monotone = (steps > rest).all(axis=0) | (steps < -rest).all(axis=0)

@@ -49,14 +49,26 @@ def allowed_errors(
     """`atol` if given, else the default: for each state (ny,) if the problem has sizes."""
     if atol is not None:
         return atol
-    relative = min(ATOL, max(OF_RTOL * rtol, LEAST_ATOL))
     if not problem.sizes:
-        return relative
-    sizes = np.array(problem.sizes)
+        return _relative(rtol)
+    return errors_of_sizes(np.array(problem.sizes), problem, method, rtol, span)
+
+
+def errors_of_sizes(
+    sizes: FloatArray, problem: Problem, method: str, rtol: float, span: float
+) -> FloatArray:
+    """The default atol for states of these sizes, (ny,) or (ny, n), with the noise of `problem`."""
+    relative = _relative(rtol)
     if relative < ATOL and problem.noise is not None:
         least = least_tolerance(method, rtol) * problem.noise(span)
+        least = least.reshape(-1, *[1] * (sizes.ndim - 1))
         return np.asarray(np.minimum(np.maximum(relative * sizes, least), ATOL * sizes))
     return np.asarray(relative * sizes)
+
+
+def _relative(rtol: float) -> float:
+    """The default atol, relative to sizes."""
+    return min(ATOL, max(OF_RTOL * rtol, LEAST_ATOL))
 
 
 def check_tolerances(method: FixedStep | Adaptive, rtol: float, atol: float | None) -> None:

@@ -3,7 +3,7 @@
 `eomgen.native.runs` implements it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,7 +23,14 @@ class Stride:
     derivatives  (m,), calls of the derivative so far
     sampled      (m,), number of rows passed so far
     rows         (r, ny), the states at the times of these rows
+    switched     (m,), the time of the last switch so far, s
+    values       (m, ns), the switching functions at their ends
+    switches, gap_checks
+                 (m,), calls of switching functions, and of gaps and their rates, so far
     usual        whether the next step may be made so, too
+    jacobians, factorisations
+                 (m,), numbers of these so far; None if there are none
+    within       gives the state at a time in the step of a number; None if that was not asked for
     ended        whether the last step reaches the end of the run
     """
 
@@ -33,8 +40,35 @@ class Stride:
     derivatives: NDArray[np.int64]
     sampled: NDArray[np.int64]
     rows: Array
+    switched: Array
+    values: Array
+    switches: NDArray[np.int64]
+    gap_checks: NDArray[np.int64]
     usual: bool
+    jacobians: NDArray[np.int64] | None = None
+    factorisations: NDArray[np.int64] | None = None
+    within: Callable[[int, float], Array] | None = None
+
     ended: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """What steps from a time on are checked for branches with: see `run.branches`.
+
+    ends      the ends of the last two steps and the switching functions (ns,) there; empty if none
+              depends on the state
+    switched  the time of the last switch, s
+    clear     the time, s, up to which no switching function of time alone changes its sign
+    timed     whether those of the state depend on time, too
+    angles    indices of the states that are angles
+    """
+
+    ends: Sequence[tuple[float, Array]]
+    switched: float
+    clear: float
+    timed: bool
+    angles: tuple[int, ...]
 
 
 class Steps(Protocol):
@@ -44,6 +78,10 @@ class Steps(Protocol):
     rtol, atol  tolerances, atol (ny,)
     longest     the longest step, s
     times       ascending times of the rows wanted, after t
+    watched     given to make no step that may pass over a branch of the derivative
+    sizes       given (nc,) to make no step in which a rigid contact, none of which is held, may
+                close; its gap is relative to its size
+    dense       whether states within the steps are wanted
     """
 
     def __call__(
@@ -58,6 +96,9 @@ class Steps(Protocol):
         longest: float,
         times: Array,
         most: int,
+        watched: Watched | None = None,
+        sizes: Array | None = None,
+        dense: bool = False,
     ) -> Stride: ...
 
 
@@ -72,10 +113,12 @@ class EqualStride:
     ends         (m,), their times, s
     states       (m, ny), the states there
     losses       (m, ny), the rounding errors of the sums there, which the next step adds
-    calls        derivatives in each step
+    calls        derivatives in each step, or in each iteration
     rate         (ny,), change of the state in the last step, by its length
     place, slope (ny,), the last derivative evaluated, and the state where
     usual        whether the next step may be made so, too
+    iterations   (m,), those in each step, with as many Jacobians as derivatives; None if the method
+                 does not iterate
     """
 
     ends: Array
@@ -86,6 +129,7 @@ class EqualStride:
     place: Array
     slope: Array
     usual: bool
+    iterations: NDArray[np.int64] | None = None
 
 
 class EqualSteps(Protocol):
@@ -115,11 +159,12 @@ class Compiled:
     """Compiled steps of a problem.
 
     derivative  the function whose steps they are: they serve no problem with another one
-    steps       the steps of a method, by its name; None if there are none, or not yet. It is asked
-                again and again during a run, and may begin to compile when the run is a long one
-    equal       the same for methods with equal steps
+    steps       the steps of a method, by its name and those of further functions that they call;
+                None if there are none, or not yet. It is asked again and again during a run, and
+                may begin to compile when the run is a long one
+    equal       the same for methods with equal steps, without further functions
     """
 
     derivative: Callable[[float, Array], Array]
-    steps: Callable[[str], Steps | None]
+    steps: Callable[[str, tuple[str, ...]], Steps | None]
     equal: Callable[[str], EqualSteps | None]

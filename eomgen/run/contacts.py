@@ -195,7 +195,8 @@ class Holding:
 def restrained(
     problem: Problem, holding: Holding | None, counted: Callable[[Rate], Rate]
 ) -> Problem:
-    """The problem while contacts are held; its Jacobian is then computed by differences.
+    """The problem while contacts are held; its Jacobian is then computed by differences, and its
+    steps are not compiled.
 
     `counted` wraps a function so that its calls count as derivatives.
     """
@@ -203,11 +204,9 @@ def restrained(
         return problem
     derivative = counted(holding.derivative)
     sizes = np.array(problem.sizes or (1.0,))
+    jacobian = partial(_differences, derivative, sizes)
     return replace(
-        problem,
-        derivative=derivative,
-        jacobian=partial(_differences, derivative, sizes),
-        series={},
+        problem, derivative=derivative, jacobian=jacobian, timed=True, compiled=None, series={}
     )
 
 

@@ -34,7 +34,12 @@ from eomgen.run.contacts import (
 )
 from eomgen.run.integrators.interface import Advance, Begin, Resume, StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
+from eomgen.run.roots import root
 from eomgen.run.trajectory import Event
+
+GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Points of an adaptive step at which the gaps of contacts are checked; for equal steps, the ends.
+"""
 
 MOST_EVENTS = 10_000
 """Greatest number of events within 1e-9 of a run's length."""
@@ -141,14 +146,17 @@ def advances(
         holding = Holding(contacts, now.held, begun, alpha) if now.held else None
         smooth = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
-        steps = stepper.begin(smooth, now.t, made, resume)
+        steps = stepper.begin(smooth, now.t, made, resume, lambda: not now.slack.any())
         resume = None
         for advance in steps:
-            made += 1
+            made += advance.steps
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             step = replace(advance, contact_powers=powers)
-            closing, closed = _closing(contacts, now, step, stepper.checked)
+            if advance.checked:
+                closing, closed = np.inf, list[int]()
+            else:
+                closing, closed = _closing(contacts, now, step, stepper.checked)
             opening, opened = _opening(holding, now, step)
             if closing <= opening and closed:
                 now.slack = np.zeros(len(contacts.names))
@@ -332,9 +340,8 @@ def _first_zero(
 
 
 def _root(function: Callable[[float], float], a: float, b: float) -> float:
-    from scipy.optimize import brentq  # here: few runs need it, and it loads slowly
-
-    return float(brentq(function, a, b, xtol=max(1e-14 * (b - a), 1e-300), rtol=1e-15))
+    xtol = max(1e-14 * (b - a), 1e-300)
+    return root(function, a, b, (function(a), function(b)), xtol=xtol, rtol=1e-15)
 
 
 def _opening(holding: Holding | None, now: _Status, step: Advance) -> tuple[float, list[int]]:

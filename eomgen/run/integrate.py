@@ -29,10 +29,6 @@ from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Event, Outcome, Trajectory
 from eomgen.run.works import Account, Powers
 
-GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Points of an adaptive step at which the gaps of contacts are checked; for equal steps, the ends.
-"""
-
 
 def integrate(
     problem: Problem,
@@ -129,14 +125,13 @@ def integrate(
             asked, method, counted, checked, compiled=compiled, each=tally is not None
         )
     else:
-        # Compiled steps give no state within a step, and are not checked for contacts and the like.
-        plain = not (monitor or powers or problem.contacts or problem.corners)
-        compiled = compiled_steps(problem) if plain else None
+        compiled = None if monitor else compiled_steps(problem)
+        each, dense = bool(tally or powers), powers is not None
         begin, settings = adaptive_steps(
-            asked, method, problem, remarks.append, compiled=compiled, each=tally is not None
+            asked, method, problem, remarks.append, compiled=compiled, each=each, dense=dense
         )
 
-    gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else GAP_CHECKS
+    gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else events.GAP_CHECKS
     stepper = events.Stepper(begin, gap_checks, calls.derivatives.of)
     advances = _advances(stepper, counted, asked, monitor, rest_speed)
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
@@ -303,6 +298,7 @@ def _follow(
                     raise StepFailure("the state overflows or is not a number", method.remedy)
                 run.take(advance)
                 calls.derivatives.calls += advance.derivatives
+                calls.jacobians.calls += advance.jacobians
                 if tally:
                     tally.take(advance, calls.derivatives.calls, calls.jacobians.calls)
                 report((run.t - t_start) / (t_end - t_start))

@@ -81,10 +81,12 @@ def as_problem(
     *,
     explain: Explain = unexplained,
     origin: Origin | None = None,
+    start: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Problem:
     """The initial-value problem of a module, at given parameters and constant inputs.
 
-    `explain` and `origin` are kept in the problem. If the module has no Jacobian, it is computed by
+    `explain` and `origin` are kept in the problem. `start` gives the initial state from that of the
+    module. If the module has no Jacobian, it is computed by
     differences, which suffices for Newton's iteration.
 
     Raises `RunError` if the module refuses parameters or inputs, or if it has no derivative at the
@@ -109,6 +111,7 @@ def as_problem(
 
     try:
         initial = module.initial_state(parameters)
+        initial = start(initial) if start else initial
     except (ValueError, ArithmeticError) as error:
         raise RunError(_unsolvable(error)) from None
     try:
@@ -117,8 +120,8 @@ def as_problem(
         why = explain(0.0, initial, initial)
         raise RunError(f"at the initial state {why}" if why else _unsolvable(error)) from None
     values = {**module.PARAMETERS, **given_values(module, parameters)[0]}
-    start = dict(zip(module.STATES, initial.tolist(), strict=True))
-    size = mechanism_size(module.UNITS, values, start)
+    first = dict(zip(module.STATES, initial.tolist(), strict=True))
+    size = float(mechanism_size(module.UNITS, values, first))
     switching = _switching(module, parameters, inputs)
     return Problem(
         name=module.NAME,
@@ -132,11 +135,12 @@ def as_problem(
         explain=explain,
         corners=switching is not None,
         switching=switching,
-        sizes=state_sizes(module.STATES, module.UNITS, initial, slope, size),
+        sizes=tuple(state_sizes(module.STATES, module.UNITS, initial, slope, size).tolist()),
         origin=origin,
         noise=cache(partial(step_noise, derivative, jacobian, 0.0, initial)),
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
         columns=hasattr(module, "_along"),
+        timed=_depends_on_time(module),
     )
 
 
@@ -161,26 +165,37 @@ def _switching(module: Any, parameters: Any, inputs: Any) -> Switching | None:
     if of_state is None and of_time is None:
         return None
     positions = [module.STATES[i] for i in module.POSITIONS]
+    u = module._NO_INPUT if inputs is None else module._inputs(inputs, 0)
     return Switching(
         of_state and (lambda t, y: np.asarray(of_state(t, y, parameters, inputs))),
         of_state is not None and "t" in inspect.signature(module._switching_functions).parameters,
         tuple(i for i, name in enumerate(positions) if module.UNITS[name] == "rad"),
-        of_time and _over_intervals(module, of_time, parameters, inputs),
+        of_time and over_intervals(module, of_time, parameters, lambda t: u),
     )
 
 
-def _over_intervals(
-    module: Any, kernel: Any, parameters: Any, inputs: Any
+def _depends_on_time(module: Any) -> bool:
+    """Whether a module's derivative depends on time, as far as known."""
+    kernel = getattr(module, "_derivative", None)
+    if kernel is None or hasattr(module, "inputs_of_time"):
+        return True
+    return "t" in inspect.signature(kernel).parameters
+
+
+def over_intervals(
+    module: Any, kernel: Any, parameters: Any, inputs: Callable[[Interval], Sequence[Any]]
 ) -> Callable[[Interval], Sequence[Interval]]:
-    """A kernel that depends on time alone, as a function of intervals of time."""
+    """A kernel that depends on time and inputs alone, as a function of intervals of time.
+
+    inputs  gives the inputs in an interval of time, as intervals or numbers
+    """
     wanted = inspect.signature(kernel).parameters
     functions = {name: BY_INTERVALS[name] for name in BY_INTERVALS if name in wanted}
     name = kernel.__name__.removeprefix("_")
     constants = (module._DEFAULT if parameters is None else module._parameters(parameters))[name]
-    u = module._NO_INPUT if inputs is None else module._inputs(inputs, 0)
 
     def values(t: Interval) -> Sequence[Interval]:
-        return cast(Sequence[Interval], kernel((), constants, u, t=t, **functions))
+        return cast(Sequence[Interval], kernel((), constants, inputs(t), t=t, **functions))
 
     return values
 

@@ -38,11 +38,13 @@ class Fast:
     """Properties of the fast modes of a motion.
 
     stiff  whether explicit steps would be many times shorter than accuracy requires
+    quick  whether a mode is fast compared with the run, damped or not
     decay  the greatest decay rate of a mode, 1/s
     noise  (ny,), greatest change of each state in a step by rounding errors of the derivative
     """
 
     stiff: bool
+    quick: bool
     decay: float
     noise: FloatArray
 
@@ -52,14 +54,15 @@ def fast(problem: Problem, states: Iterable[tuple[float, FloatArray]], span: flo
 
     States at which the derivative or the Jacobian is not finite are ignored.
     """
-    stiff, decay, most = False, 0.0, np.zeros(len(problem.states))
+    stiff, some, decay, most = False, False, 0.0, np.zeros(len(problem.states))
     for t, y in states:
         modes, noise = _modes_and_noise(problem.derivative, problem.jacobian, t, y, span)
         quick = np.abs(modes) * span > MANY
+        some = some or bool(quick.any())
         stiff = stiff or bool((-modes[quick].real * span > DAMPED).any())
         decay = max(decay, float((-modes.real).max(initial=0.0)))
         most = np.maximum(most, noise)
-    return Fast(stiff, decay, most)
+    return Fast(stiff, some, decay, most)
 
 
 def step_noise(

@@ -107,6 +107,7 @@ class Problem:
                 known
     operations  number of operations in a call of a function, by its name, as far as known
     columns     whether the Jacobian is computed along all directions at once
+    timed       whether the derivative depends on time beside the state
     corners     whether the derivative has corners or jumps, as with one-sided forces: a long step
                 might pass over what begins and ends within it
     switching   the switching functions of these corners; None if not known
@@ -135,6 +136,7 @@ class Problem:
     noise: Callable[[float], FloatArray] | None = None
     operations: Mapping[str, int] = field(default_factory=dict)
     columns: bool = False
+    timed: bool = True
     compiled: Compiled | None = None
     series: Mapping[str, Callable[[], Series]] = field(default_factory=dict)
 
@@ -158,6 +160,12 @@ class Problem:
         assert all(0 <= index < len(self.states) for index in self.positions)
         initial.flags.writeable = False
         object.__setattr__(self, "initial", initial)
+
+    @property
+    def leading_positions(self) -> int:
+        """The number of positions if these are the first states; else 0."""
+        count = len(self.positions)
+        return count if self.positions == tuple(range(count)) else 0
 
     def unit(self, y: FloatArray) -> FloatArray:
         """The state `y` (ny,) with normalised quaternions; those that are not finite stay as is.

@@ -2,6 +2,7 @@
 
 import shutil
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +11,10 @@ Progress = Callable[[float], None]
 """Called with the fraction done, 0 to 1."""
 
 _BAR = 30
+SOON = 0.3
+"""Time after which the rest is estimated, s."""
+TICK = 0.5
+"""Time between two states of a notice, s."""
 WIDEST = 500
 """Greatest number of columns used."""
 
@@ -29,12 +34,11 @@ def throttled(progress: Progress, interval: float = 0.1) -> Progress:
 
 
 @contextmanager
-def terminal_progress(label: str, *, countdown: bool = False) -> Iterator[Progress]:
+def terminal_progress(label: str, *, countdown: bool = True) -> Iterator[Progress]:
     """Yield a function that draws a bar on one line of standard error, erased when the block ends.
 
-    With `countdown`, for work of equal parts, it also shows about how long the rest will take: as
-    long as what was done since the first call. If standard error is no terminal, the function does
-    nothing.
+    With `countdown` it also shows about how long the rest will take, if it goes on as since the
+    first call. If standard error is no terminal, the function does nothing.
     """
     with terminal_line() as write:
         first: tuple[float, float] | None = None
@@ -46,7 +50,7 @@ def terminal_progress(label: str, *, countdown: bool = False) -> Iterator[Progre
             now = time.monotonic()
             first = first or (now, done)
             left = ""
-            if countdown and done > first[1]:
+            if countdown and done > first[1] and now - first[0] > SOON:
                 left = rough_time((now - first[0]) * (1 - done) / (done - first[1]))
             write(f"{label} [{bar:<{_BAR}}] {done:4.0%}{left and f', about {left} left'}")
 
@@ -61,11 +65,32 @@ def rough_time(seconds: float) -> str:
 
 
 @contextmanager
-def terminal_notice(text: str) -> Iterator[None]:
-    """Show a line on standard error during the block, if that is a terminal."""
+def terminal_notice(text: str, expected: float | None = None) -> Iterator[None]:
+    """Show a line on standard error during the block, if that is a terminal: the text, the time
+    passed, and that left if the block is `expected` to take so long, s.
+    """
     with terminal_line() as write:
         write(text)
-        yield
+        if not sys.stderr.isatty():
+            yield
+            return
+        began, over = time.monotonic(), threading.Event()
+
+        def tell() -> None:
+            while not over.wait(TICK):
+                spent = time.monotonic() - began
+                left = f", about {rough_time(expected - spent)} left" if expected else ""
+                if expected and spent > expected:
+                    left = ", longer than last time"
+                write(f"{text} {rough_time(spent)}{left}")
+
+        teller = threading.Thread(target=tell, daemon=True)
+        teller.start()
+        try:
+            yield
+        finally:
+            over.set()
+            teller.join()
 
 
 @contextmanager

@@ -17,6 +17,8 @@ SHORTEST = 1e-12
 """Fraction of a step below which intervals are not bisected; shorter pulses are ignored."""
 AHEAD = 16.0
 """Number of steps ahead that are first checked together."""
+FARTHER = 4.0
+"""Ratio of the numbers of steps ahead that are tried before that, where many are to be made."""
 
 
 class Schedule:
@@ -47,6 +49,22 @@ class Schedule:
                 found.append((since + low) / 2)
             signs, since = those, high
         return found, True
+
+    def clear(self, start: float, length: float, most: int) -> float:
+        """A time up to which no function changes sign after `start`, s: up to so many steps of this
+        length ahead. `start` if none is found so.
+        """
+        known = self._no_change[1] if self._no_change[0] <= start else start
+        ahead = float(most)
+        while ahead >= AHEAD:
+            far = start + ahead * length
+            if far <= known:
+                break
+            if None not in self._signs(start, far):
+                self._no_change = (start, far)
+                return far
+            ahead /= FARTHER
+        return max(start, known)
 
     def _parts(
         self, start: float, end: float

@@ -4,68 +4,81 @@ All sizes scale with the units of a scene: if units change by powers of two, run
 powers of ten, identical but for rounding.
 """
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from eomgen.run.problem import FloatArray
 
+Numbers = Mapping[str, float | FloatArray]
+"""Numbers by name, or arrays (n,) of them for n mechanisms at once."""
 FAR = 64 * np.finfo(float).eps / 1e-9
 """Least size, relative to the greatest distance: 1e-9 of the size then exceeds rounding errors."""
 
 
-def mechanism_size(
-    units: Mapping[str, str], parameters: Mapping[str, float], start: Mapping[str, float]
-) -> float:
+def mechanism_size(units: Mapping[str, str], parameters: Numbers, start: Numbers) -> FloatArray:
     """The size of a mechanism, m: its greatest length, without the distances of the ground and of
-    the initial state from the origin; 1 if it has none.
+    the initial state from the origin; 1 if it has none. Of n mechanisms: (n,).
 
     units       units of parameters and states, by name
     parameters  values of parameters, by name
     start       the initial state, by name
     """
-    own = _lengths((name, value) for name, value in parameters.items() if units.get(name) == "m")
-    initial = _lengths((name, value) for name, value in start.items() if units.get(name) == "m")
-    near = max((value for name, value in own if not name.endswith("_offset")), default=0.0)
-    far = max((value for _, value in own + initial), default=0.0)
-    return _or_one(max(near, FAR * far) if near else far)
+    near = far = np.zeros(())
+    for name, value in parameters.items():
+        if units.get(name) == "m":
+            length = _finite(np.abs(value))
+            near = near if name.endswith("_offset") else np.maximum(near, length)
+            far = np.maximum(far, length)
+    for name, value in start.items():
+        if units.get(name) == "m":
+            far = np.maximum(far, _finite(np.abs(value)))
+    return _or_one(np.where(near > 0, np.maximum(near, FAR * far), far))
 
 
 def state_sizes(
-    states: Sequence[str], units: Mapping[str, str], y: FloatArray, slope: FloatArray, size: float
-) -> tuple[float, ...]:
+    states: Sequence[str],
+    units: Mapping[str, str],
+    y: FloatArray,
+    slope: FloatArray,
+    size: FloatArray | float,
+) -> FloatArray:
     """The size of each state, (ny,), in its unit: for lengths the size of the mechanism, m; for
     angles 1; for velocities these times the rate of the motion; for other states, such as those of
-    controllers, the greatest initial value of the same unit.
+    controllers, the greatest initial value of the same unit. Of n mechanisms: (ny, n).
 
-    y, slope  (ny,), the initial state and its derivative
+    y, slope  (ny,) or (ny, n), the initial state and its derivative
     """
-    lengths = {"m": size, "m/s": size, "rad": 1.0, "rad/s": 1.0, "": 1.0}
-    moves = [i for i, state in enumerate(states) if units.get(state) in ("m/s", "rad/s")]
-    rate = 0.0
-    for i in moves:
-        own = lengths[units[states[i]]]
-        rate = max(rate, abs(float(y[i])) / own, math.sqrt(abs(float(slope[i])) / own))
+    one = np.ones(())
+    lengths = {"m": size, "m/s": size, "rad": one, "rad/s": one, "": one}
+    own = [units.get(state, "") for state in states]
+    rate = np.zeros(())
+    for i, unit in enumerate(own):
+        if unit in ("m/s", "rad/s"):
+            here = np.fmax(np.abs(y[i]) / lengths[unit], np.sqrt(np.abs(slope[i]) / lengths[unit]))
+            rate = np.fmax(rate, here)
     rate = _or_one(rate)
-    others: dict[str, float] = {}
-    for i, state in enumerate(states):
-        unit = units.get(state, "")
+    others: dict[str, FloatArray] = {}
+    for i, unit in enumerate(own):
         if unit not in lengths:
-            now = max(abs(float(y[i])), abs(float(slope[i])) / rate)
-            others[unit] = max(others.get(unit, 0.0), now)
-    found = []
-    for state in states:
-        unit = units.get(state, "")
-        known = lengths[unit] if unit in lengths else _or_one(others[unit])
-        found.append(known * (rate if unit in ("m/s", "rad/s") else 1.0))
-    return tuple(found)
+            now = np.fmax(np.abs(y[i]), np.abs(slope[i]) / rate)
+            others[unit] = np.fmax(others.get(unit, np.zeros(())), now)
+    found = [
+        np.broadcast_to(
+            (lengths[unit] if unit in lengths else _or_one(others[unit]))
+            * (rate if unit in ("m/s", "rad/s") else one),
+            y.shape[1:],
+        )
+        for unit in own
+    ]
+    return np.array(found).reshape(y.shape)
 
 
-def _or_one(value: float) -> float:
-    """A positive value; 1 for one that is 0 or not finite."""
-    return value if value > 0 and math.isfinite(value) else 1.0
+def _or_one(values: FloatArray) -> FloatArray:
+    """Positive values; 1 for those that are 0 or not finite."""
+    return np.where((values > 0) & np.isfinite(values), values, 1.0)
 
 
-def _lengths(pairs: Iterable[tuple[str, float]]) -> list[tuple[str, float]]:
-    return [(name, abs(value)) for name, value in pairs if math.isfinite(value)]
+def _finite(values: FloatArray) -> FloatArray:
+    """Values, 0 for those that are not finite."""
+    return np.where(np.isfinite(values), values, 0.0)

@@ -1,6 +1,6 @@
 """The steps of a run, from its arguments."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -20,7 +20,7 @@ from eomgen.run.checks import (
 )
 from eomgen.run.compiled import Compiled
 from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
-from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume
+from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume, always
 from eomgen.run.problem import Problem
 
 ADAPTIVE_SAMPLES = 1001
@@ -84,7 +84,11 @@ def equal_steps(
     steps = partial(compiled.equal, method.compiled) if compiled and method.compiled else None
 
     def begin(
-        problem: Problem, t: float, made: int, resume: Resume | None = None
+        problem: Problem,
+        t: float,
+        made: int,
+        resume: Resume | None = None,
+        compiles: Callable[[], bool] = always,
     ) -> Iterator[Advance]:
         return fixed_step.advances(
             change,
@@ -112,12 +116,14 @@ def adaptive_steps(
     *,
     compiled: Compiled | None = None,
     each: bool = True,
+    dense: bool = True,
 ) -> tuple[Begin, Resume]:
     """A function that begins adaptive steps, and the settings that a later run compares.
 
     remark    called with the method's remarks
     compiled  compiled steps of the problem, if it has some
     each      whether each compiled step becomes an `Advance`
+    dense     whether these give the states within steps
 
     Raises `RunError` if `dt` is given, or `max_step` is invalid.
     """
@@ -132,7 +138,11 @@ def adaptive_steps(
     bounds = adaptive.Bounds(asked.rtol, atol, longest, unseen, asked.max_steps)
 
     def begin(
-        problem: Problem, t: float, made: int, resume: Resume | None = None
+        problem: Problem,
+        t: float,
+        made: int,
+        resume: Resume | None = None,
+        compiles: Callable[[], bool] = always,
     ) -> Iterator[Advance]:
         return adaptive.advances(
             method,
@@ -144,8 +154,10 @@ def adaptive_steps(
             made=made,
             remark=remark,
             resume=resume,
-            steps=compiled.steps if compiled else None,
+            steps=compiled.steps if compiled and problem.compiled else None,
+            compiles=compiles,
             each=each,
+            dense=dense,
         )
 
     return begin, {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}

@@ -61,6 +61,8 @@ class Tally:
         self.factorisations += advance.factorisations
         self.rows += len(advance.samples)
         self.derivatives, self.jacobians = derivatives, jacobians
+        self.switches += advance.switches
+        self.gap_checks += advance.gap_checks
         self.low = np.minimum(self.low, advance.y)
         self.high = np.maximum(self.high, advance.y)
         self.check(self, advance.t)

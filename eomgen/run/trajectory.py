@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eomgen.errors import RunError
 from eomgen.files import is_ours, read_plain, write_whole
@@ -20,6 +21,8 @@ LARGEST = 2**32
 """Size of the largest file that is read, bytes: a million samples of 500 states."""
 RESUME = "resume_"
 """Prefix of the members of a file from which a later run continues."""
+SAVED, COLUMNS = "saved_", "columns_"
+"""Prefixes of the members of a file that hold outputs, and the names of their columns."""
 COUNTS = ("steps", "derivatives", "jacobians", "impacts", "capped", "cut")
 Kind = Literal["impact", "rest", "lift"]
 Ending = Literal["finished", "interrupted", "ended", "stopped"]
@@ -60,6 +63,14 @@ class Event:
 
 
 @dataclass(frozen=True, eq=False)
+class Saved:
+    """An output along a run, (n, …), and the names of its columns in tables, row by row."""
+
+    values: FloatArray
+    columns: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Trajectory:
     """The states of a mechanism at n times; arrays are read-only copies, in SI units.
 
@@ -80,6 +91,7 @@ class Trajectory:
                   the method cannot
     origin        what the motion depends on; None if not known
     outcome       how it ended
+    saved         further outputs at each row, by name
 
     Raises `ValueError` if the values are inconsistent.
     """
@@ -98,6 +110,7 @@ class Trajectory:
     resume: Mapping[str, FloatArray] = field(default_factory=dict)
     origin: Origin | None = None
     outcome: Outcome = Outcome()
+    saved: Mapping[str, Saved] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.finished and self.outcome.kind == "finished":
@@ -130,6 +143,15 @@ class Trajectory:
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "y", y)
         object.__setattr__(self, "counts", {key: int(self.counts[key]) for key in COUNTS})
+
+    @property
+    def struck(self) -> NDArray[np.int64]:
+        """For each row the number of impacts at its time before it, (n,): 0 but for the rows after
+        an impact, which repeat the time of the row before it.
+        """
+        again = np.diff(self.t, prepend=-np.inf) == 0
+        counts = np.cumsum(again)
+        return np.asarray(counts - np.maximum.accumulate(np.where(again, 0, counts)), np.int64)
 
     @property
     def held(self) -> dict[str, float]:
@@ -167,6 +189,10 @@ def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
     }
     if trajectory.works is not None:
         members |= {"works": trajectory.works, "work_names": _names(trajectory.work_names)}
+    if trajectory.struck.any():
+        members["event"] = trajectory.struck
+    for name, saved in trajectory.saved.items():
+        members |= {f"{SAVED}{name}": saved.values, f"{COLUMNS}{name}": _names(saved.columns)}
     if trajectory.origin is not None:
         members |= _origin_members(trajectory.origin)
     members |= {f"{RESUME}{name}": trajectory.resume[name] for name in sorted(trajectory.resume)}
@@ -220,6 +246,7 @@ def _trajectory(members: dict[str, Array]) -> Trajectory:
     if counts.dtype != np.int64 or counts.ndim != 1 or finished.dtype != np.bool_ or finished.ndim:
         raise ValueError("numbers of another type")
     worked, known = "works" in rest, "scene" in rest
+    rest.pop("event", None)  # which follows from t
     pairs = zip(
         _floats(rest.pop("events"), 2).tolist(), _strings(rest.pop("event_names"), 2), strict=True
     )
@@ -242,6 +269,14 @@ def _trajectory(members: dict[str, Array]) -> Trajectory:
         },
         origin=_origin(rest) if known else None,
         outcome=_outcome(_strings(rest.pop("outcome"), 1)),
+        saved={
+            name.removeprefix(SAVED): Saved(
+                _floats(rest.pop(name)),
+                tuple(_strings(rest.pop(f"{COLUMNS}{name.removeprefix(SAVED)}"), 1)),
+            )
+            for name in members
+            if name.startswith(SAVED)
+        },
     )
     if rest:
         raise ValueError("members that no trajectory has")
@@ -288,7 +323,9 @@ def _text(array: Array) -> str:
 
 def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
     """Write `trajectory` as a table: a line of names, then for each time a row with t, y and, if
-    there are works, work_<effect>, J.
+    there are works, work_<effect>, J; then what else is saved. If times repeat, which they do at
+    impacts, a column `event` follows t: see `Trajectory.struck`. Rows where it is 0 have times of
+    their own.
 
     Numbers are the shortest that read back exactly. `pandas.read_csv(path)` and
     `np.genfromtxt(path, delimiter=",", names=True)` read the table. The rest of the trajectory is
@@ -296,9 +333,9 @@ def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
     """
     buffer = io.StringIO()
     table = csv.writer(buffer, lineterminator="\n")
-    works = [] if trajectory.works is None else [trajectory.works]
-    table.writerow(_columns(trajectory))
-    table.writerows(np.column_stack([trajectory.t, trajectory.y, *works]).tolist())
+    columns = table_of(trajectory)
+    table.writerow(columns)
+    table.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
     write_whole(path, buffer.getvalue(), force=force or is_own_table(path))
 
 
@@ -310,10 +347,21 @@ def is_own_table(path: Path) -> bool:
     try:
         with path.open(encoding="utf-8", newline="") as file:
             head = next(csv.reader(file), [])
-        return head == _columns(load_npz(path.with_suffix(".npz")))
+        return head == [*table_of(load_npz(path.with_suffix(".npz")))]
     except (OSError, UnicodeDecodeError, csv.Error, RunError):
         return False
 
 
-def _columns(trajectory: Trajectory) -> list[str]:
-    return ["t", *trajectory.states, *(f"work_{name}" for name in trajectory.work_names)]
+def table_of(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
+    """The columns of a table, (n,) each, by name."""
+    columns: dict[str, NDArray[Any]] = {"t": trajectory.t}
+    if trajectory.struck.any():
+        columns["event"] = trajectory.struck
+    columns |= zip(trajectory.states, trajectory.y.T, strict=True)
+    if trajectory.works is not None:
+        names = (f"work_{name}" for name in trajectory.work_names)
+        columns |= zip(names, trajectory.works.T, strict=True)
+    for saved in trajectory.saved.values():
+        rows = saved.values.reshape(len(trajectory.t), -1)
+        columns |= zip(saved.columns, rows.T, strict=True)
+    return columns

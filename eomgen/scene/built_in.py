@@ -4,6 +4,8 @@ import tomllib
 from pathlib import Path
 
 BUILT_IN = Path(__file__).parent.parent / "scenes"
+START = BUILT_IN / "start" / "start.toml"
+"""A scene with comments, to begin with."""
 
 
 def built_in_names() -> tuple[str, ...]:

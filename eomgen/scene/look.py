@@ -1,7 +1,7 @@
 """The appearance of a scene: shapes on bodies, and the camera. No equation depends on it."""
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field
 
@@ -27,7 +27,18 @@ Point = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
 Lengths = Annotated[tuple[Positive, ...], Field(min_length=2, max_length=3)]
 Angles = tuple[Number, Number, Number]
 
-NOTHING = "the body's centre of mass if absent"
+
+def _metres(about: str, **options: Any) -> Any:
+    """A field for a length or a position, m."""
+    return Field(description=about, json_schema_extra={"unit": "m"}, **options)
+
+
+def _colour_field() -> Any:
+    return Field(default="#4477aa", description="colour, #rrggbb")
+
+
+def _center() -> Any:
+    return _metres("centre; the body's centre of mass if absent", default=None)
 
 
 class Box(Table):
@@ -37,75 +48,134 @@ class Box(Table):
     about the body's x, then y, then z axis.
     """
 
+    example: ClassVar[str] = """
+[[bodies.shapes]]
+type = "box"
+size = [0.4, 0.1]
+color = "#33658a"
+"""
     type: Literal["box"]
-    size: Lengths
-    center: Point | None = Field(default=None, description=NOTHING)
+    size: Lengths = _metres("lengths of its edges")
+    center: Point | None = _center()
     angle: Number = Field(default=0.0, description="rad, in the plane")
     orientation_deg: Angles = Field(
         default=(0.0, 0.0, 0.0), description="about x, then y, then z, in space"
     )
-    color: Colour = "#4477aa"
+    color: Colour = _colour_field()
 
 
 class Disc(Table):
     """A disc of `radius` m about `center`, in body axes; in the plane."""
 
+    example: ClassVar[str] = """
+[[bodies.shapes]]
+type = "disc"
+radius = 0.05
+"""
     type: Literal["disc"]
-    radius: Positive
-    center: Point | None = Field(default=None, description=NOTHING)
-    color: Colour = "#4477aa"
+    radius: Positive = _metres("radius")
+    center: Point | None = _center()
+    color: Colour = _colour_field()
 
 
 class Polygon(Table):
     """A closed polygon through `points`, m, body axes; in the plane."""
 
+    example: ClassVar[str] = """
+[[bodies.shapes]]
+type = "polygon"
+points = [[0, 0], [0.3, 0], [0, 0.2]]
+"""
     type: Literal["polygon"]
-    points: Annotated[tuple[Point, ...], Field(min_length=3, max_length=1000)]
-    color: Colour = "#4477aa"
+    points: Annotated[tuple[Point, ...], Field(min_length=3, max_length=1000)] = _metres(
+        "corners in order"
+    )
+    color: Colour = _colour_field()
 
 
 class Rod(Table):
     """A thick line with round ends from one point to another, m, body axes."""
 
+    example: ClassVar[str] = """
+[[bodies.shapes]]
+type = "rod"
+start = [-0.4, 0]
+end = [0.4, 0]
+width = 0.06
+"""
     type: Literal["rod"]
-    start: Point
-    end: Point
-    width: Positive
-    color: Colour = "#4477aa"
+    start: Point = _metres("one end")
+    end: Point = _metres("the other end")
+    width: Positive = _metres("width")
+    color: Colour = _colour_field()
 
 
 class Sphere(Table):
     """A ball of `radius` m about `center`, in body axes; in space."""
 
+    example: ClassVar[str] = """
+[[bodies.shapes]]
+type = "sphere"
+radius = 0.05
+center = [0, 0, 0.1]
+"""
     type: Literal["sphere"]
-    radius: Positive
-    center: Point | None = Field(default=None, description=NOTHING)
-    color: Colour = "#4477aa"
+    radius: Positive = _metres("radius")
+    center: Point | None = _center()
+    color: Colour = _colour_field()
 
 
 class Cylinder(Table):
     """A cylinder of `radius` m with flat ends at `start` and `end`, m, body axes; in space."""
 
+    example: ClassVar[str] = """
+[[bodies.shapes]]
+type = "cylinder"
+start = [0, 0, -0.4]
+end = [0, 0, 0.4]
+radius = 0.03
+"""
     type: Literal["cylinder"]
-    start: Point
-    end: Point
-    radius: Positive
-    color: Colour = "#4477aa"
+    start: Point = _metres("one end")
+    end: Point = _metres("the other end")
+    radius: Positive = _metres("radius")
+    color: Colour = _colour_field()
 
 
 class Ellipsoid(Table):
     """An ellipsoid with half-axes `radii` m, in body axes, rotated like a box; in space."""
 
+    example: ClassVar[str] = """
+[[bodies.shapes]]
+type = "ellipsoid"
+radii = [0.1, 0.1, 0.3]
+"""
     type: Literal["ellipsoid"]
-    radii: Lengths
-    center: Point | None = Field(default=None, description=NOTHING)
+    radii: Lengths = _metres("half-axes")
+    center: Point | None = _center()
     orientation_deg: Angles = Field(default=(0.0, 0.0, 0.0), description="about x, then y, then z")
-    color: Colour = "#4477aa"
+    color: Colour = _colour_field()
 
 
 Shape: TypeAlias = Annotated[
     Box | Cylinder | Disc | Ellipsoid | Polygon | Rod | Sphere, Field(discriminator="type")
 ]
+
+
+def from_centre(shape: Shape, com: Sequence[float]) -> Shape:
+    """A shape given in a body's frame, from its centre of mass `com`; () if that is the origin."""
+    fields: dict[str, object] = {}
+    for name in ("center", "start", "end") if com else ():
+        if (point := getattr(shape, name, None)) is not None:
+            fields[name] = _shifted(point, com)
+    if com and isinstance(shape, Polygon):
+        fields["points"] = tuple(_shifted(point, com) for point in shape.points)
+    return shape.replaced(**fields) if fields else shape
+
+
+def _shifted(point: Sequence[float], com: Sequence[float]) -> tuple[float, ...]:
+    return tuple(x - c for x, c in zip(point, com, strict=True))
+
 
 INSTEAD = {
     2: {"sphere": "disc", "cylinder": "box", "ellipsoid": "disc"},
@@ -122,10 +192,17 @@ class Camera(Table):
     by `elevation_deg` towards z.
     """
 
-    center: Point | None = Field(default=None, description="the world's origin if absent")
-    height: Positive = 4.0
-    follow: Identifier | None = None
-    background: Colour = "#ffffff"
+    example: ClassVar[str] = """
+[camera]
+height = 3.0
+follow = "arm"
+"""
+    center: Point | None = _metres(
+        "point that it looks at; the world's origin if absent", default=None
+    )
+    height: Positive = _metres("height of the picture", default=4.0)
+    follow: Identifier | None = Field(default=None, description="body that it follows")
+    background: Colour = Field(default="#ffffff", description="colour of the background")
     azimuth_deg: Number = Field(default=-60.0, description="in space")
     elevation_deg: Annotated[Number, Field(ge=-90, le=90)] = Field(
         default=20.0, description="in space"

@@ -89,7 +89,7 @@ def _line(detail: ErrorDetails) -> str:
             location = f"{location}.{key}" if location else key
             return f"{location}: unknown key{context['hint']}"
         case "keys":
-            return f"{location}.{context['key']}: {detail['msg']}"
+            return f"{location}.{context['key']}: {detail['msg']}".lstrip(".")
         case "missing":
             if location.endswith("]"):
                 return f"{location}: missing; the list is too short"
@@ -154,9 +154,11 @@ _UNION_MEMBERS = (
     "dict[",
     "function-plain",
     "function-after[",
+    "function-before[",
     "tuple-",
     "float",
     "ParameterTable",
+    "InputTable",
 )
 _TAGGED = {"joints", "effects", "shapes"}
 

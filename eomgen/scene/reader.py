@@ -12,6 +12,7 @@ from eomgen.errors import SceneError, nearest
 from eomgen.files import read_plain
 from eomgen.language.base import LARGEST
 from eomgen.scene.built_in import BUILT_IN, built_in_names
+from eomgen.scene.lines import with_lines
 from eomgen.scene.mistakes import mistakes, shown
 from eomgen.scene.schema import MOST, Scene
 from eomgen.text import breaks_lines, brief
@@ -52,15 +53,23 @@ def find_scene(scene: str) -> Path:
 def read_scene(scene: str | Path) -> Scene:
     """Read a scene from a path or by its built-in name.
 
-    Raises `SceneError` with a line for each mistake: location, value, remedy.
+    Raises `SceneError` with a message for each mistake: line of the file, location, value, remedy.
     """
     path = find_scene(scene) if isinstance(scene, str) else scene
+    text = scene_text(path)
+    try:
+        return parse_scene(text, path.name)
+    except SceneError as error:
+        raise SceneError(*with_lines(error.lines, path.name, text)) from None
+
+
+def scene_text(path: Path) -> str:
+    """The text of a scene's file. Raises `SceneError` if it cannot be read, or is not UTF-8."""
     data = read_plain(path, LARGEST_FILE, name=path.name, error=SceneError)
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SceneError(f"{path.name}: is not UTF-8 text (byte {error.start})") from None
-    return parse_scene(text, path.name)
 
 
 def parse_scene(text: str, source: str = "scene") -> Scene:

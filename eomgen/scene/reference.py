@@ -14,10 +14,20 @@ from eomgen.language.quantity import of_any_joint
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
-from eomgen.scene.schema import BodyTable, ChainTable, Initial, PointTable, Scene, Simulation
+from eomgen.scene.look import Camera, Shape
+from eomgen.scene.schema import (
+    BodyTable,
+    ChainTable,
+    Initial,
+    InputTable,
+    ParameterTable,
+    PointTable,
+    Scene,
+    Simulation,
+)
 
 HEAD = """\
-# Scenes: their tables, joints and effects
+# Scenes: their tables, joints, effects and shapes
 
 `eomgen reference` prints this page. It lists each key with its unit and its default; a key that is
 not marked as needed may be left out. A quantity is a number, which becomes a parameter of the
@@ -29,26 +39,33 @@ stands for the time `t` and all coordinates, velocities, inputs and states of ef
 
 TABLES: Mapping[str, type[Table]] = {
     "the scene itself": Scene,
+    "parameters": ParameterTable,
+    "inputs": InputTable,
     "bodies": BodyTable,
     "chains": ChainTable,
     "points": PointTable,
     "initial": Initial,
     "simulation": Simulation,
+    "camera": Camera,
 }
-"""Tables other than joints and effects."""
+"""Tables other than joints, effects and shapes."""
 
 
 def reference(kind: str | None = None) -> str:
-    """Markdown about all joints and effects, or about the one whose `type` is `kind`.
+    """Markdown about all tables, or about the one whose `type` is `kind`.
 
     Raises `SceneError` if there is none.
     """
-    groups = {"Joints": _by_type(Joint), "Effects": _by_type(Effect)}
+    groups = {
+        "Joints": by_type(Joint),
+        "Effects": by_type(Effect),
+        "Shapes": by_type(Shape),
+    }
     if kind is not None:
         known = {name: table for tables in groups.values() for name, table in tables.items()}
         if kind not in known:
             hint = nearest(kind, known) or f"; known: {', '.join(known)}"
-            raise SceneError(f"no joint or effect is of type '{kind}'{hint}")
+            raise SceneError(f"no joint, effect or shape is of type '{kind}'{hint}")
         return "\n".join(_section(kind, known[kind]))
     functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
     constants = ", ".join(f"`{name}`" for name in CONSTANTS)
@@ -62,7 +79,7 @@ def reference(kind: str | None = None) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _by_type(union: Any) -> dict[str, type[Table]]:
+def by_type(union: Any) -> dict[str, type[Table]]:
     """The tables of an annotated union, by their `type`, in alphabetical order."""
     tables = get_args(get_args(union)[0])
     return {_word(table): table for table in sorted(tables, key=_word)}
@@ -83,6 +100,9 @@ def _section(name: str, table: type[Table], heading: str = "# ") -> Iterator[str
         if key != "type":
             yield "| " + " | ".join(_row(key, field)) + " |"
     yield ""
+    if table.example:
+        yield f"```toml{table.example}```"
+        yield ""
 
 
 def _row(key: str, field: FieldInfo) -> tuple[str, str, str, str]:

@@ -1,12 +1,12 @@
 """The scene: all tables and keys of the language."""
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
 from eomgen.integrators import INTEGRATORS
-from eomgen.language.base import Identifier, Number, Positive, Table, Text
+from eomgen.language.base import ByName, Identifier, Number, Positive, Table, Text
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
 from eomgen.routes import ROUTES
@@ -46,12 +46,23 @@ LeftOut = Literal["velocity_forces"]
 """Terms of the equations that a scene may leave out."""
 
 
+UNIT = r"^[A-Za-z0-9 /^*.()-]*$"
+"""What the unit of a parameter or an input may be written with."""
+
+
 class ParameterTable(Table):
     """A parameter with its unit and meaning: `{ value = 1.0, unit = "kg", about = "…" }`."""
 
-    value: Number
-    unit: Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z0-9 /^*.()-]*$")] = ""
-    about: Text = ""
+    example: ClassVar[str] = """
+[parameters]
+l = 0.8
+m = { value = 2.0, unit = "kg", about = "mass of the arm" }
+"""
+    value: Number = Field(description="its value")
+    unit: Annotated[str, Field(max_length=40, pattern=UNIT)] = Field(
+        default="", description="its unit, which documentation shows"
+    )
+    about: Text = Field(default="", description="what it is, in one line")
 
 
 Inertia = Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=6)]
@@ -64,16 +75,48 @@ def inertia() -> Any:
     return quantity("kg m^2", about, "nonnegative", union_mode="left_to_right")
 
 
+class InputTable(Table):
+    """An input of the module for formulas of the scene: `{ name = "thrust", unit = "N" }`."""
+
+    example: ClassVar[str] = """
+inputs = [{ name = "thrust", unit = "N", about = "of the engine" }, "wind"]
+"""
+
+    name: Identifier
+    unit: Annotated[str, Field(max_length=40, pattern=UNIT)] = Field(default="", description="unit")
+    about: Text = Field(default="", description="one line of text")
+    default: Number = Field(default=0.0, description="its value unless given")
+
+
 class BodyTable(Table):
     """A rigid body; a particle has `inertia_com = 0`.
 
     In the plane the inertia is a number; in space [xx, yy, zz], or [xx, yy, zz, xy, xz, yz], the
     entries of the matrix about the centre of mass in body axes.
+
+    Points of a body are given from its centre of mass; with `com` in a frame of its own, in which
+    the centre of mass is at `com`. Then joints without `r_parent` or `r_child` are at its origin.
+    Other points that are absent are the centre of mass, and so are the coordinates of a free joint
+    and the outputs of poses.
     """
 
+    example: ClassVar[str] = """
+[[bodies]]
+name = "arm"
+mass = "m"
+inertia_com = "m*l**2/12"
+"""
     name: Identifier
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
+    com: Vector = quantity(
+        "m", "centre of mass in the body's frame", default=(), validate_default=False
+    )
+    inertia_check: Literal["on", "off"] = Field(
+        default="on",
+        description="whether to refuse an inertia that no body has, with a principal moment larger "
+        "than the other two together by more than 0.1 %",
+    )
     shapes: tuple[Shape, ...] = Field(default=(), description="shapes in pictures")
 
 
@@ -84,6 +127,15 @@ class ChainTable(Table):
     the centre of mass of its link; `start` is the first pin on `parent`.
     """
 
+    example: ClassVar[str] = """
+[[chains]]
+name = "link"
+count = 20
+mass = 0.05
+inertia_com = 2e-5
+r_parent = [0.05, 0]
+r_child = [-0.05, 0]
+"""
     name: Identifier
     count: Annotated[int, Strict(), Field(ge=1, le=MOST, description="number of links")]
     parent: Identifier = Field(default="world", description="parent of the first link")
@@ -99,6 +151,12 @@ class ChainTable(Table):
 class PointTable(Table):
     """A named point of a body."""
 
+    example: ClassVar[str] = """
+[[points]]
+name = "tip"
+body = "hand"
+at = [0.1, 0]
+"""
     name: Identifier
     body: Identifier = Field(description="body it is fixed to")
     at: Vector = quantity("m", "point from the centre of mass", default=(), validate_default=False)
@@ -107,14 +165,19 @@ class PointTable(Table):
 class Initial(Table):
     """The initial state: lists in the order of `eomgen check`, or tables by name.
 
-    In a table, values that are not named are 0, and an angle may be given in degrees as
-    `<name>_deg`.
+    In a table, values that are not named are 0, and an angle may be given in degrees, as
+    `<name>_deg = 90` or `<name> = "90 deg"`.
     """
 
-    q: tuple[Number, ...] | dict[str, Number] = Field(
+    example: ClassVar[str] = """
+[initial]
+q = { shoulder_angle_deg = 30 }
+v = { elbow_angle_dot = -2.0 }
+"""
+    q: tuple[Number, ...] | ByName = Field(
         default={}, union_mode="left_to_right", description="coordinates"
     )
-    v: tuple[Number, ...] | dict[str, Number] = Field(
+    v: tuple[Number, ...] | ByName = Field(
         default={}, union_mode="left_to_right", description="velocities"
     )
 
@@ -129,6 +192,12 @@ class Simulation(Table):
     less than its rounding error.
     """
 
+    example: ClassVar[str] = """
+[simulation]
+t_end = 5.0
+integrator = "DOP853"
+rtol = 1e-10
+"""
     t_end: Positive = Field(default=10.0, description="end time, s")
     integrator: Integrator = Field(default="DOP853", description="method")
     dt: Positive = Field(default=0.001, description="step of a fixed-step method, s")
@@ -160,6 +229,10 @@ class Scene(Table):
     parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
         Field(default={}, description="named numbers, or tables of value, unit and about")
     )
+    inputs: Annotated[tuple[Identifier | InputTable, ...], Field(max_length=MOST)] = Field(
+        default=(),
+        description="inputs that formulas use: names, or tables of name, unit, about and default",
+    )
     definitions: Annotated[dict[Identifier, Quantity], Field(max_length=MOST)] = Field(
         default={}, description="names for formulas of parameters, the motion and one another"
     )
@@ -180,8 +253,9 @@ class Scene(Table):
     effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = Field(
         default=(), description="effects: forces, contacts, controllers, drives"
     )
-    locked: Annotated[dict[Identifier, Number], Field(max_length=MOST)] = Field(
-        default={}, description="coordinates held constant, by name (<name>_deg for an angle)"
+    locked: Annotated[ByName, Field(max_length=MOST)] = Field(
+        default={},
+        description="coordinates held constant, by name (<name>_deg or '90 deg' for an angle)",
     )
     leave_out: Annotated[tuple[LeftOut, ...], Field(max_length=1)] = Field(
         default=(),

@@ -30,7 +30,7 @@ def draw_plane(axes: Axes, motion: Motion) -> None:
             zorder=2,
         )
     for order, (row, strength) in enumerate(instants(motion)):
-        _draw_pose(axes, motion, motion.poses[row], strength, zorder=3 + order)
+        draw_pose(axes, motion, motion.poses[row], strength, zorder=3 + order)
     for ball in motion.balls:
         draw_ball(axes, ball, np.array(ball.center), motion.camera)
     _draw_planes(axes, motion)
@@ -121,7 +121,7 @@ def _turned(points: Array, angle: float) -> Array:
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
 
 
-def _draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: int) -> None:
+def draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: int) -> None:
     paper = motion.camera.background
     edge = mixed(paper, ink_on(paper), strength)
     for (x, y, angle), shapes in zip(pose, motion.shapes, strict=True):

@@ -8,7 +8,7 @@ from eomgen.model.model import Model
 from eomgen.scene.appearance import Appearance
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
-from eomgen.scene.look import Box, Rod, Shape
+from eomgen.scene.look import Box, Rod, Shape, from_centre
 
 BOX, ROD = 0.25, 0.07
 """Side of a box and width of a rod, relative to the length of a rod."""
@@ -22,7 +22,9 @@ def shapes_of(model: Model, appearance: Appearance) -> tuple[tuple[Shape, ...], 
     own = _size(model, arms)
     size = appearance.camera.height / 10 if own is None else own
     return tuple(
-        appearance.shapes.get(body.name) or _skeleton(arms[body.name], model.dimensions, size)
+        tuple(from_centre(shape, [*map(model.value, body.com)]) for shape in own_shapes)
+        if (own_shapes := appearance.shapes.get(body.name))
+        else _skeleton(arms[body.name], model.dimensions, size)
         for body in model.bodies
     )
 

@@ -28,6 +28,7 @@ COLOURS = {
     "RK45": "#55bbe8",
     "DOP853": "#0055bb",
     "gragg_bulirsch_stoer": "#332288",
+    "Rodas5P": "#66a61e",
     "Radau": "#228833",
     "Radau_differences": "#228833",
     "BDF": "#ee7733",

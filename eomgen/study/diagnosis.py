@@ -3,7 +3,7 @@ lock, and what its motion depends on. `run` knows only the module and receives t
 """
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,15 +34,16 @@ def problem_of(
     parameters: Any = None,
     inputs: Any = None,
     model: Model | None = None,
+    start: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Problem:
     """The initial-value problem of a module, as from `as_problem`. With the `model` of the module,
-    its messages name the part of the model that has no finite value.
+    its messages name the part of the model that has no finite value. `start` is as there.
 
     Raises `RunError` if the module refuses parameters or inputs, or has no derivative at its
     initial state.
     """
     if model is None:
-        return as_problem(module, parameters, inputs)
+        return as_problem(module, parameters, inputs, start=start)
     given = given_values(module, parameters, inputs)
     return as_problem(
         module,
@@ -50,6 +51,7 @@ def problem_of(
         inputs,
         explain=explained(model, *given),
         origin=origin_of(model, *given),
+        start=start,
     )
 
 
@@ -72,7 +74,7 @@ def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str
     return Origin(
         {name: hashlib.sha256(repr(part).encode()).hexdigest() for name, part in parts.items()},
         {**model.defaults, **parameters},
-        {**dict.fromkeys([i.name for i in model.inputs], 0.0), **inputs},
+        {**{i.name: i.default for i in model.inputs}, **inputs},
     )
 
 

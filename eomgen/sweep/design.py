@@ -1,6 +1,5 @@
 """The members of a sweep: the values that each of them has instead of the scene's."""
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -84,7 +83,7 @@ def grid(axes: Mapping[str, Values]) -> Design:
     count = math.prod(len(column) for column in columns)
     if not columns or not 0 < count <= MOST:
         raise RunError(f"vary: makes {count if columns else 0} members; 1 to {MOST} are possible")
-    rows = np.array(list(itertools.product(*(column.tolist() for column in columns))))
+    rows = np.stack([mesh.ravel() for mesh in np.meshgrid(*columns, indexing="ij")], axis=1)
     return _checked(Design(tuple(axes), rows, columns))
 
 

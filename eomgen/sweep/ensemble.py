@@ -1,8 +1,8 @@
 """The result of a sweep."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,16 @@ from eomgen.run.problem import FloatArray
 from eomgen.sweep.design import Design
 from eomgen.sweep.members import FINISHED, WORDS
 
+SHARES = (0.05, 0.5, 0.95)
+"""Shares of the members below the quantiles that are given if no others are asked for."""
+MOST_NUMBERS = 2**22
+"""Greatest number of numbers of which statistics are computed at once."""
+
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """The runs of n members.
+    """The runs of n members. If they are kept in a folder, arrays are memory maps of its files:
+    what is not used stays on disk.
 
     scene      the scene's name
     design     what is varied: names, values (n, k), axes of a grid
@@ -27,6 +33,7 @@ class Ensemble:
     times      (m,), of the rows, s
     rows       (n, m, ny), states at these times, nan after a stop; None if only ends were kept
     outputs    functions of the module by name: (n, m, …) at these times, or (n, …) at the end
+    units      units by name, as far as known
     """
 
     scene: str
@@ -39,6 +46,7 @@ class Ensemble:
     times: FloatArray
     rows: FloatArray | None
     outputs: Mapping[str, FloatArray]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.final)
@@ -65,7 +73,7 @@ class Ensemble:
             return values if self.rows is None else np.asarray(values[:, -1])
         if name in self.design.names:
             return np.asarray(self.design.values[:, self.design.names.index(name)])
-        known = (*self.states, *self.outputs, *self.design.names)
+        known = tuple(dict.fromkeys((*self.states, *self.outputs, *self.design.names)))
         listed = ", ".join(known)
         raise RunError(f"of: unknown name '{name}'{nearest(name, known)}; known: {listed}")
 
@@ -76,20 +84,75 @@ class Ensemble:
         values = self.of(name)
         return values.reshape(*map(len, self.design.axes), *values.shape[1:])
 
-    def quantiles(self, name: str, shares: tuple[float, ...] = (0.05, 0.5, 0.95)) -> FloatArray:
-        """Quantiles over the members, of a state at each of `times`: (len(shares), m).
+    def statistics(self, name: str, shares: Sequence[float] = SHARES) -> "Statistics":
+        """Statistics over the members of a state or an output with one number, at each of `times`,
+        or at the end if only ends were kept.
+
+        Members without a value at a time do not count there. Only a part of the times is in memory
+        at once. Raises `RunError` for an unknown name, or an output with several numbers.
+        """
+        self.of(name)
+        if self.rows is None:
+            ends = self.of(name).astype(float)
+            ends[~self.finished] = np.nan
+            column, times = ends[:, None], self.times[-1:]
+        elif name in self.states:
+            column, times = self.rows[:, :, self.states.index(name)], self.times
+        else:
+            column, times = self.outputs.get(name, self.of(name)[:, None, None]), self.times
+        if column.ndim > 2:
+            raise RunError(f"statistics: {name} is not a state or an output with one number")
+        at_once = max(1, MOST_NUMBERS // len(self))
+        parts = [
+            _statistics(np.array(column[:, start : start + at_once], dtype=float), shares)
+            for start in range(0, len(times), at_once)
+        ]
+        joined = np.concatenate(parts, axis=1)
+        count, mean, deviation = joined[:3]
+        return Statistics(name, times, count.astype(np.int64), mean, deviation, joined[3:])
+
+    def quantiles(self, name: str, shares: Sequence[float] = SHARES) -> FloatArray:
+        """Quantiles over the members, of a state or an output with one number at each of `times`:
+        (len(shares), m).
 
         Members without a value at a time do not count there. Raises `RunError` for an unknown
-        state, or if only ends were kept.
+        name, or if only ends were kept.
         """
         if self.rows is None:
             raise RunError("quantiles: only ends were kept; give samples = 101")
-        if name not in self.states:
-            raise RunError(f"quantiles: unknown state '{name}'{nearest(name, self.states)}")
-        column = self.rows[:, :, self.states.index(name)]
-        found = np.full((len(shares), len(self.times)), np.nan)
-        for i in range(len(self.times)):
-            there = column[np.isfinite(column[:, i]), i]
-            if there.size:
-                found[:, i] = np.quantile(there, shares)
-        return found
+        return self.statistics(name, shares).quantiles
+
+
+class Statistics(NamedTuple):
+    """Statistics of a quantity over the members of a sweep, in its unit.
+
+    times      (m,), s
+    members    (m,), how many have a value at each of them; nan stands for statistics of none
+    mean       (m,)
+    deviation  (m,), the standard deviation of the sample, nan for a single member
+    quantiles  (k, m), one row for each share
+    """
+
+    name: str
+    times: FloatArray
+    members: NDArray[np.int64]
+    mean: FloatArray
+    deviation: FloatArray
+    quantiles: FloatArray
+
+
+def _statistics(values: FloatArray, shares: Sequence[float]) -> FloatArray:
+    """Rows of counts, means, deviations and quantiles of the finite values in each column."""
+    found = np.full((3 + len(shares), values.shape[1]), np.nan)
+    for i, column in enumerate(values.T):
+        there = column[np.isfinite(column)]
+        found[0, i] = there.size
+        if not there.size:
+            continue
+        # In a unit, a power of two, in which sums and squares of great values do not overflow.
+        exponent = np.frexp(np.abs(there).max())[1]
+        there = np.ldexp(there, -exponent)
+        parts = [there.mean(), there.std(ddof=1) if there.size > 1 else np.nan]
+        with np.errstate(over="ignore"):
+            found[1:, i] = np.ldexp([*parts, *np.quantile(there, shares)], exponent)
+    return found

@@ -1,8 +1,9 @@
 """The chunks of a sweep, run here, in processes of this machine, or by a Dask scheduler."""
 
 import math
+import multiprocessing
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     Executor,
@@ -14,102 +15,169 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from importlib import import_module
 from itertools import islice
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.progress import Progress
+from eomgen.sweep.counter import SIZE, Counter, StoppedError
 from eomgen.sweep.design import Design
 from eomgen.sweep.members import Arrays, Task
-from eomgen.sweep.storage import Storage
 from eomgen.sweep.together import run_chunk
 
 LARGEST_CHUNK, TOGETHER, CHUNKS = 256, 4096, 64
 """Greatest number of members in a chunk that run one by one, or together; and about how many chunks
 there are if it is less.
 """
+FILLING = 32
+"""Least number of members in a chunk that run together: fewer would not fill vector registers."""
+MOST_BYTES = 2**26
+"""Greatest size of a chunk's results, if it has more than one member."""
+PAUSE = 0.2
+"""Time between two looks at how far the members are, s."""
 
 Job = tuple[int, np.ndarray]
 """The number of a chunk, and the values of its members."""
 
 
-def chunk_size(members: int, together: bool) -> int:
+class Kept(Protocol):
+    """Where results are kept."""
+
+    def has(self, number: int) -> bool:
+        """Whether a chunk is there."""
+        ...
+
+    def put(self, number: int, arrays: Arrays) -> None:
+        """Take a chunk."""
+        ...
+
+
+def chunk_size(members: int, together: bool, bytes_each: int) -> int:
     """Number of members in a chunk; it depends on nothing else, so that a sweep can go on."""
-    largest = TOGETHER if together else LARGEST_CHUNK
-    return max(1, min(largest, math.ceil(members / CHUNKS)))
+    least, largest = (FILLING, TOGETHER) if together else (1, LARGEST_CHUNK)
+    wanted = max(least, min(largest, math.ceil(members / CHUNKS)))
+    return max(1, min(wanted, MOST_BYTES // max(1, bytes_each)))
 
 
 def execute(
     task: Task,
     design: Design,
-    storage: Storage | None,
+    kept: Kept,
+    size: int,
     *,
     workers: int = 1,
     scheduler: str = "",
     progress: Progress = lambda fraction: None,
-) -> Arrays:
-    """Run all members, or those whose chunks `storage` does not have; return their arrays in order.
+) -> None:
+    """Run all members in chunks of `size`, or those whose chunks `kept` does not have.
 
     Raises `RunError` if workers fail, or if the scheduler cannot be reached.
     """
-    size = chunk_size(len(design.values), bool(task.vectors))
-    count = math.ceil(len(design.values) / size)
-    chunks: dict[int, Arrays] = {}
-    if storage:
-        chunks = {k: kept for k in range(count) if (kept := storage.get(k)) is not None}
-    jobs = [(k, design.values[k * size : (k + 1) * size]) for k in range(count) if k not in chunks]
-    progress(len(chunks) / count)
-    for number, arrays in _results(task, jobs, workers, scheduler):
-        if storage:
-            storage.put(number, arrays)
-        chunks[number] = arrays
-        progress(len(chunks) / count)
-    return {name: np.concatenate([chunks[k][name] for k in range(count)]) for name in chunks[0]}
+    total = len(design.values)
+    jobs = [
+        (number, design.values[number * size : (number + 1) * size])
+        for number in range(math.ceil(total / size))
+        if not kept.has(number)
+    ]
+    ended = total - sum(len(values) for _, values in jobs)
+    sizes = {number: len(values) for number, values in jobs}
+    progress(ended / total)
+
+    def running(members: int) -> None:  # so many have ended in chunks that are not done
+        progress(min(1.0, (ended + members) / total))
+
+    for number, arrays in _results(task, jobs, workers, scheduler, running):
+        kept.put(number, arrays)
+        ended += sizes[number]
+        running(0)
 
 
 def _results(
-    task: Task, jobs: Sequence[Job], workers: int, scheduler: str
+    task: Task,
+    jobs: Sequence[Job],
+    workers: int,
+    scheduler: str,
+    running: Callable[[int], None],
 ) -> Iterator[tuple[int, Arrays]]:
     """The chunks as they come."""
     if scheduler:
         yield from _by_dask(task, jobs, scheduler)
-    elif workers > 1 and len(jobs) > 1:
-        yield from _by_workers(task, jobs, min(workers, len(jobs)))
+    elif task.together or (workers > 1 and len(jobs) > 1):
+        yield from _by_workers(task, jobs, max(1, min(workers, len(jobs))), running)
     else:
         for number, values in jobs:
-            yield number, run_chunk(task, values)
+            yield number, run_chunk(task, values, _Shown(running))
 
 
-def _by_workers(task: Task, jobs: Sequence[Job], workers: int) -> Iterator[tuple[int, Arrays]]:
-    left = iter(jobs)
-    with _pool(task, workers) as pool:
-        running = {
-            pool.submit(run_chunk, task, values): number
+class _Shown(Counter):
+    """A counter that shows each member at once."""
+
+    def __init__(self, show: Callable[[int], None]) -> None:
+        super().__init__()
+        self._show = show
+
+    def add(self, members: int = 1) -> None:
+        super().add(members)
+        self._show(self.ended)
+
+
+def _by_workers(
+    task: Task, jobs: Sequence[Job], workers: int, running: Callable[[int], None]
+) -> Iterator[tuple[int, Arrays]]:
+    left, done = iter(jobs), 0
+    pool, counter, run = _pool(task, workers)
+    with pool:
+        futures = {
+            pool.submit(run, task, values): (number, len(values))
             for number, values in islice(left, 2 * workers)
         }
         try:
-            while running:
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in done:
-                    number = running.pop(future)
+            while futures:
+                ready, _ = wait(futures, PAUSE, FIRST_COMPLETED)
+                for future in ready:
+                    number, members = futures.pop(future)
                     for following, values in islice(left, 1):
-                        running[pool.submit(run_chunk, task, values)] = following
+                        futures[pool.submit(run, task, values)] = (following, len(values))
+                    done += members
                     yield number, future.result()
+                running(max(0, counter.ended - done))
         except BrokenProcessPool:
             raise RunError("a worker process ended unexpectedly, out of memory perhaps") from None
         finally:
-            for future in running:
+            counter.stop()
+            for future in futures:
                 future.cancel()
 
 
-def _pool(task: Task, workers: int) -> Executor:
+Run = Callable[[Task, Any], Arrays]
+
+
+def _pool(task: Task, workers: int) -> tuple[Executor, Counter, Run]:
     """Threads if compiled code makes the runs, which lets other threads go on; else processes."""
-    if task.vectors:
-        return ThreadPoolExecutor(workers)
-    # Ctrl-C is heard here; a worker would print a traceback.
-    deaf = (signal.SIGINT, signal.SIG_IGN)
-    return ProcessPoolExecutor(workers, initializer=signal.signal, initargs=deaf)
+    if task.together:
+        counter = Counter()
+        return ThreadPoolExecutor(workers), counter, lambda t, values: run_chunk(t, values, counter)
+    memory = multiprocessing.Array("q", SIZE)
+    pool = ProcessPoolExecutor(workers, initializer=_begin_worker, initargs=(memory,))
+    return pool, Counter(memory.get_obj(), memory.get_lock()), _in_worker
+
+
+_of_worker = Counter()
+
+
+def _begin_worker(memory: Any) -> None:
+    """Ctrl-C is heard by the main process; a worker would print a traceback."""
+    global _of_worker
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _of_worker = Counter(memory.get_obj(), memory.get_lock())
+
+
+def _in_worker(task: Task, values: Any) -> Arrays:
+    try:
+        return run_chunk(task, values, _of_worker)
+    except StoppedError:
+        return {}
 
 
 def _by_dask(task: Task, jobs: Sequence[Job], scheduler: str) -> Iterator[tuple[int, Arrays]]:

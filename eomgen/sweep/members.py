@@ -1,53 +1,61 @@
 """The runs of some members in this process. Its tasks and results can be sent to another one."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from typing import Any
+from functools import cached_property, lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.errors import EomgenError, RunError
+from eomgen.codegen.interface import Interface
+from eomgen.errors import EomgenError
 from eomgen.model.model import Model
-from eomgen.native.library import compiled_library
-from eomgen.native.runs import MAIN, CompiledSteps
-from eomgen.run.compiled import Compiled
+from eomgen.native.accelerator import Accelerator
+from eomgen.program.program import Program
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, given_values, load_module
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Trajectory
+from eomgen.store import key_of
 from eomgen.study.diagnosis import explained
+from eomgen.sweep.counter import Counter
 
 Arrays = dict[str, NDArray[Any]]
 FINISHED, STOPPED, REFUSED = 0, 1, 2
 """How a member ended: at its end time, before it, or not at all."""
 WORDS = ("finished", "stopped", "refused")
+Values = tuple[Mapping[str, float] | None, Mapping[str, float] | None]
+"""Parameters and inputs by name."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Task:
     """What all members share.
 
     model       the scene's model
     source      the text of its module
-    key         determines the kernels; `kernels` are the C sources of compiled steps, empty if
-                there are none
+    program     its program and interface, from which compiled code is made where the members run;
+                None if they run in Python
+    at_once     whether that is compiled before the first run, or once it pays
+    together    whether members run together, see `sweep.together`, or one by one
     names       what is varied; `kinds` says of each whether it is a "parameter", "state" or "input"
     parameters, inputs  fixed values by name
     outputs     functions of the module that are computed at the kept rows
     t_end       end time, s
     times       (n,) of the rows that are kept, s; the last is `t_end`
     settings    further arguments of `run.integrate.integrate`
-    vectors     the C sources of kernels for several members at once, see `sweep.together`; empty
-                if members run one by one
-    dt, every   for these the step, s, and that each `every`-th is kept
+    dt, every   of equal steps that members make together: the step, s, and that each `every`-th is
+                kept
     """
 
     model: Model
     source: str
-    key: str
-    kernels: Mapping[str, str]
+    program: tuple[Program, Interface] | None
+    at_once: bool
+    together: bool
     names: tuple[str, ...]
     kinds: tuple[str, ...]
     parameters: Mapping[str, float]
@@ -56,13 +64,32 @@ class Task:
     t_end: float
     times: tuple[float, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
-    vectors: Mapping[str, str] = field(default_factory=dict)
     dt: float = 0.0
     every: int = 1
 
+    @cached_property
+    def digest(self) -> str:
+        """A digest of all that, beside its values, determines the results of a member."""
+        parts = (
+            *(key_of(self.model), self.source, self.names, self.kinds, self.outputs, self.t_end),
+            *(sorted(self.parameters.items()), sorted(self.inputs.items())),
+            *(self.times, sorted(self.settings.items()), self.together),
+        )
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
-def run_members(task: Task, values: FloatArray) -> Arrays:
-    """Run members with these values (m, k). Returns arrays of m rows:
+    @property
+    def _key(self) -> tuple[object, ...]:
+        return self.digest, self.program is None, self.at_once
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Task) and self._key == other._key
+
+
+def run_members(task: Task, values: FloatArray, counter: Counter | None = None) -> Arrays:
+    """Run members with these values (m, k), counted as they end. Returns arrays of m rows:
 
     final    the state at the end, or where a member stopped; nan if it was refused
     t        the time of that, s
@@ -71,101 +98,137 @@ def run_members(task: Task, values: FloatArray) -> Arrays:
     rows     (m, n, ny), the states at the kept times, nan after a stop; if there are more than two
     NAME     each of the outputs, (m, n, …) at these times, or (m, …) at the end
     """
-    runs = [_run(task, row) for row in values.tolist()]
-    module = module_of(task.source)
-    ny, many = len(module.STATES), len(task.times) > 2
-    nothing = np.full(ny, np.nan)
+    counter, prepared, done = counter or Counter(), _prepared(task), []
+    for row in values.tolist():
+        done.append(prepared.member(row))
+        counter.add()
     found: Arrays = {
-        "final": np.array([run.y[-1] if isinstance(run, Trajectory) else nothing for run in runs]),
-        "t": np.array([run.t[-1] if isinstance(run, Trajectory) else 0.0 for run in runs]),
-        "status": np.array([_status(run) for run in runs], dtype=np.int8),
-        "message": np.array([run if isinstance(run, str) else run.message for run in runs]),
+        "final": np.array([member.final for member in done]),
+        "t": np.array([member.t for member in done]),
+        "status": np.array([member.status for member in done], dtype=np.int8),
+        "message": np.array([member.message for member in done]),
     }
-    kept = np.array([_rows(task, run, ny) for run in runs])
+    many = len(task.times) > 2
     if many:
-        found["rows"] = kept
-    for name in task.outputs:
-        each = [
-            _output(task, module, name, row, states)
-            for row, states in zip(values.tolist(), kept if many else kept[:, -1:], strict=True)
-        ]
-        found[name] = np.array(each) if many else np.array(each)[:, 0]
+        found["rows"] = np.array([member.rows for member in done])
+    for i, name in enumerate(task.outputs):
+        each = np.array([member.outputs[i] for member in done])
+        found[name] = each if many else each[:, 0]
     return found
 
 
-def _run(task: Task, row: Sequence[float]) -> Trajectory | str:
-    """The run of a member, or why it was refused."""
-    try:
-        problem = _problem(task, row)
-        return integrate(problem, t_end=task.t_end, samples=len(task.times), **task.settings)
-    except EomgenError as error:
-        return " ".join(error.lines)
+class _Member(NamedTuple):
+    """The results of a member; `rows` and `outputs` are those at the kept times."""
+
+    final: FloatArray
+    t: float
+    status: int
+    message: str
+    rows: FloatArray
+    outputs: list[FloatArray]
 
 
-def _given(task: Task, row: Sequence[float]) -> dict[str, dict[str, float]]:
-    """The values of a member by kind and name."""
-    given = {"parameter": dict(task.parameters), "input": dict(task.inputs), "state": {}}
-    for name, kind, value in zip(task.names, task.kinds, row, strict=True):
-        given[kind][name] = value
-    return given
+class _Prepared:
+    """What members share in this process."""
 
+    def __init__(self, task: Task) -> None:
+        self.task, self.module = task, module_of(task.source)
+        self.times = np.array(task.times)
+        self.kept = task.times if len(task.times) > 2 else task.times[-1:]
+        self.shapes = [output_shape(task.source, name) for name in task.outputs]
+        self.accelerator: Accelerator | None = None
+        if task.program is not None:
+            self.accelerator = Accelerator(
+                task.model, self.module, None, None, program=task.program
+            )
 
-def _problem(task: Task, row: Sequence[float]) -> Problem:
-    module = module_of(task.source)
-    given = _given(task, row)
-    values = given["parameter"] or None, given["input"] or None
-    explain = explained(task.model, *given_values(module, *values))
-    problem = as_problem(module, *values, explain=explain)
-    if given["state"]:
-        initial = problem.initial.copy()
-        for name, value in given["state"].items():
-            initial[module.STATES.index(name)] = value
-        problem = replace(problem, initial=initial)
-        problem = replace(problem, initial=problem.unit(initial))
-    library = _library(task.key, tuple(task.kernels.items())) if task.kernels else None
-    if library is None:
-        return problem
-    steps = CompiledSteps(module, library, *values)
-    return replace(problem, compiled=Compiled(problem.derivative, steps.named, steps.equal))
+    def compile(self) -> None:
+        """Compile the steps now. Raises `RunError` if there is no compiler, or if it fails."""
+        if self.accelerator is not None:
+            self.accelerator.compile()
 
-
-def _status(run: Trajectory | str) -> int:
-    if isinstance(run, str):
-        return REFUSED
-    return FINISHED if run.finished else STOPPED
-
-
-def _rows(task: Task, run: Trajectory | str, ny: int) -> FloatArray:
-    """The states of a run at the kept times, nan where it has none; the last is that at its end."""
-    rows = np.full((len(task.times), ny), np.nan)
-    if isinstance(run, str):
-        return rows
-    times = np.array(task.times)
-    near = 1e-9 * task.t_end
-    at = np.searchsorted(run.t, times + near, side="right") - 1
-    there = np.abs(run.t[at] - times) <= near
-    rows[there] = run.y[at[there]]
-    return rows
-
-
-def _output(
-    task: Task, module: Any, name: str, row: Sequence[float], states: FloatArray
-) -> FloatArray:
-    """An output of a member at some states (n, ny), nan where it has no value."""
-    given = _given(task, row)
-    times = task.times if len(states) > 1 else task.times[-1:]
-    found = []
-    for t, y in zip(times, states, strict=True):
+    def member(self, row: Sequence[float]) -> _Member:
+        """Run a member. One that is refused or stops says so."""
+        given: dict[str, dict[str, float]] = {
+            "parameter": dict(self.task.parameters),
+            "input": dict(self.task.inputs),
+            "state": {},
+        }
+        for name, kind, value in zip(self.task.names, self.task.kinds, row, strict=True):
+            given[kind][name] = value
+        values = given["parameter"] or None, given["input"] or None
+        own = self.accelerator and self.accelerator.at(*values)
         try:
-            found.append(getattr(module, name)(t, y, given["parameter"] or None, given["input"]))
-        except (ArithmeticError, ValueError):
-            found.append(np.nan)
-    shape = np.broadcast_shapes(*(np.shape(value) for value in found), _shape(task.source, name))
-    return np.array([np.broadcast_to(value, shape) for value in found])
+            run = self._run(self._problem(given["state"], values, own))
+        except EomgenError as error:
+            nothing = np.full((len(self.times), len(self.module.STATES)), np.nan)
+            text = " ".join(error.lines)
+            return _Member(nothing[0], 0.0, REFUSED, text, nothing, self._outputs(nothing, values))
+        rows = self._rows(run)
+        outputs = self._outputs(rows, values, own)
+        status = FINISHED if run.finished else STOPPED
+        return _Member(run.y[-1], float(run.t[-1]), status, run.message, rows, outputs)
+
+    def _problem(
+        self, states: Mapping[str, float], values: Values, own: Accelerator | None
+    ) -> Problem:
+        explain = explained(self.task.model, *given_values(self.module, *values))
+        problem = as_problem(self.module, *values, explain=explain)
+        if states:
+            initial = problem.initial.copy()
+            for name, value in states.items():
+                initial[self.module.STATES.index(name)] = value
+            problem = replace(problem, initial=initial)
+            problem = replace(problem, initial=problem.unit(initial))
+        return own.of(problem) if own else problem
+
+    def _run(self, problem: Problem) -> Trajectory:
+        task = self.task
+        run = integrate(problem, t_end=task.t_end, samples=len(task.times), **task.settings)
+        if run.outcome.kind == "interrupted":  # which is no result of the member's
+            raise KeyboardInterrupt
+        return run
+
+    def _rows(self, run: Trajectory) -> FloatArray:
+        """The states at the kept times, nan where there is none; the last is that at the end."""
+        rows, near = np.full((len(self.times), run.y.shape[1]), np.nan), 1e-9 * self.task.t_end
+        at = np.searchsorted(run.t, self.times + near, side="right") - 1
+        there = np.abs(run.t[at] - self.times) <= near
+        rows[there] = run.y[at[there]]
+        return rows
+
+    def _outputs(
+        self, rows: FloatArray, values: Values, own: Accelerator | None = None
+    ) -> list[FloatArray]:
+        """The outputs at the kept rows, nan where they have no value."""
+        found = []
+        for name, shape in zip(self.task.outputs, self.shapes, strict=True):
+            python = partial(_called, getattr(self.module, name), values)
+            function = own.function(name, python) if own else python
+            array = np.full((len(self.kept), *shape), np.nan)
+            for i, (t, y) in enumerate(zip(self.kept, rows[-len(self.kept) :], strict=True)):
+                with suppress(ArithmeticError, ValueError):
+                    array[i] = function(t, y)
+            found.append(array)
+        return found
+
+
+def _called(function: Any, values: Values, t: float, y: FloatArray) -> Any:
+    return function(t, y, *values)
+
+
+@lru_cache(4)
+def _prepared(task: Task) -> _Prepared:
+    return _Prepared(task)
+
+
+def compile_steps(task: Task) -> None:
+    """Compile the steps of members that run one by one. Raises `RunError` if that fails."""
+    _prepared(task).compile()
 
 
 @lru_cache(64)
-def _shape(source: str, name: str) -> tuple[int, ...]:
+def output_shape(source: str, name: str) -> tuple[int, ...]:
     """The shape of an output."""
     module = module_of(source)
     return np.shape(getattr(module, name)(0.0, module.initial_state()))
@@ -175,22 +238,3 @@ def _shape(source: str, name: str) -> tuple[int, ...]:
 def module_of(source: str) -> Any:
     """The module of a source text."""
     return load_module(source, "sweep")
-
-
-def compiled_steps(task: Task) -> Any:
-    """The library of compiled steps, or None if there are no sources. Raises `RunError`."""
-    return _compiled(task.key, tuple(task.kernels.items())) if task.kernels else None
-
-
-@lru_cache(4)
-def _compiled(key: str, kernels: tuple[tuple[str, str], ...]) -> Any:
-    return compiled_library(key, lambda: dict(kernels), MAIN)
-
-
-@lru_cache(4)
-def _library(task_key: str, kernels: tuple[tuple[str, str], ...]) -> Any:
-    """The same; None where it cannot be made: steps in Python have the same results."""
-    try:
-        return _compiled(task_key, kernels)
-    except RunError:
-        return None

@@ -1,30 +1,56 @@
-"""The runs of many members at once by the classical Runge-Kutta method, in vector registers."""
+"""The runs of many members at once by rk4 or DOP853, in vector registers."""
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eomgen.native import adaptive_lanes, lanes
+from eomgen.native.adaptive_lanes import AdaptiveLanes
 from eomgen.native.lanes import Lanes
-from eomgen.run.module import given_values
-from eomgen.run.problem import USUAL_LENGTH, FloatArray
-from eomgen.sweep.members import FINISHED, Arrays, Task, compiled_steps, module_of, run_members
+from eomgen.run.checks import errors_of_sizes
+from eomgen.run.module import as_problem, given_values
+from eomgen.run.problem import USUAL_LENGTH, FloatArray, Problem
+from eomgen.run.sizes import mechanism_size, state_sizes
+from eomgen.sweep.counter import Counter
+from eomgen.sweep.members import FINISHED, Arrays, Task, compile_steps, module_of, run_members
 
-METHOD = "rk4"
+METHODS = ("rk4", "DOP853")
+"""The methods that run members together."""
 
 
-def run_together(task: Task, values: FloatArray) -> Arrays:
+def run_together(task: Task, values: FloatArray, counter: Counter | None = None) -> Arrays:
     """The same as `run_members`, to rounding.
 
-    Members that overflow, or whose steps seem too long for stability, are run one by one: so their
-    messages are the same. Raises `RunError` if there is no compiler.
+    Members that overflow, or whose steps seem too long for stability or too many, are run one by
+    one: so their messages are the same. Raises `RunError` if there is no compiler.
     """
-    lanes = _library(tuple(task.vectors.items()))
-    k, u, y, sound = _starts(task, values, lanes)
-    rows, stable = lanes.rk4(y, k, u, t_end=task.t_end, dt=task.dt, every=task.every)
+    counter, kernels = counter or Counter(), _library(task)
+    starts = _Starts(task, values, kernels)
+    k, u, y, sound = starts.k, starts.u, starts.y, starts.sound
+    if isinstance(kernels, AdaptiveLanes):
+        rows, valid = kernels.dop853(
+            y,
+            k,
+            u,
+            starts.allowed(),
+            rtol=task.settings["rtol"],
+            longest=task.settings["max_step"] or math.inf,
+            times=np.array(task.times[1:]),
+            addresses=counter.addresses,
+        )
+    else:
+        rows, valid = kernels.rk4(
+            *(y, k, u),
+            t_end=task.t_end,
+            dt=task.dt,
+            every=task.every,
+            addresses=counter.addresses,
+        )
+    counter.check()
     rows = np.concatenate([y[None], rows])
-    sound &= stable
+    sound &= valid
     count = len(values)
     found: Arrays = {
         "final": rows[-1].T.copy(),
@@ -39,14 +65,15 @@ def run_together(task: Task, values: FloatArray) -> Arrays:
         chosen = zip(task.times, rows, strict=True) if many else [(task.t_end, rows[-1])]
         each = []
         for t, states in chosen:
-            value, valid = lanes.output(name, t, states, k, u)
+            value, valid = kernels.output(name, t, states, k, u)
             sound &= valid
             each.append(np.moveaxis(value, -1, 0))
         found[name] = np.stack(each, axis=1) if many else each[0]
     left = np.flatnonzero(~sound)
     if not left.size:
         return found
-    alone = run_members(task, values[left])
+    counter.add(-left.size)
+    alone = run_members(task, values[left], counter)
     if alone["message"].dtype.itemsize > found["message"].dtype.itemsize:
         found["message"] = found["message"].astype(alone["message"].dtype)
     for name, array in alone.items():
@@ -54,55 +81,95 @@ def run_together(task: Task, values: FloatArray) -> Arrays:
     return found
 
 
-def run_chunk(task: Task, values: FloatArray) -> Arrays:
+def run_chunk(task: Task, values: FloatArray, counter: Counter | None = None) -> Arrays:
     """Run members together if the task has kernels for that, else one by one."""
-    return run_together(task, values) if task.vectors else run_members(task, values)
+    run = run_together if task.together else run_members
+    return run(task, values, counter)
 
 
 def build(task: Task) -> None:
     """Compile the kernels of a task now. Raises `RunError` if there is no compiler, or it fails."""
-    if task.vectors:
-        _library(tuple(task.vectors.items()))
-    else:
-        compiled_steps(task)
+    if task.together:
+        _library(task)
+    elif task.at_once:
+        compile_steps(task)
 
 
 @lru_cache(4)
-def _library(texts: tuple[tuple[str, str], ...]) -> Lanes:
-    return Lanes(dict(texts))
+def _library(task: Task) -> Lanes:
+    assert task.program is not None
+    if task.settings["integrator"] == "rk4":
+        return Lanes(lanes.sources(*task.program, task.outputs))
+    return AdaptiveLanes(adaptive_lanes.sources(*task.program, task.outputs))
 
 
-def _starts(
-    task: Task, values: FloatArray, lanes: Lanes
-) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Constants, inputs and initial states of members, as columns, and which can be used."""
-    module = module_of(task.source)
-    columns = {name: values[:, i] for i, name in enumerate(task.names)}
-    kinds = dict(zip(task.names, task.kinds, strict=True))
-    own, _ = given_values(module, dict(task.parameters) or None)
-    varied = [name for name in columns if kinds[name] == "parameter"]
-    count = len(values) if varied else 1
-    p = _filled({**module.PARAMETERS, **own}, {name: columns[name] for name in varied}, count)
-    k, y, sound = lanes.prepare(np.ascontiguousarray(p.T))
-    pushes = [name for name in columns if kinds[name] == "input"]
-    inputs = {**dict.fromkeys(module.INPUTS, 0.0), **task.inputs}
-    given = {name: columns[name] for name in pushes}
-    u = _filled(inputs, given, len(values) if pushes else 1)
-    if not varied:
-        y = np.repeat(y, len(values), axis=1)
-    for name in columns:
-        if kinds[name] == "state":
-            y[module.STATES.index(name)] = columns[name]
-    if "state" in task.kinds:
-        for indices in module.QUATERNIONS:
-            a, b, c, d = y[list(indices)]
-            length = np.sqrt(a * a + b * b + c * c + d * d)
-            sound = sound & (length > USUAL_LENGTH[0]) & (length < USUAL_LENGTH[1])
-            y[list(indices)] /= np.where(sound, length, 1.0)
-    return k, u, y, np.broadcast_to(sound, len(values)).copy()
+class _Starts:
+    """Where members begin, as columns: constants k, inputs u, initial states y, and which members
+    can be run together, `sound`.
+    """
+
+    def __init__(self, task: Task, values: FloatArray, kernels: Lanes) -> None:
+        module, count = module_of(task.source), len(values)
+        self._task, self._kernels, self._module = task, kernels, module
+        columns = {name: values[:, i] for i, name in enumerate(task.names)}
+        kinds = dict(zip(task.names, task.kinds, strict=True))
+        own, _ = given_values(module, dict(task.parameters) or None)
+        varied = {name: columns[name] for name in columns if kinds[name] == "parameter"}
+        self._parameters: dict[str, float | FloatArray] = {**module.PARAMETERS, **own, **varied}
+        p = _filled(self._parameters, count if varied else 1)
+        self.k, self._own, sound = kernels.prepare(np.ascontiguousarray(p.T))
+        pushes = {name: columns[name] for name in columns if kinds[name] == "input"}
+        inputs: dict[str, float | FloatArray] = {
+            **module.INPUTS,
+            **task.inputs,
+            **pushes,
+        }
+        self.u = _filled(inputs, count if pushes else 1)
+        self.y = self._own.copy() if varied else np.repeat(self._own, count, axis=1)
+        for name in columns:
+            if kinds[name] == "state":
+                self.y[module.STATES.index(name)] = columns[name]
+        if "state" in task.kinds:
+            for indices in module.QUATERNIONS:
+                a, b, c, d = self.y[list(indices)]
+                length = np.sqrt(a * a + b * b + c * c + d * d)
+                sound = sound & (length > USUAL_LENGTH[0]) & (length < USUAL_LENGTH[1])
+                self.y[list(indices)] /= np.where(sound, length, 1.0)
+        self.sound = np.broadcast_to(sound, count).copy()
+
+    def allowed(self) -> FloatArray:
+        """The absolute tolerances of each state, (ny, n) or (ny, 1): as `run.checks` has them for
+        a single run, with the noise of the scene's own values.
+        """
+        task, module, settings = self._task, self._module, self._task.settings
+        if settings.get("atol") is not None:
+            return np.full((len(module.STATES), 1), settings["atol"])
+        count = max(self.k.shape[1], self.u.shape[1])
+        y = self._own if self._own.shape[1] == count else np.repeat(self._own, count, axis=1)
+        slope, _ = self._kernels.output("derivative", 0.0, y, self.k, self.u)
+        start = dict(zip(module.STATES, y, strict=True))
+        size = mechanism_size(module.UNITS, self._parameters, start)
+        with np.errstate(all="ignore"):  # of members that are not sound
+            sizes = state_sizes(module.STATES, module.UNITS, y, slope, size)
+            problem = _own_problem(task.source, *map(_pairs, (task.parameters, task.inputs)))
+            found = errors_of_sizes(sizes, problem, "DOP853", settings["rtol"], task.t_end)
+        return np.ascontiguousarray(found)
 
 
-def _filled(own: Mapping[str, float], columns: Mapping[str, FloatArray], count: int) -> FloatArray:
-    """A row for each name: its own value, or its column of `count` values."""
-    rows = [np.broadcast_to(columns.get(name, value), count) for name, value in own.items()]
-    return np.array(rows, dtype=float).reshape(len(own), count)
+Pairs = tuple[tuple[str, float], ...]
+
+
+def _pairs(values: Mapping[str, float]) -> Pairs:
+    return tuple(values.items())
+
+
+@lru_cache(4)
+def _own_problem(source: str, parameters: Pairs, inputs: Pairs) -> Problem:
+    """The problem of a module at fixed values."""
+    return as_problem(module_of(source), dict(parameters) or None, dict(inputs) or None)
+
+
+def _filled(values: Mapping[str, float | FloatArray], count: int) -> FloatArray:
+    """A row of `count` values for each name."""
+    rows = [np.broadcast_to(value, count) for value in values.values()]
+    return np.array(rows, dtype=float).reshape(len(values), count)

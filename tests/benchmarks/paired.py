@@ -55,6 +55,14 @@ def spread(ratios: np.ndarray) -> str:
     return f"{middle:.3g} ({low:.3g} to {high:.3g})"
 
 
+def compared(ours: np.ndarray, theirs: np.ndarray) -> str:
+    """The ratio of least times, which other work on the machine disturbs little, and the quartiles
+    of the ratios of paired rounds.
+    """
+    low, high = np.quantile(theirs / ours, (0.25, 0.75))
+    return f"{theirs.min() / ours.min():.3g} ({low:.3g} to {high:.3g})"
+
+
 def row(*words: object) -> None:
     """Print a row of a table."""
     print(f"| {' | '.join(map(str, words))} |", flush=True)

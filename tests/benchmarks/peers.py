@@ -2,10 +2,12 @@
 
     pip install -e '.[bench]' && python tests/benchmarks/peers.py [--rounds N] [--only TABLE ...]
 
-A derivative, one state after another in a loop of C or C++: the kernel of `eomgen.native` over 2000
-columns, beside Pinocchio's `abaInParallel` with one thread. Planar chains of 2 to 100 links are the
-same mechanism for both (accelerations are compared first); for the human figure Pinocchio has its
-own sample humanoid, of 34 degrees of freedom where the figure has 41.
+A derivative: the kernel of `eomgen.native` over 2000 columns, one state after another and several
+states in vector registers with the same bits, beside Pinocchio's `abaInParallel` with one thread
+and C code that CasADi makes of the same algorithm; and derivatives that wait for one another.
+Planar chains of 2 to 100 links are the same mechanism for all (accelerations are compared first);
+for the human figure Pinocchio has its own sample humanoid, of 34 degrees of freedom where the
+figure has 41.
 
 The same for several states at once in vector registers, beside Pinocchio and beside the same
 program by JAX and by CasADi; and ensembles of runs by the classical Runge-Kutta method, on one core
@@ -17,7 +19,8 @@ loosest of a ladder of tolerances whose end is that near to a reference in exten
 Compilation comes first and is told apart. The same beside MuJoCo, and beside Pinocchio and SymPy's
 lambdify in SciPy.
 
-Printed are medians, and of the ratios of paired rounds median and quartiles.
+Printed of derivatives are the least times and the ratios of these, of runs medians; and of the
+ratios of paired rounds the quartiles.
 """
 
 import argparse
@@ -33,18 +36,20 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+import peer_casadi
 import peer_engines
 import peer_lanes
 import pinocchio as pin
-from paired import COLUMNS, chain, chain_of_pinocchio, paired, row, spread
+from paired import COLUMNS, chain, chain_of_pinocchio, compared, paired, row, spread
 from scipy.integrate import DOP853
 
+from eomgen.codegen.backends import c
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.native.accelerator import Accelerator
+from eomgen.native.functions import restricted
 from eomgen.native.library import compiled_library
 from eomgen.native.module import Kernels
-from eomgen.native.runs import MAIN, sources
 from eomgen.native.taylor import MAIN as MAIN_OF_TAYLOR
 from eomgen.native.taylor import sources as sources_of_taylor
 from eomgen.program.kernel import kernel
@@ -58,17 +63,39 @@ from eomgen.study.accuracy.reference import reference
 
 PEERS = ("heyoka", "mujoco", "jax", "casadi")
 ERRORS = (1e-6, 1e-9, 1e-12)
+TIMED = """
+#include "checked.c"
+
+/* Derivatives of states, one row of y each, as they are computed for a single state. */
+int each(long count, const double *y, const double *k, const double *u, double *out) {
+    int all = 1;
+    for (long j = 0; j < count; j++) {
+        all &= checked_derivative(0.0, y + j * STATES, k, u, 0, out + j * STATES);
+    }
+    return all;
+}
+
+/* Derivatives of which each waits for the one before. */
+void dependent(long count, double *y, const double *k, const double *u, double *out) {
+    for (long j = 0; j < count; j++) {
+        NAME_derivative(0.0, y, k, u, out);
+        for (int i = 0; i < STATES; i++) y[i] += 1e-30 * out[i];
+    }
+}
+"""
 LADDER = [10.0**-k for k in np.arange(4, 16.1, 0.5)]
 
 
-@cache
-def library(model: Model) -> tuple[Any, Any, float]:
-    """A model's Python module, the library of its compiled derivative, and the time to compile."""
-    module = load_module(generated_code(model).module, model.name)
-    texts = sources(*interfaced_program_of(model))
+def library(model: Model, vectors: bool) -> tuple[Any, float]:
+    """The library of a model's derivative, and the time to compile it."""
+    program, interface = restricted(*interfaced_program_of(model), ("derivative",))
+    texts = {**c.library(program, interface, vectors=vectors)}
+    name = interface.name
+    texts["timed.c"] = TIMED.replace("NAME", name).replace("STATES", str(len(interface.states)))
     start = time.perf_counter()
-    made = compiled_library(f"bench {key_of(model)} {time.time()}", lambda: texts, MAIN)
-    return module, made, time.perf_counter() - start
+    about = f"bench {key_of(model)} {time.time()}"
+    made = compiled_library(about, lambda: texts, "timed.c")
+    return made, time.perf_counter() - start
 
 
 def mechanisms() -> list[tuple[str, Model, Any]]:
@@ -80,26 +107,54 @@ def mechanisms() -> list[tuple[str, Model, Any]]:
 
 def derivatives(rounds: int) -> None:
     """Print the table of derivatives."""
-    row("mechanism", "operations", "C, µs", "Pinocchio, µs", "ratio and quartiles", "compile, s")
-    row(*["---"] * 6)
+    names = ("one state", "columns", "one after another", "Pinocchio", "Pinocchio, CasADi, C")
+    ratios = ("one state", "columns", "one state, CasADi", "columns, CasADi")
+    row("mechanism", "operations", *(f"{name}, µs" for name in names), *ratios, "compile, s")
+    row(*["---"] * 12)
     rng = np.random.default_rng(1)
     for name, model, peer in mechanisms():
-        module, made, seconds = library(model)
+        module = load_module(generated_code(model).module, model.name)
         y = rng.uniform(-1.0, 1.0, (len(module.STATES), COLUMNS))
-        ours, rates = compiled_columns(module, made, y)
-        theirs, found = columns_of_pinocchio(peer, y, rng)
-        times = paired(rounds, ours, theirs)
+        (one, seconds), (many, together) = library(model, False), library(model, True)
+        vectors, rates = compiled_columns(module, many, y)
+        (ours, rows), (waiting, _) = (of_rows(module, one, y, f) for f in ("each", "dependent"))
+        theirs, found, given = columns_of_pinocchio(peer, y, rng)
+        written, again, _ = peer_casadi.columns(peer, *given)
+        times = paired(rounds, ours, vectors, waiting, theirs, *written)
+        assert np.array_equal(rates, rows.T)
+        assert np.abs(again - found).max() < 1e-9 * np.abs(found).max()
         if is_same(peer, y):
             worst = np.abs(rates[peer.nq :] - found).max() / np.abs(found).max()
             assert worst < 1e-6, worst
-        per = np.median(times, axis=0) / COLUMNS * 1e6
+        times = np.column_stack([times[:, :4], times[:, 4:][:, best(times[:, 4:])]])
         row(
             name,
             module.COST["derivative"]["total"],
-            *(f"{x:.3g}" for x in per),
-            spread(times[:, 1] / times[:, 0]),
-            f"{seconds:.2g}",
+            *(f"{x:.3g}" for x in np.min(times, axis=0) / COLUMNS * 1e6),
+            *(compared(times[:, i], times[:, 3 + k]) for k in (0, 1) for i in (0, 1)),
+            f"{seconds:.2g}, {together:.2g}",
         )
+
+
+def best(times: np.ndarray) -> int:
+    """The column of the least time."""
+    return int(np.argmin(np.min(times, axis=0)))
+
+
+def of_rows(
+    module: Any, made: Any, y: np.ndarray, name: str
+) -> tuple[Callable[[], None], np.ndarray]:
+    """A call of a function of `TIMED`, and where it puts the derivatives, a row for each state."""
+    constants, inputs = Kernels(module, made).held(None), np.zeros(max(1, len(module.INPUTS)))
+    states, call = y.T.copy(), made[name]
+    out = np.empty_like(states)
+    call.argtypes = [ctypes.c_long, *[ctypes.c_void_p] * 4]
+    given = (states.ctypes.data, constants, inputs.ctypes.data, out.ctypes.data)
+
+    def compute(kept: Any = (states, inputs, out)) -> None:
+        assert call(COLUMNS, *given) or name != "each"
+
+    return compute, out
 
 
 def vectors(rounds: int) -> None:
@@ -115,6 +170,7 @@ def vectors(rounds: int) -> None:
     built_in = ("two_body", "double_pendulum", "tumbling_body", "human_figure")
     models = [(name, elaborate(read_scene(name))) for name in built_in]
     peer_lanes.ensembles(models, os.cpu_count() or 1, max(5, rounds // 3))
+    peer_lanes.adaptive_ensembles(os.cpu_count() or 1, max(5, rounds // 3))
 
 
 def is_same(peer: Any, y: np.ndarray) -> bool:
@@ -132,7 +188,7 @@ def compiled_columns(module: Any, made: Any, y: np.ndarray) -> tuple[Callable[[]
     )
     given = (y.ctypes.data, constants, inputs.ctypes.data, 0)
 
-    def compute() -> None:
+    def compute(kept: Any = inputs) -> None:
         call(COLUMNS, 0.0, *given, out.ctypes.data, sound.ctypes.data)
         assert sound[0]
 
@@ -141,8 +197,10 @@ def compiled_columns(module: Any, made: Any, y: np.ndarray) -> tuple[Callable[[]
 
 def columns_of_pinocchio(
     peer: Any, y: np.ndarray, rng: np.random.Generator
-) -> tuple[Callable[[], None], Any]:
-    """A call of Pinocchio for as many states, the same if it has these, and its accelerations."""
+) -> tuple[Callable[[], None], Any, tuple[Any, Any, Any]]:
+    """A call of Pinocchio for as many states, the same if it has these; its accelerations; and what
+    it is given.
+    """
     low, high = -np.ones(peer.nq), np.ones(peer.nq)
     q = np.array([pin.randomConfiguration(peer, low, high) for _ in range(COLUMNS)]).T
     v, tau = rng.uniform(-1.0, 1.0, (2, peer.nv, COLUMNS))
@@ -150,7 +208,7 @@ def columns_of_pinocchio(
         q, v, tau = y[: peer.nq], y[peer.nq :], np.zeros_like(tau)
     q, v, tau = (np.asfortranarray(array) for array in (q, v, tau))
     pool, found = pin.ModelPool(peer, 1), np.zeros((peer.nv, COLUMNS), order="F")
-    return lambda: pin.abaInParallel(1, pool, q, v, tau, found), found
+    return lambda: pin.abaInParallel(1, pool, q, v, tau, found), found, (q, v, tau)
 
 
 def taylor(model: Model, module: Any) -> tuple[Callable[[float], Any], float]:

@@ -1,14 +1,17 @@
 """The C backend: a C99 source and header without dependencies, suitable for firmware."""
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from eomgen.codegen.backends.conditions import Test, refusals
-from eomgen.codegen.backends.division import divided
+from eomgen.codegen.backends.division import Line, Part, divided, in_place, together
 from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.language.formula import names_in
+from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.scalars.functions import FUNCTIONS
@@ -32,7 +35,10 @@ MACROS = (
     "DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE MAXFLOAT"
 )
 """Macros of <math.h> or of compilers."""
-OURS = "y p u k out extra between real R failed"
+OURS = (
+    "y p u k out extra between real R failed several wide either before after shared column "
+    "first many AGAIN APART"
+)
 C_NAMES = {"abs": "fabs"}
 """Names of functions of formulas that differ in C."""
 OWN = {
@@ -50,7 +56,29 @@ CONSTANTS = (
 RESERVED = frozenset(
     [*f"{KEYWORDS} {MACROS} {OURS} {CONSTANTS}".split(), *FUNCTIONS, *(f"{f}_" for f in FUNCTIONS)]
 )
-DIALECT = Dialect({name: f"{name}_" for name in FUNCTIONS}, RESERVED, number="R({})")
+DIALECT = Dialect(
+    {name: f"{name}_" for name in FUNCTIONS},
+    RESERVED,
+    number="R({})",
+    assigned=frozenset({"sin", "cos"}),
+)
+OURS_IN_VECTORS = (
+    "V I N EACH LANES INLINE STATES INPUTS CONSTANTS WIDTH RAISED either size_of any root columns "
+    "times reduced bits_from sine_and_cosine put taken lanes_of beside begin unit suspicious l i "
+    "fused plus_product product_minus minus_product from_row to_row finite_lanes FUSED SUM VECTORS "
+    "AGAIN APART"
+)
+VECTORS = replace(
+    DIALECT,
+    functions={name: f"{name}_v" for name in FUNCTIONS},
+    reserved=RESERVED | {*OURS_IN_VECTORS.split(), *(f"{name}_v" for name in FUNCTIONS)},
+    number="N({})",
+)
+"""The dialect for vectors of states."""
+EACH = ("tan", "asin", "acos", "atan", "exp", "log", "tanh")
+"""Functions of one number that the mathematical library computes for each lane."""
+ANGLE = re.compile(r"(sin|cos)_v?\((\w+)\)")
+"""A sine or cosine of a variable; both of one angle are computed together."""
 
 
 def files(program: Program, interface: Interface) -> Mapping[str, str]:
@@ -60,10 +88,11 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
     `-std=c99` in GCC) and with the same mathematical library, each function returns the same bits
     as that of the Python module.
     """
-    return _files(context(program, interface), interface)
+    return files_of(context(ordered(program), interface), interface)
 
 
-def _files(values: Mapping[str, Any], interface: Interface) -> dict[str, str]:
+def files_of(values: Mapping[str, Any], interface: Interface) -> dict[str, str]:
+    """The same from the values for their templates."""
     name = interface.name
     shared = {key: values[key] for key in _SHARED}
     return {
@@ -86,13 +115,18 @@ def _files(values: Mapping[str, Any], interface: Interface) -> dict[str, str]:
     }
 
 
-def library(program: Program, interface: Interface) -> Mapping[str, str]:
+def library(program: Program, interface: Interface, *, vectors: bool = False) -> Mapping[str, str]:
     """The sources of a shared library: those of `files`, and `MAIN`, which includes them.
 
     `MAIN` defines `checked_NAME` and `columns_NAME` for each output, which report whether a result
     is valid.
+
+    vectors  whether columns of the derivative are computed in vector registers; it has the same
+             bits, but takes as long again to compile
     """
+    program = ordered(program)
     values = context(program, interface)
+    wanted = ("derivative",) if vectors else ()
     checked = {
         "prefix": interface.name,
         "states": len(interface.states),
@@ -100,8 +134,10 @@ def library(program: Program, interface: Interface) -> Mapping[str, str]:
         "parameters": len(interface.parameters),
         "held": len(values["held"]),
         "kernels": values["kernels"],
+        "each": [(name, C_NAMES.get(name, name)) for name in ("sin", "cos", *EACH)],
+        "vectors": {k["name"]: k for k in in_vectors(program, interface, VECTORS, wanted)},
     }
-    return {**_files(values, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
+    return {**files_of(values, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}
 
 
 _SHARED = ("scene", "prefix", "kernels")
@@ -135,7 +171,7 @@ def context(program: Program, interface: Interface) -> dict[str, Any]:
         "checks": checks,
         "fixed": constants.lines,
         "held": list(place.items()),
-        "kernels": [_in_parts(written(kernel, place)) for kernel in kernels],
+        "kernels": [in_parts(written(kernel, place)) for kernel in kernels],
     }
 
 
@@ -161,31 +197,69 @@ def written(kernel: Kernel, place: Mapping[str, int]) -> dict[str, Any]:
             *_places(kernel.inputs, "u"),
             *_places(kernel.extra, "extra"),
         ],
-        "unused": [
-            word
-            for word, used in (
-                ("t", kernel.time),
-                ("y", any(kernel.state)),
-                ("k", bool(kernel.constants)),
-                ("u", any(kernel.inputs)),
-                ("extra", not function.extra or any(kernel.extra)),
-                ("out", bool(block.results)),
-            )
-            if not used
-        ],
         "lines": block.lines,
         "results": block.results,
         "operations": kernel.counts["total"],
     }
 
 
-def _in_parts(kernel: dict[str, Any]) -> dict[str, Any]:
-    """The same kernel in parts, if it is long."""
-    division = divided(kernel["lines"], kernel["given"], kernel["results"])
-    if division is None:
-        return {**kernel, "parts": (), "between": 0}
-    parts = {"given": division.given, "lines": (), "parts": division.parts}
-    return {**kernel, **parts, "between": max(1, division.size)}
+def in_vectors(
+    program: Program, interface: Interface, dialect: Dialect, wanted: Collection[str]
+) -> list[dict[str, Any]]:
+    """The kernels of these outputs for vectors of states, as values for the templates."""
+    kernels, _ = kernels_of(program, interface, dialect)
+    # The constants are those of the scalar kernels, in their order; only names may differ.
+    held = dict.fromkeys(name for kernel in kernels for name in kernel.constants)
+    place = {name: i for i, name in enumerate(held)}
+    return [
+        in_parts(written(kernel, place), paired)
+        for kernel in kernels
+        if kernel.function.name in wanted
+    ]
+
+
+def in_parts(
+    kernel: dict[str, Any], rewritten: Callable[[Sequence[Line]], Sequence[Line]] = tuple
+) -> dict[str, Any]:
+    """The same kernel, in parts if it is long; `rewritten` is applied to the lines of each."""
+    lines = together(kernel["lines"], ANGLE)
+    division = divided(lines, kernel["given"], kernel["results"])
+    given: Sequence[Line] = kernel["given"]
+    parts: tuple[Part, ...] = ()
+    if division is not None:
+        given, lines = division.given, []
+        parts = tuple(
+            replace(part, lines=in_place(rewritten(part.lines), part.given))
+            for part in division.parts
+        )
+    results = in_place([("", result) for result in kernel["results"]], given)
+    return {
+        **kernel,
+        "lines": in_place(rewritten(lines), given),
+        "results": [source for _, source in results],
+        "parts": parts,
+        "between": max(1, division.size) if division else 0,
+    }
+
+
+def paired(lines: Sequence[Line]) -> list[Line]:
+    """Lines in which a sine and a cosine of one angle, one after another, are computed together;
+    they are statements with an empty name.
+    """
+    made: list[Line] = []
+    first, before = "", None
+    for name, source in lines:
+        match = ANGLE.fullmatch(source)
+        if match and before and match[2] == before[2]:
+            sine, cosine = (first, name) if match[1] == "cos" else (name, first)
+            made[-1:] = [
+                ("", f"V {sine}, {cosine}"),
+                ("", f"sine_and_cosine({match[2]}, &{sine}, &{cosine})"),
+            ]
+        else:
+            made.append((name, source))
+        first, before = name, match
+    return made
 
 
 def _places(names: Sequence[str], array: str) -> list[tuple[str, str]]:

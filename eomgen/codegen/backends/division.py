@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 Line = tuple[str, str]
 """A name, and the source of its value."""
-MOST = 400
+MOST = 2000
 """Lines of a function."""
 WORD = re.compile(r"[A-Za-z_]\w*")
 
@@ -40,6 +40,31 @@ class Division:
     parts: tuple[Part, ...]
     given: tuple[Line, ...]
     size: int
+
+
+def together(lines: Sequence[Line], pairs: re.Pattern[str]) -> list[Line]:
+    """The same lines; where the sources of two match `pairs` with the same second group, the later
+    one follows the earlier at once. It must depend on that group alone.
+    """
+    groups: dict[str, list[Line]] = {}
+    for line in lines:
+        if match := pairs.fullmatch(line[1]):
+            groups.setdefault(match[2], []).append(line)
+    made: list[Line] = []
+    for line in lines:
+        match = pairs.fullmatch(line[1])
+        made += groups.pop(match[2], []) if match else [line]
+    return made
+
+
+def in_place(lines: Sequence[Line], given: Sequence[Line]) -> tuple[Line, ...]:
+    """The same lines, which read elements of arrays where they use them. A compiler that reads many
+    at the start stores most of them again.
+    """
+    known = dict(given)
+    return tuple(
+        (name, WORD.sub(lambda word: known.get(word[0], word[0]), source)) for name, source in lines
+    )
 
 
 def divided(

@@ -43,6 +43,7 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
         "title": " ".join(interface.title.split()).replace("*/", "* /"),
         "form": interface.form,
         "states": [(s.name, s.unit) for s in interface.states],
+        "rest": _rest([i.default for i in interface.inputs]),
         "inputs": [(i.name, i.unit) for i in interface.inputs],
         "parameters": [(p.name, repr(p.default), p.unit) for p in interface.parameters],
         "shapes": [(k.function.name, list(k.function.shape)) for k in kernels],
@@ -110,6 +111,11 @@ def body_poses(program: Program, interface: Interface) -> str:
         "rows": rows,
     }
     return render(TEMPLATES, "poses.js.jinja", context)
+
+
+def _rest(defaults: Sequence[float]) -> str:
+    """The source of the inputs that are not given."""
+    return repr(list(defaults)) if any(defaults) else "INPUTS.map(() => 0)"
 
 
 def _bracketed(parts: Sequence[str], width: int, between: str) -> list[str]:

@@ -265,7 +265,13 @@ def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
     lines += _table([(s.name, s.unit, s.about) for s in interface.states])
     if interface.inputs:
         lines += ["", "Inputs u, each 0 unless given:"]
-        lines += _table([(i.name, i.unit, i.about) for i in interface.inputs])
+        rows = [
+            (f"{i.name} = {i.default!r}" if i.default else i.name, i.unit, i.about)
+            for i in interface.inputs
+        ]
+        if any(i.default for i in interface.inputs):
+            lines[-1] = "Inputs u, each 0 or as here unless given:"
+        lines += _table(rows)
     if interface.parameters:
         lines += ["", "Parameters p, with the scene's values:"]
         lines += _table(

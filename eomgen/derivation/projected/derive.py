@@ -56,7 +56,7 @@ def derive_projected(model: Model) -> ProjectedEquations:
     ledger = Ledger(symbols.fixed, *(WRITTEN if few else NAMED))
     bodies = inertias(model, symbols)
     constraints = state_joints(model, symbols, ledger)
-    applied_loads = loads(model, symbols, bodies)
+    applied_loads = loads(model, symbols, bodies, ledger)
     world = World(model, constraints, ledger)
     motions = body_motions(model, constraints, applied_loads.uniform, world, ledger, symbols)
     equations = balance(model, symbols, bodies, motions, applied_loads, world, ledger)

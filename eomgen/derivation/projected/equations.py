@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.joint_loads import JointMechanism, joint_loads
 from eomgen.derivation.projected.constraints import Constraint, MotionSymbols, about
 from eomgen.derivation.projected.simplify import gathered
 from eomgen.derivation.projected.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
-from eomgen.language.formula import Formula
 from eomgen.model.model import Model
-from eomgen.scene.effects.base import JointLoad, Load, Unmoved
+from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import Geared
 
 ROTATIONS = ("R__", "k__", "W__")
@@ -52,15 +52,16 @@ class Inertia:
 
 @dataclass(frozen=True)
 class Loads:
-    """The loads: forces in world axes with their points, and generalised forces by index in v.
+    """The loads: forces in world axes with their points and torques, and generalised forces by
+    index in v.
 
     `uniform` is the acceleration of gravity in world axes, if it is the same for all bodies. Then
     `gravity` is empty.
     """
 
     uniform: Expr
-    gravity: tuple[tuple[int, Expr, Expr], ...]
-    applied: tuple[tuple[int, Expr, Expr], ...]
+    gravity: tuple[tuple[int, Expr, Expr, Expr], ...]
+    applied: tuple[tuple[int, Expr, Expr, Expr], ...]
     motors: Mapping[int, Expr]
 
 
@@ -72,32 +73,6 @@ class Balance:
     V: Expr
     G: Expr
     F: Expr
-
-
-class SymbolicTreeMechanism(Unmoved):
-    """The model as effects see it: masses, parameters and inputs as symbols."""
-
-    def __init__(self, model: Model, symbols: Symbols) -> None:
-        self._symbols = symbols
-        self._mass = {body.name: symbols.value(body.mass) for body in model.bodies}
-        self.dimensions = model.dimensions
-        self.bodies = tuple(self._mass)
-
-    def mass(self, body: str) -> Expr:
-        """Mass of a body."""
-        return self._mass[body]
-
-    def height(self, body: str) -> Expr:
-        """No load depends on where a body is."""
-        raise NotImplementedError
-
-    def value(self, formula: Formula, **names: Expr) -> Expr:
-        """A quantity over parameter symbols."""
-        return self._symbols.value(formula)
-
-    def input(self, name: str) -> Expr:
-        """Symbol of an input."""
-        return self._symbols.inputs[name]
 
 
 def inertias(model: Model, symbols: Symbols) -> tuple[Inertia, ...]:
@@ -113,22 +88,26 @@ def inertias(model: Model, symbols: Symbols) -> tuple[Inertia, ...]:
     return tuple(found)
 
 
-def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...]) -> Loads:
-    """The loads of all effects on bodies and joints."""
-    mechanism = SymbolicTreeMechanism(model, symbols)
+def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...], ledger: Ledger) -> Loads:
+    """The loads of all effects on bodies and joints; those at joints that depend on the motion get
+    definitions.
+    """
+    mechanism = JointMechanism(model, symbols)
     given = [load for effect in model.effects for load in effect.loads(mechanism)]
-    first = {body.joint.name: j for body, j in zip(model.bodies, model.first_velocity, strict=True)}
-    motors: dict[int, Expr] = {}
-    for load in given:
-        if isinstance(load, JointLoad):
-            j = first[load.joint]
-            motors[j] = motors.get(j, sp.Integer(0)) + load.force
+    at_joints = [load for load in given if isinstance(load, JointLoad)]
+    motors, definitions = joint_loads(model, symbols, at_joints)
+    ledger.definitions.update(definitions)
 
-    def forces(kind: str) -> tuple[tuple[int, Expr, Expr], ...]:
+    def forces(kind: str) -> tuple[tuple[int, Expr, Expr, Expr], ...]:
         return tuple(
-            (mechanism.bodies.index(load.body), _spatial(load.at), _spatial(load.force))
+            (
+                mechanism.bodies.index(load.body),
+                _spatial(load.at),
+                _spatial(load.force),
+                _moment(load.torque),
+            )
             for load in given
-            if isinstance(load, Load) and load.kind == kind and any(f != 0 for f in load.force)
+            if isinstance(load, Load) and load.kind == kind and any((*load.force, *load.torque))
         )
 
     gravity = forces("gravity")
@@ -140,16 +119,21 @@ def _spatial(vector: tuple[Expr, ...]) -> Expr:
     return sp.Matrix([*vector, *([0] * (3 - len(vector)))])
 
 
-def _uniform(forces: tuple[tuple[int, Expr, Expr], ...], bodies: tuple[Inertia, ...]) -> Expr:
+def _moment(torque: tuple[Expr, ...]) -> Expr:
+    """A torque with three components; in the plane it is about z."""
+    return sp.Matrix([*([0] * (3 - len(torque))), *torque])
+
+
+def _uniform(forces: tuple[tuple[int, Expr, Expr, Expr], ...], bodies: tuple[Inertia, ...]) -> Expr:
     """The acceleration that gravity gives all bodies, if it is the same for all; else 0."""
     none = sp.zeros(3, 1)
     if len(forces) != sum(body.mass != 0 for body in bodies) or not forces:
         return none
-    k, _, force = forces[0]
+    k, _, force, _ = forces[0]
     shared = (force / bodies[k].mass).applyfunc(sp.cancel)
     same = all(
         not any(at) and not any((f - bodies[k].mass * shared).applyfunc(sp.expand))
-        for k, at, f in forces
+        for k, at, f, _ in forces
     )
     return shared if same else none
 
@@ -344,13 +328,15 @@ def _written_out(entry: Expr, ledger: Ledger) -> Expr:
 
 
 def generalised(
-    model: Model, motions: Sequence[Motion], world: World, load: tuple[int, Expr, Expr]
+    model: Model, motions: Sequence[Motion], world: World, load: tuple[int, Expr, Expr, Expr]
 ) -> dict[int, Expr]:
-    """The generalised forces of a force (world axes) at a point of a body, by index in v."""
-    k, at, outside = load
+    """The generalised forces of a force at a point of a body and a torque (world axes), by index
+    in v.
+    """
+    k, at, outside, beside = load
     motion, floating = motions[k], translational_velocities(model)
     force = world.rotation(k).T * outside
-    torque = at.cross(force)
+    torque = at.cross(force) + world.rotation(k).T * beside
     found: dict[int, Expr] = {}
     for i, partial_velocity in motion.partial_velocities.items():
         found[i] = outside[floating[i]] if i in floating else partial_velocity.dot(force)

@@ -67,21 +67,27 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
             pairs.append((sp.Symbol(f"R_{body.name}"), whole[:size, :size]))
         pairs.append((sp.Symbol(f"r_{body.name}"), position[:size, :].applyfunc(_short)))
         yield (
-            f"Joint {body.joint.name}: {body.joint.type}, {parent} to {body.name}",
-            f"R_{body.name} turns axes of {body.name} into those of {parent}, and r_{body.name} "
-            f"runs from the centre of mass of {parent} to that of {body.name}, axes of {parent}."
-            if body.parent >= 0
-            else f"R_{body.name} turns axes of {body.name} into the world's, and r_{body.name} is "
-            f"the place of the centre of mass of {body.name} in the world.",
+            f"Joint `{body.joint.name}`: {body.joint.type}, `{parent}` to `{body.name}`",
+            _joint_words(body.name, parent),
             pairs,
         )
         yield (
-            f"Joint {body.joint.name}, differentiated twice",
-            f"Angular velocity ω and velocity u of the centre of mass of {body.name}, and their "
-            f"derivatives α and a, in axes of {body.name}"
-            + (f", by those of {parent}." if body.parent >= 0 else "."),
+            f"Joint `{body.joint.name}`, differentiated twice",
+            f"Angular velocity ω and velocity u of the centre of mass of `{body.name}`, and their "
+            f"derivatives α and a, in axes of `{body.name}`"
+            + (f", by those of `{parent}`." if body.parent >= 0 else "."),
             _differentiated(c, still),
         )
+
+
+def _joint_words(name: str, parent: str) -> str:
+    """What the rotation R and the vector r of a joint are."""
+    turns = f"R_{name} turns axes of `{name}` into"
+    if parent == WORLD:
+        place = f"r_{name} is the place of the centre of mass of `{name}` in the world"
+        return f"{turns} the world's, and {place}."
+    runs = f"r_{name} runs from the centre of mass of `{parent}` to that of `{name}`"
+    return f"{turns} those of `{parent}`, and {runs}, axes of `{parent}`."
 
 
 def _differentiated(c: Constraint, still: dict[Expr, Expr]) -> Pairs:
@@ -205,7 +211,7 @@ def _needed(
 KINDS = {
     "omega": "omega", "alpha": "alpha", "a": "a", "u": "u", "g": "g", "R": "R", "k": "k", "W": "W",
     "turn": "omega", "move": "u", "pivot": "d", "coupling": "c", "bias": "beta", "rest": "b",
-    "row": "j", "load": "Q", "drive": "f",
+    "row": "j", "load": "Q", "drive": "f", "effort": "tau",
     "mass": "M", "mean": "h", "apart": "j", "weight": "w", "ratio": "l",
 }  # fmt: skip
 """What the kinds of derived symbols are written with."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from eomgen.derivation.projected.simplify import gathered
-from eomgen.derivation.symbols import Expr, SympyScalars
-from eomgen.language.formula import Formula, Name, calls_function, evaluate
+from eomgen.derivation.symbols import Expr, SympyScalars, functions_of_parameters
+from eomgen.language.formula import Formula, Name, evaluate
 from eomgen.model.model import Model
 from eomgen.scalars.exact import Real, direction, opposite, orientation, quarters, radians
 from eomgen.scene.joints import Free
@@ -74,7 +74,7 @@ def make_symbols(model: Model) -> Symbols:
     quantities = [q for body in model.bodies for q in (body.mass, *body.inertia_com[:3])]
     quantities += [b.joint.motor_inertia for b in model.bodies if isinstance(b.joint, Geared)]
     positive = {quantity.name for quantity in quantities if isinstance(quantity, Name)}
-    called = dict.fromkeys(f for f in model.quantities() if calls_function(f))
+    called = dict.fromkeys(functions_of_parameters(model))
     return Symbols(
         parameters={
             p.name: sp.Symbol(p.name, positive=True) if p.name in positive else real(p.name)

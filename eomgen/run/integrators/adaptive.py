@@ -1,7 +1,8 @@
 """The steps of SciPy's adaptive methods, and of our own with the same interface.
 
-RK45 and our DOP853 are explicit (Dormand, Prince), Radau is Radau IIA of order 5, BDF and LSODA are
-multistep methods; LSODA switches between stiff and nonstiff methods by itself (Hindmarsh, Petzold).
+RK45 and our DOP853 are explicit (Dormand, Prince), our Rodas5P is a Rosenbrock method, Radau is
+Radau IIA of order 5, BDF and LSODA are multistep methods; LSODA switches between stiff and nonstiff
+methods by itself (Hindmarsh, Petzold).
 The implicit ones are given the problem's exact Jacobian, except `Radau_differences` and
 `BDF_differences`, which approximate it by differences of derivatives that count as derivatives.
 """
@@ -15,7 +16,14 @@ import numpy as np
 
 from eomgen.run.branches import BranchMonitor, Retry, Step
 from eomgen.run.compiled import Steps
-from eomgen.run.integrators.interface import Adaptive, Advance, Remark, Resume, StepFailure
+from eomgen.run.integrators.interface import (
+    Adaptive,
+    Advance,
+    Remark,
+    Resume,
+    StepFailure,
+    always,
+)
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.integrators.strides import Strides, continuation
 from eomgen.run.problem import FloatArray, Problem
@@ -62,8 +70,10 @@ def advances(
     made: int,
     remark: Remark,
     resume: Resume | None = None,
-    steps: Callable[[str], Steps | None] | None = None,
+    steps: Callable[[str, tuple[str, ...]], Steps | None] | None = None,
+    compiles: Callable[[], bool] = always,
     each: bool = True,
+    dense: bool = True,
 ) -> Iterator[Advance]:
     """Yield the steps of `method`, each with samples at those of `times` (ascending) within it.
 
@@ -74,8 +84,10 @@ def advances(
 
     made    number of earlier steps, which count towards `bounds.most`
     remark  called with what SciPy would warn of
-    steps   see `run.compiled.Compiled`; used where steps need no check of their own
+    steps   see `run.compiled.Compiled`
+    compiles  asked each time whether they may be used
     each    whether each compiled step is yielded, or many at once
+    dense   whether compiled steps give the states within them
 
     Raises `StepFailure` if the method fails, or after `bounds.most` steps.
     """
@@ -85,13 +97,15 @@ def advances(
     left, factored, here = bounds.most - made, 0, 0
     compiled = None
     if steps and method.compiled:
-        compiled = Strides(method, problem, t_end, bounds, times, steps)
+        compiled = Strides(method, problem, bounds, times, steps, dense=dense)
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
         until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
-        stride = compiled.made(stepper.solver, sampled, until - here) if compiled else None
-        if compiled and stride:
-            yield from compiled.advances(stride, sampled, stepper.is_whole, each)
+        # A step that was cut is repeated in Python, which counts that.
+        use = compiled if compiled and not cut and compiles() else None
+        stride = use.made(stepper, sampled, until - here) if use else None
+        if use and stride:
+            yield from use.advances(stride, sampled, stepper.is_whole, each)
             here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
             if stepper.ended:
                 return
@@ -145,21 +159,21 @@ class _Stepper:
     ) -> None:
         self.method, self.t_end, self._problem, self._bounds = method, t_end, problem, bounds
         self._remark = remark
-        self._longest, self._branches = bounds.longest, None
+        self.longest, self.branches = bounds.longest, None
         if problem.switching:
-            self._branches = BranchMonitor(
+            self.branches = BranchMonitor(
                 problem, problem.switching, bounds.allowed, bounds.unseen, method.sees_end
             )
         elif problem.corners:
-            self._longest = min(bounds.longest, bounds.unseen)
+            self.longest = min(bounds.longest, bounds.unseen)
         self._whole, self._unseen, self.factorisations = True, False, 0
 
     def begin(self, t: float, resume: Resume | None) -> None:
         """Begin at time t with the problem's initial state; `resume` is from `continuation`."""
         until = self.t_end
-        if resume and self._branches:
+        if resume and self.branches:
             until = min(float(resume["until"]), until)
-            self._branches.restore(resume)
+            self.branches.restore(resume)
         self._start(t, self._problem.initial, until, resume or {})
 
     def _start(self, t: float, y: FloatArray, until: float, memory: Mapping[str, Any]) -> None:
@@ -169,16 +183,18 @@ class _Stepper:
         if self.method.series:
             make = self._problem.series.get(self.method.series)
             options["series"] = make() if make else None
+        if self.method.asks_more:
+            options |= {"timed": self._problem.timed, "positions": self._problem.leading_positions}
         # y is copied because LSODA's compiled code modifies state arrays in place. If a later run
         # can continue from this one, the choice of the first step must not depend on the end.
         bound = np.inf if self.method.memory else until
         self.solver: Any = self.method.solver(
-            self._problem.derivative, t, y.copy(), bound, max_step=self._longest, **options
+            self._problem.derivative, t, y.copy(), bound, max_step=self.longest, **options
         )
         if hasattr(self.solver, "remark"):
             self.solver.remark = self._remark
         self.solver.t_bound = until
-        self._until = until
+        self.until = until
         for name in self.method.memory if memory else ():
             setattr(self.solver, name, _restored(memory[name], type(getattr(self.solver, name))))
 
@@ -186,9 +202,9 @@ class _Stepper:
         """Make a step. Raises `StepFailure` if the method fails."""
         solver = self.solver
         self._before = (float(solver.t), solver.y.copy(), self._memory())
-        if self.method.memory and self._until == self.t_end:
+        if self.method.memory and self.until == self.t_end:
             # A step shortened to the end would be retried with another length if rejected.
-            length = min(getattr(solver, self.method.memory[0]), self._longest)
+            length = min(getattr(solver, self.method.memory[0]), self.longest)
             self._whole = self._whole and solver.t + length < self.t_end
         factored = int(solver.nlu)
         message = solver.step()
@@ -207,9 +223,9 @@ class _Stepper:
         """Check a step for branches. If it must be repeated, restart the solver for that and say
         how; None if it is accepted.
         """
-        if self._branches is None or not step.start < step.end:
+        if self.branches is None or not step.start < step.end:
             return None
-        retry = self._branches.check(step)
+        retry = self.branches.check(step)
         if retry:
             # A run with a later end would have checked a longer step.
             self._whole = self._whole and step.end < self.t_end
@@ -236,12 +252,12 @@ class _Stepper:
     @property
     def ended(self) -> bool:
         """Whether the run has reached its end."""
-        return bool(self.solver.status == "finished" and self._until == self.t_end)
+        return bool(self.solver.status == "finished" and self.until == self.t_end)
 
     def is_capped(self, step: Step) -> bool:
         """Whether a step has the greatest length allowed there."""
         limited = self._unseen and self.solver.status == "finished" and not self.ended
-        return limited or step.length >= self._longest * (1 - 1e-9)
+        return limited or step.length >= self.longest * (1 - 1e-9)
 
     def continuation(self) -> Callable[[], Resume] | None:
         """A function that gives what a later run needs to continue from here; None if it cannot.
@@ -251,10 +267,10 @@ class _Stepper:
         if self.ended or not self.is_whole:
             return None
         memory = self._memory()
-        if self._branches:
+        if self.branches:
             reached = self.solver.status == "finished"
-            memory["until"] = np.inf if reached or self._until == self.t_end else self._until
-            memory |= self._branches.memory
+            cut = not reached and self.until != self.t_end
+            memory |= {"until": self.until if cut else np.inf, **self.branches.memory}
         t, y = float(self.solver.t), self._problem.unit(self.solver.y.copy())
         return partial(continuation, t, y, memory)
 
@@ -283,7 +299,7 @@ def _check_stiff(problem: Problem, solver: Any, span: tuple[float, float], made:
         why = stiffness(problem, float(solver.t), solver.y, float(solver.t - solver.t_old))
         if why:
             reason = f"{made} steps reached only {solver.t:g} s: {why}"
-            raise UnstableStepError(reason, "take --integrator Radau, or BDF")
+            raise UnstableStepError(reason, "take --integrator Rodas5P, or Radau")
 
 
 def _restored(value: Any, kind: type) -> Any:

@@ -7,8 +7,10 @@ every machine on which its derivative has them, and also when C makes its steps:
 """
 
 import math
-from collections.abc import Callable
-from typing import Literal
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import cycle
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,6 +24,7 @@ from eomgen.run.integrators.dop853_coefficients import (
     STAGES,
     Row,
 )
+from eomgen.run.integrators.first_length import first_length
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.problem import FloatArray
 
@@ -79,7 +82,15 @@ class DormandPrince8:
         self.t_old = self.t
         self.status: Literal["running", "finished", "failed"] = "running"
         self.f, self.lost = fun(self.t, y0), np.zeros(len(y0))
-        self.h_abs = self._first_length(min(t_bound - self.t, max_step))
+        self.h_abs = first_length(
+            fun,
+            self.t,
+            y0,
+            self.f,
+            scale=atol + np.abs(y0) * rtol,
+            power=1 / 8,
+            longest=min(t_bound - self.t, max_step),
+        )
         self._slopes = np.empty((SLOPES, len(y0)))
         self._sums = np.empty((len(SUMS), len(y0)))
         products = np.empty_like(self._sums)
@@ -89,22 +100,6 @@ class DormandPrince8:
         ]
         self._step = (0.0, y0)
         self._dense: Callable[[FloatArray | float], FloatArray] | None = None
-
-    def _first_length(self, longest: float) -> float:
-        """The length of the first step. Hairer, Norsett, Wanner I, section II.4."""
-        t, y, f = self.t, self.y, self.f
-        if not len(y):
-            return longest
-        scale = self.atol + np.abs(y) * self.rtol
-        size, speed = _norm(y / scale), _norm(f / scale)
-        trial = 0.01 * size / speed if size >= 1e-5 and 1e-5 <= speed < math.inf else 1e-6
-        trial = min(trial, longest)
-        bend = _norm((self.fun(t + trial, y + trial * f) - f) / scale) / trial
-        if speed <= 1e-15 and bend <= 1e-15:
-            length = max(1e-6, trial * 1e-3)
-        else:
-            length = (0.01 / max(speed, bend)) ** (1 / 8)
-        return min(100 * trial, length, longest)
 
     def step(self) -> str | None:
         """Make a step; returns why it failed, or None."""
@@ -181,20 +176,22 @@ class DormandPrince8:
         terms[2] = 2 * change - h * (self.f + first)
         terms[3:] = h * sums[IN_DENSE:]
 
-        def states(times: FloatArray | float) -> FloatArray:
-            x = (np.asarray(times)[..., None] - start) / h
-            found = np.zeros((*np.shape(times), len(y)))
-            for i in range(6, -1, -1):
-                found += terms[i]
-                found *= x if i % 2 == 0 else 1 - x
-            return (found + y).T
-
-        return states
+        return partial(interpolated, start, h, y, list(terms))
 
 
-def _norm(values: FloatArray) -> float:
-    """The root of the mean square, summed in order."""
-    return math.sqrt(float(np.add.accumulate(values * values)[-1]) / len(values))
+def interpolated(
+    start: float, h: float, y: FloatArray, terms: Sequence[FloatArray], times: FloatArray | float
+) -> FloatArray:
+    """The states at times within a step of length h from `y` at `start`, from the terms (ny,) of
+    its interpolant.
+    """
+    one = isinstance(times, float)
+    x: Any = (times - start) / h if one else (np.asarray(times)[..., None] - start) / h
+    found = np.zeros((len(y),) if one else (*np.shape(times), len(y)))
+    for term, factor in zip(reversed(terms), cycle((x, 1 - x)), strict=False):
+        found += term
+        found *= factor
+    return (found + y).T
 
 
 INTEGRATOR = Adaptive(

@@ -83,6 +83,9 @@ def advances_of(
     for first in range(count) if each else (0,):
         last = first if each else count - 1
         kept = range(first + -(made + 1 + first) % every, last + 1, every)
+        derivatives = (last + 1 - first) * stride.calls
+        if stride.iterations is not None:
+            derivatives = int(stride.iterations[first : last + 1].sum()) * stride.calls
         yield Advance(
             ends[last],
             states[last],
@@ -90,7 +93,8 @@ def advances_of(
             problem,
             _unknown,
             steps=last + 1 - first,
-            derivatives=(last + 1 - first) * stride.calls,
+            derivatives=derivatives,
+            jacobians=0 if stride.iterations is None else derivatives,
             resume=partial(continuation, ends[last], states[last], stride.losses[last]),
         )
 

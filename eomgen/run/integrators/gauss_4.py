@@ -18,5 +18,6 @@ METHOD = ImplicitMethod(
     b=(1 / 2, 1 / 2),
     c=(1 / 2 - sqrt(3) / 6, 1 / 2 + sqrt(3) / 6),
     order=4,
+    compiled="gauss_4",
 )
 INTEGRATOR = METHOD.integrator

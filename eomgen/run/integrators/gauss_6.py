@@ -20,5 +20,6 @@ METHOD = ImplicitMethod(
     b=(5 / 18, 4 / 9, 5 / 18),
     c=(1 / 2 - sqrt(15) / 10, 1 / 2, 1 / 2 + sqrt(15) / 10),
     order=6,
+    compiled="gauss_6",
 )
 INTEGRATOR = METHOD.integrator

@@ -5,15 +5,19 @@ equations are solved. Hairer, McLachlan, Razakarivony, Achieving Brouwer's law w
 Runge-Kutta methods (BIT 48, 2008) give two more causes of drift by rounding: rounded coefficients,
 which `ImplicitMethod.shares` avoids, and sums of small changes to large states, which `fixed_step`
 compensates.
+
+Sums are taken term by term in a fixed order, so that compiled code has the same bits: see
+`eomgen.native.implicit` and `templates/c/implicit.c.jinja`, which repeats this arithmetic.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import isfinite
 
 import numpy as np
-from scipy.linalg.lapack import dgesv
+from numpy.typing import NDArray
 
+from eomgen.run.integrators.elimination import factored
 from eomgen.run.integrators.interface import FixedStep, StepFailure
 from eomgen.run.integrators.tableau import ButcherTableau
 from eomgen.run.problem import FloatArray, Problem
@@ -21,15 +25,15 @@ from eomgen.run.problem import FloatArray, Problem
 MAX_ITERATIONS = 20
 REMEDY = "take a smaller --dt or an adaptive method (--integrator Radau)"
 
-_ROUNDOFF = 4 * np.finfo(np.float64).eps
+ROUNDOFF = 4 * float(np.finfo(np.float64).eps)
 # If updates stop shrinking below this fraction of the state, they are rounding errors of the
 # derivative, and the iteration ends. Above it, the iteration has not converged.
-_NOISE = 1e-10
+NOISE = 1e-10
 # The same bound, absolute, for a state that is almost zero, as of a body at rest on the ground.
-_NOTHING = 1e-13
+NOTHING = 1e-13
 # A component below this fraction of the largest one is solved to roundoff of that fraction, not of
 # itself: it may be 0 in exact arithmetic.
-_SMALL = 1e-9
+SMALL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -42,13 +46,15 @@ class ImplicitMethod:
     Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes
     (Numerical Algorithms 76, 2017).
 
-    Raises `ValueError` if the method does not have the given order.
+    `compiled` is the name of its compiled steps. Raises `ValueError` if the method does not have
+    the given order.
     """
 
     shares: tuple[tuple[float, ...], ...]
     b: tuple[float, ...]
     c: tuple[float, ...]
     order: int
+    compiled: str = ""
 
     def __post_init__(self) -> None:
         shares, b = self._arrays
@@ -58,7 +64,9 @@ class ImplicitMethod:
     @property
     def integrator(self) -> FixedStep:
         """The method as an integrator with equal steps."""
-        return FixedStep(lambda _: self.change, self.order, REMEDY, explicit=False)
+        return FixedStep(
+            lambda _: self.change, self.order, REMEDY, explicit=False, compiled=self.compiled
+        )
 
     @cached_property
     def _arrays(self) -> tuple[FloatArray, FloatArray]:
@@ -75,31 +83,32 @@ class ImplicitMethod:
         stages, states = len(b), len(y)
         times = [t + node * h for node in self.c]
         lengths = h * b
-        coupling = -lengths[:, None] * shares
+        coupling = lengths[:, None] * shares
         changes = np.zeros((stages, states))
         slopes = np.empty((stages, states))
         matrix = np.empty((stages, states, stages, states))
         square = matrix.reshape(stages * states, stages * states)
-        diagonal = square.ravel()[:: stages * states + 1]
+        positions = problem.leading_positions
+        order = _positions_first(stages, states, positions)
+        across, update = order[:, None], np.empty_like(changes)
         previous = 0.0
         for _ in range(MAX_ITERATIONS):
-            at_stages = y + shares @ changes
+            at_stages = y + _last(shares[:, :, None] * changes, axis=1)
             for i, time in enumerate(times):
                 slopes[i] = problem.derivative(time, at_stages[i])
                 jacobian = problem.jacobian(time, at_stages[i])
                 np.multiply(coupling[i][:, None], jacobian[:, None, :], out=matrix[i])
-            diagonal += 1.0
             missing = lengths[:, None] * slopes - changes
-            *_, solution, singular = dgesv(square, missing.ravel())
-            if singular:
+            factors = factored(square[across, order], 1.0, stages * positions)
+            if factors is None:
                 raise StepFailure("Newton's matrix is singular", REMEDY)
-            update = solution.reshape(stages, states)
+            update.ravel()[order] = factors.solve(missing.ravel()[order])
             changes += update
             size = float(np.abs(update).max())
             if not isfinite(size):
                 raise StepFailure("Newton's iteration diverges", REMEDY)
             if size == 0 or (previous and _is_solved(y, changes, update, size, previous)):
-                return np.asarray(changes.sum(axis=0))
+                return _last(changes, axis=0)
             previous = size
         raise StepFailure(f"Newton did not converge in {MAX_ITERATIONS} iterations", REMEDY)
 
@@ -108,11 +117,23 @@ def _is_solved(
     y: FloatArray, changes: FloatArray, update: FloatArray, size: float, previous: float
 ) -> bool:
     """Whether the iteration has converged to roundoff, by the sizes of the last two updates."""
-    scale = np.abs(y) + np.abs(changes).sum(axis=0)
+    scale = np.abs(y) + _last(np.abs(changes), axis=0)
     largest = float(scale.max())
     # The remaining error is about the next update: this one times the last contraction factor.
     # Hairer, Wanner, Solving ODEs II, section IV.8.
     missing = np.abs(update) * (size / previous)
-    if (missing <= _ROUNDOFF * np.maximum(scale, _SMALL * largest)).all():
+    if (missing <= ROUNDOFF * np.maximum(scale, SMALL * largest)).all():
         return True
-    return previous <= 2 * size and size <= max(_NOISE * largest, _NOTHING)
+    return previous <= 2 * size and size <= max(NOISE * largest, NOTHING)
+
+
+def _last(terms: FloatArray, axis: int) -> FloatArray:
+    """The sum of terms along an axis, one after the other."""
+    return np.asarray(np.take(np.add.accumulate(terms, axis=axis), -1, axis=axis))
+
+
+@cache
+def _positions_first(stages: int, states: int, positions: int) -> NDArray[np.intp]:
+    """The order of the unknowns in which the positions of all stages come before all else."""
+    numbers = np.arange(stages * states).reshape(stages, states)
+    return np.concatenate((numbers[:, :positions].ravel(), numbers[:, positions:].ravel()))

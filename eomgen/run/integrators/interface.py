@@ -49,6 +49,10 @@ Remark = Callable[[str], None]
 """Called with a method's remark on a step, as text."""
 
 
+def ignored(text: str) -> None:
+    """A `Remark` that does nothing."""
+
+
 @dataclass(frozen=True)
 class FixedStep:
     """A method whose step the user chooses.
@@ -76,6 +80,8 @@ class Adaptive:
 
     solver         SciPy's `OdeSolver` of the method, or a class with the same interface
     uses_jacobian  whether it is given the problem's Jacobian
+    asks_more      whether it is told whether the derivative depends on `timed`, and how many states
+                   are `positions` that come first
     one_step       whether a step depends on the state alone, not on earlier steps; then the state
                    may be corrected between steps
     remedy         what to change when a run fails
@@ -90,6 +96,7 @@ class Adaptive:
 
     solver: Callable[..., Any]
     uses_jacobian: bool = False
+    asks_more: bool = False
     one_step: bool = True
     remedy: str = LOOSER
     memory: tuple[str, ...] = ()
@@ -108,8 +115,10 @@ class Advance:
     problem  whose derivative was integrated
     within   gives the state at any time in the step; valid until the next step is made
     steps    number of steps; 0 if no time passes: an impact, or `events` only
-    derivatives
-             calls of the derivative that compiled code made, which are not counted otherwise
+    derivatives, jacobians, switches, gap_checks
+             calls that compiled code made of these, of switching functions, and of gaps and their
+             rates, which are not counted otherwise
+    checked  whether compiled code has checked that no rigid contact closes
     struck   number of the contact of an impact
     events   changes of contacts at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts and of the drives during the step,
@@ -128,6 +137,10 @@ class Advance:
     within: Callable[[float], FloatArray]
     steps: int = 1
     derivatives: int = 0
+    jacobians: int = 0
+    switches: int = 0
+    gap_checks: int = 0
+    checked: bool = False
     struck: int | None = None
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, FloatArray], FloatArray] | None = None
@@ -137,9 +150,22 @@ class Advance:
     cut: int = 0
 
 
+def always() -> bool:
+    """Whether steps may be made in compiled code: yes."""
+    return True
+
+
 class Begin(Protocol):
-    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run."""
+    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run.
+
+    `compiles` is asked before steps are made in compiled code, where gaps below 0 end them.
+    """
 
     def __call__(
-        self, problem: Problem, t: float, made: int, resume: Resume | None = None
+        self,
+        problem: Problem,
+        t: float,
+        made: int,
+        resume: Resume | None = None,
+        compiles: Callable[[], bool] = always,
     ) -> Iterator[Advance]: ...

@@ -7,74 +7,110 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from eomgen.run.compiled import Steps, Stride
+from eomgen.run.branches import BranchMonitor
+from eomgen.run.compiled import Steps, Stride, Watched
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import FloatArray, Problem
 
 MOST = 1024
 """Greatest number of steps at once: between them progress is shown, and Ctrl-C is heard."""
+OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates")
+"""Functions of a module that steps are checked with."""
+
+_COUNTED = ("derivatives", "jacobians", "factorisations", "switches", "gap_checks")
 
 
 class Tolerances(Protocol):
-    """What `adaptive.Bounds` says of the error and the length of steps."""
+    """What `adaptive.Bounds` says of the error of steps."""
 
     @property
     def rtol(self) -> float: ...
     @property
     def atol(self) -> float | FloatArray: ...
-    @property
-    def longest(self) -> float: ...
+
+
+class Stepper(Protocol):
+    """A solver, the longest step and the end of its steps, s, and what checks them for branches."""
+
+    solver: Any
+    longest: float
+    until: float
+    t_end: float
+    branches: BranchMonitor | None
 
 
 class Strides:
-    """The compiled steps of a run, with rows at `times`; `steps` is asked for them each time."""
+    """The compiled steps of a run, with rows at `times`, and states at any time if it is `dense`.
+
+    `steps` is asked for them each time.
+    """
 
     def __init__(
         self,
         method: Adaptive,
         problem: Problem,
-        t_end: float,
         bounds: Tolerances,
         times: FloatArray,
-        steps: Callable[[str], Steps | None],
+        steps: Callable[[str, tuple[str, ...]], Steps | None],
+        *,
+        dense: bool,
     ) -> None:
-        self._steps = steps
-        self._method, self._problem, self._t_end, self._bounds = method, problem, t_end, bounds
-        self._times = times
-        self._atol = np.zeros(problem.initial.shape) + bounds.atol
+        switching, contacts = problem.switching, problem.contacts
+        self._steps, self._dense = steps, dense
+        self._method, self._problem, self._bounds, self._times = method, problem, bounds, times
+        self._atol = np.array(np.broadcast_to(bounds.atol, problem.initial.shape), dtype=float)
+        self._needed = (
+            *(OF_STATE if switching and switching.of_state else ()),
+            *(OF_CONTACTS if contacts else ()),
+        )
+        self._sizes = None
+        if contacts:
+            self._sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
         self._unusual = False
 
-    def made(self, solver: Any, sampled: int, most: int) -> Stride | None:
-        """Make at most so many steps and put the solver at their end; None if Python must make the
+    def made(self, stepper: Stepper, sampled: int, most: int) -> Stride | None:
+        """Make at most so many steps and put the stepper at their end; None if Python must make the
         next, or if there are no compiled ones yet. `sampled` is the number of rows so far.
         """
-        steps = self._steps(self._method.compiled)
+        steps = self._steps(self._method.compiled, self._needed)
         if steps is None:
             return None
         if self._unusual:  # the last stride ended before a step that Python must make
             self._unusual = False
             return None
+        solver, branches, most = stepper.solver, stepper.branches, min(most, MOST)
+        watched = branches.watched(solver.t, solver.h_abs, most) if branches else None
+        if branches and not watched:
+            return None
+        if self._method.series and (branches or self._dense):  # series are not checked in C
+            return None
         stride = steps(
             solver.t,
             solver.y,
             _Memory(solver, self._method.memory),
-            t_end=self._t_end,
+            t_end=stepper.until,
             rtol=self._bounds.rtol,
             atol=self._atol,
-            longest=self._bounds.longest,
+            longest=stepper.longest,
             times=self._times[sampled:],
-            most=min(most, MOST),
+            most=most,
+            watched=watched,
+            sizes=self._sizes,
+            dense=self._dense,
         )
         count = len(stride.ends)
         if not count:
             return None
         self._unusual = not stride.usual
-        self._start = solver.t
+        self._start, self._longest, self._watched = solver.t, stepper.longest, watched
+        self._until = stepper.until if stepper.until < stepper.t_end else np.inf
         solver.t_old = float(stride.ends[-2]) if count > 1 else solver.t
         solver.t, solver.y = float(stride.ends[-1]), stride.states[-1].copy()
         for name, values in stride.memory.items():
             last = values[-1]
             setattr(solver, name, last.copy() if last.ndim else float(last))
+        if branches and watched:
+            branches.restore(_checks(watched, stride, count - 1))
         if stride.ended:
             solver.status = "finished"
         return stride
@@ -86,28 +122,33 @@ class Strides:
         their ends.
         """
         ends = stride.ends.tolist()
-        capped = [0] * len(ends)
-        if self._bounds.longest < np.inf:
-            lengths = np.diff(stride.ends, prepend=self._start)
-            capped = np.cumsum(lengths >= self._bounds.longest * (1 - 1e-9)).tolist()
-        derivatives, passed = stride.derivatives.tolist(), stride.sampled.tolist()
-        times = self._times[sampled : sampled + passed[-1]].tolist()
-        steps, rows, called, shortened = 0, 0, 0, 0
         whole = len(ends) - stride.ended  # the end shortens the last step
-        for i in range(len(ends)) if each else (len(ends) - 1,):
-            at = slice(rows, passed[i])
+        lengths = np.diff(stride.ends, prepend=self._start)
+        capped = np.cumsum(lengths >= self._longest * (1 - 1e-9))
+        none = np.zeros_like(stride.derivatives)
+        solved = (none if x is None else x for x in (stride.jacobians, stride.factorisations))
+        called = (stride.derivatives, *solved, stride.switches, stride.gap_checks)
+        sums = np.column_stack((np.arange(1, len(ends) + 1), stride.sampled, capped, *called))
+        kept = slice(None) if each else slice(-1, None)
+        made = np.diff(sums[kept], axis=0, prepend=0).tolist()
+        times, rows = self._times[sampled : sampled + sums[-1, 1]].tolist(), 0
+        for i, (steps, passed, shortened, *calls) in zip(range(len(ends))[kept], made, strict=True):
+            at = slice(rows, rows + passed)
             yield Advance(
                 ends[i],
                 stride.states[i],
-                list(zip(times[at], stride.rows[at], strict=True)) if at.stop > rows else [],
+                list(zip(times[at], stride.rows[at], strict=True)) if passed else [],
                 self._problem,
-                _unknown,
-                steps=i + 1 - steps,
-                derivatives=derivatives[i] - called,
-                resume=partial(_after, stride, min(i, whole - 1)) if resumes and whole else None,
-                capped=capped[i] - shortened,
+                partial(_within, self._problem, stride.within, i) if stride.within else _unknown,
+                steps=steps,
+                **dict(zip(_COUNTED, calls, strict=True)),
+                checked=True,
+                resume=partial(_after, stride, self._watched, self._until, min(i, whole - 1))
+                if resumes and whole
+                else None,
+                capped=shortened,
             )
-            steps, rows, called, shortened = i + 1, passed[i], derivatives[i], capped[i]
+            rows += passed
 
 
 @dataclass(frozen=True)
@@ -127,10 +168,22 @@ class _Memory(Mapping[str, Any]):
         return len(self.names)
 
 
-def _after(stride: Stride, i: int) -> Resume:
-    """What a later run needs to continue after step i."""
-    memory = {name: values[i] for name, values in stride.memory.items()}
+def _after(stride: Stride, watched: Watched | None, until: float, i: int) -> Resume:
+    """What a later run needs to continue after step i, which does not go beyond `until`."""
+    memory: dict[str, Any] = {name: values[i] for name, values in stride.memory.items()}
+    if watched:
+        memory |= {"until": until, **_checks(watched, stride, i)}
     return continuation(float(stride.ends[i]), stride.states[i], memory)
+
+
+def _checks(watched: Watched, stride: Stride, i: int) -> dict[str, Any]:
+    """What `BranchMonitor.memory` is after step i."""
+    checked = np.empty((0, 0))
+    if watched.ends:
+        before = (stride.ends[i - 1], stride.values[i - 1]) if i else watched.ends[-1]
+        pairs = (before, (stride.ends[i], stride.values[i]))
+        checked = np.array([[t, *values] for t, values in pairs])
+    return {"turned": stride.switched[i], "checked": checked}
 
 
 def continuation(t: float, y: FloatArray, memory: Mapping[str, Any]) -> Resume:
@@ -139,5 +192,12 @@ def continuation(t: float, y: FloatArray, memory: Mapping[str, Any]) -> Resume:
     return {"t": np.array(t), "y": y, **arrays}
 
 
+def _within(
+    problem: Problem, states: Callable[[int, float], FloatArray], i: int, t: float
+) -> FloatArray:
+    """The state at a time in step i."""
+    return problem.unit(states(i, t))
+
+
 def _unknown(t: float) -> FloatArray:
-    raise AssertionError("compiled steps are not made where states within them are needed")
+    raise AssertionError("states within these compiled steps were not asked for")

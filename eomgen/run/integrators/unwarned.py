@@ -16,7 +16,7 @@ from scipy.integrate import Radau as ScipyRadau
 from scipy.integrate._ode import IntegratorConcurrencyError
 from scipy.linalg import get_lapack_funcs
 
-from eomgen.run.integrators.interface import Remark
+from eomgen.run.integrators.interface import Remark, ignored
 
 Matrix = NDArray[np.float64] | NDArray[np.complex128]
 Factors = tuple[Matrix, NDArray[np.int32]]
@@ -25,10 +25,6 @@ Factors = tuple[Matrix, NDArray[np.int32]]
 
 _ONE_STEP = RLock()
 """Held during a step of LSODA: in old versions of SciPy all runs share its work arrays."""
-
-
-def ignored(text: str) -> None:
-    """A `Remark` that does nothing."""
 
 
 class Radau(ScipyRadau):

@@ -1,7 +1,7 @@
 """Gravity towards a fixed point, such as a planet or a star."""
 
 from collections.abc import Iterator, Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -20,6 +20,13 @@ class PointGravity(EffectTable):
     There is no gravity gradient torque. The force is infinite at the point itself.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "point_gravity"
+name = "sun"
+mu = 10.0
+at = [5, 0]
+"""
     body_fields = ("except_bodies",)
     vector_fields = ("at",)
 
@@ -64,4 +71,5 @@ class PointGravity(EffectTable):
         zeros = (mechanism.value(ZERO),) * mechanism.dimensions
         centre = tuple(mechanism.value(part) for part in self.at)
         arm = sub(mechanism.position(body, zeros), centre)
+        arm = mechanism.called("r", *arm)
         return arm, dot(arm, arm)

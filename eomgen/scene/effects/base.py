@@ -17,7 +17,7 @@ Vector = tuple[Scalar, ...]
 
 @dataclass(frozen=True)
 class Input:
-    """An input `u` of the generated module; it is 0 unless given.
+    """An input `u` of the generated module; it has its default, 0 in effects, unless given.
 
     At a joint `unit` and `about` may have alternatives: see `language.quantity.of_joint`.
     """
@@ -25,6 +25,7 @@ class Input:
     name: str
     unit: str
     about: str
+    default: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -167,6 +168,11 @@ class Mechanism(Protocol):
     def call(self, function: str, *arguments: Scalar) -> Scalar:
         """Value of a function of `scalars.functions.FUNCTIONS`."""
 
+    def called(self, letter: str, *values: Scalar) -> Vector:
+        """The values themselves, a scalar or the components of a vector. A derivation shows them by
+        this letter, with their formula beside it.
+        """
+
 
 class Unmoved:
     """A base for mechanisms whose effects all satisfy `is_plain`: they need few members."""
@@ -196,34 +202,13 @@ class Unmoved:
         """Unused."""
         raise AssertionError(body)
 
-    @property
-    def joints(self) -> Mapping[str, tuple[str, ...]]:
-        """Unused."""
-        raise AssertionError
-
-    def coordinate(self, joint: str, index: int = 0) -> Scalar:
-        """Unused."""
-        raise AssertionError(joint)
-
-    def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """Unused."""
-        raise AssertionError(joint)
-
-    def rate(self, joint: str, index: int = 0) -> Scalar:
-        """Unused."""
-        raise AssertionError(joint)
-
     def state(self, name: str) -> Scalar:
         """Unused."""
         raise AssertionError(name)
 
-    def number(self, value: Real) -> Scalar:
-        """Unused."""
-        raise AssertionError(value)
-
-    def call(self, function: str, *arguments: Scalar) -> Scalar:
-        """Unused."""
-        raise AssertionError(function)
+    def called(self, letter: str, *values: Scalar) -> Vector:
+        """The values themselves."""
+        return values
 
 
 class EffectTable(Table):
@@ -240,6 +225,10 @@ class EffectTable(Table):
     """Fields that name one joint or several, neither free nor weld, or are "all"."""
     vector_fields: ClassVar[tuple[str, ...]] = ()
     """Fields with a vector that has one component for each dimension, or is absent."""
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    """For each field with a point of a body the fields that name the body or bodies."""
+    input_field: ClassVar[str] = ""
+    """The field that may be "input"."""
 
     name: Identifier
 
@@ -314,7 +303,8 @@ class EffectTable(Table):
         return bool(own) and not any(inputs.get(i.name) for i in own)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """Whether its loads depend only on parameters, inputs and poses of bodies.
+        """Whether its loads depend only on parameters, inputs and poses of bodies, or are at
+        joints and depend on no extra state. It has no rigid contacts.
 
         Route `closed` requires it.
         """

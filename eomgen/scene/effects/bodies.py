@@ -1,6 +1,6 @@
 """The base of effects that act on a point of one body, of several bodies, or of all."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -21,6 +21,7 @@ class OnBodies(EffectTable):
     body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies")
     point_fields = ("points",)
     vector_fields: ClassVar[tuple[str, ...]] = ("at",)
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {"at": ("body", "bodies")}
 
     body: Identifier | None = Field(default=None, description="body it acts on")
     bodies: Literal["all"] | Annotated[tuple[Identifier, ...], Field(min_length=1)] | None = Field(

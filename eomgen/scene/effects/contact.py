@@ -74,9 +74,25 @@ class BodyContact(OnBodies):
     v >> s a block slides v²/(2 μ g) (1 + (s/v)² (½ + ln(2 v/s))).
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "contact"
+name = "floor"
+law = "hunt_crossley"
+body = "hand"
+radius = 0.05
+offset = -1.0
+stiffness = 5e4
+dissipation = 0.2
+"""
     body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies", "radii")
     anchor_fields: ClassVar[tuple[str, ...]] = ("other",)
     vector_fields: ClassVar[tuple[str, ...]] = ("at", "corners", "other_at")
+
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "at": ("body", "bodies"),
+        "other_at": ("other",),
+    }
 
     type: Literal["contact"]
     law: Literal["spring_damper", "hunt_crossley", "impact"]
@@ -201,11 +217,11 @@ class BodyContact(OnBodies):
         found: list[Load] = []
         for touch in self._touches(mechanism):
             if self.friction == ZERO:
-                force = self._force(mechanism, touch, gap_rate_of(mechanism, touch))
+                force = self._named_force(mechanism, touch, gap_rate_of(mechanism, touch))
                 found += normal_loads(touch, force)
                 continue
             gap_rate, slip = gap_rate_and_slip(mechanism, touch)
-            force = self._force(mechanism, touch, gap_rate)
+            force = self._named_force(mechanism, touch, gap_rate)
             speed = self._slip_speed(mechanism)
             size = mechanism.call("sqrt", dot(slip, slip) + speed * speed)
             drag = mechanism.value(self.friction) * force / size
@@ -299,6 +315,9 @@ class BodyContact(OnBodies):
             force = force * (mechanism.number(1.0) - factor * gap_rate)
             return mechanism.call("max", force, nothing)
         return force
+
+    def _named_force(self, mechanism: Mechanism, touch: Touch, gap_rate: Scalar) -> Scalar:
+        return mechanism.called("F", self._force(mechanism, touch, gap_rate))[0]
 
     def _slip_speed(self, mechanism: Mechanism) -> Scalar:
         """The slip speed, m/s; without friction, where it has no effect, 1."""

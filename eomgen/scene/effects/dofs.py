@@ -1,6 +1,6 @@
 """The bases of effects on degrees of freedom of one joint, of several, or of all."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -61,8 +61,9 @@ def joint_dof(mechanism: Mechanism, joint: str, kind: str, index: int) -> Dof:
     half = mechanism.call("atan2", sine, mechanism.call("abs", w))
     per_sine = mechanism.number(1.0) / sine
     per_sine = mechanism.call("select", -w, -per_sine, per_sine)
-    direction = scale(per_sine, vector)
-    return Dof(joint, index, half + half, direction, rates)
+    direction = mechanism.called("n", *scale(per_sine, vector))
+    (angle,) = mechanism.called("beta", half + half)
+    return Dof(joint, index, angle, direction, rates)
 
 
 def spring_energy(mechanism: Mechanism, stiffness: Formula, stretches: Iterable[Scalar]) -> Scalar:
@@ -120,6 +121,10 @@ class OnJoints(EffectTable):
             assert self.joint is not None
             known = _scalar_coordinates(joints, names, self.joint)
             _check_coordinate(self.coordinate, self.joint, known, location)
+
+    def is_plain(self, parameters: Collection[str]) -> bool:
+        """True: its loads are at joints."""
+        return True
 
     def dofs(self, mechanism: Mechanism) -> Iterator[Dof]:
         """The degrees of freedom that it acts on."""

@@ -1,7 +1,7 @@
 """Linear and quadratic drag in a fluid, of translation and of rotation."""
 
 from collections.abc import Iterator
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -23,6 +23,14 @@ class Drag(OnBodies):
     axes; each body has these coefficients. The drag is differentiable at rest.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "drag"
+name = "air"
+bodies = ["arm", "hand"]
+quadratic = 0.02
+wind = ["3*sin(t)", 0]
+"""
     vector_fields = ("at", "wind")
 
     type: Literal["drag"]
@@ -86,7 +94,7 @@ class Drag(OnBodies):
                 if has_wind:
                     names = local_names(mechanism, self.wind, body, at)
                     wind = tuple(mechanism.value(part, **names) for part in self.wind)
-                    speed = sub(speed, wind)
+                    speed = mechanism.called("w", *sub(speed, wind))
                 force = _drag(mechanism, linear, quadratic, speed)
             torque: Vector = ()
             if has_torque:

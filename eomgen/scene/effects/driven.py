@@ -1,6 +1,6 @@
 """A joint whose coordinate follows a formula of time."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -20,6 +20,13 @@ class Driven(EffectTable):
     load.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "driven"
+name = "crank"
+joint = "shoulder"
+coordinate = "0.5*sin(6*t)"
+"""
     joint_fields = ("joint",)
 
     type: Literal["driven"]

@@ -1,7 +1,7 @@
 """An external force at a point of a body."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -18,8 +18,18 @@ class ExternalForce(EffectTable):
     `<name>_z`.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "external_force"
+name = "pull"
+body = "hand"
+at = [0.1, 0]
+force = ["2*sin(t)", 0]
+"""
     body_fields = ("body",)
     vector_fields = ("at", "force")
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {"at": ("body",)}
+    input_field = "force"
 
     type: Literal["external_force"]
     body: Identifier = Field(description="body it acts on")

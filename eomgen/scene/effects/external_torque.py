@@ -1,7 +1,7 @@
 """An external torque on a body."""
 
 from collections.abc import Iterator, Mapping
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -18,7 +18,15 @@ class ExternalTorque(EffectTable):
     With `torque = "input"` it is the input `<name>`, in space `<name>_x`, `<name>_y`, `<name>_z`.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "external_torque"
+name = "twist"
+body = "hand"
+torque = "input"
+"""
     body_fields = ("body",)
+    input_field = "torque"
 
     type: Literal["external_torque"]
     name: Identifier

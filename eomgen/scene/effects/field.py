@@ -1,7 +1,7 @@
 """Force fields: formulas of position, velocity and time, and some predefined ones."""
 
 from collections.abc import Iterator, Mapping
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -50,6 +50,13 @@ class ForceField(OnBodies):
     there; a run with fixed steps may jump across the centre and continue with a large error.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "field"
+name = "stream"
+body = "hand"
+force = ["-2*(vx - 1)", "-2*vy"]
+"""
     vector_fields = ("at", "center", "force")
 
     type: Literal["field"]
@@ -140,6 +147,7 @@ class ForceField(OnBodies):
         r, zero = self._from_center(mechanism, body, at), mechanism.number(0.0)
         if self.kind == "vortex":
             r = r[:2]
+        r = mechanism.called("r", *r)
         square = self._square(mechanism, r)
         factor = self._value(mechanism, self.strength)
         factor = factor / _raised(mechanism, square, self.power + 1)
@@ -151,15 +159,16 @@ class ForceField(OnBodies):
 
     def _sideways(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
         call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
-        ahead = negative(self._from_center(mechanism, body, at))
+        ahead = mechanism.called("d", *negative(self._from_center(mechanism, body, at)))
         v = mechanism.velocity(body, at)
         distance, speed = length(mechanism, ahead), length(mechanism, v)
+        distance, speed = mechanism.called("l", distance)[0], mechanism.called("v", speed)[0]
         gap = distance - self._value(mechanism, self.radius)
         near = call("max", zero, one - gap / self._value(mechanism, self.reach))
-        near = call("min", near, one)
+        (near,) = mechanism.called("h", call("min", near, one))
         towards = call("max", zero, dot(v, ahead))
         # c² |v|, where `length` keeps the speed above 0.
-        cosine = towards / (distance * speed)
+        (cosine,) = mechanism.called("c", towards / (distance * speed))
         factor = self._value(mechanism, self.steering) * near * near * cosine * cosine * speed
         if mechanism.dimensions == 2:
             left = v[0] * ahead[1] - v[1] * ahead[0]  # its sign says on which side the obstacle is
@@ -178,7 +187,7 @@ class ForceField(OnBodies):
         upright = (zero, zero, one)
         axis = tuple(call("select", beside, a, b) for a, b in zip(about, upright, strict=True))
         size = length(mechanism, axis)
-        return tuple(part / size for part in axis)
+        return mechanism.called("n", *(part / size for part in axis))
 
 
 def _raised(mechanism: Mechanism, square: Scalar, power: float) -> Scalar:

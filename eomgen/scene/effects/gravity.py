@@ -1,7 +1,7 @@
 """Uniform gravity, downwards or in a given direction."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, field_validator
 
@@ -20,6 +20,11 @@ class Gravity(EffectTable):
     applied forces, in F of M v̇ + V + G = F instead of G.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
     body_fields = ("except_bodies",)
     vector_fields = ("direction",)
 

@@ -1,7 +1,7 @@
 """Friction in a joint."""
 
 from collections.abc import Iterator
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -21,6 +21,15 @@ class JointFriction(OnJoints):
     under a load F < C the joint creeps at speed · artanh(F/C).
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "joint_friction"
+name = "bearing"
+joint = "elbow"
+viscous = 0.02
+coulomb = 0.1
+speed = 0.01
+"""
     type: Literal["joint_friction"]
     viscous: Quantity = quantity(
         "N m s/rad | N s/m",

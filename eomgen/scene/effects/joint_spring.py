@@ -1,7 +1,7 @@
 """A spring and damper at a joint."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -24,6 +24,15 @@ class JointSpring(OnJoints):
     n, and the torque is -k s n - c ω; its `rest` is 0, and the torque reverses at s = π.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "joint_spring"
+name = "tendon"
+joint = "elbow"
+stiffness = 3.0
+damping = 0.1
+rest = 0.5
+"""
     type: Literal["joint_spring"]
     stiffness: Quantity = quantity(
         "N m/rad | N/m", "stiffness", "nonnegative", default=ZERO, validate_default=False

@@ -1,7 +1,7 @@
 """Soft or rigid stops at the limits of a joint's coordinate."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal, Self
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -25,6 +25,16 @@ class JointStop(OnJoints):
     `<effect>_low` and `<effect>_high`.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "joint_stop"
+name = "limit"
+joint = "elbow"
+low = 0.0
+high = 2.5
+stiffness = 200.0
+damping = 1.0
+"""
     type: Literal["joint_stop"]
     low: Quantity | None = quantity("rad | m", "lower limit", default=None)
     high: Quantity | None = quantity("rad | m", "upper limit", default=None)
@@ -83,6 +93,14 @@ class JointStop(OnJoints):
                     f"{location}.coordinate: missing; a rigid stop is of one coordinate, and "
                     f"'{self.joint}' has {', '.join(names[acted_on[0]])}"
                 )
+
+    def is_plain(self, parameters: Collection[str]) -> bool:
+        """True for a soft stop."""
+        return self.restitution is None
+
+    def why_not_plain(self) -> str:
+        """Only a rigid stop is not plain."""
+        return "with a restitution"
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Loads on the child, with reactions on the parent."""
@@ -168,4 +186,4 @@ class JointStop(OnJoints):
             within = mechanism.call("min", within, mechanism.value(self.high))
         if self.low is not None:
             within = mechanism.call("max", within, mechanism.value(self.low))
-        return q - within
+        return mechanism.called("x", q - within)[0]

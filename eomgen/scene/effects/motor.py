@@ -1,9 +1,8 @@
 """A motor at a joint."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
-from eomgen.language.formula import names_in
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import Input, JointLoad, Mechanism
 from eomgen.scene.effects.dofs import OnCoordinate
@@ -14,6 +13,15 @@ class Motor(OnCoordinate):
 
     At a prismatic joint it is a force. With `torque = "input"` it is the input `<name>`.
     """
+
+    example: ClassVar[str] = """
+[[effects]]
+type = "motor"
+name = "drive"
+joint = "elbow"
+torque = "input"
+"""
+    input_field: ClassVar[str] = "torque"
 
     type: Literal["motor"]
     torque: Literal["input"] | Quantity = quantity(
@@ -42,7 +50,5 @@ class Motor(OnCoordinate):
         return self.idle(inputs, dimensions)
 
     def is_plain(self, parameters: Collection[str]) -> bool:
-        """True unless its formula depends on the motion or on time, or it names a coordinate."""
-        if self.coordinate is not None:
-            return False
-        return self.torque == "input" or all(n in parameters for n in names_in(self.torque))
+        """True: its load is at a joint."""
+        return True

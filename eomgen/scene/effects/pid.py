@@ -1,6 +1,6 @@
 """A proportional-integral-derivative controller of a joint."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import ExtraState, Mechanism, Scalar
@@ -15,6 +15,16 @@ class Pid(Servo):
     k_p/k_i (Åström, Murray, Feedback Systems, section on integrator windup).
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "pid"
+name = "servo"
+joint = "elbow"
+target = 0.5
+stiffness = 20.0
+damping = 2.0
+integral_gain = 10.0
+"""
     type: Literal["pid"]
     stiffness: Quantity = quantity("N m/rad | N/m", "gain k_p of the deviation", "positive")
     integral_gain: Quantity = quantity(

@@ -1,6 +1,6 @@
 """The base of joint controllers: target, gains, saturation, and an actuator with lag."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from pydantic import Field
 
@@ -55,6 +55,7 @@ class Servo(OnCoordinate):
         if self.limit is None:
             return command
         limit = mechanism.value(self.limit)
+        (command,) = mechanism.called("c", command)
         return mechanism.call("max", -limit, mechanism.call("min", limit, command))
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
@@ -70,6 +71,14 @@ class Servo(OnCoordinate):
             return ()
         difference = self.command(mechanism) - mechanism.state(f"{self.name}_torque")
         return (difference / mechanism.value(self.lag),)
+
+    def is_plain(self, parameters: Collection[str]) -> bool:
+        """True without states."""
+        return not self.states(2)
+
+    def why_not_plain(self) -> str:
+        """Only one with states is not plain."""
+        return "that has states"
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """The command, or the torque of an actuator with lag."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -30,8 +30,19 @@ class Spring(EffectTable):
     consistent; with rest length 0 the force is k d everywhere.
     """
 
+    example: ClassVar[str] = """
+[[effects]]
+type = "spring"
+name = "elastic"
+body_1 = "world"
+at_1 = [1, 0]
+body_2 = "hand"
+stiffness = 40.0
+rest_length = 0.5
+"""
     anchor_fields = ("body_1", "body_2")
     vector_fields = ("at_1", "at_2")
+    points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {"at_1": ("body_1",), "at_2": ("body_2",)}
 
     type: Literal["spring"]
     body_1: Identifier = Field(description="body of its first end, or 'world'")
@@ -91,6 +102,7 @@ class Spring(EffectTable):
             tension = per_length * stretch
             if self.rest_length != ZERO:
                 per_length = tension / line.length
+        (per_length,) = mechanism.called("k", per_length)
         opposed = line.damped_velocity(mechanism.number(1.0))
         pull = tuple(per_length * d + damping * w for d, w in zip(line.d, opposed, strict=True))
         if not self.tension_only:
@@ -157,10 +169,11 @@ def _line(spring: Spring, mechanism: Mechanism) -> _Line:
     at_2 = tuple(mechanism.value(part) for part in spring.at_2)
     d = sub(mechanism.position(spring.body_2, at_2), mechanism.position(spring.body_1, at_1))
     d_dot = sub(mechanism.velocity(spring.body_2, at_2), mechanism.velocity(spring.body_1, at_1))
+    d, d_dot = mechanism.called("d", *d), mechanism.called("ddot", *d_dot)
     square = dot(d, d)
     larger = mechanism.call("max", square, nearest_square(mechanism))
-    length = mechanism.call("sqrt", larger)
-    stretch = length - mechanism.value(spring.rest_length)
+    (length,) = mechanism.called("l", mechanism.call("sqrt", larger))
+    (stretch,) = mechanism.called("s", length - mechanism.value(spring.rest_length))
     return _Line(at_1, at_2, d, d_dot, square, larger, length, stretch)
 
 

@@ -73,6 +73,7 @@ def on_plane(
     centre = mechanism.position(ball.body, ball.at)
     if plane.body != WORLD:
         centre = sub(centre, mechanism.position(plane.body, plane.at))
+    normal = mechanism.called("n", *normal)
     height = dot(normal, centre) - (plane.offset + ball.radius)
     arms: list[Vector] = [()]
     lifts = [mechanism.number(0.0)]
@@ -85,7 +86,8 @@ def on_plane(
         if plane.body != WORLD:
             from_plane = add(centre, arm) if arm else centre
             sides.append(Side(plane.body, plane.at, from_plane, -ball.radius))
-        yield Touch(normal, height + lift, tuple(sides))
+        (gap,) = mechanism.called("g", height + lift)
+        yield Touch(normal, gap, tuple(sides))
 
 
 def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
@@ -96,29 +98,32 @@ def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
     of each other, n is d/ε with the vector d from the second centre to the first, so it falls to 0.
     """
     d = sub(mechanism.position(first.body, first.at), mechanism.position(second.body, second.at))
+    d = mechanism.called("d", *d)
     square = dot(d, d)
     larger = mechanism.call("max", square, nearest_square(mechanism))
-    length = mechanism.call("sqrt", larger)
+    (length,) = mechanism.called("l", mechanism.call("sqrt", larger))
     both = first.radius + second.radius
     sides = [Side(first.body, first.at, (), -(length * (first.radius / both)))]
     if second.body != WORLD:
         sides.append(Side(second.body, second.at, (), length * (second.radius / both)))
-    normal = tuple(x / length for x in d)
-    return Touch(normal, length - both, tuple(sides), (larger - square) / (length + length))
+    normal = mechanism.called("n", *(x / length for x in d))
+    (gap,) = mechanism.called("g", length - both)
+    return Touch(normal, gap, tuple(sides), (larger - square) / (length + length))
 
 
 def gap_rate_of(mechanism: Mechanism, touch: Touch) -> Scalar:
     """The rate of the gap, m/s."""
-    return dot(touch.normal, _relative([_speed(mechanism, side, side.arm) for side in touch.sides]))
+    u = _relative([_speed(mechanism, side, side.arm) for side in touch.sides])
+    return mechanism.called("gdot", dot(touch.normal, u))[0]
 
 
 def gap_rate_and_slip(mechanism: Mechanism, touch: Touch) -> tuple[Scalar, Vector]:
     """The rate of the gap, and the slip velocity of the first body on the second, m/s."""
     levers = (_lever(touch, side) for side in touch.sides)
     speeds = [_speed(mechanism, s, lever) for s, lever in zip(touch.sides, levers, strict=True)]
-    u = _relative(speeds)
-    gap_rate = dot(touch.normal, u)
-    return gap_rate, sub(u, scale(gap_rate, touch.normal))
+    u = mechanism.called("c", *_relative(speeds))
+    (gap_rate,) = mechanism.called("gdot", dot(touch.normal, u))
+    return gap_rate, mechanism.called("u", *sub(u, scale(gap_rate, touch.normal)))
 
 
 def point_loads(touch: Touch, force: Vector) -> tuple[Load, ...]:

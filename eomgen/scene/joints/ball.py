@@ -12,6 +12,15 @@ class Ball(JointTable):
     relative to the parent, in the child's axes.
     """
 
+    example: ClassVar[str] = """
+[[joints]]
+name = "elbow"
+type = "ball"
+parent = "arm"
+child = "hand"
+r_parent = [0, 0, -0.4]
+r_child = [0, 0, 0.1]
+"""
     spaces: ClassVar[tuple[int, ...]] = (3,)
     type: Literal["ball"]
 

@@ -8,11 +8,11 @@ own axes every column is constant; `dynamics.kinematics.MotionAxis` is one colum
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from eomgen.language.base import Identifier, Number, Table
+from eomgen.language.base import AngleOrNumber, Identifier, Number, Table
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, Vector, quantity
 
@@ -57,6 +57,18 @@ class Primitive:
 Z_AXIS = (0.0, 0.0, 1.0)
 
 
+Orientation = (
+    Quantity
+    | Annotated[tuple[Quantity, ...], Field(min_length=3, max_length=4)]
+    | tuple[
+        tuple[Quantity, Quantity, Quantity],
+        tuple[Quantity, Quantity, Quantity],
+        tuple[Quantity, Quantity, Quantity],
+    ]
+)
+"""An angle, three angles, a quaternion or a matrix."""
+
+
 class JointTable(Table):
     """The keys of all joints except the free one: two bodies, a point on each, a fixed rotation."""
 
@@ -78,6 +90,13 @@ class JointTable(Table):
         description="child's axes in the parent's at zero: an angle; in space about x, then y, z",
     )
 
+    orientation: Orientation | None = Field(
+        default=None,
+        description="the same: an angle, in space three about x, then y, z, a quaternion w, x, y, "
+        "z, or a matrix of three rows; in rad, as '90 deg', or formulas of parameters, whose "
+        "values are then fixed",
+    )
+
 
 class Geared(JointTable):
     """A joint with one coordinate, and optionally the geared rotor of a motor."""
@@ -89,7 +108,7 @@ class Geared(JointTable):
     gear_ratio: Quantity | None = quantity(
         "", "turns of the rotor to one of the joint", default=None
     )
-    limits: tuple[Number, Number] | None = Field(
+    limits: tuple[AngleOrNumber, AngleOrNumber] | None = Field(
         default=None, description="range of the coordinate; reported, not enforced"
     )
 

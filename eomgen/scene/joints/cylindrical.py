@@ -12,6 +12,14 @@ from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Primitive, 
 class Cylindrical(JointTable):
     """The child translates along `axis` and rotates about it."""
 
+    example: ClassVar[str] = """
+[[joints]]
+name = "elbow"
+type = "cylindrical"
+parent = "arm"
+child = "hand"
+axis = [1, 0, 0]
+"""
     spaces: ClassVar[tuple[int, ...]] = (3,)
     type: Literal["cylindrical"]
     axis: Numbers = Field(default=Z_AXIS, description="direction in the child's axes")

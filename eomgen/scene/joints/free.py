@@ -19,6 +19,12 @@ class Free(Table):
     velocities are that of the centre of mass in world axes and the angular velocity in body axes.
     """
 
+    example: ClassVar[str] = """
+[[joints]]
+name = "flight"
+type = "free"
+child = "hand"
+"""
     spaces: ClassVar[tuple[int, ...]] = (PLANE, SPACE)
     type: Literal["free"]
     name: Identifier

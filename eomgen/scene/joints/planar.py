@@ -1,6 +1,6 @@
 """The planar joint: translation in a plane of the parent and rotation about its normal."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -11,6 +11,13 @@ from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Primitive
 class Planar(JointTable):
     """The child translates along x and y of the joint's axes, and rotates about z."""
 
+    example: ClassVar[str] = """
+[[joints]]
+name = "elbow"
+type = "planar"
+parent = "arm"
+child = "hand"
+"""
     type: Literal["planar"]
     coordinates: tuple[Identifier, Identifier, Identifier] | None = Field(
         default=None,

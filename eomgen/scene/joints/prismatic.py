@@ -1,9 +1,10 @@
 """The prismatic joint."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
+from eomgen.language.base import Number
 from eomgen.language.quantity import Numbers
 from eomgen.scene.joints.base import WORLD, Coordinate, Geared, Primitive, spatial
 
@@ -11,8 +12,21 @@ from eomgen.scene.joints.base import WORLD, Coordinate, Geared, Primitive, spati
 class Prismatic(Geared):
     """The child translates along `axis` and does not rotate relative to the parent."""
 
+    example: ClassVar[str] = """
+[[joints]]
+name = "elbow"
+type = "prismatic"
+parent = "arm"
+child = "hand"
+axis = [1, 0]
+coordinate = "reach"
+"""
     type: Literal["prismatic"]
     axis: Numbers = Field(description="direction in the child's axes")
+
+    limits: tuple[Number, Number] | None = Field(
+        default=None, description="range of the coordinate; reported, not enforced"
+    )
 
     def positions(self, dimensions: int) -> tuple[Coordinate, ...]:
         """The displacement of the joint's point on the child from that on the parent, m."""

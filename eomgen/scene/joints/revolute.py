@@ -1,6 +1,6 @@
 """The revolute joint between two bodies, or between a body and the world."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -16,6 +16,16 @@ class Revolute(Geared):
     the axis is z.
     """
 
+    example: ClassVar[str] = """
+[[joints]]
+name = "elbow"
+type = "revolute"
+parent = "arm"
+child = "hand"
+r_parent = [0.4, 0]
+r_child = [-0.1, 0]
+coordinate = "bend"
+"""
     type: Literal["revolute"]
     axis: Numbers | None = Field(default=None, description="direction in space; z if absent")
 

@@ -12,6 +12,14 @@ from eomgen.scene.joints.base import Coordinate, JointTable, Primitive, spatial
 class Universal(JointTable):
     """The child rotates about the first axis, and about the second, which moves with the first."""
 
+    example: ClassVar[str] = """
+[[joints]]
+name = "elbow"
+type = "universal"
+parent = "arm"
+child = "hand"
+axes = [[1, 0, 0], [0, 1, 0]]
+"""
     spaces: ClassVar[tuple[int, ...]] = (3,)
     type: Literal["universal"]
     axes: tuple[Numbers, Numbers] = Field(

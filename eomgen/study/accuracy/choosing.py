@@ -16,6 +16,7 @@ import math
 from collections.abc import Sequence
 
 from eomgen.errors import RunError
+from eomgen.run.problem import Problem
 from eomgen.study.accuracy.estimate import ROUNDING, Law, fit
 from eomgen.study.accuracy.measure import WRONG
 from eomgen.study.accuracy.search import Choice, Plan, Say, Search
@@ -51,8 +52,8 @@ LOOSE = 1e-5
 """Equal steps are tried for required errors down to this."""
 FEW_ROWS = 257
 """With more rows, equal steps do not pay: each row ends a step."""
-STIFF = "Radau"
-"""Tried first where the motion is stiff."""
+STIFF = ("Rodas5P", "Radau")
+"""Tried first where motion is stiff; the first of them only where compiled code makes its steps."""
 PATIENT = "gauss_6"
 """Tried if the other methods at their tightest tolerances are not accurate enough. It takes equal
 steps with compensated summation, which reduces rounding errors a thousandfold."""
@@ -151,15 +152,28 @@ def _missed(
 def _candidates(search: Search) -> list[str]:
     """The methods to try, in this order; each was the cheapest for some scene.
 
-    For smooth motion DOP853 comes first, whose steps are made in compiled code where that is
-    possible. With contacts, a multistep method restarts at each impact, so one-step methods replace
-    it. For stiff motion an implicit method comes first: stability would force explicit ones to take
-    thousands of steps.
+    DOP853 comes first, whose steps are made in compiled code where that is possible. For stiff
+    motion implicit methods come before it: stability would force explicit ones to take thousands
+    of steps. With contacts, a multistep method restarts at each impact, so one-step methods replace
+    it.
     """
-    others = ["LSODA", "DOP853"] if search.case.problem.contacts is None else ["RK45", "DOP853"]
     if search.fast.stiff:
-        return [STIFF, *others]
-    return ["DOP853"] if _smooth(search.case) else others
+        beside = "LSODA" if search.case.problem.contacts is None else "RK45"
+        return [*_stiff(search.case), beside, "DOP853"]
+    return ["DOP853"]
+
+
+def _stiff(case: Case) -> list[str]:
+    """The methods for stiff motion."""
+    return list(STIFF if _is_compiled(case.problem) else STIFF[1:])
+
+
+def _is_compiled(problem: Problem) -> bool:
+    """Whether compiled code can make the steps of a stiff method: forces switch at given times, at
+    most, and there are no rigid contacts.
+    """
+    in_time_only = problem.switching is not None and problem.switching.of_state is None
+    return problem.contacts is None and (in_time_only or not problem.corners)
 
 
 def _slowed(search: Search) -> bool:
@@ -176,8 +190,9 @@ def race(search: Search, asked: str | None, loose: bool) -> list[str]:
     all methods that were run.
 
     If stability limits the steps of DOP853, LSODA is run, too, which changes over to an implicit
-    method. If a run needed Jacobians, or none finished, `STIFF` is run, too. Else, if the motion is
-    smooth and the required error is `loose`, rk4 is run, too: it spends no time on step control.
+    method. If a run needed Jacobians, or none finished, those of `STIFF` are run, too. Else the
+    first of them is if a mode is fast: a small oscillation is damped instead of followed. And rk4
+    is if the motion is smooth and the required error `loose`: it spends no time on step control.
     """
     names = [method_of(asked).name] if asked is not None else _candidates(search)
     for name in names:
@@ -189,9 +204,10 @@ def race(search: Search, asked: str | None, loose: bool) -> list[str]:
         _first(search, method_of("LSODA"))
     more = []
     if not search.runs or any(run.trajectory.counts["jacobians"] for run in search.runs):
-        more = [STIFF]
-    elif loose and _few_steps_do(search.case):
-        more = ["rk4"]
+        more = _stiff(search.case)
+    else:
+        more = _stiff(search.case)[:-1] if search.fast.quick else []
+        more += ["rk4"] if loose and _few_steps_do(search.case) else []
     more = [name for name in more if name not in names]
     for name in more:
         _first(search, method_of(name))
@@ -204,7 +220,7 @@ def patience(search: Search, names: list[str], plans: Sequence[object], most: fl
     It is run if the motion is smooth, DOP853 has been run at its tightest tolerance, and there is
     no plan left for an explicit method. `plans` belong to `names`; `PATIENT` is added to `names`.
     """
-    explicit = [plan for name, plan in zip(names, plans, strict=True) if name != STIFF]
+    explicit = [plan for name, plan in zip(names, plans, strict=True) if name not in STIFF]
     if PATIENT in names or any(explicit) or not (_spent(search) and _smooth(search.case)):
         return False
     names.append(PATIENT)

@@ -19,7 +19,7 @@ from eomgen.program.kernel import fixed_values
 from eomgen.program.program import Program
 from eomgen.program.tape import Stage
 from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import Problem
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.scalars.extended import Bits
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import program_of
@@ -37,15 +37,17 @@ def moved_problem(
     parameters: Any = None,
     inputs: Any = None,
     *,
+    start: FloatArray | None = None,
     compiled: Callable[[Problem, GeneratedModule], Problem] | None = None,
 ) -> Callable[[int], Problem]:
     """A function that gives, by number, the problem of a model's module with constants perturbed in
     one of several patterns of signs, from the same initial state. Each problem is made once.
 
+    start     the initial state, (ny,); None for that of the module
     compiled  adds compiled steps to a problem and its perturbed module
     """
     program = cache(partial(program_of, model))
-    made = partial(_made, module, program, model, parameters, inputs, compiled)
+    made = partial(_made, module, program, model, parameters, inputs, start, compiled)
     return cache(made)
 
 
@@ -55,12 +57,14 @@ def _made(
     model: Model,
     parameters: Any,
     inputs: Any,
+    start: FloatArray | None,
     compiled: Callable[[Problem, GeneratedModule], Problem] | None,
     seed: int,
 ) -> Problem:
-    true = problem_of(module, parameters, inputs, model)
+    if start is None:
+        start = problem_of(module, parameters, inputs, model).initial
     twin = moved(module, program(), parameters, seed)
-    problem = replace(problem_of(twin, parameters, inputs, model), initial=true.initial)
+    problem = replace(problem_of(twin, parameters, inputs, model), initial=start)
     return compiled(problem, twin) if compiled else problem
 
 
@@ -116,5 +120,5 @@ def _over(module: GeneratedModule, constants: Mapping[str, Any]) -> GeneratedMod
                 value.__code__, names, name, value.__defaults__, value.__closure__
             )
     names["_DEFAULT"], names["_DERIVATIVE"] = constants, constants["derivative"]
-    names["_parameters"] = lambda _: constants
+    names["_parameters"] = lambda *_: constants
     return cast(GeneratedModule, twin)

@@ -21,14 +21,15 @@ from eomgen.run.works import Powers
 from eomgen.study.accuracy.cost import meter
 from eomgen.study.accuracy.measure import scales
 
-TIGHTEST = {"LSODA": 1e-12, "DOP853": 1e-16, "taylor": 1e-16, "heyoka": 1e-16}
+TIGHTEST = {"LSODA": 1e-12, "DOP853": 1e-16, "Rodas5P": 3e-15, "taylor": 1e-16, "heyoka": 1e-16}
 """Relative tolerances below which a method fails for many scenes, or gains nothing. The sums of
-DOP853 and of Taylor series are compensated: their errors go on to fall with the tolerance."""
+DOP853, Rodas5P and Taylor series are compensated: their errors go on to fall with the tolerance."""
 TIGHTEST_OF_ALL = 1e-13
 ORDERS = {
     "RK45": 5,
     "DOP853": 8,
     "LSODA": 10,
+    "Rodas5P": 5,
     "Radau": 5,
     "BDF": 4,
     "gragg_bulirsch_stoer": 12,

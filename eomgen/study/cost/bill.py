@@ -68,7 +68,8 @@ class Bill:
     `route` and `bare_route` are those of their equations. `extent` is that of the scene's motion,
     m, or None if no motion was asked for. `spread` is how much times of the same call vary on this
     machine, s: a smaller difference means nothing. `at_contacts` are the operations of functions
-    for rigid contacts, by name; they are not part of `derivative`.
+    for rigid contacts, by name; they are not part of `derivative`. `stopped` says that an interrupt
+    ended the motions, of which there is then none, or is "".
     """
 
     name: str
@@ -84,6 +85,7 @@ class Bill:
     t_end: float
     extent: float | None
     at_contacts: Mapping[str, int]
+    stopped: str = ""
 
     @property
     def shared(self) -> tuple[int, float, float]:
@@ -140,9 +142,13 @@ def bill(
     changed, other_routes = timed[2 : 2 + len(parts)], timed[2 + len(parts) :]
     size: float | None = None
     changes: list[Change | None] = [None] * len(parts)
+    stopped = ""
     if motion:
         reported = partial(_part_of, progress, 1.5, 2.5)
-        size, changes = _changes(whole, parts, changed, scene.simulation, motion, reported)
+        try:
+            size, changes = _changes(whole, parts, changed, scene.simulation, motion, reported)
+        except KeyboardInterrupt:
+            stopped = "interrupted; motions are not compared"
     return Bill(
         name=whole.model.name,
         route=whole.route,
@@ -160,6 +166,7 @@ def bill(
         t_end=scene.simulation.t_end,
         extent=size,
         at_contacts={name: cost[name]["total"] for name in AT_CONTACTS if name in cost},
+        stopped=stopped,
     )
 
 

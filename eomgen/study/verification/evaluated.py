@@ -159,6 +159,10 @@ class EvaluatedModel:
         """The value of a function of formulas."""
         return self.scalars.call(function, *arguments)
 
+    def called(self, letter: str, *values: Extended) -> Vector:
+        """The values themselves."""
+        return values
+
     @cached_property
     def _names(self) -> dict[str, Extended]:
         model = self.model

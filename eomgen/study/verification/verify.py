@@ -3,7 +3,7 @@
 The bounds are in `study.verification.bounds`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,6 +62,7 @@ class Verified:
     until     time up to which the scene's own run was followed, s
     ulps      forward error of v̇ of each route at each state
     data      change of v̇ there by one ulp in the data, ulps
+    stopped   how far an interrupt let it come; "" if it is complete
     """
 
     name: str
@@ -76,6 +77,7 @@ class Verified:
     until: float
     ulps: Mapping[str, FloatArray]
     data: FloatArray
+    stopped: str = ""
 
     @property
     def better(self) -> list[str]:
@@ -121,28 +123,34 @@ def verify(
     asked = hard_states(module, len(model.velocities), count, seed, wanted.t_end)
     run = sampled(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
     asked += _states(run, module)
-    found = []
-    for k, state in enumerate(asked):
-        found.append(judged(bare, truth, taken, modules, full, state))
-        progress(0.3 + 0.5 * (k + 1) / len(asked))
+    found: list[Judged | None] = []
+    stopped = ""
+    try:
+        for k, state in enumerate(asked):
+            found.append(judged(bare, truth, taken, modules, full, state))
+            progress(0.3 + 0.5 * (k + 1) / len(asked))
+    except KeyboardInterrupt:
+        if all(one is None for one in found):
+            raise
+        stopped = f"interrupted after {len(found)} of {len(asked)} states; no laws, no run"
     there = [one for one in found if one is not None]
     if not there:
         raise RunError("no finite acceleration in 60 digits at any state; change the scene")
-    firsts = [one for one in there if one.state.number == 0]
-    laws = [broken(bare, module, one.state) for one in firsts if _has(one, taken)]
-    progress(0.85)
-    # Effects that act only for a time, as contacts do, are found by the run alone.
-    reported = [one.state for one in firsts if one.state.kind in ("random", "still")]
-    reported += [one.state for one in there if one.state.kind == OWN]
-    ran = drift(model, wanted, module, full, reported, lambda part: progress(0.88 + 0.12 * part))
+    lawful, ran = list[Check](), None
+    if not stopped:
+        firsts = [one for one in there if one.state.number == 0]
+        laws = [broken(bare, module, one.state) for one in firsts if _has(one, taken)]
+        progress(0.85)
+        shown = _of_conservation(there, firsts)
+        ran = drift(model, wanted, module, full, shown, lambda x: progress(0.88 + 0.12 * x))
+        lawful = [*law_checks(bare, laws), *drift_checks(ran)]
     ulps = {route: forward_ulps(there, route, bare) for route in modules}
     data = in_ulps(np.array([one.data for one in there]), there, bare)
     checks = (
         *forward_checks(there, ulps, data, taken, len(bare.velocities), bound),
         *matrix_checks(there),
         *loss_checks(there, taken),
-        *law_checks(bare, laws),
-        *drift_checks(ran),
+        *lawful,
     )
     notes = [f"route {route} is not available: {why}" for route, why in missing.items()]
     if form != "velocity":
@@ -155,12 +163,21 @@ def verify(
         units=tuple(module.UNITS[state] for state in module.STATES),
         judged=tuple(there),
         checks=checks,
-        notes=(*notes, *_notes(ran, bare)),
+        notes=(*notes, *(_notes(ran, bare) if ran else (stopped,))),
         left_out=len(found) - len(there),
         until=run.until,
         ulps=ulps,
         data=data,
+        stopped=stopped,
     )
+
+
+def _of_conservation(there: Sequence[Judged], firsts: Sequence[Judged]) -> list[State]:
+    """The states at which what motion conserves is determined. Effects that act only for a time, as
+    contacts do, are found by the run alone.
+    """
+    found = [one.state for one in firsts if one.state.kind in ("random", "still")]
+    return found + [one.state for one in there if one.state.kind == OWN]
 
 
 def _modules(

@@ -1,0 +1,188 @@
+"""Checked arguments of a simulation: `plan_run`, which `simulate` calls."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from typing import TYPE_CHECKING, Literal
+
+from eomgen.api.given import Values, values_of
+from eomgen.api.recording import wanted_outputs
+from eomgen.api.reporter import SILENT, Reporter
+from eomgen.api.settings import setting_of
+from eomgen.api.states import values_by_index
+from eomgen.errors import RunError
+from eomgen.model.elaborate import in_order
+from eomgen.model.model import Model
+from eomgen.results import Run
+from eomgen.run.inputs import InputsOfTime
+from eomgen.scene.schema import SHOWN, Scene
+
+if TYPE_CHECKING:
+    from eomgen.study.accuracy.trial import Setting
+
+GuardMode = Literal["stop", "repair"]
+Backend = Literal["auto", "numpy", "c"]
+EarlierRun = str | PathLike[str] | Run
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Checked arguments of a run.
+
+    scene    its settings and appearance are used
+    model    with the outputs that the run and its pictures need
+    setting  method and tolerances or step; None if `accuracy` or `budget` choose them
+    outputs  those that the caller named
+    state    values of the initial state, by index in [q, v, x]
+    varying  all inputs, if some of them are tables or functions of time
+
+    The other fields are arguments of `simulate`.
+    """
+
+    scene: Scene
+    model: Model
+    setting: "Setting | None"
+    t_end: float
+    parameters: Mapping[str, float]
+    inputs: Mapping[str, float]
+    outputs: Sequence[str] = ()
+    state: Mapping[int, float] = field(default_factory=dict)
+    varying: InputsOfTime | None = None
+    accuracy: float | None = None
+    budget: float | None = None
+    integrator: str | None = None
+    samples: int = 1001
+    max_step: float | None = None
+    works: bool = False
+    save: Sequence[str] = ()
+    guard: GuardMode | None = None
+    unstable: bool = False
+    estimate: bool = False
+    resume: EarlierRun | None = None
+    backend: Backend = "auto"
+
+
+def plan_run(
+    scene: Scene,
+    model: Model,
+    *,
+    outputs: Sequence[str] = (),
+    t_end: float | None = None,
+    integrator: str | None = None,
+    dt: float | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    accuracy: float | None = None,
+    budget: float | None = None,
+    parameters: Values | None = None,
+    state: Values | None = None,
+    inputs: Values | None = None,
+    varying: InputsOfTime | None = None,
+    samples: int = 1001,
+    max_step: float | None = None,
+    works: bool = False,
+    save: Sequence[str] = (),
+    guard: GuardMode | None = None,
+    unstable: bool = False,
+    estimate: bool = False,
+    resume: EarlierRun | None = None,
+    backend: Backend = "auto",
+    reporter: Reporter = SILENT,
+) -> Plan:
+    """Check the arguments of `simulate`, which describes them, for a scene's model.
+
+    `inputs` are constants; `varying` are all of them if some are not, see `inputs.applied`.
+    `outputs` must be in the module. Raises `RunError` for an invalid argument.
+    """
+    bounds = {"rtol": rtol, "atol": atol, "dt": dt}
+    aims = [n for n, x in (("accuracy", accuracy), ("budget", budget)) if x is not None]
+    _check_aims(aims, bounds, resume, reporter)
+    parameters, inputs = values_of(model, parameters, inputs, reporter)
+    if guard not in (None, "stop", "repair"):
+        raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
+    if backend not in ("auto", "numpy", "c"):
+        raise RunError(f"{reporter.argument('backend')}: '{backend}' is none of auto, numpy, c")
+    if varying is not None and (
+        aims or estimate or guard is not None or resume is not None or backend == "c"
+    ):
+        raise RunError(
+            f"{reporter.argument('inputs')}: with tables and functions of time there is no choice "
+            "of method, estimate, guard, earlier run or compiled code; give a formula of t, or "
+            "leave the other out"
+        )
+    setting = None
+    if not aims:
+        setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
+    if varying is not None and setting and setting.integrator in ("taylor", "heyoka"):
+        raise RunError(
+            f"{reporter.argument('inputs')}: Taylor series need constant inputs or formulas of t; "
+            "take --integrator DOP853 for tables and functions of time"
+        )
+    if unstable:
+        _check_unstable(setting, reporter)
+    works = works or "works" in save
+    saved = wanted_outputs(save, model, reporter)
+    needed = (*model.outputs, *SHOWN, *saved, *(("effect_powers",) if works else ()))
+    return Plan(
+        scene,
+        replace(model, outputs=in_order(needed)),
+        setting,
+        scene.simulation.t_end if t_end is None else t_end,
+        parameters,
+        inputs,
+        outputs,
+        values_by_index(model, state, reporter),
+        varying,
+        accuracy=accuracy,
+        budget=budget,
+        integrator=integrator,
+        samples=samples,
+        max_step=max_step,
+        works=works,
+        save=save,
+        guard=guard,
+        unstable=unstable,
+        estimate=estimate,
+        resume=resume,
+        backend=backend,
+    )
+
+
+def _check_aims(
+    aims: Sequence[str],
+    bounds: Mapping[str, float | None],
+    resume: EarlierRun | None,
+    reporter: Reporter,
+) -> None:
+    """Raise `RunError` for two aims, or for an aim with a tolerance, a step or an earlier run."""
+    if len(aims) > 1:
+        both = ", ".join(map(reporter.argument, aims))
+        raise RunError(f"{both}: a run has one aim; give one of them")
+    for aim in map(reporter.argument, aims):
+        for name, value in bounds.items():
+            if value is not None:
+                option = reporter.argument(name)
+                raise RunError(f"{aim}, {option}: {aim} chooses {name} itself; leave one out")
+    if aims and resume is not None:
+        raise RunError(
+            f"{reporter.argument('resume')}: continues with a given method; leave "
+            f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
+        )
+
+
+def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
+    """Raise `RunError` for `unstable` unless the method is explicit with a given step."""
+    from eomgen.run.integrators import FixedStep, find_integrator
+
+    asked = reporter.argument("unstable")
+    if setting is None:
+        raise RunError(
+            f"{asked}: is for a given step; leave {reporter.argument('accuracy')}, "
+            f"{reporter.argument('budget')} out"
+        )
+    method = find_integrator(setting.integrator)
+    if not (isinstance(method, FixedStep) and method.explicit):
+        raise RunError(
+            f"{asked}: {setting.integrator} is stable at any step or chooses its own; leave "
+            f"it out, or take {reporter.argument('integrator')} euler, leapfrog or rk4"
+        )

@@ -1,0 +1,142 @@
+"""What results hold beside states: energies, forces, points and other outputs along a run."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from eomgen.api.reporter import SILENT, Reporter
+from eomgen.errors import RunError, nearest
+from eomgen.model.elaborate import outputs_for
+from eomgen.model.model import Model
+from eomgen.outputs import DERIVATIVES, OUTPUTS, Size
+from eomgen.run.trajectory import Saved, Trajectory
+
+GROUPS: Mapping[str, tuple[str, ...]] = {
+    "energy": ("kinetic_energy", "potential_energy"),
+    "points": ("point_positions", "point_velocities"),
+    "poses": ("body_poses",),
+    "works": (),
+    "inputs": (),
+}
+"""Words for what is saved, with the outputs that they need; `works` are integrated with the run."""
+SAVED = tuple(name for name in OUTPUTS if not (name.endswith("_dynamics") or name in DERIVATIVES))
+"""The outputs that a state determines."""
+FORCES = {3: ("fx", "fy", "mz"), 6: ("fx", "fy", "fz", "mx", "my", "mz")}
+PARTS: Mapping[str, Mapping[int, tuple[str, ...]]] = {
+    "joint_forces": FORCES,
+    "body_velocities": {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")},
+    "body_poses": {3: ("x", "y", "angle")},
+    "momentum": {3: ("px", "py", "lz"), 6: ("px", "py", "pz", "lx", "ly", "lz")},
+}
+"""Names of the components of an output, by their number."""
+
+
+def wanted_outputs(
+    names: Sequence[str], model: Model, reporter: Reporter = SILENT
+) -> tuple[str, ...]:
+    """The outputs that are needed to save what is named.
+
+    Raises `RunError` for an unknown name, or `SceneError` for one that the model lacks.
+    """
+    argument = reporter.argument("save")
+    found: list[str] = []
+    for name in names:
+        if name not in GROUPS and name not in SAVED:
+            known = (*GROUPS, *SAVED)
+            hint = nearest(name, known) or f"; known: {', '.join(known)}"
+            raise RunError(f"{argument}: no '{name}' can be saved{hint}")
+        found += GROUPS.get(name, (name,))
+    return outputs_for(found, argument, model.points, model.inputs, model.parameters, model.driven)
+
+
+def recorded(
+    names: Sequence[str],
+    model: Model,
+    module: Any,
+    trajectory: Trajectory,
+    values: tuple[Mapping[str, float] | None, Mapping[str, float] | None],
+) -> dict[str, Saved]:
+    """What is named along a trajectory, (n, …) each, with the names of its columns.
+
+    values  parameters and constant inputs
+
+    Where a rigid contact is held, forces that depend on its force, which is not known afterwards,
+    are nan.
+    """
+    found: dict[str, Saved] = {}
+    for name in names:
+        if name == "inputs":
+            found[name] = _inputs(module, trajectory, values[1])
+        for output in GROUPS.get(name, (name,)):
+            array = np.moveaxis(
+                getattr(module, output)(trajectory.t, trajectory.y.T, *values), -1, 0
+            )
+            if OUTPUTS[output].contacts and trajectory.events:
+                array = np.where(
+                    _held(trajectory).reshape(-1, *[1] * (array.ndim - 1)), np.nan, array
+                )
+            found[output] = Saved(array, tuple(_columns(output, model, module, array.shape[1:])))
+        if name == "energy":
+            total = found["kinetic_energy"].values + found["potential_energy"].values
+            found[name] = Saved(total, ("energy",))
+    return found
+
+
+def unknown_forces(trajectory: Trajectory) -> str:
+    """A note if some of what is saved is nan; else ""."""
+    if not any(np.isnan(saved.values).any() for saved in trajectory.saved.values()):
+        return ""
+    return "forces are nan where a rigid contact is held, because its own force is not kept"
+
+
+def _inputs(module: Any, trajectory: Trajectory, constants: Mapping[str, float] | None) -> Saved:
+    """The inputs at each row."""
+    of_time = getattr(module, "inputs_of_time", None)
+    if of_time is not None:
+        values = of_time(trajectory.t).T
+    else:
+        values = np.tile([*{**module.INPUTS, **(constants or {})}.values()], (len(trajectory.t), 1))
+    return Saved(values, tuple(f"input_{name}" for name in module.INPUTS))
+
+
+def _held(trajectory: Trajectory) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """At which rows a rigid contact is held."""
+    held = np.zeros(len(trajectory.t), dtype=bool)
+    since: dict[str, float] = {}
+    for event in trajectory.events:
+        if event.kind == "rest":
+            since[event.contact] = event.t
+        elif event.kind == "lift" and event.contact in since:
+            held |= (trajectory.t >= since.pop(event.contact)) & (trajectory.t <= event.t)
+    for start in since.values():
+        held |= trajectory.t >= start
+    return held
+
+
+def _columns(output: str, model: Model, module: Any, shape: tuple[int, ...]) -> list[str]:
+    """A name for each entry of an output, row by row."""
+    axes, _ = OUTPUTS[output].of(model.dimensions)
+    names = [output]
+    for i, (axis, count) in enumerate(zip(axes, shape, strict=True)):
+        labels = _labels(output, axis, count, model, module, last=i == len(shape) - 1)
+        names = [f"{name}_{label}" for name in names for label in labels]
+    return names
+
+
+def _labels(
+    output: str, axis: Size, count: int, model: Model, module: Any, *, last: bool
+) -> Sequence[str]:
+    if isinstance(axis, int):
+        numbers = tuple(str(i + 1) for i in range(count))
+        return PARTS.get(output, {}).get(count, numbers) if last else numbers
+    known: Mapping[str, Sequence[str]] = {
+        "joints": module.JOINTS,
+        "bodies": module.BODIES,
+        "points": getattr(module, "POINTS", ()),
+        "effects": module.EFFECT_NAMES,
+        "driven": getattr(module, "DRIVEN", ()),
+        "nv": [c.name for c in model.velocities],
+        "dimensions": "xyz"[: model.dimensions],
+    }
+    return known[axis]

@@ -1,0 +1,109 @@
+"""Runs of many members at once by DOP853, one in each lane of vector registers.
+
+Steps are those of `run.integrators.dormand_prince_8`, to rounding: sums are fused, and sine and
+cosine are those of `native.lanes`.
+"""
+
+import ctypes
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.codegen.backends import c, c_lanes
+from eomgen.codegen.interface import Interface
+from eomgen.native import lanes
+from eomgen.native.lanes import Columns, Lanes, columns_of
+from eomgen.program.program import Program
+from eomgen.run.integrators import dormand_prince_8 as dop853
+from eomgen.run.integrators.dop853_coefficients import NODES, Row
+from eomgen.run.problem import FloatArray
+from eomgen.templating import render
+
+MAIN = "adaptive_lanes.c"
+PACES = ((10_000.0, 20.0), (100_000.0, 99.0))
+"""A member is given up after so many steps if the rest takes more than so many times as long: it is
+then run by itself, where it is checked for stiffness."""
+MOST_STEPS = 1e7
+_POINTER, _LONG, _REAL = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
+_VALID = 1
+
+
+def sources(
+    program: Program, interface: Interface, outputs: tuple[str, ...] = ()
+) -> Mapping[str, str]:
+    """The C sources of `native.lanes`, and of runs by DOP853."""
+    context = {
+        "main": c_lanes.MAIN,
+        "slopes": dop853.SLOPES,
+        "nodes": [repr(node) for node in NODES],
+        "stages": [(i, _terms(dop853.SUMS[i])) for i in range(1, 12)],
+        "ends": [
+            ("end_sum", _terms(dop853.SUMS[dop853.AT_END])),
+            ("long_error", _terms(dop853.SUMS[dop853.LONG_ERROR])),
+            ("short_error", _terms(dop853.SUMS[dop853.SHORT_ERROR])),
+        ],
+        "dense_stages": [
+            (i, _terms(dop853.SUMS[dop853.AT_DENSE + i - 13])) for i in range(13, dop853.SLOPES)
+        ],
+        "dense": [_terms(row) for row in dop853.SUMS[dop853.IN_DENSE :]],
+        "safety": repr(dop853.SAFETY),
+        "smallest": repr(dop853.SMALLEST),
+        "greatest": repr(dop853.GREATEST),
+        "short_weight": repr(dop853.SHORT_WEIGHT),
+        "paces": PACES,
+        "most_steps": MOST_STEPS,
+    }
+    own = render(c.TEMPLATES, "adaptive_lanes.c.jinja", context)
+    return {**lanes.sources(program, interface, outputs), MAIN: own}
+
+
+def _terms(row: Row) -> list[tuple[int, str]]:
+    """The slopes in a sum, and their factors."""
+    return [(j, repr(row[j])) for j in sorted(row) if row[j]]
+
+
+class _Common(ctypes.Structure):
+    _fields_ = (
+        *((name, _REAL) for name in ("rtol", "longest", "t_end")),
+        *((name, _POINTER) for name in ("times", "done", "stop")),
+    )
+
+
+class AdaptiveLanes(Lanes):
+    """The library of `sources`, for vectors of `lanes` doubles: see `Lanes`."""
+
+    main = MAIN
+
+    def dop853(
+        self,
+        y: FloatArray,
+        k: FloatArray,
+        u: FloatArray,
+        atol: FloatArray,
+        *,
+        rtol: float,
+        longest: float,
+        times: FloatArray,
+        addresses: tuple[int, int] | None = None,
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Runs from states (ny, n) at time 0 to the last of `times` (m,), s, ascending.
+
+        atol (ny, n) or (ny, 1) and `rtol` are the tolerances for the error of a step, `longest` is
+        the longest step, s. Of two 64-bit integers at `addresses`, members that have ended are
+        counted in the first, and all runs end early once the second is not 0.
+
+        Returns rows (m, ny, n) at these times, and which runs are valid: finite, without a flag,
+        and with steps that are neither too short nor too many.
+        """
+        y, times = np.ascontiguousarray(y, dtype=float), np.ascontiguousarray(times, dtype=float)
+        n = y.shape[1]
+        rows, found = np.empty((len(times), self.states, n)), np.zeros(n, dtype=np.int8)
+        idle = np.zeros(2, dtype=np.int64)
+        shared = addresses or (idle.ctypes.data, idle.ctypes.data + 8)
+        common = _Common(rtol, longest, float(times[-1]), times.ctypes.data, *shared)
+        call = self.library.dop853
+        call.argtypes, call.restype = [_POINTER, _LONG, *[Columns] * 4, *[_POINTER] * 2], None
+        arguments = columns_of(y, k, u, atol)
+        call(ctypes.byref(common), n, *arguments, rows.ctypes.data, found.ctypes.data)
+        return rows, found == _VALID

@@ -1,0 +1,117 @@
+"""What compiled steps are checked with: switching functions, and the gaps of rigid contacts.
+
+`templates/c/checks.c.jinja` repeats `eomgen.run.branches` and `eomgen.run.events`. The functions
+lie in libraries of their own.
+"""
+
+import ctypes
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from eomgen.native.module import outputs_of, usual_constants
+from eomgen.run import branches, roots
+from eomgen.run.compiled import Array, Watched
+from eomgen.run.events import GAP_CHECKS
+
+_POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+_INTERVALS = len(branches.INNER) + 1
+_MOST_PARTS = branches.MOST_EVALUATIONS // 4 + 2
+"""Parts of a step that wait at one time, at most: each first one takes four evaluations, or three
+of one alone, and each more six."""
+
+
+class Function(NamedTuple):
+    """A compiled function: its address, its constants, and the number of its results."""
+
+    address: int
+    constants: Any
+    size: int
+
+
+class _Function(ctypes.Structure):
+    _fields_ = (("value", _POINTER), ("k", _POINTER), ("count", _WHOLE))
+
+
+class Watch(ctypes.Structure):
+    """`watch` of `templates/c/checks.c.jinja`."""
+
+    _fields_ = (
+        *((name, _Function) for name in ("switching", "gaps", "rates")),
+        *((name, _POINTER) for name in ("factors", "inner", "sizes", "angles")),
+        *((name, _WHOLE) for name in ("angled", "timed")),
+        *((name, _REAL) for name in ("clear", "earlier", "switched")),
+        ("values", _POINTER * 3),
+        *((name, _POINTER) for name in ("room", "asked", "kinds")),
+        *((name, _WHOLE) for name in ("switches", "gap_checks")),
+    )
+
+
+def context() -> dict[str, Any]:
+    """The values of the template."""
+    return {
+        "intervals": _INTERVALS,
+        "irregular": [repr(share) for share in branches.IRREGULAR],
+        "far": repr(branches.FAR),
+        "shortest_part": repr(branches.SHORTEST_PART),
+        "inside": repr(branches.INSIDE),
+        "most_evaluations": branches.MOST_EVALUATIONS,
+        "most_parts": _MOST_PARTS,
+        "largest_angle": repr(branches.LARGEST_ANGLE),
+        "together": repr(branches.TOGETHER),
+        "located": repr(branches.LOCATED),
+        "root_rtol": repr(roots.RTOL),
+        "most_iterations": roots.MOST,
+        "gap_checks": [repr(share) for share in GAP_CHECKS],
+    }
+
+
+def functions(module: Any, libraries: Mapping[str, ctypes.CDLL], p: Any) -> dict[str, Function]:
+    """The functions of these libraries, by name, at parameters `p`; without those whose kernels
+    cannot compute with them.
+    """
+    found = {}
+    for name, library in libraries.items():
+        constants = usual_constants(module, name, p)
+        if constants is not None:
+            address = ctypes.cast(library[f"checked_{name}"], _POINTER).value
+            assert address is not None
+            found[name] = Function(
+                address, ctypes.cast(constants, _POINTER), math.prod(outputs_of(library)[name])
+            )
+    return found
+
+
+def watch(
+    found: Mapping[str, Function], watched: Watched | None, sizes: Array | None
+) -> tuple[Watch, list[Any]]:
+    """What `templates/c/checks.c.jinja` is given, and the arrays that it points to."""
+    made, arrays = Watch(clear=math.inf, switched=-math.inf), dict[str, Any]()
+    switching = contacts = 0
+    values = np.empty((3, 0))
+    if watched:
+        made.clear, made.switched, made.timed = watched.clear, watched.switched, watched.timed
+    if watched and watched.ends:
+        (made.earlier, before), (_, start) = watched.ends
+        switching, values = len(start), np.array((before, start, start))
+        made.switching = _Function(*found["switching_functions"])
+        arrays["angles"] = np.array(watched.angles, np.int64)
+        made.angled = len(watched.angles)
+    if sizes is not None:
+        contacts, arrays["sizes"] = len(sizes), sizes
+        made.gaps, made.rates = (_Function(*found[name]) for name in ("gaps", "gap_rates"))
+    parts = _MOST_PARTS + 1
+    arrays |= {
+        "factors": np.ascontiguousarray(branches.FACTORS),
+        "inner": np.ascontiguousarray(branches.INNER),
+        "room": np.empty((1 + parts * (_INTERVALS + 1)) * switching + 3 * contacts),
+        "asked": np.empty(parts * switching, np.int64),
+        "kinds": np.empty(switching, np.intc),
+    }
+    for name, array in arrays.items():
+        setattr(made, name, array.ctypes.data)
+    for i, row in enumerate(values):
+        made.values[i] = row.ctypes.data
+    return made, [*arrays.values(), values]

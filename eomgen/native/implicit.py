@@ -1,0 +1,253 @@
+"""Whole steps of implicit methods in compiled code, with the bits of the same steps in Python.
+
+The library of the methods serves all scenes: it calls the compiled derivative and Jacobian of the
+scene, which are libraries of their own.
+"""
+
+import ctypes
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.codegen.backends import c
+from eomgen.native import equal_steps
+from eomgen.native.functions import constants_of
+from eomgen.native.module import Kernels
+from eomgen.run.compiled import Array, EqualSteps, Steps, Stride, Watched
+from eomgen.run.integrators import gauss_4, gauss_6, implicit_midpoint, implicit_stages, rodas_5p
+from eomgen.run.integrators.implicit_stages import ImplicitMethod
+from eomgen.run.integrators.rodas_5p_coefficients import GAMMA, IN_TIME, NODES, Row
+from eomgen.run.problem import USUAL_LENGTH, Problem
+from eomgen.templating import render
+
+MAIN = "implicit.c"
+NEEDED = ("derivative", "jacobian")
+"""The functions that the methods call."""
+METHODS = ("rodas_5p",)
+GAUSS: Mapping[str, ImplicitMethod] = {
+    method.METHOD.compiled: method.METHOD for method in (implicit_midpoint, gauss_4, gauss_6)
+}
+"""The methods of adaptive and of equal steps, by the names of their compiled steps."""
+OPERATIONS = 3600
+"""The methods take as long to compile as a function of about so many operations."""
+_POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+_UNUSUAL = 2
+"""What C returns before a step that Python must make."""
+
+
+def sources() -> Mapping[str, str]:
+    """The C source of the methods."""
+    low, high = USUAL_LENGTH
+    sums = [_sum(row) for row in rodas_5p.SUMS]
+    context = {
+        "shortest": repr(low),
+        "longest": repr(high),
+        "stages": rodas_5p.STAGES,
+        "aside": repr(rodas_5p.ASIDE),
+        "gamma": repr(GAMMA),
+        "in_time": [repr(factor) for factor in IN_TIME],
+        "stage_sums": [
+            (i, repr(NODES[i]), sums[2 * i - 2], sums[2 * i - 1]) for i in range(1, rodas_5p.STAGES)
+        ],
+        "end_sum": sums[rodas_5p.AT_END],
+        "dense": sums[rodas_5p.IN_DENSE :],
+        "safety": repr(rodas_5p.SAFETY),
+        "power": repr(rodas_5p.POWER),
+        "smallest": repr(rodas_5p.SMALLEST),
+        "greatest": repr(rodas_5p.GREATEST),
+        "negligible": repr(rodas_5p.NEGLIGIBLE),
+        "least_error": repr(rodas_5p.LEAST_ERROR),
+        "unit": "unit(((const iteration *)run->more)->of, ",
+        "max_iterations": implicit_stages.MAX_ITERATIONS,
+        "roundoff": repr(implicit_stages.ROUNDOFF),
+        "noise": repr(implicit_stages.NOISE),
+        "nothing": repr(implicit_stages.NOTHING),
+        "small": repr(implicit_stages.SMALL),
+        "gauss": [
+            (name, len(of.b), *(_listed(x) for x in (sum(of.shares, ()), of.b, of.c)))
+            for name, of in GAUSS.items()
+        ],
+    }
+    return {MAIN: render(c.TEMPLATES, "implicit.c.jinja", context)}
+
+
+def _listed(values: Iterable[float]) -> str:
+    return ", ".join(repr(float(value)) for value in values)
+
+
+def _sum(row: Row) -> str:
+    """A sum over solutions. It begins with 0 and so is never -0, as where all factors are added."""
+    return " + ".join(["0.0", *(f"{factor!r} * u{j}[j]" for j, factor in enumerate(row))])
+
+
+class _System(ctypes.Structure):
+    _fields_ = (
+        *((name, _POINTER) for name in NEEDED),
+        *((name, _POINTER) for name in ("constants", "jacobian_constants", "inputs")),
+        ("quaternions", _POINTER),
+        *((name, _WHOLE) for name in ("count", "states", "positions", "timed")),
+    )
+
+
+class _Settings(ctypes.Structure):
+    _fields_ = (
+        ("atol", _POINTER),
+        *((name, _REAL) for name in ("rtol", "longest", "t_end", "clear")),
+    )
+
+
+class _Records(ctypes.Structure):
+    _fields_ = (
+        *((name, _POINTER) for name in ("ends", "lengths", "last_lengths", "errors")),
+        *((name, _POINTER) for name in ("states", "losses")),
+        *((name, _POINTER) for name in ("derivatives", "jacobians", "factorisations", "sampled")),
+        *((name, _POINTER) for name in ("times", "rows")),
+        ("count", _WHOLE),
+    )
+
+
+class _Iteration(ctypes.Structure):
+    _fields_ = tuple((name, _POINTER) for name in ("system", "reals", "wholes"))
+
+
+@dataclass(frozen=True, eq=False)
+class Libraries:
+    """The libraries of the derivative, of the Jacobian and of the methods."""
+
+    derivative: ctypes.CDLL
+    jacobian: ctypes.CDLL
+    methods: ctypes.CDLL
+
+
+class CompiledImplicit:
+    """The compiled steps of a problem of a module at given parameters and inputs.
+
+    origin  the module that had the constants of its parameters, if this one has perturbed ones
+    """
+
+    def __init__(
+        self, problem: Problem, module: Any, libraries: Libraries, p: Any, u: Any, origin: Any
+    ) -> None:
+        kernels = Kernels(module, libraries.derivative)
+        constants = constants_of(kernels, "derivative", p, origin)
+        others = constants_of(Kernels(module, libraries.jacobian), "jacobian", p, origin)
+        inputs = kernels.given(u)
+        self._methods, self._system = libraries.methods, None
+        if constants is None or others is None or inputs is None:
+            return
+        quaternions = np.array(problem.quaternions, np.int64)
+        self._kept = constants, others, inputs, quaternions, libraries
+        self._system = _System(
+            *(
+                ctypes.cast(getattr(libraries, name)[f"{module.NAME}_{name}"], _POINTER)
+                for name in NEEDED
+            ),
+            ctypes.cast(constants, _POINTER),
+            ctypes.cast(others, _POINTER),
+            inputs.ctypes.data,
+            quaternions.ctypes.data,
+            len(problem.quaternions),
+            len(problem.states),
+            problem.leading_positions,
+            problem.timed,
+        )
+
+    def named(self, name: str) -> Steps | None:
+        """The steps of a method; None if there are none for it, these parameters or inputs."""
+        if self._system is None or name not in METHODS:
+            return None
+        call = self._methods.rodas_5p
+        call.restype = ctypes.c_int
+        call.argtypes = [_POINTER, _POINTER, _WHOLE, *[_REAL] * 4, *[_POINTER] * 6]
+        return partial(_rodas_5p, call, self._system)
+
+    def equal(self, name: str) -> EqualSteps | None:
+        """The same for methods with equal steps."""
+        if self._system is None or name not in GAUSS:
+            return None
+        stages = len(GAUSS[name].b)
+        reals, wholes = _space(stages * self._system.states)
+        with_them = _Iteration(
+            ctypes.addressof(self._system), reals.ctypes.data, wholes.ctypes.data
+        )
+        with_them.kept = self, reals, wholes
+        call = self._methods[f"steps_{name}"]
+        return partial(equal_steps.made, call, stages, None, None, with_them, iterates=True)
+
+
+def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:
+    """Space for numbers and for whole numbers in which methods solve for so many unknowns."""
+    square = unknowns * unknowns
+    return np.empty(5 * square + 24 * unknowns), np.empty(square + 2 * unknowns, np.int64)
+
+
+def _rodas_5p(
+    call: Any,
+    system: _System,
+    t: float,
+    y: Array,
+    memory: Mapping[str, float | Array],
+    *,
+    t_end: float,
+    rtol: float,
+    atol: Array,
+    longest: float,
+    times: Array,
+    most: int,
+    watched: Watched | None = None,
+    sizes: Array | None = None,
+    dense: bool = False,
+) -> Stride:
+    """Steps of Rodas5P, with the arguments of `run.compiled.Steps`, of which `watched` may have
+    switching functions of time alone only, and there are no `sizes`; none if they are to be
+    `dense`.
+    """
+    assert sizes is None and not (watched and watched.ends)
+    most = 0 if dense else most
+    ny = system.states
+    ends, lengths, last_lengths, errors = np.empty((4, most))
+    states, losses = np.empty((2, most, ny))
+    derivatives, jacobians, factorisations, sampled = np.empty((4, most), np.int64)
+    rows, made = np.empty((len(times), ny)), ctypes.c_int64()
+    memories = {"h_abs": lengths, "h_last": last_lengths, "error": errors, "lost": losses}
+    counts = derivatives, jacobians, factorisations, sampled
+    arrays = ends, lengths, last_lengths, errors, states, losses, *counts, times, rows
+    records = _Records(*(array.ctypes.data for array in arrays), len(times))
+    clear = watched.clear if watched else math.inf
+    settings = _Settings(atol.ctypes.data, rtol, longest, t_end, clear)
+    start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
+    reals, wholes = _space(ny)
+    why = call(
+        ctypes.byref(system),
+        ctypes.byref(settings),
+        most,
+        t,
+        *(float(memory[name]) for name in ("h_abs", "h_last", "error")),
+        *(array.ctypes.data for array in start),
+        ctypes.byref(records),
+        reals.ctypes.data,
+        wholes.ctypes.data,
+        ctypes.byref(made),
+    )
+    n = made.value
+    passed = int(sampled[n - 1]) if n else 0
+    return Stride(
+        ends[:n],
+        states[:n],
+        {name: values[:n] for name, values in memories.items()},
+        derivatives[:n],
+        sampled[:n],
+        rows[:passed].copy(),  # the array for all rows to come is not kept with them
+        np.full(n, watched.switched if watched else -math.inf),
+        np.empty((n, 0)),
+        np.zeros(n, np.int64),
+        np.zeros(n, np.int64),
+        usual=why != _UNUSUAL,
+        jacobians=jacobians[:n],
+        factorisations=factorisations[:n],
+    )

@@ -1,0 +1,127 @@
+"""Options that several commands share, and those of `simulate`."""
+
+import argparse
+from pathlib import Path
+
+from eomgen.usage import path
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """An option to overwrite files."""
+    parser.add_argument(
+        "--force", action="store_true", help="also overwrite files that eomgen did not write"
+    )
+
+
+def add_folder(parser: argparse.ArgumentParser) -> None:
+    """The folder of what is written."""
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        type=path,
+        default=Path("out"),
+        help="folder of what is written",
+    )
+
+
+def add_values(parser: argparse.ArgumentParser) -> None:
+    """Values of parameters and inputs."""
+    parser.add_argument(
+        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
+    )
+    parser.add_argument(
+        "--input", metavar="NAME=X", action="append", default=[], help="constant value of an input"
+    )
+
+
+def add_simulation(parser: argparse.ArgumentParser) -> None:
+    """The options of `simulate` and `view`."""
+    parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
+    parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
+    parser.add_argument(
+        "--unstable",
+        action="store_true",
+        help="allow steps of an explicit method that are too long for stability",
+    )
+    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
+    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
+    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
+    parser.add_argument(
+        "--accuracy",
+        metavar="X",
+        type=float,
+        help="choose method and tolerances for an error of X at the end, relative to the motion",
+    )
+    parser.add_argument(
+        "--budget",
+        metavar="TIME",
+        help="choose the most accurate run of about this time, 2s for example",
+    )
+    parser.add_argument(
+        "--estimate", action="store_true", help="estimate the error by a second run"
+    )
+    parser.add_argument(
+        "--guard",
+        choices=("stop", "repair"),
+        nargs="?",
+        const="stop",
+        help="check rounding at each step; stop (without a word) or repair where digits are lost",
+    )
+    parser.add_argument("--t-end", metavar="S", type=float, help="end time")
+    parser.add_argument(
+        "--from",
+        metavar="FILE.npz",
+        dest="resume",
+        type=path,
+        help="continue an earlier run as if it had not ended",
+    )
+    parser.add_argument(
+        "--backend",
+        metavar="NAME",
+        default="auto",
+        help="auto: compute in compiled C code if that pays; numpy: never; c: always",
+    )
+    _add_start(parser)
+    _add_results(parser)
+
+
+def _add_results(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
+    parser.add_argument(
+        "--save",
+        metavar="A,B,…",
+        default="",
+        help="what results hold beside states: energy, points, poses, works, inputs, or outputs by "
+        "name, joint_forces for example",
+    )
+    parser.add_argument(
+        "--parquet", action="store_true", help="also write the table as a Parquet file"
+    )
+    parser.add_argument("--works", action="store_true", help="compute the work of each effect")
+    add_folder(parser)
+    parser.add_argument("--plot", metavar="FILE", type=path, help="figure (DIR/NAME.png)")
+    parser.add_argument("--no-pictures", action="store_true", help="write no figure and no page")
+    parser.add_argument("--view", action="store_true", help="open the page when done")
+    add_force(parser)
+
+
+def _add_start(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
+    )
+    parser.add_argument(
+        "--state",
+        metavar="NAME=X",
+        action="append",
+        default=[],
+        help="value of a state at the start; NAME_deg in degrees (the scene's initial state)",
+    )
+    parser.add_argument(
+        "--input",
+        metavar="NAME=X",
+        action="append",
+        default=[],
+        help="an input: a number or a formula of t, 'push=3*sin(t)'; or FILE.csv with columns t "
+        "and names, between whose times inputs are linear",
+    )

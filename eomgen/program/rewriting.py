@@ -1,0 +1,331 @@
+"""Rewriting of a program that needs fewer operations afterwards; see `passes`."""
+
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from functools import partial, reduce
+from itertools import combinations
+from types import MappingProxyType
+from typing import Any
+
+from eomgen.program.program import Output, Program, finish, live_steps
+from eomgen.program.tape import ExactTape, Stage, Step, Tape
+
+MOST_FACTORS = 8
+"""Products of so many factors are not taken apart."""
+MOST_TRIED = 1000
+"""Steps of a program up to which `take_apart_shared` tries what may help."""
+Rule = Callable[[Tape, str, list[int]], int]
+"""Records an operation on steps of a tape and returns the step of its result."""
+
+
+class Steps:
+    """Steps in order, none twice."""
+
+    def __init__(self) -> None:
+        self.all: list[Step] = []
+        self._index: dict[tuple[Any, ...], int] = {}
+
+    def put(self, step: Step) -> int:
+        """The index of a step, which is added unless there is an equal one."""
+        operation, operands, _, value = step  # the stage follows from these, and is slow to hash
+        found = self._index.setdefault((operation, operands, value), len(self.all))
+        if found == len(self.all):
+            self.all.append(step)
+        return found
+
+    def apply(self, operation: str, *operands: int) -> int:
+        """The index of an operation on steps, as it stands."""
+        stage = max(self.all[o].stage for o in operands)
+        return self.put(Step(operation, operands, stage))
+
+    def copied(self, program: Program) -> list[int]:
+        """The index of each step of a program."""
+        new: list[int] = []
+        for operation, operands, stage, value in program.steps:
+            new.append(self.put(Step(operation, tuple([new[o] for o in operands]), stage, value)))
+        return new
+
+
+def without_dead_steps(program: Program) -> Program:
+    """A program without steps that no output and no check needs."""
+    roots = [n for output in program.outputs.values() for n in output.nodes]
+    keep = live_steps(program, [*roots, *(check.node for check in program.checks)])
+    if len(keep) == len(program.steps):
+        return program
+    new = {old: i for i, old in enumerate(keep)}
+    steps = [
+        Step(operation, tuple([new[o] for o in operands]), stage, value)
+        for operation, operands, stage, value in (program.steps[i] for i in keep)
+    ]
+    names = {i: name for i, name in program.names.items() if i in new}
+    return renumbered(replace(program, names=names), steps, new)
+
+
+def renumbered(
+    program: Program, steps: Sequence[Step], new: Mapping[int, int] | Sequence[int]
+) -> Program:
+    """A program with other steps: `new` is for each old step the one that has its value."""
+    names: dict[int, str] = {}
+    for i, name in program.names.items():
+        names.setdefault(new[i], name)
+    return Program(
+        tuple(steps),
+        {k: Output(o.shape, tuple(new[n] for n in o.nodes)) for k, o in program.outputs.items()},
+        names,
+        tuple(replace(check, node=new[check.node]) for check in program.checks),
+    )
+
+
+def gather_parameters(program: Program) -> Program:
+    """Rewrite k·(x·(l·y)) as (k·l)·(x·y) and k + (x + l) as (k + l) + x.
+
+    Operands that depend on parameters alone are combined, so that they are computed once and not at
+    every call. Only intermediate results that are used once are taken apart.
+    """
+    return _gathered(program, shared=False)
+
+
+def _gathered(program: Program, *, shared: bool) -> Program:
+    """`gather_parameters`; `shared` takes k·x apart in l·(k·x) even if k·x is used elsewhere."""
+    used_once = _UsedOnce(program, ("mul", "add"))
+
+    def is_inner(tape: Tape, operation: str, node: int) -> bool:
+        inner, operands, _, _ = tape.steps[node]
+        if inner != operation:
+            return False
+        fixed = shared and any(tape.steps[o].stage <= Stage.PARAMETERS for o in operands)
+        return node in used_once.results or fixed
+
+    def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
+        inner = partial(is_inner, tape, operation)
+        if operation in ("mul", "add") and any(map(inner, nodes)):
+            parts = _flattened(tape, nodes, inner)
+            fixed = [n for n in parts if tape.steps[n].stage <= Stage.PARAMETERS]
+            if len(fixed) > 1 and len(parts) > len(fixed):
+                rest = [n for n in parts if tape.steps[n].stage > Stage.PARAMETERS]
+                combine = partial(tape.applied, operation)
+                return combine(reduce(combine, fixed), reduce(combine, rest))
+        return tape.applied(operation, *nodes)
+
+    return without_dead_steps(_rebuilt(program, rule, used_once.note))
+
+
+def _flattened(tape: Tape, nodes: list[int], is_inner: Callable[[int], bool]) -> list[int]:
+    """The operands of nested products, or sums."""
+    parts: list[int] = []
+    stack = nodes[::-1]
+    while stack:
+        node = stack.pop()
+        if is_inner(node):
+            stack += reversed(tape.steps[node].operands)
+        else:
+            parts.append(node)
+    return parts
+
+
+def factor_sums(program: Program) -> Program:
+    """Rewrite a·x ± a·y as a·(x ± y), and (s ± a·x) ± a·y as s ± a·(x ± y), where the products and
+    the inner sum are not used elsewhere.
+
+    Rounding errors keep their size: it is that of the largest term, before and after.
+    """
+    return _factored(program, shared=False)
+
+
+def _factored(program: Program, *, shared: bool) -> Program:
+    """`factor_sums`; with `shared`, one of the two products may be used elsewhere."""
+    used_once = _UsedOnce(program, ("mul", "add", "sub"))
+
+    def product(tape: Tape, operation: str, left: int, right: int) -> int | None:
+        """a·(x ± y) for the products a·x and a·y; None if they are not, or have no common a."""
+        if not tape.steps[left].operation == tape.steps[right].operation == "mul":
+            return None
+        if sum(node in used_once.results for node in (left, right)) < 2 - shared:
+            return None
+        a, b = tape.steps[left].operands, tape.steps[right].operands
+        factor = next((i for i in a if i in b), None)
+        if factor is None:
+            return None
+        x, y = (o[0] if o[1] == factor else o[1] for o in (a, b))
+        return tape.applied("mul", factor, tape.applied(operation, x, y))
+
+    def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
+        if operation in ("add", "sub"):
+            left, right = nodes
+            if found := product(tape, operation, left, right):
+                return found
+            inner, operands, _, _ = tape.steps[left]
+            if left in used_once.results and inner in ("add", "sub"):
+                alike = "add" if inner == operation else "sub"
+                if found := product(tape, alike, operands[1], right):
+                    return tape.applied(inner, operands[0], found)
+        return tape.applied(operation, *nodes)
+
+    return without_dead_steps(_rebuilt(program, rule, used_once.note))
+
+
+def share_factors(program: Program) -> Program:
+    """Rewrite a·(b·x) and a·(b·y) as (a·b)·x and (a·b)·y, so that a·b is computed once.
+
+    Only intermediate products that are used once are taken apart. Of several such pairs in a
+    product the one that occurs most often is taken, of equals the first. If that makes an output
+    more expensive, the program is left as it is.
+    """
+    uses = _uses(program)
+    inner: set[int] = set()
+    factors: dict[int, list[int]] = {}
+    for i, (operation, operands, _, _) in enumerate(program.steps):
+        if operation != "mul" or operands[0] == operands[1]:
+            continue  # a square is a factor by itself
+        parts: list[int] = []
+        for node in operands:
+            if uses[node] == 1 and 0 < len(factors.get(node, ())) < MOST_FACTORS:
+                inner.add(node)
+                parts += factors[node]
+            else:
+                parts.append(node)
+        factors[i] = parts
+    products = {i: parts for i, parts in factors.items() if i not in inner}
+    often = Counter(pair for parts in products.values() for pair in _pairs(parts))
+    plans = {}
+    for i, parts in products.items():
+        if len(parts) < 3 or not _pairs(parts):
+            continue
+        pair = max(_pairs(parts), key=often.__getitem__)
+        if often[pair] > 1:
+            rest = list(parts)
+            for factor in pair:
+                rest.remove(factor)
+            plans[i] = (*pair, *rest)
+    if not plans:
+        return program
+
+    def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
+        return tape.applied(operation, *nodes)
+
+    made = without_dead_steps(_rebuilt(program, rule, lambda *_: None, plans))
+    # What two outputs shared they may now compute in different ways.
+    pairs = program.operations.items()
+    return made if all(made.operations[name] <= count for name, count in pairs) else program
+
+
+def take_apart_shared(program: Program) -> Program:
+    """Gather parameters and factor sums also where a product is used elsewhere, and is computed
+    again in its old form; the shortest program found. Only for small programs.
+    """
+    if len(program.steps) > MOST_TRIED:
+        return program
+    best = program
+    for gathered, factored in ((True, False), (False, True), (True, True)):
+        made = _gathered(program, shared=gathered)
+        made = share_factors(_factored(made, shared=factored))
+        if _operations(made) < _operations(best):
+            best = made
+    return best
+
+
+def _operations(program: Program) -> int:
+    return sum(program.operations.values())
+
+
+def absorb_minus_signs(program: Program) -> Program:
+    """Rewrite -(k·x) as (-k)·x, and -(y + k·x) as (-k)·x - y, where k depends on parameters alone,
+    so that -k is computed once, and the product and the sum are not used elsewhere.
+
+    It is the last pass: a tape moves minus signs outwards again.
+    """
+    uses, once, steps = _uses(program), set[int](), Steps()
+
+    def opposite(i: int) -> int | None:
+        """Minus a step, in as many operations as the step itself; None if it takes more."""
+        operation, operands, stage, _ = steps.all[i]
+        if stage <= Stage.PARAMETERS:
+            return steps.apply("neg", i)
+        if i not in once or operation not in ("mul", "div", "add"):
+            return None
+        left, right = operands
+        if (found := opposite(left)) is not None:
+            return steps.apply("sub" if operation == "add" else operation, found, right)
+        if (found := opposite(right)) is None:
+            return None
+        if operation == "add":
+            return steps.apply("sub", found, left)
+        return steps.apply(operation, left, found)
+
+    new: list[int] = []
+    for i, (operation, operands, stage, value) in enumerate(program.steps):
+        found = None
+        if operation == "neg" and stage > Stage.PARAMETERS:
+            found = opposite(new[operands[0]])
+        if found is None:
+            found = steps.put(Step(operation, tuple([new[o] for o in operands]), stage, value))
+        if uses[i] == 1:
+            once.add(found)
+        new.append(found)
+    return without_dead_steps(renumbered(program, steps.all, new))
+
+
+def _pairs(factors: Sequence[int]) -> list[tuple[int, int]]:
+    """The pairs of different factors, each with the earlier step first."""
+    return sorted({(min(p), max(p)) for p in combinations(factors, 2) if p[0] != p[1]})
+
+
+class _UsedOnce:
+    """The steps of a tape, results of given operations, that are used exactly once."""
+
+    def __init__(self, program: Program, operations: Collection[str]) -> None:
+        self.results: set[int] = set()
+        self._uses = _uses(program)
+        self._operations = operations
+
+    def note(self, old: int, operation: str, new: int) -> None:
+        """Note that step `old` of the program became step `new`, the result of `operation`."""
+        if self._uses[old] == 1 and operation in self._operations:
+            self.results.add(new)
+        else:
+            self.results.discard(new)
+
+
+def _uses(program: Program) -> list[int]:
+    """How often each step is an operand or an output entry."""
+    uses = [0] * len(program.steps)
+    for step in program.steps:
+        for o in step.operands:
+            uses[o] += 1
+    for output in program.outputs.values():
+        for n in output.nodes:
+            uses[n] += 1
+    return uses
+
+
+def _rebuilt(
+    program: Program,
+    rule: Rule,
+    note: Callable[[int, str, int], None],
+    products: Mapping[int, Sequence[int]] = MappingProxyType({}),
+) -> Program:
+    """The program recorded on a new tape, each operation by `rule`; `note` gets each step. The
+    `products` are recorded as those of the given steps, from the left.
+    """
+    tape = ExactTape()
+    new: list[int] = []
+    for i, (operation, operands, stage, value) in enumerate(program.steps):
+        if operation == "constant":
+            node = tape.number(float(value or 0.0))
+        elif operation == "input":
+            node = tape.input(str(value), stage).index
+        elif i in products:
+            node = reduce(partial(tape.applied, "mul"), [new[o] for o in products[i]])
+        else:
+            node = rule(tape, operation, [new[o] for o in operands])
+        if i in program.names:
+            tape.names.setdefault(node, program.names[i])
+        note(i, tape.steps[node].operation, node)
+        new.append(node)
+    outputs = {
+        name: Output(output.shape, tuple([new[n] for n in output.nodes]))
+        for name, output in program.outputs.items()
+    }
+    checks = (replace(check, node=new[check.node]) for check in program.checks)
+    return finish(tape, outputs, checks)

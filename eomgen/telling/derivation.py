@@ -1,0 +1,310 @@
+"""The derivation of any scene, as steps to be read.
+
+Small trees of pins and free bodies in the plane follow the handout, other small trees Kane's
+method, and everything else the articulated-body algorithm. M, V and G do not depend on the effects:
+what depends on the motion enters the derivation as forces with names, and each effect says what its
+forces are.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from eomgen.derivation.closed import Equations, derive
+from eomgen.derivation.elimination import symmetric
+from eomgen.derivation.matrices import Matrices, of_pins, of_projected
+from eomgen.derivation.projected.derive import derive_projected
+from eomgen.derivation.projected.steps import projected_steps
+from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.steps import Definition, Equation, Step, handout_steps, readable
+from eomgen.derivation.supported import MOST_REPORTED, why_not_closed, why_not_pins
+from eomgen.derivation.symbols import Expr
+from eomgen.derivation.told_scalars import TellingScalars
+from eomgen.errors import SceneError
+from eomgen.language.formula import names_in
+from eomgen.language.rates import with_rates
+from eomgen.model.model import Model
+from eomgen.scene.effects.base import Load
+from eomgen.scene.joints.base import WORLD
+from eomgen.scene.schema import Form
+from eomgen.telling.effects import ToldEffect, equations_of, told_effects, with_symbols
+from eomgen.telling.frames import frames_of
+from eomgen.telling.impacts import impact_steps
+from eomgen.telling.mechanism import Notes, TellingMechanism
+from eomgen.telling.poses import poses
+from eomgen.telling.reading import numbered, read_all, reading_names
+from eomgen.telling.recursion import recursive_steps
+from eomgen.telling.state_forms import form_step, momentum_form, plain_form, velocity_form
+
+HANDOUT = (
+    'Numbers in brackets up to (36) are those of the handout that this derivation follows: "CS229 '
+    'Dynamics Handout", a university handout on dynamics for computer graphics, section 2: two '
+    "rigid bodies, one rotational joint, free in the plane. What is different here: the bodies and "
+    "joints are those of the scene, ψ is the orientation of a body and ω its rate, sin and cos are "
+    "written out where the handout has S and C, and each effect of the scene has its own forces "
+    "beside (29) to (36). Numbers from (37) on are not in the handout: it leaves the solution to "
+    "the computer."
+)
+PROJECTED = (
+    'The handout "CS229 Dynamics Handout" derives two rigid bodies in the plane with one '
+    "rotational "
+    "joint. This mechanism is another, so the steps have numbers of their own. The equations "
+    "M dv/dt + V + G = F have the handout's form (24), (36); M is symmetric here, the same as that "
+    "of `mass_matrix()` in the generated module."
+)
+RECURSIVE = (
+    "The equations of this mechanism written out would be too long to be read, so they are told as "
+    "an algorithm: named quantities, one frame after another, each by those before. It solves "
+    'M dv/dt + V + G = F, the handout\'s (24) with (36) ("CS229 Dynamics Handout"), without '
+    "forming "
+    "M. The symmetric M is what `mass_matrix()` of the generated module returns."
+)
+SYMMETRIC = (
+    "There are two ways to write (24). Its rows above are torques about the bodies' own centres "
+    "of mass, so M of (26) is not symmetric. A Lagrangian derivation has generalised forces as "
+    "rows, and its M is symmetric: ½ vᵀ M v is the kinetic energy. `mass_matrix()` of the "
+    "generated module returns that one, and `velocity_force()`, `gravity_force()`, "
+    "`applied_force()` the V, G, F that belong to it. The matrix T leads from one to the other: "
+    "to the torque of each body it adds the moment of the tree's total force, and then it sums "
+    "the rows of all bodies that a joint turns. T has an inverse, so both systems have the same "
+    "solution."
+)
+PRESCRIBED = (
+    "Driven coordinates follow the formulas above, and their rates are the derivatives of these; "
+    "locked coordinates are constant. Neither is a state, and the forces that see to it are "
+    "whatever that takes."
+)
+ALREADY = (
+    "With the rows above M is symmetric already: it is the matrix that `mass_matrix()` of the "
+    "generated module returns."
+)
+
+
+@dataclass(frozen=True)
+class Telling:
+    """The steps of a derivation, and its equations as matrices unless they are too long."""
+
+    steps: tuple[Step, ...]
+    matrices: Matrices | None
+    effects: tuple[ToldEffect, ...]
+
+
+def tell(model: Model, form: Form | None = None) -> Telling:
+    """Derive a model and tell it in a state form, by default the scene's.
+
+    Raises `SceneError` for a form that the mechanism does not have.
+    """
+    form = form or model.form
+    effects = told_effects(model)
+    bare = replace(with_symbols(model, effects), form=form)
+    small = len(model.bodies) <= MOST_REPORTED
+    why_not = why_not_pins(bare) or ("" if small else f"it has more than {MOST_REPORTED} bodies")
+    if form != "velocity" and why_not:
+        raise SceneError(f"form: no derivation in the form '{form}': {why_not}; use velocity")
+    if not why_not:
+        return _of_pins(model, bare, effects, form)
+    if small and not why_not_closed(bare):
+        return _of_any(model, bare, effects)
+    return _recursive(model, effects)
+
+
+def _of_pins(model: Model, bare: Model, effects: tuple[ToldEffect, ...], form: Form) -> Telling:
+    equations = derive(bare)
+    names = _names(model, readable(equations))
+    names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
+    figures = {"(1)": "mechanism", "(2)-(11)": "bodies"}
+    steps = [
+        replace(step, figure=figures.get(step.number, "")) for step in handout_steps(equations)
+    ]
+    place = next(i for i, step in enumerate(steps) if step.number == "(37)")
+    written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
+    last = form_step(model, form, written, effects)
+    ends = [_symmetry(equations), *impact_steps(model, effects), last]
+    inner = _numbered_within(_effect_steps(model, effects), "36")
+    steps = [
+        Step("", "The handout", HANDOUT, ()),
+        *steps[:place],
+        *(_renamed(step, names) for step in inner),
+        *steps[place:],
+        *(_renamed(step, names) for step in numbered(ends, 39)),
+    ]
+    return Telling(tuple(steps), _whole(of_pins(equations), model, effects), effects)
+
+
+def _of_any(model: Model, bare: Model, effects: tuple[ToldEffect, ...]) -> Telling:
+    equations = derive_projected(bare)
+    names = reading_names(model)
+    found = list(projected_steps(equations))
+    place = next(i for i, step in enumerate(found) if step.title == "Closed form")
+    solved = {line.left.name: line.right for line in found[place].equations}
+    rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
+    form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
+    ends = [*impact_steps(model, effects), form_step(model, "velocity", form, effects)]
+    words = (
+        "Each body by itself, with its weight, the forces of the effects, and those of its joints."
+    )
+    state = replace(found[0], figure="mechanism")
+    steps = [
+        state,
+        Step("", "Free bodies", words, (), "bodies"),
+        *found[1:place],
+        *(_renamed(step, names) for step in _effect_steps(model, effects)),
+        *found[place:],
+        *(_renamed(step, names) for step in ends),
+    ]
+    whole = numbered([replace(step, number="") for step in steps])
+    intro = Step("", "Beside the handout", PROJECTED, ())
+    return Telling((intro, *whole), _whole(of_projected(equations), model, effects), effects)
+
+
+def _recursive(model: Model, effects: tuple[ToldEffect, ...]) -> Telling:
+    names = reading_names(model)
+    frames = frames_of(model)
+    state = [
+        Equation(sp.Symbol(letter), sp.Matrix([[real(c.name) for c in group]]))
+        for letter, group in (("q", model.coordinates), ("v", model.velocities))
+    ]
+    state += prescribed_motion(model)
+    form = plain_form(model, [real(c.acceleration) for c in model.velocities])
+    words = "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
+    words += "axes of its own body."
+    steps = [
+        Step("", "State", words, tuple(state), "mechanism"),
+        Step("", "Free bodies", _free_words(model), (), "bodies"),
+        *_effect_steps(model, effects, every=True),
+        *recursive_steps(model, frames, effects),
+        *impact_steps(model, effects),
+        form_step(model, "velocity", form, effects),
+    ]
+    told = (_renamed(step, names) for step in steps)
+    intro = Step("", "Beside the handout", RECURSIVE, ())
+    return Telling((intro, *numbered(list(told))), None, effects)
+
+
+def _effect_steps(
+    model: Model, effects: Sequence[ToldEffect], *, every: bool = False
+) -> Iterator[Step]:
+    """Poses and motions that the effects use, and each effect with its forces.
+
+    The recursion needs the poses of bodies with forces that no motion changes as well (`every`).
+    """
+    needed = dict.fromkeys(body for t in effects if every or not t.kept for body in used_bodies(t))
+    if needed:
+        words = (
+            "The forces below use where bodies are in the world and how they move. o is the place "
+            "of a joint; "
+        )
+        words += (
+            "ψ is a body's angle from the world's x axis, ω its rate, x and y the place of its "
+            "centre of mass."
+            if model.dimensions == 2
+            else "W turns a body's axes into the world's, Ω is its angular velocity in world axes, "
+            "x, y, z the place of its centre of mass."
+        )
+        _, equations = poses(model, frames_of(model), needed)
+        yield Step("", "Where the bodies are, and how they move", words, tuple(equations))
+    for told in effects:
+        lines = equations_of(told.definitions)
+        if told.kept:
+            lines = _loads_as_they_are(told)
+        lines += [Equation(symbol, rate) for symbol, rate in told.rates]
+        yield Step(
+            "",
+            f"Effect `{told.effect.name}` ({told.effect.type.replace('_', ' ')})",
+            told.words,
+            tuple(lines),
+        )
+
+
+def used_bodies(told: ToldEffect) -> Iterator[str]:
+    """The bodies whose pose or motion the formulas of an effect, or its use, need."""
+    yield from told.bodies
+    weight = told.kept and told.effect.type == "gravity"
+    loads = [*(() if weight else told.loads)]
+    for contact in told.contacts:
+        loads += [*contact.normal, *(load for tangent in contact.tangents for load in tangent)]
+    yield from (load.body for load in loads if isinstance(load, Load) and load.body != WORLD)
+
+
+def _loads_as_they_are(told: ToldEffect) -> list[Equation]:
+    """The loads of an effect that no motion changes, with the names of the scene."""
+    lines = []
+    for load in told.loads:
+        parts = load.force if isinstance(load, Load) else (load.force,)
+        if all(part == 0 or part.is_Symbol for part in parts):
+            continue  # inputs or parameters, which stand in F by their own names
+        if isinstance(load, Load):
+            lines.append(Equation(real(f"f_{told.effect.name},{load.body}"), sp.Matrix(load.force)))
+        else:
+            lines.append(Equation(real(f"tau_{told.effect.name}"), load.force))
+    return lines
+
+
+def prescribed_motion(model: Model) -> list[Equation]:
+    """Driven coordinates with their rates and accelerations, and locked ones."""
+    names = TellingMechanism(model, Notes()).names
+    found = []
+    for c in model.prescribed:
+        used = {name: names[name] for name in names_in(c.value) if name != "t"}
+        x, v, a = with_rates(c.value, used, names["t"], TellingScalars())
+        found.append(Equation(real(c.position.name), x))
+        if not c.locked:
+            found.append(Equation(real(c.velocity.name), v))
+            found.append(Equation(real(c.velocity.acceleration), a))
+    return found
+
+
+def _free_words(model: Model) -> str:
+    words = (
+        "Each body by itself, with its weight, the forces of the effects and those of its joints. "
+        "The algorithm below never forms the joint forces: along a joint's own motion they are the "
+        "forces of its effects, and in the other directions they do no work."
+    )
+    return words + (" " + PRESCRIBED if model.prescribed else "")
+
+
+def _symmetry(equations: Equations) -> Step:
+    """How the handout's M becomes the symmetric one of the generated module."""
+    n, s = len(equations.symbols.a), equations.symmetric
+    by = symmetric(equations.model, equations.symbols, equations.kinematics, sp.eye(n))
+    if by == sp.eye(n):
+        return Step("", "One M", ALREADY, ())
+    own = (("M", s.M), ("V", s.V), ("G", s.G), ("F", s.F))
+    lines = [Equation(sp.MatrixSymbol("T", n, n), by)]
+    transform = sp.MatrixSymbol("T", n, n)
+    for letter, whole in own:
+        columns = n if letter == "M" else 1
+        name = sp.MatrixSymbol(f"{letter}_sym", n, columns)
+        lines.append(Equation(name, sp.MatMul(transform, sp.MatrixSymbol(letter, n, columns))))
+        lines.append(Equation(name, whole))
+    return Step("", "One M: from the handout's to the symmetric one", SYMMETRIC, tuple(lines))
+
+
+def _names(model: Model, shown: dict[Expr, Expr]) -> dict[str, str]:
+    own = {symbol.name: other.name for symbol, other in shown.items()}
+    return {**reading_names(model), **own}
+
+
+def _renamed(step: Step, names: dict[str, str]) -> Step:
+    return replace(step, equations=read_all(step.equations, names))
+
+
+def _numbered_within(steps: Iterator[Step], number: str) -> list[Step]:
+    return [replace(step, number=f"({number}.{i})") for i, step in enumerate(steps, 1)]
+
+
+def _whole(found: Matrices, model: Model, effects: Sequence[ToldEffect]) -> Matrices:
+    """The matrices with the forces of the effects written out."""
+    needed = dict.fromkeys(body for told in effects for body in used_bodies(told))
+    more, _ = poses(model, frames_of(model), needed)
+    more += [pair for told in effects for pair in told.definitions]
+    if not more:
+        return found
+    known = {s.name: s for e in (found.M, found.V, found.G, found.F) for s in e.free_symbols}
+    known |= {s.name: s for s in (*found.q, *found.v)}
+    definitions: list[Definition] = [
+        (symbol, e.xreplace({s: known.get(s.name, s) for s in e.free_symbols}))
+        for symbol, e in more
+    ]
+    return replace(found, definitions=(*definitions, *found.definitions))

@@ -1,0 +1,69 @@
+"""The names of a scene as they are read: a dot over a rate, a subscript for what it belongs to."""
+
+from collections.abc import Mapping, Sequence
+
+import sympy as sp
+
+from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.symbols import Expr
+from eomgen.model.model import Model
+
+
+def reading_names(model: Model) -> dict[str, str]:
+    """How each name of a scene is written: `theta_dot` as θ with a dot, which is "thetadot"."""
+    names: dict[str, str] = {}
+    taken = {p.name for p in model.parameters} | {i.name for i in model.inputs}
+    for body in model.bodies:
+        for c in body.positions[body.plain :]:  # a quaternion, named <prefix>_qw
+            stem, _, part = c.name.rpartition("_")
+            names[c.name] = f"q_{stem},{part[1:]}"
+            names[f"{c.name}_dot"] = f"qdot_{stem},{part[1:]}"
+        for c in body.velocities:
+            stem = c.name.removesuffix("_dot")
+            if stem != c.name:
+                names[c.name], names[c.acceleration] = dotted(stem, "dot"), dotted(stem, "ddot")
+            else:
+                prefix, _, axis = c.name.rpartition("_w")
+                names[c.name] = f"omega_{prefix},{axis}"
+                names[c.acceleration] = f"omegadot_{prefix},{axis}"
+        for ending, letter in (("mass", "m"), ("inertia_com", "I")):
+            brief = f"{letter}_{body.name}"
+            if f"{body.name}_{ending}" in taken and brief not in taken:
+                names[f"{body.name}_{ending}"] = brief
+    return names
+
+
+def dotted(name: str, dots: str) -> str:
+    """A name with "dot" or "ddot" after its first part, which printers write above it."""
+    base, underscore, rest = name.partition("_")
+    return f"{base}{dots}{underscore}{rest}"
+
+
+def read(expression: Expr, names: Mapping[str, str]) -> Expr:
+    """An expression with its symbols by the names that are read."""
+    renamed = {}
+    for symbol in expression.free_symbols:
+        if (name := names.get(symbol.name)) is not None:
+            shaped = isinstance(symbol, sp.MatrixSymbol)
+            renamed[symbol] = sp.MatrixSymbol(name, *symbol.shape) if shaped else sp.Symbol(name)
+    if isinstance(expression, sp.MatrixBase):
+        return expression.applyfunc(lambda e: e.xreplace(renamed))
+    return expression.xreplace(renamed)
+
+
+def read_all(equations: Sequence[Equation], names: Mapping[str, str]) -> tuple[Equation, ...]:
+    """Equations with the names that are read, but for those that then say nothing."""
+    found = (Equation(read(e.left, names), read(e.right, names)) for e in equations)
+    return tuple(e for e in found if e.left != e.right)
+
+
+def numbered(steps: Sequence[Step], start: int = 1) -> tuple[Step, ...]:
+    """Steps with numbers in brackets, from `start`, for those that have none."""
+    found, n = [], start
+    for step in steps:
+        if step.number:
+            found.append(step)
+            continue
+        found.append(Step(f"({n})", step.title, step.words, step.equations, step.figure))
+        n += 1
+    return tuple(found)

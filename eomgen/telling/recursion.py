@@ -1,0 +1,396 @@
+"""The articulated-body algorithm with a mechanism's own bodies, joints and constants.
+
+Featherstone, "Rigid Body Dynamics Algorithms" (2008), table 7.1: outwards the velocities, inwards
+the articulated-body inertias and bias forces, outwards the accelerations. The cost is linear in the
+number of bodies, so that any mechanism can be told.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.symbols import Expr
+from eomgen.model.model import Model
+from eomgen.scene.effects import Gravity
+from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints.base import WORLD
+from eomgen.telling.effects import ToldEffect
+from eomgen.telling.frames import Frame
+from eomgen.telling.mechanism import AXES, Notes, TellingMechanism, rotation_symbols
+from eomgen.telling.poses import frame_name
+from eomgen.telling.spatial import (
+    ForceCross,
+    MotionCross,
+    cut,
+    hat,
+    motion_subspace,
+    motion_transform,
+    rigid_inertia,
+)
+
+ABOUT = (
+    "The algorithm is one page for any tree: R. Featherstone, Rigid Body Dynamics Algorithms "
+    "(2008), table 7.1. Here it is with the bodies, joints and constants of this mechanism."
+)
+
+KINDS = ("gravity", "applied")
+
+
+@dataclass(frozen=True)
+class Recursion:
+    """The mechanism as the recursion reads it."""
+
+    model: Model
+    frames: tuple[Frame, ...]
+    told: tuple[ToldEffect, ...]
+
+    @property
+    def size(self) -> int:
+        """Components of a spatial vector."""
+        return 6 if self.model.dimensions == 3 else 3
+
+    @property
+    def still(self) -> bool:
+        """Whether the scene leaves the velocity forces out."""
+        return "velocity_forces" in self.model.leave_out
+
+    def vector(self, letter: str, frame: Frame) -> Expr:
+        """A spatial vector of a frame."""
+        return sp.MatrixSymbol(f"{letter}_{frame.name}", self.size, 1)
+
+    def matrix(self, letter: str, frame: Frame) -> Expr:
+        """A spatial matrix of a frame."""
+        return sp.MatrixSymbol(f"{letter}_{frame.name}", self.size, self.size)
+
+    def joint(self, letter: str, frame: Frame, columns: int = 1) -> Expr:
+        """A vector or matrix over the velocities of a frame's joint."""
+        return sp.MatrixSymbol(f"{letter}_{frame.name}", len(frame.v), columns)
+
+    def rate(self, frame: Frame, order: int = 1) -> Expr:
+        """The velocities of a frame's joint, or their derivatives."""
+        symbols = frame.v if order == 1 else frame.a
+        if len(symbols) == 1:
+            return sp.MatrixSymbol(symbols[0].name, 1, 1)
+        return self.joint("omega" if order == 1 else "omegadot", frame)
+
+    def children(self, k: int) -> list[Frame]:
+        """The frames on frame k."""
+        return [frame for frame in self.frames if frame.parent == k]
+
+
+def recursive_steps(
+    model: Model, frames: tuple[Frame, ...], told: tuple[ToldEffect, ...]
+) -> Iterator[Step]:
+    """The steps of the algorithm, frame by frame."""
+    r = Recursion(model, frames, told)
+    yield Step("", "The algorithm", _algorithm(r), ())
+    for k, frame in enumerate(frames):
+        yield Step("", f"Frame `{frame.name}`: {_kind(r, k)}", "", tuple(_constants(r, frame)))
+    order = range(len(frames))
+    lines = [line for k in order for line in _velocities(r, k)]
+    yield Step("", "Outwards: velocities and bias forces", _outward_words(r), tuple(lines))
+    words = (
+        "From the leaves to the root. I^A is the inertia that a frame seems to have with all that "
+        "hangs on it, p^A the force on it that would leave it without acceleration. What is left "
+        "of both after the frame's own joint has given way, I^a and p^a, goes to the parent."
+    )
+    lines = [line for k in reversed(order) for line in _articulated(r, k)]
+    yield Step("", "Inwards: articulated-body inertias", words, tuple(lines))
+    words = (
+        "From the root to the leaves: the joint takes what the forces leave over after the "
+        "parent's acceleration a'. The world accelerates by minus g, which stands for gravity."
+    )
+    lines = [line for k in order for line in _accelerations(r, k)]
+    yield Step("", "Outwards: accelerations", words, tuple(lines))
+    yield _applied(r)
+
+
+def _applied(r: Recursion) -> Step:
+    """F of M v̇ + V + G = F, term by term."""
+    lines: list[Equation] = []
+    loaded: set[int] = set()
+    for k in reversed(range(len(r.frames))):
+        frame = r.frames[k]
+        applied = _wrench(r, frame, ["applied"])
+        terms = [r.vector("f", frame)] if applied else []
+        if len(applied) < len(_wrench(r, frame)):  # a weight that is told as a load
+            terms = [_sum(applied, r.size)] if applied else []
+        for i, child in enumerate(r.frames):
+            if child.parent == k and i in loaded:
+                terms.append(sp.MatMul(r.matrix("X", child).T, r.vector("Phi", child)))
+        force: list[Expr] = [tau] if _moves(frame) and any(tau := _joint_force(r, frame)) else []
+        if terms:
+            loaded.add(k)
+            lines.append(Equation(r.vector("Phi", frame), _sum(terms, r.size)))
+            if _moves(frame):
+                force.append(sp.MatMul(_subspace(r, frame).T, r.vector("Phi", frame)))
+        if frame.free:
+            lines.append(Equation(r.joint("F", frame), _sum(force, len(frame.v))))
+    words = (
+        "The same F as in M dv/dt + V + G = F, joint by joint; M, V and G do not depend on it. Φ "
+        "is the sum of the loads f on a frame and on all that hangs on it, taken to its origin; "
+        "the joint feels what of it is along its motion, and its own loads."
+    )
+    return Step("", "Applied forces, term by term", words, tuple(lines))
+
+
+def _algorithm(r: Recursion) -> str:
+    plane = r.size == 3
+    vectors = (
+        "A motion is a column of ω_z, v_x, v_y and a force one of n_z, f_x, f_y"
+        if plane
+        else "A motion is a column of ω and v, a force one of n and f, six components each"
+    )
+    return (
+        f"{ABOUT}\n\n{vectors}, at the origin of a frame and in its axes. A frame moves on its "
+        "parent by one joint primitive, with the motion subspace S; a joint with several "
+        "primitives is a chain of frames, all but the last without mass. R turns axes of the "
+        "frame into the parent's, r runs from the parent's origin to its own, X takes motions "
+        "from the parent to the frame, and its transpose takes forces back. The matrix of r × is "
+        "written r^×. I is the inertia of the frame's own body at the frame's origin, × the cross "
+        "product of two motions, and ×* that of a motion and a force. D is a number for one "
+        "degree of freedom, and a matrix of three rows for a ball. It is positive for positive "
+        "masses, so no division can fail."
+    )
+
+
+def _kind(r: Recursion, k: int) -> str:
+    frame = r.frames[k]
+    above = f"`{r.frames[frame.parent].name}`" if frame.parent >= 0 else f"the {WORLD}"
+    carries = f", carries `{frame_name(r.model, frame)}`" if frame.body >= 0 else ", without mass"
+    moved = {
+        "revolute": "turns about", "prismatic": "slides along", "spherical": "turns freely",
+        "fixed": "fixed",
+    }[frame.kind]  # fmt: skip
+    axis = ""
+    if frame.kind in ("revolute", "prismatic"):
+        axis = " " + _direction(frame.axis)
+    prescribed = " as prescribed" if frame.given else ""
+    return f"{moved}{axis}{prescribed} on {above}{carries}"
+
+
+def _direction(axis: Expr) -> str:
+    for letter, part in zip(AXES, axis, strict=True):
+        if abs(part) == 1:
+            return letter if part > 0 else f"-{letter}"
+    return "[" + ", ".join(f"{float(part):.4g}" for part in axis) + "]"
+
+
+def _constants(r: Recursion, frame: Frame) -> Iterator[Equation]:
+    plane, size = r.size == 3, r.model.dimensions
+    transform = motion_transform(frame.rotation, frame.offset)
+    if plane:
+        inertia = rigid_inertia(frame.mass, frame.centre, frame.inertia)
+        yield Equation(r.matrix("X", frame), cut(transform, size))
+        if frame.free or frame.given:
+            subspace = cut(motion_subspace(frame.kind, frame.axis), size)
+            yield Equation(sp.MatrixSymbol(f"S_{frame.name}", 3, 1), subspace)
+        if frame.body >= 0:
+            yield Equation(r.matrix("I", frame), cut(inertia, size))
+        return
+    rotation = sp.MatrixSymbol(f"R_{frame.name}", 3, 3)
+    yield from (Equation(symbol, value) for symbol, value in frame.defined)
+    turns = frame.rotation != sp.eye(3)
+    yield Equation(rotation, frame.rotation if turns else sp.Identity(3))
+    yield Equation(sp.MatrixSymbol(f"r_{frame.name}", 3, 1), _column(frame.offset))
+    lever = sp.MatrixSymbol(f"r^×_{frame.name}", 3, 3)
+    nothing = sp.ZeroMatrix(3, 3)
+    moved = sp.MatMul(-1, rotation.T, lever) if any(frame.offset) else nothing
+    transform = sp.BlockMatrix([[rotation.T, nothing], [moved, rotation.T]])
+    yield Equation(r.matrix("X", frame), transform)
+    if _moves(frame):
+        subspace = motion_subspace(frame.kind, frame.axis)
+        name = sp.MatrixSymbol(f"S_{frame.name}", *subspace.shape)
+        blocks = sp.BlockMatrix([[sp.Identity(3)], [nothing]])
+        yield Equation(name, _column(subspace) if subspace.cols == 1 else blocks)
+    if frame.body >= 0:
+        yield from _inertia(r, frame)
+
+
+def _inertia(r: Recursion, frame: Frame) -> Iterator[Equation]:
+    """Mass, centre of mass and inertia about it, and with them the spatial inertia."""
+    mass, about = real(f"m_{frame.name}"), sp.MatrixSymbol(f"J_{frame.name}", 3, 3)
+    yield Equation(mass, frame.mass)
+    yield Equation(about, frame.inertia)
+    upper, lower = about, sp.MatMul(mass, sp.Identity(3))
+    corner, other = sp.ZeroMatrix(3, 3), sp.ZeroMatrix(3, 3)
+    if any(frame.centre):
+        yield Equation(sp.MatrixSymbol(f"c_{frame.name}", 3, 1), _column(frame.centre))
+        lever = sp.MatrixSymbol(f"c^×_{frame.name}", 3, 3)
+        upper = sp.MatAdd(about, sp.MatMul(mass, lever, lever.T))
+        corner, other = sp.MatMul(mass, lever), sp.MatMul(mass, lever.T)
+    yield Equation(r.matrix("I", frame), sp.BlockMatrix([[upper, corner], [other, lower]]))
+
+
+def _column(vector: Expr) -> Expr:
+    """A column written as a row, transposed."""
+    return sp.Transpose(sp.ImmutableMatrix(vector.T))
+
+
+def _outward_words(r: Recursion) -> str:
+    words = (
+        "v is the velocity of a frame, c what the velocities alone make of its acceleration, and p "
+        "the force that would leave its body without acceleration: of inertia, less the loads f of "
+        "the effects, whose components are named with the effects."
+    )
+    if r.still:
+        words += " The scene leaves the velocity forces out: c and the inertial part of p are 0."
+    return words
+
+
+def _subspace(r: Recursion, frame: Frame) -> Expr:
+    return sp.MatrixSymbol(f"S_{frame.name}", r.size, len(frame.v))
+
+
+def _moves(frame: Frame) -> bool:
+    return frame.kind != "fixed"
+
+
+def _velocities(r: Recursion, k: int) -> Iterator[Equation]:
+    frame = r.frames[k]
+    v, own = r.vector("v", frame), None
+    if _moves(frame):
+        own = sp.MatMul(_subspace(r, frame), r.rate(frame))
+        if len(frame.v) > 1:
+            yield Equation(r.rate(frame), sp.Matrix(frame.v))
+    terms = [own] if own is not None else []
+    if frame.parent >= 0:
+        terms.insert(0, sp.MatMul(r.matrix("X", frame), r.vector("v", r.frames[frame.parent])))
+    yield Equation(v, _sum(terms, r.size))
+    c = []
+    if own is not None and frame.parent >= 0 and not r.still:
+        c.append(MotionCross(v, own))
+    if frame.given:
+        c.append(sp.MatMul(_subspace(r, frame), r.rate(frame, 2)))
+    yield Equation(r.vector("c", frame), _sum(c, r.size))
+    loads = _wrench(r, frame)
+    if loads:
+        yield Equation(r.vector("f", frame), _sum(loads, r.size))
+    bias = []
+    if frame.body >= 0 and not r.still:
+        bias.append(ForceCross(v, sp.MatMul(r.matrix("I", frame), v)))
+    if loads:
+        bias.append(sp.MatMul(-1, r.vector("f", frame)))
+    yield Equation(r.vector("p", frame), _sum(bias, r.size))
+
+
+def _sum(terms: Sequence[Expr], rows: int, columns: int = 1) -> Expr:
+    if not terms:
+        return sp.ZeroMatrix(rows, columns)
+    return terms[0] if len(terms) == 1 else sp.MatAdd(*terms)
+
+
+def _wrench(r: Recursion, frame: Frame, kinds: Sequence[str] = KINDS) -> list[Expr]:
+    """The loads on a frame's body as spatial forces at its origin, in its axes."""
+    if frame.body < 0:
+        return []
+    name, size = frame_name(r.model, frame), r.model.dimensions
+    found: list[Expr] = []
+    for told in r.told:
+        if isinstance(told.effect, Gravity) and told.kept:
+            continue
+        for load in told.loads:
+            if isinstance(load, Load) and load.body == name and load.kind in kinds:
+                found += _one_wrench(load, frame, name, size)
+    return found
+
+
+def _one_wrench(load: Load, frame: Frame, name: str, size: int) -> list[Expr]:
+    arm = frame.centre + sp.Matrix([*load.at, *([0] * (3 - size))])
+    if size == 2:
+        own = sp.Matrix([*(rotation_symbols(name, 2).T * sp.Matrix(load.force)), 0])
+        moment = arm.cross(own)[2] + (load.torque[0] if load.torque else 0)
+        return [sp.ImmutableMatrix([moment, own[0], own[1]])]
+    back = sp.MatrixSymbol(f"W_{name}", 3, 3).T
+    force = sp.MatMul(back, sp.ImmutableMatrix(load.force))
+    moments = []
+    if any(load.force) and any(arm):
+        moments.append(sp.MatMul(sp.ImmutableMatrix(hat(arm)), force))
+    if any(load.torque):
+        moments.append(sp.MatMul(back, sp.ImmutableMatrix(load.torque)))
+    lower = force if any(load.force) else sp.ZeroMatrix(3, 1)
+    return [sp.BlockMatrix([[_sum(moments, 3)], [lower]])]
+
+
+def _joint_force(r: Recursion, frame: Frame) -> Expr:
+    """The loads along a frame's own coordinates."""
+    parts = [sp.Integer(0)] * len(frame.v)
+    start = [f.name for f in r.frames if f.joint == frame.joint].index(frame.name)
+    for told in r.told:
+        for load in told.loads:
+            if isinstance(load, JointLoad) and load.joint == frame.joint:
+                i = load.coordinate - start
+                if 0 <= i < len(parts):
+                    parts[i] = parts[i] + load.force
+    return sp.ImmutableMatrix(parts)
+
+
+def _articulated(r: Recursion, k: int) -> Iterator[Equation]:
+    frame, size = r.frames[k], r.size
+    whole, bias = r.matrix("I^A", frame), r.vector("p^A", frame)
+    inertias = [r.matrix("I", frame)] if frame.body >= 0 else []
+    forces = [r.vector("p", frame)]
+    for child in r.children(k):
+        x = r.matrix("X", child)
+        inertias.append(sp.MatMul(x.T, r.matrix("I^a", child), x))
+        forces.append(sp.MatMul(x.T, r.vector("p^a", child)))
+    yield Equation(whole, _sum(inertias, size, size))
+    yield Equation(bias, _sum(forces, size))
+    handed = (r.matrix("I^a", frame), r.vector("p^a", frame))
+    c = r.vector("c", frame)
+    if not frame.free:
+        if frame.parent >= 0:
+            yield Equation(handed[0], whole)
+            yield Equation(handed[1], sp.MatAdd(bias, sp.MatMul(whole, c)))
+        return
+    n = len(frame.v)
+    subspace, column = _subspace(r, frame), sp.MatrixSymbol(f"U_{frame.name}", size, n)
+    pivot, left = r.joint("D", frame, n), r.joint("u", frame)
+    yield Equation(column, sp.MatMul(whole, subspace))
+    along = sp.MatMul(subspace.T, column)
+    if frame.armature != 0:
+        along = sp.MatAdd(along, sp.ImmutableMatrix([[frame.armature]]))
+    yield Equation(pivot, along)
+    pull = sp.MatMul(-1, subspace.T, bias)
+    tau = _joint_force(r, frame)
+    yield Equation(left, sp.MatAdd(tau, pull) if any(tau) else pull)
+    if frame.parent >= 0:
+        taken = sp.MatMul(-1, column, sp.Inverse(pivot), column.T)
+        yield Equation(handed[0], sp.MatAdd(whole, taken))
+        given = sp.MatMul(column, sp.Inverse(pivot), left)
+        yield Equation(handed[1], sp.MatAdd(bias, sp.MatMul(handed[0], c), given))
+
+
+def _accelerations(r: Recursion, k: int) -> Iterator[Equation]:
+    frame = r.frames[k]
+    before, after = r.vector("a'", frame), r.vector("a", frame)
+    base = sp.MatrixSymbol("a_world", r.size, 1)
+    if k == 0:
+        yield Equation(base, _falling(r))
+    above = r.vector("a", r.frames[frame.parent]) if frame.parent >= 0 else base
+    c = r.vector("c", frame)
+    reached = sp.MatAdd(sp.MatMul(r.matrix("X", frame), above), c)
+    if not frame.free:
+        yield Equation(after, reached)
+        return
+    yield Equation(before, reached)
+    column = sp.MatrixSymbol(f"U_{frame.name}", r.size, len(frame.v))
+    rest = sp.MatAdd(r.joint("u", frame), sp.MatMul(-1, column.T, before))
+    rate = r.rate(frame, 2)
+    yield Equation(rate, sp.MatMul(sp.Inverse(r.joint("D", frame, len(frame.v))), rest))
+    if r.children(k):
+        yield Equation(after, sp.MatAdd(before, sp.MatMul(_subspace(r, frame), rate)))
+
+
+def _falling(r: Recursion) -> Expr:
+    """Minus the acceleration of uniform gravity."""
+    mechanism: Any = TellingMechanism(r.model, Notes())
+    total = sp.zeros(r.model.dimensions, 1)
+    for told in r.told:
+        if isinstance(told.effect, Gravity) and told.kept:
+            total -= sp.Matrix(told.effect.acceleration(mechanism))
+    return sp.Matrix([0] * (r.size - r.model.dimensions) + list(total))

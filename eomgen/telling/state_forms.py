@@ -1,0 +1,169 @@
+"""The state that a form names, and its time derivative written out."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from eomgen.derivation.closed import Equations
+from eomgen.derivation.forms import StateForm, state_form
+from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.symbols import Expr, over_coordinates
+from eomgen.model.model import Model
+from eomgen.telling.effects import ToldEffect
+
+FORMS = {
+    "redundant": "The redundant state (1): all that is known of every body, {count} numbers.",
+    "momentum": "The state without what (21) gives: {count} numbers. Each further body of a tree "
+    "adds its angle and its angular momentum.",
+    "velocity": "Coordinates q and velocities v: {count} numbers.",
+}
+
+
+QUATERNION = ("_qw", "_qx", "_qy", "_qz", "_wx", "_wy", "_wz")
+"""How the names of quaternions and of their angular velocities end."""
+
+
+BELOW = "; below, what the lines are written with"
+OWN = ", in this state's own numbers. The lines on bodies are (4) to (11)."
+BEFORE = "; what the lines are written with stands in the steps before"
+
+
+@dataclass(frozen=True)
+class WrittenForm:
+    """A state by its symbols, its derivative, and what that is written with, in order."""
+
+    states: tuple[Expr, ...]
+    rates: tuple[Expr, ...]
+    definitions: tuple[tuple[Expr, Expr], ...]
+
+
+def momentum_form(equations: Equations) -> WrittenForm:
+    """The handout's states, in the order of (1): Ẏ by (4) to (11), with the joint forces of (38)
+    and the closed form (37) in the numbers of this state.
+    """
+    form = state_form(equations)
+    s, bodies = equations.symbols, equations.model.bodies
+    given = {**form.replaced, **form.defined}
+    accelerations: dict[Expr, Expr] = {}
+    lines = equations.free_bodies.equations
+    still = dict.fromkeys(s.tau, sp.Integer(0))
+    for k in range(len(bodies)):
+        (_, fx), (_, fy), (_, torque) = lines[3 * k : 3 * k + 3]
+        accelerations |= {
+            s.mass[k] * s.xdd[k]: fx,
+            s.mass[k] * s.ydd[k]: fy,
+            s.inertia[k] * s.alpha[k]: torque,
+        }
+    rates = tuple(_in_state(accelerations.get(rate, rate), given) for rate in form.rates)
+    needed = [
+        *((symbol, e.xreplace(still)) for symbol, e in equations.solution.definitions),
+        *equations.joint_force,
+    ]
+    coordinates = {*s.a}
+    definitions = [
+        (symbol, _in_state(e, given)) for symbol, e in needed if symbol not in coordinates
+    ]
+    return WrittenForm(form.symbols, rates, tuple(_used(rates, definitions)))
+
+
+def velocity_form(equations: Equations) -> WrittenForm:
+    """[q, v] by the closed form (37), in coordinates."""
+    s = equations.symbols
+    accelerations = {*s.xdd, *s.ydd, *s.alpha}
+    turned = over_coordinates(equations.model, s)
+    given = {symbol: e for symbol, e in turned.items() if symbol not in accelerations}
+    form: StateForm = state_form(equations)
+    still = dict.fromkeys(s.tau, sp.Integer(0))
+    own = {*s.q, *s.v}
+    given |= {symbol: e for symbol, e in form.defined.items() if symbol not in own}
+    definitions = [
+        (symbol, _in_state(e.xreplace(still), given))
+        for symbol, e in equations.solution.definitions
+    ]
+    return WrittenForm(form.symbols, form.rates, tuple(_used(form.rates, definitions)))
+
+
+def _in_state(expression: Expr, given: Mapping[Expr, Expr]) -> Expr:
+    """An expression over the symbols of a state: what is defined is put in until none is left."""
+    while True:
+        inner = expression.xreplace(given)
+        if inner == expression:
+            return inner
+        expression = inner
+
+
+def _used(
+    rates: Sequence[Expr], definitions: Sequence[tuple[Expr, Expr]]
+) -> Iterator[tuple[Expr, Expr]]:
+    """The definitions that the rates need, directly or by others."""
+    needed = {s for rate in rates for s in rate.free_symbols}
+    kept = []
+    for symbol, e in reversed(definitions):
+        if symbol in needed:
+            needed |= e.free_symbols
+            kept.append((symbol, e))
+    yield from reversed(kept)
+
+
+def form_step(model: Model, form: str, written: WrittenForm, extra: Iterable[ToldEffect]) -> Step:
+    """The last step: Y, and Ẏ line by line."""
+    states, rates = list(written.states), list(written.rates)
+    states += (real(x.name) for x in model.states)
+    rates += (rate for told in extra for _, rate in told.rates)
+    words = FORMS[form].format(count=len(states)) + " Its time derivative, one line for each number"
+    words += BELOW if written.definitions else BEFORE
+    words += "." if form == "velocity" else OWN
+    dotted = [rate_symbol(state) for state in states]
+    own = {*states}
+    plain = [rate if rate in own else symbol for symbol, rate in zip(dotted, rates, strict=True)]
+    equations = [
+        Equation(sp.Symbol("Y"), sp.Matrix([states])),
+        Equation(sp.Symbol("Ydot"), sp.Matrix([plain])),
+    ]
+    equations += [Equation(s, rate) for s, rate in zip(plain, rates, strict=True) if s != rate]
+    equations += [Equation(symbol, e) for symbol, e in written.definitions]
+    return Step("", f"State form {form}: Y and its derivative", words, tuple(equations))
+
+
+def rate_symbol(state: Expr) -> Expr:
+    """The time derivative of a state: its name with one more dot."""
+    base, underscore, rest = state.name.partition("_")
+    if rest.endswith("_dot") or rest == "dot":
+        return real(state.name.removesuffix("dot") + "ddot")
+    if state.name.endswith(QUATERNION):
+        return real(f"{state.name}_dot")
+    return real(f"{base}dot{underscore}{rest}")
+
+
+def plain_form(model: Model, accelerations: Sequence[Expr]) -> WrittenForm:
+    """[q, v] of any mechanism, its accelerations by the steps before."""
+    states: list[Expr] = []
+    rates: list[Expr] = []
+    for index in model.joint_indices:
+        if max(index.v, default=-1) >= len(model.velocities):
+            continue
+        body = index.body
+        pairs = zip(body.positions[: body.plain], body.velocities, strict=False)
+        for position, velocity in pairs:
+            states.append(real(position.name))
+            rates.append(real(velocity.name))
+        if not index.quaternion:
+            continue
+        w, x, y, z = (real(c.name) for c in body.positions[body.plain :])
+        a, b, c = (real(v.name) for v in body.velocities[body.plain :])
+        states += [w, x, y, z]
+        half = sp.Rational(1, 2)
+        rates += [
+            -half * (x * a + y * b + z * c),
+            half * (w * a + y * c - z * b),
+            half * (w * b + z * a - x * c),
+            half * (w * c + x * b - y * a),
+        ]
+    order = {c.name: i for i, c in enumerate(model.coordinates)}
+    both = sorted(zip(states, rates, strict=True), key=lambda pair: order[pair[0].name])
+    states, rates = [s for s, _ in both], [r for _, r in both]
+    states += [real(c.name) for c in model.velocities]
+    rates += list(accelerations)
+    return WrittenForm(tuple(states), tuple(rates), ())

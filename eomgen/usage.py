@@ -1,0 +1,73 @@
+"""How the command line looks: its parser, help with defaults, an example of each command."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from eomgen.text import breaks_lines, one_line
+
+EXAMPLES = {
+    "list": "eomgen list",
+    "show": "eomgen show pendulum",
+    "new": "eomgen new swing",
+    "copy": "eomgen copy cart_pole my_cart",
+    "completion": "eomgen completion bash > ~/.local/share/bash-completion/completions/eomgen",
+    "schema": "eomgen schema > scene.schema.json",
+    "reference": "eomgen reference contact",
+    "check": "eomgen check two_body",
+    "derive": "eomgen derive two_body --format html -o two_body.html",
+    "generate": "eomgen generate two_body pendulum -o modules",
+    "simulate": "eomgen simulate cart_pole --set l=0.4 --state theta=0.3 --input push=3*sin(t)",
+    "view": "eomgen view double_pendulum",
+    "sweep": "eomgen sweep cart_pole --vary m_pole=0.1:0.5:20 --of theta",
+    "verify": "eomgen verify two_body --states 20",
+    "accuracy": "eomgen accuracy pendulum --quick",
+    "effects": "eomgen effects ragdoll --each",
+    "linearise": "eomgen linearise cart_pole --state theta_deg=180 -o cart_pole.npz",
+}
+"""An example for the help of each command."""
+
+
+def example_of(command: str) -> str | None:
+    """The last line of a command's help; None if it has no example."""
+    return f"example: {EXAMPLES[command]}" if command in EXAMPLES else None
+
+
+def path(text: str) -> Path:
+    if breaks_lines(text):
+        raise argparse.ArgumentTypeError(f"{text} has a control character in its name")
+    return Path(text)
+
+
+class Version(argparse.Action):
+    """Prints the version, which is looked up only if the option is given."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, help: str) -> None:
+        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from importlib.metadata import version
+
+        print(f"eomgen {version('eomgen')}")
+        parser.exit()
+
+
+class Help(argparse.RawDescriptionHelpFormatter):
+    """Help that states the default of each option that has one, unless its text does."""
+
+    def _get_help_string(self, action: argparse.Action) -> str:
+        text, default = action.help or "", action.default
+        if default in (None, False, "", argparse.SUPPRESS) or default == []:
+            return text
+        return f"{text} (default: %(default)s)"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose error messages stay on one line, whatever the arguments contain."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"formatter_class": Help, **options})
+
+    def error(self, message: str) -> NoReturn:
+        super().error(one_line(message))

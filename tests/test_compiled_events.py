@@ -1,0 +1,247 @@
+"""Compiled steps of scenes with contacts, stops and pulses: the bits of Python's."""
+
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from campaign import FULL, some
+from scipy.optimize import brentq
+from test_compiled_steps import assert_same, both, compiler
+
+import eomgen
+from eomgen.native import checked
+from eomgen.results import Run
+from eomgen.run.integrators import strides
+from eomgen.run.roots import root
+from eomgen.scene.built_in import built_in_names
+from eomgen.scene.reader import read_scene
+
+SCENES = some(("bouncing_two_body",), ("bouncing_two_body", *built_in_names()))
+ENDS = {"ragdoll": 1.0, "walker_motors": 0.5, "stiff_beam": 0.2}
+WHEEL = """
+name = "wheel"
+parameters = { a = 1.0, w = 0.1, k = 400.0, s = 1.0, m = 0.0, u = 1.0, f = 3.0 }
+bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.4 }]
+[[joints]]
+name = "axle"
+type = "revolute"
+parent = "world"
+child = "disc"
+coordinate = "q"
+[[effects]]
+type = "motor"
+name = "pulse"
+joint = "axle"
+torque = "5*step(t - a)*step(a + w - t)"
+[[effects]]
+type = "motor"
+name = "stops"
+joint = "axle"
+torque = "-s*k*max(0, q - 1) + s*k*max(0, -1 - q) - s*0.4*step(q_dot)*max(0, q - 1)"
+[[effects]]
+type = "motor"
+name = "brush"
+joint = "axle"
+torque = "m*step(sin(u*q - f*t) - 0.95)"
+[initial]
+q = { q = 0.3 }
+v = { q_dot = 3.0 }
+[simulation]
+integrator = "DOP853"
+rtol = 1e-8
+t_end = 3.0
+"""
+"""A wheel between springy stops, with a pulse in time."""
+TURNING = WHEEL.replace("s = 1.0, m = 0.0", "s = 0.0, m = 2.0").replace(
+    "q_dot = 3.0", "q_dot = 40.0"
+)
+"""The wheel turns freely, many times in a step, past a brush that moves."""
+STILL = WHEEL.replace("q_dot = 3.0", "q_dot = 1e-3").replace(
+    "u = 1.0, f = 3.0", "u = 1e-6, f = 62.83185307179586"
+)
+"""The wheel hardly turns. The brush is there in each period of 0.1 s, and has no force."""
+HELD = """
+name = "block"
+dimensions = 2
+parameters = { push = 8.0 }
+bodies = [{ name = "block", mass = 1.0, inertia_com = 0.1 }]
+points = [{ name = "foot", body = "block", at = [0.3, 0.0] }]
+[[joints]]
+name = "flight"
+type = "free"
+child = "block"
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "external_force"
+name = "lift"
+body = "block"
+force = [1, "push*max(0, sin(3*t))"]
+[[effects]]
+type = "contact"
+name = "floor"
+law = "impact"
+points = ["foot"]
+restitution = 0.6
+[initial]
+q = { block_y = 0.7 }
+v = { block_angle_dot = 25.0 }
+[simulation]
+t_end = 3.0
+"""
+
+pytestmark = compiler
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The numbers of steps that were made in C at once."""
+    numbers: list[int] = []
+    original = strides.Strides.made
+
+    def noted(self: strides.Strides, *given: Any) -> Any:
+        stride = original(self, *given)
+        numbers.append(len(stride.ends) if stride else 0)
+        return stride
+
+    monkeypatch.setattr(strides.Strides, "made", noted)
+    return numbers
+
+
+def alike(scene: str, **options: Any) -> Run:
+    """The run in C, which is that in Python."""
+    compiled, python = both(scene, **options)
+    assert_same(compiled, python)
+    assert compiled.trajectory.events == python.trajectory.events
+    return compiled
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-10])
+def test_the_bits_are_those_of_python(scene: str, rtol: float, made: list[int]) -> None:
+    end = min(ENDS.get(scene, 2.0), read_scene(scene).simulation.t_end)
+    run = alike(scene, t_end=end, rtol=rtol, samples=237)
+    assert sum(made) > 0.3 * run.trajectory.counts["steps"]
+
+
+@pytest.mark.parametrize(("scene", "share"), [(WHEEL, 0.7), (TURNING, 0.4)])
+def test_stops_and_pulses_are_seen(scene: str, share: float, made: list[int]) -> None:
+    """Wherever they lie, at loose and tight tolerances. Most steps are made in C."""
+    random, steps, cut = np.random.default_rng(3), 0, 0
+    for _ in range(150 if FULL else 5):
+        given = {
+            "a": random.uniform(0.0, 3.0),
+            "w": 10 ** random.uniform(-5, -1),
+            "k": 10 ** random.uniform(0, 5),
+        }
+        rtol = 10 ** random.uniform(-11, -3)
+        run = alike(scene, parameters=given, rtol=rtol, samples=11)
+        steps += run.trajectory.counts["steps"]
+        cut += run.trajectory.counts["cut"]
+    assert cut
+    assert sum(made) > share * steps
+
+
+def test_a_function_with_the_period_of_a_step_is_seen() -> None:
+    """At the ends of all steps it has the same value, far from 0."""
+    begun = alike(STILL, parameters={"a": 9.0}, max_step=0.1, t_end=2.05)
+    assert begun.trajectory.counts["capped"] > 15
+    assert begun.trajectory.resume["turned"] > 1.9
+
+
+def test_a_contact_that_closes_and_opens_in_a_step_is_seen() -> None:
+    """Its gap is positive wherever it is checked."""
+    alike(HELD, integrator="DOP853", parameters={"push": 13.0}, rtol=1e-2)
+
+
+@pytest.mark.parametrize("scene", [WHEEL, TURNING, "bouncing_two_body"])
+def test_a_run_goes_on_in_either(scene: str) -> None:
+    """What one has begun the other continues, also where a step is to end before a pulse."""
+    whole = eomgen.simulate(scene, t_end=3.0, backend="numpy")
+    for end in (0.99, 1.5):
+        for first, second in (("c", "numpy"), ("numpy", "c")):
+            begun = eomgen.simulate(scene, t_end=end, backend=first)
+            run = eomgen.simulate(scene, t_end=3.0, resume=begun, backend=second)
+            assert run.y[-1].tobytes() == whole.y[-1].tobytes()
+
+
+@pytest.mark.parametrize("scene", [WHEEL, HELD, *some((), built_in_names())])
+def test_works_are_the_same(scene: str, made: list[int]) -> None:
+    """They need states within steps. Powers are computed in C, too."""
+    end = min(ENDS.get(scene, 2.0), 0.5 if scene in built_in_names() else 2.0)
+    compiled, python = both(scene, integrator="DOP853", works=True, t_end=end)
+    assert_same(compiled, python)
+    ours, theirs = compiled.trajectory.works, python.trajectory.works
+    if theirs is None:
+        assert ours is None
+    else:
+        assert ours is not None and ours.tobytes() == theirs.tobytes()
+    assert sum(made) > 0.3 * compiled.trajectory.counts["steps"]
+
+
+@pytest.mark.parametrize("scene", [WHEEL, HELD])
+def test_each_step_is_followed(scene: str) -> None:
+    seen = []
+    for backend in ("c", "numpy"):
+        steps = list[tuple[float, bytes]]()
+
+        def follow(t: float, y: Any, steps: list[tuple[float, bytes]] = steps) -> None:
+            steps.append((t, y.tobytes()))
+
+        run = eomgen.simulate(scene, integrator="DOP853", backend=backend, follow=follow)  # type: ignore[arg-type]
+        assert run.compiled == (backend == "c")
+        seen.append((steps, run.trajectory.events))
+    assert seen[0] == seen[1] and len(seen[0][0]) > 30
+
+
+def test_aims_are_met_by_the_same_runs() -> None:
+    compiled, python = both(WHEEL, accuracy=1e-6, integrator=None)
+    assert compiled.options == python.options and compiled.error == python.error
+    assert_same(compiled, python)
+
+
+@pytest.mark.parametrize(
+    ("scene", "fault"),
+    [
+        (WHEEL, {"far": "0.0"}),
+        (WHEEL, {"together": "2.0"}),
+        (HELD, {"gap_checks": ["0.0", "0.1"]}),
+    ],
+)
+def test_a_check_left_out_is_noticed(
+    scene: str, fault: dict[str, Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+) -> None:
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
+    right = checked.context
+    monkeypatch.setattr(checked, "context", lambda: {**right(), **fault})
+    options: dict[str, Any] = {"rtol": 1e-9}
+    if scene == WHEEL:
+        options = {"rtol": 1e-3, "parameters": {"w": 1e-2}}
+    with pytest.raises(AssertionError):
+        alike(scene, **options)
+
+
+def test_zeros_are_those_of_scipy() -> None:
+    """To the bit, by as many evaluations."""
+    random = np.random.default_rng(5)
+    for case in range(600):
+        powers, (a, b) = random.normal(size=4), sorted(random.uniform(-3, 3, 2).tolist())
+        places: list[float] = []
+
+        def function(x: float, case: int, powers: Any, places: list[float]) -> float:
+            places.append(x)
+            value = float(np.polyval(powers, x))
+            jump = math.copysign(max(abs(value), 0.1), value)
+            return (value, math.sin(3 * value), jump)[case % 3]
+
+        given = partial(function, case=case, powers=powers, places=places)
+        ends = given(a), given(b)
+        if ends[0] * ends[1] < 0:
+            xtol = 10 ** random.uniform(-14, -3)
+            ours = root(given, a, b, ends, xtol=xtol)
+            count = len(places)
+            assert ours == brentq(given, a, b, xtol=xtol)
+            assert places[:count] == places[count:]

@@ -1,0 +1,144 @@
+"""The pages for newcomers are run as they stand, each in a folder of its own."""
+
+import contextlib
+import io
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pages
+import pytest
+
+from eomgen.cli import main
+from eomgen.errors import SceneError
+from eomgen.language.base import Table
+from eomgen.model.elaborate import elaborate
+from eomgen.scene.appearance import appearance_of
+from eomgen.scene.effects import Effect
+from eomgen.scene.joints import Joint
+from eomgen.scene.look import Shape
+from eomgen.scene.reference import TABLES, by_type
+from eomgen.scene.schema import Scene
+
+DOCS = Path(__file__).parent.parent / "docs"
+PAGES = [
+    DOCS / "tutorial.md",
+    *sorted((DOCS / "howto").glob("*.md")),
+    *sorted((DOCS / "concepts").glob("*.md")),
+]
+FILE = re.compile(r"^(?:#|/\*) (append to )?(\S+\.\w+)\b.*\n")
+"""The first line of a block that is a file, or the end of one."""
+
+
+def blocks(text: str) -> list[tuple[str, str]]:
+    """The fenced blocks of a page in order: language and content."""
+    return re.findall(r"^```(\w+)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.usefixtures("blank_figures")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_page_does_what_it_says(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files are written, commands run, and Python prints what it says. Every line of a text block
+    is printed by the commands before it, in order.
+    """
+    monkeypatch.chdir(tmp_path)
+    printed = ""
+    for language, content in blocks(page.read_text("utf-8")):
+        if named := FILE.match(content):
+            path, rest = tmp_path / named[2], content[named.end() :]
+            before = path.read_text("utf-8") + "\n" if named[1] else ""
+            path.write_text(before + rest, "utf-8")
+        elif language == "sh":
+            printed = "".join(command(line) for line in content.splitlines())
+        elif language == "python":
+            assert python(content) == re.findall(r"# prints (.*)", content), content
+        elif language == "text":
+            at = 0
+            for line in filter(str.strip, content.splitlines()):
+                at = printed.find(line, at)
+                assert at >= 0, f"{line!r} is not in:\n{printed}"
+        else:
+            raise AssertionError(f"{page.name}: a block of {language} is not tested")
+
+
+def command(line: str) -> str:
+    """Run a command of a page; return what it prints."""
+    words = shlex.split(line)
+    if words[0] != "eomgen":
+        done = subprocess.run(words, capture_output=True, text=True, check=True)
+        return done.stdout
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        assert main(words[1:]) == 0, line
+    return output.getvalue()
+
+
+def python(content: str) -> list[str]:
+    """Run an example in a process of its own; return the lines that it prints."""
+    done = subprocess.run([sys.executable, "-c", content], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+@pytest.mark.parametrize("name", pages.PAGES)
+def test_pages_made_from_the_program_are_fresh(name: str) -> None:
+    """`python tests/pages.py` writes them."""
+    assert (DOCS / name).read_text("utf-8") == pages.PAGES[name]()
+
+
+def test_pages_are_linked() -> None:
+    """Nothing that a page points to inside the project is missing."""
+    for page in [*DOCS.glob("*.md"), *DOCS.glob("*/*.md")]:
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text("utf-8")):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def tables() -> list[type[Table]]:
+    """The tables of the reference but the whole scene."""
+    groups = [*TABLES.values(), *(t for u in (Joint, Effect, Shape) for t in by_type(u).values())]
+    return [table for table in groups if table is not Scene]
+
+
+@pytest.mark.parametrize("table", tables(), ids=lambda table: table.__name__)
+def test_each_example_of_the_reference_is_part_of_a_scene(table: type[Table]) -> None:
+    """It is read as part of an arm with a hand, in the plane or in space, and elaborated."""
+    found = []
+    for dimensions, inertia, pin in ((2, 0.1, [-0.4, 0]), (3, [0.1, 0.1, 0.1], [-0.4, 0, 0])):
+        try:
+            scene = Scene(**arm_with(tomllib.loads(table.example), dimensions, inertia, pin))
+            assert elaborate(scene) and appearance_of(scene)
+        except SceneError as error:
+            found.append(str(error))
+    assert table.example and len(found) < 2, found
+
+
+def arm_with(
+    example: dict[str, Any], dimensions: int, inertia: Any, pin: list[float]
+) -> dict[str, Any]:
+    """The tables of an arm with a hand, and in it those of an example."""
+    shoulder = {"name": "shoulder", "type": "revolute", "parent": "world", "child": "arm"}
+    elbow = {"name": "elbow", "type": "revolute", "parent": "arm", "child": "hand"}
+    scene: dict[str, Any] = {
+        "name": "example",
+        "dimensions": dimensions,
+        "parameters": {"m": 1.0, "l": 1.0},
+        "bodies": [{"name": name, "mass": 1.0, "inertia_com": inertia} for name in ("arm", "hand")],
+        "joints": [joint | {"r_child": pin} for joint in (shoulder, elbow)],
+    }
+    if isinstance(example.get("bodies"), dict):
+        scene["bodies"][0] |= example.pop("bodies")
+    for key, content in example.items():
+        if not isinstance(content, list) or key not in scene:
+            scene[key] = content
+            continue
+        child = "child" if key == "joints" else "name"
+        new = {table.get(child, "") for table in content}
+        kept = [table for table in scene.get(key, ()) if table[child] not in new]
+        scene[key] = kept + content
+    return scene

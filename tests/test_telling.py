@@ -1,0 +1,377 @@
+"""Derivations as they are told: every scene, its effects, recursions, impacts, state forms."""
+
+import re
+import unicodedata
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from campaign import some
+from effect_cases import CASES, TRIED, Case
+from test_driven import given
+from told import follow_effects, follow_recursion, instant
+
+import eomgen
+from eomgen.cli import main
+from eomgen.dynamics import impulses
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.model.elaborate import elaborate
+from eomgen.model.model import Model
+from eomgen.results import Derivation
+from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
+from eomgen.show.derivation import as_html, as_latex, as_text
+from eomgen.show.prose import blocks, pieces
+from eomgen.show.terms import explained
+from eomgen.telling.derivation import prescribed_motion, tell
+from eomgen.telling.effects import told_effects
+from eomgen.telling.evaluate import array, define, number
+from eomgen.telling.impacts import impact_steps
+from eomgen.telling.reading import dotted
+
+ROUNDING = 1e-9
+SHOWN = some(("two_body_forced", "bouncing_two_body", "furuta_pendulum", "walker_motors"),
+             built_in_names())  # fmt: skip
+
+
+def model_of(scene: str) -> Model:
+    """The model of a built-in scene or of a scene's text."""
+    text = "\n" in scene
+    return elaborate(parse_scene(scene) if text else read_scene(scene))
+
+
+@cache
+def derived(scene: str) -> Derivation:
+    """The derivation of a built-in scene."""
+    return eomgen.derive(scene)
+
+
+def assert_close(ours: Any, theirs: Any, within: float = ROUNDING) -> None:
+    """Vectors, relative to the largest entry."""
+    ours, theirs = np.ravel(ours), np.ravel(theirs)
+    assert ours.shape == theirs.shape
+    size = max(1.0, float(np.max(np.abs(theirs), initial=0.0)))
+    assert float(np.max(np.abs(ours - theirs), initial=0.0)) < within * size
+
+
+@pytest.mark.parametrize("scene", built_in_names())
+def test_the_algorithm_followed_by_hand(scene: str) -> None:
+    """Every equation in its order, from parameters to v̇ and F: what the numeric solver has."""
+    model = model_of(scene)
+    at = instant(model)
+    rates, forces = follow_recursion(model, at.known)
+    assert_close(rates, at.solver.articulated_forward(), 1e-7)  # light bodies on heavy ones
+    assert_close(forces, at.solver.applied_force)
+
+
+@pytest.mark.parametrize("case", TRIED[:: some(3, 1)], ids=lambda case: case.name)
+def test_each_effect_by_its_formulas(case: Case) -> None:
+    """Every type and key: forces and the rates of its states, by the formulas that are told."""
+    model = model_of(case.text())
+    at = instant(model)
+    rates, forces = follow_recursion(model, at.known)
+    assert_close(forces, at.solver.applied_force)
+    assert_close(rates, at.solver.articulated_forward())
+    states = [at.known[dotted(x.name, "dot")] for x in model.states]
+    assert_close(states, at.solver.state_rates)
+
+
+@pytest.mark.parametrize("seed", range(some(4, 30)))
+def test_driven_and_locked_joints(seed: int) -> None:
+    """Trees of any joints: what is prescribed is a motion, not an unknown."""
+    model = model_of(given(2 + seed % 2, seed, 6).text)
+    for still in ((), ("velocity_forces",)):
+        left = replace(model, leave_out=still)
+        at = instant(left, seed)
+        for line in prescribed_motion(left):
+            assert_close(number(line.right, at.known), at.known[line.left.name])
+        rates, _ = follow_recursion(left, at.known)
+        assert_close(rates, at.solver.articulated_forward())
+
+
+CLOSED = """\
+name = "closed"
+[[bodies]]
+name = "a"
+mass = 1.1
+inertia_com = 0.3
+[[bodies]]
+name = "b"
+mass = 0.7
+inertia_com = 0.12
+[[joints]]
+name = "root"
+type = "free"
+child = "a"
+[[joints]]
+name = "hinge"
+type = "{}"
+parent = "a"
+child = "b"
+r_parent = [0.3, 0.1]
+r_child = [-0.2, 0.05]
+coordinate = "c"
+{}
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "spring"
+name = "tie"
+body_1 = "world"
+body_2 = "b"
+at_2 = [0.1, 0.2]
+stiffness = 40.0
+damping = 2.0
+rest_length = 0.3
+[[effects]]
+type = "drag"
+name = "air"
+bodies = "all"
+quadratic = 0.4
+turning_linear = 0.1
+[[effects]]
+type = "pid"
+name = "servo"
+joint = "hinge"
+target = "0.3*sin(t)"
+stiffness = 8.0
+integral_gain = 2.0
+limit = 3.0
+lag = 0.1
+[[effects]]
+type = "contact"
+name = "floor"
+law = "hunt_crossley"
+bodies = "all"
+radius = 0.4
+offset = -0.1
+stiffness = 300.0
+dissipation = 0.2
+friction = 0.4
+slip_speed = 0.1
+"""
+
+
+TOP = """
+[[effects]]
+type = "drag"
+name = "air"
+body = "top"
+at = [0.1, 0.0, 0.2]
+linear = 0.3
+turning_linear = 0.2
+turning_quadratic = 0.1
+"""
+BY = {
+    "the handout's steps": CLOSED.format("revolute", ""),
+    "Kane's method": CLOSED.format("prismatic", "axis = [0.6, 0.8]"),
+    "Kane's method in space": (BUILT_IN / "spinning_top.toml").read_text("utf-8") + TOP,
+}
+
+
+@pytest.mark.parametrize("by", BY)
+def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
+    """M v̇ + V + G = F and its solution, F written out."""
+    model = model_of(BY[by])
+    told, at = tell(model), instant(model)
+    bare = tell(replace(model, effects=model.effects[:1], states=()))
+    found, other = told.matrices, bare.matrices
+    assert found is not None and other is not None
+    for letter in "MVG":
+        assert getattr(found, letter) == getattr(other, letter)
+    define(found.definitions, at.known)
+    want = at.solver.articulated_forward()
+    assert_close([at.known[a.name] for a in found.a], want)
+    M, V, G, F = (array(x, at.known) for x in (found.M, found.V, found.G, found.F))
+    assert_close(F, at.solver.applied_force)
+    assert_close(M @ np.array(want) + (V + G - F).ravel(), np.zeros(len(want)))
+
+
+@pytest.mark.parametrize("form", ["redundant", "momentum", "velocity"])
+@pytest.mark.parametrize("scene", ["two_body", "two_body_forced"])
+def test_the_derivative_of_a_state_form(scene: str, form: Any) -> None:
+    """Ẏ as it is written out is the module's `derivative` in this form: 12 numbers, 8, [q, v]."""
+    module: Any = eomgen.load(eomgen.generate(scene, form=form))
+    last = tell(model_of(scene), form).steps[-1]
+    first, second, *lines = last.equations
+    assert len(first.right) == {"redundant": 12, "momentum": 8, "velocity": 8}[form]
+    rng = np.random.default_rng(5)
+    y = rng.uniform(-1.0, 1.0, len(module.STATES))
+    u = {name: float(rng.uniform(-2.0, 2.0)) for name in module.INPUTS}
+    if form == "redundant":  # the joint holds
+        y = np.array(module.initial_state())
+    known = {**module.PARAMETERS, **u}
+    known |= {s.name: float(x) for s, x in zip(first.right, y, strict=True)}
+    rates = {line.left.name: line.right for line in lines}
+
+    def value(name: str) -> float:
+        if name not in known:
+            for symbol in rates[name].free_symbols:
+                value(symbol.name)
+            known[name] = number(rates[name], known)
+        return float(known[name])
+
+    found = [value(symbol.name) for symbol in second.right]
+    assert_close(found, module.derivative(0.3, y, None, u), 1e-12)
+
+
+def test_from_the_handouts_m_to_the_symmetric_one() -> None:
+    """T M is symmetric, and the page says so; T has an inverse."""
+    steps = derived("two_body_forced").steps
+    by_name = {str(e.left): e.right for step in steps for e in step.equations}
+    rng = np.random.default_rng(9)
+    symbols = {x for name in ("T", "M", "V", "G", "F") for x in by_name[name].free_symbols}
+    known = {name: float(rng.uniform(0.5, 2.0)) for name in sorted(x.name for x in symbols)}
+    T, M, whole = (array(by_name[name], known) for name in ("T", "M", "M_sym"))
+    assert_close(T @ M, whole)
+    assert_close(whole, whole.T)
+    assert np.max(np.abs(M - M.T)) > 0.1 and abs(np.linalg.det(T)) > 0.9
+    for letter in "VGF":
+        assert_close(T @ array(by_name[letter], known), array(by_name[f"{letter}_sym"], known))
+    words = " ".join(step.words for step in steps)
+    assert "`mass_matrix()`" in words and "not symmetric" in words
+
+
+def test_the_impulse_equations() -> None:
+    """Gap, opening speed and slip of each contact, against the solver's rows."""
+    model = model_of("bouncing_two_body")
+    at = instant(model)
+    told = told_effects(model)
+    follow_effects(model, told, at.known)
+    steps = list(impact_steps(model, told))
+    assert len(steps) == 4 and {"v^+", "P_II"} <= {e.left.name for e in steps[0].equations}
+    solver: Dynamics = at.solver
+    for step, contact in zip(steps[1:], solver.contacts, strict=True):
+        define(((e.left, e.right) for e in step.equations), at.known)
+        name = contact.name
+        assert_close(at.known[f"g_{name}"], contact.gap)
+        assert_close(at.known[f"u_{name},n"], solver.power_of(contact.normal))
+        (tangent,) = contact.tangents
+        assert_close(at.known[f"u_{name},t"], solver.power_of(tangent))
+        row = impulses.generalised(solver, contact.normal)
+        assert_close(at.known[f"u_{name},n"], np.dot(row, solver.v))
+
+
+@pytest.mark.parametrize("scene", SHOWN)
+def test_three_formats(scene: str) -> None:
+    """No refusal. In prose no markup, in formulas no hyphen for a minus, in LaTeX plain ASCII."""
+    found = derived(scene)
+    long = len(found.steps) > 40
+    steps = tuple(s for i, s in enumerate(found.steps) if s.figure or not long or i % 5 == 1)
+    page, paper = (
+        write(found.model, steps, found.telling.effects) for write in (as_html, as_latex)
+    )
+    text = as_text(found.model, steps)
+    assert paper.isascii()
+    formulas = [line for line in text.splitlines() if line.startswith("    ")]
+    assert formulas and not any("-" in line for line in formulas)
+    for step in found.steps:
+        for kind, words in (p for b in blocks(step.words) for item in b.items for p in item):
+            assert kind != "word" or not re.search(r"[`_^]", words), words
+    for formula in re.findall(r"<math.*?</math>", page):
+        tree = ElementTree.fromstring(formula)
+        assert "-" not in "".join(tree.itertext())
+    drawings = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    assert len(drawings) == 1 + len(found.model.bodies)
+    for drawing in drawings:
+        ElementTree.fromstring(drawing)
+    assert paper.count(r"\begin{tikzpicture}") == len(drawings)
+    assert "src=" not in page and not re.search(r'href="[^#]', page)
+    assert "nan" not in page and "zoo" not in page
+
+
+def test_no_character_is_lost_on_paper() -> None:
+    """Descriptions of all effects have LaTeX for every letter: a question mark would be a loss."""
+    for case in CASES[:: some(4, 1)]:
+        model = model_of(case.text())
+        for told in told_effects(model):
+            paper = as_latex(model, (tell_words(told.words),), ())
+            assert "?" not in paper, told.effect.type
+
+
+def tell_words(words: str) -> Any:
+    """A step of words alone."""
+    from eomgen.derivation.steps import Step
+
+    return Step("", "", words, ())
+
+
+def test_forces_in_sketches_have_the_names_of_the_equations() -> None:
+    """Weights, joint forces, external forces, the motor's torque on both bodies."""
+    page = derived("two_body_forced").html()
+    drawings = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
+    texts = [
+        re.sub("<title>.*?</title>|<[^>]*>|\u200b", "", d.replace("</text>", "|")) for d in drawings
+    ]
+    assert {"rhinge, parent", "rhinge, child", "θ", "φ"} <= set(labels(texts[0]))
+    assert {"g\u2009mA", "fhinge", "fA", "−τ"} <= set(labels(texts[1]))
+    assert {"g\u2009mB", "−fhinge", "fB", "τ"} <= set(labels(texts[2]))
+
+
+def labels(text: str) -> list[str]:
+    """The labels of a drawing."""
+    return [part.strip() for part in text.split("|")]
+
+
+def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`derive --form`, and what has no such state."""
+    assert main(["derive", "bouncing_two_body", "--form", "redundant"]) == 0
+    end = capsys.readouterr().out.split("State form redundant")[1]
+    assert "12 numbers" in end and "Ṗ_A,x = f_hinge,x" in end and "L̇_B" in end
+    assert main(["derive", "furuta_pendulum", "--form", "momentum"]) == 1
+    assert "derived in the plane; use velocity" in capsys.readouterr().err
+
+
+def test_large_mechanisms_have_steps_and_no_matrices() -> None:
+    found = derived("human_figure")
+    assert len(found.steps) > 30
+    with pytest.raises(eomgen.SceneError, match="too long to be written out"):
+        _ = found.M
+
+
+def test_words() -> None:
+    """Names in prose are formulas, minus signs are minus signs, ranges have dashes."""
+    assert pieces("The force f_j, -f_j at `r_a`, d^1.5 (29)-(34), a - b") == (
+        ("word", "The force "), ("name", "f_j"), ("word", ", −"), ("name", "f_j"),
+        ("word", " at "), ("code", "r_a"), ("word", ", d"), ("power", "1.5"),
+        ("word", " (29)–(34), a − b"),
+    )  # fmt: skip
+
+
+def test_the_handouts_equations_stand_where_the_table_says() -> None:
+    """(1) to (36), each in its step of `derive two_body`, or `two_body_forced` from (29) on."""
+    page = (Path(__file__).parent.parent / "docs" / "derivation.md").read_text("utf-8")
+    rows = re.findall(r"^\| \((\d+)\) \| .* \| (\([^|]*) \| (`.*) \|$", page, re.MULTILINE)
+    assert [int(number) for number, _, _ in rows] == list(range(1, 37))
+    for scene, some_rows in (("two_body", rows[:28]), ("two_body_forced", rows[28:])):
+        text = derived(scene).text()
+        sections = re.split(r"^(\([\d., ()-]*\)) ", text, flags=re.MULTILINE)
+        by_number = dict(zip(sections[1::2], sections[2::2], strict=True))
+        for equation, step, lines in some_rows:
+            for line in re.findall(r"`([^`]*)`", unicodedata.normalize("NFC", lines)):
+                assert line in by_number[step], f"({equation}): {line}"
+
+
+def test_each_line_of_code_names_its_term(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every assignment of every kernel, and what it is or is part of; the same in `--explain`."""
+    source = eomgen.generate("two_body").source
+    lines = list(explained(source))
+    assert len(lines) == len(
+        re.findall(r"^    (?!.*\bk = |.* = [ky]$)[\w]+ = ", kernels(source), re.M)
+    )
+    terms = {(line.kernel, line.line.split(" = ")[0]): line.term for line in lines}
+    assert terms["derivative", "alpha_A"] == "angular acceleration α of A"
+    assert terms["derivative", "coupling_B_A"].startswith("coupling of B A: c of the closed form")
+    assert terms["fixed", "pivot_B"].startswith("pivot of B: d of the closed form (37)")
+    assert "M_1,3" in " ".join(t for (kernel, _), t in terms.items() if kernel == "mass_matrix")
+    assert all(term and "part of ;" not in term for term in terms.values())
+
+
+def kernels(source: str) -> str:
+    """The kernels of a generated module, without what checks its arguments."""
+    fixed, rest = source[source.index("def _fixed") :].split("def _constants(")
+    return fixed + rest[rest.index("def _initial_state") : rest.index("def _numbers")]
