@@ -113,6 +113,11 @@ def plan_run(
     setting = None
     if not aims:
         setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
+    if varying is not None and setting and setting.integrator in ("taylor", "heyoka"):
+        raise RunError(
+            f"{reporter.argument('inputs')}: Taylor series need constant inputs or formulas of t; "
+            "take --integrator DOP853 for tables and functions of time"
+        )
     if unstable:
         _check_unstable(setting, reporter)
     works = works or "works" in save

@@ -144,8 +144,6 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     problem, model = _problem(plan, model, functions, values, reporter)
     accelerator = _accelerator(plan, functions, values, reporter)
     made = accelerator.of if accelerator else without_compiler(model, functions, values)
-    if plan.varying:  # functions of time have no series
-        made = _unchanged
     problem = made(problem)
     began, start = problem.initial, _start(plan, problem)
     if start is not None:
@@ -195,10 +193,6 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         begun=start.reported(trajectory) if start else "",
         compiled=accelerator is not None and accelerator.used,
     )
-
-
-def _unchanged(problem: Problem, other: Any = None) -> Problem:
-    return problem
 
 
 def _error_of_choice(choice: "Choice | None") -> tuple[float, list[str]]:

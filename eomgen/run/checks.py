@@ -125,8 +125,7 @@ def check_series(problem: Problem, integrator: str, series: str) -> None:
     """Raise `RunError` if a problem does not have the Taylor series that a method needs."""
     if series not in problem.series:
         raise RunError(
-            f"integrator: {integrator} serves single runs of scenes, with inputs that are constant "
-            "or formulas; take --integrator DOP853"
+            f"integrator: {integrator} serves single runs of scenes; take --integrator DOP853"
         )
     problem.series[series]()
 
