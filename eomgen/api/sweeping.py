@@ -20,7 +20,13 @@ from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
 from eomgen.program.program import Program
-from eomgen.run.checks import check_samples, check_steps
+from eomgen.run.checks import (
+    check_no_step,
+    check_samples,
+    check_steps,
+    check_tolerances,
+    longest_steps,
+)
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.fixed_step import count_steps
 from eomgen.run.problem import FloatArray
@@ -89,8 +95,9 @@ def ensemble(
     parameters, inputs  values that all members have
     outputs     functions of the module to compute: "kinetic_energy" for example
     samples     number of rows that are kept, about; 2 keeps the ends alone
-    backend     "numpy": make all steps in Python; "c": those of DOP853 in C; "auto": if that pays
-    workers     number of processes. With more than one, a script needs `if __name__ == "__main__":`
+    backend     "numpy": run in Python; "c": compile at once; "auto": compile if that pays
+    workers     number of processes, or threads if members run together in compiled code. With more
+                than one, a script needs `if __name__ == "__main__":`
     scheduler   address of a Dask scheduler whose workers run the members
     folder      keeps what has run, so that the same call goes on after it was stopped
 
@@ -247,6 +254,10 @@ def _times(plan: SweepPlan) -> tuple[tuple[float, ...], float, int]:
     """
     method = find_integrator(plan.setting.integrator)
     if not isinstance(method, FixedStep):
+        check_no_step(plan.setting.integrator, plan.setting.dt)
+        assert plan.setting.rtol is not None
+        check_tolerances(method, plan.setting.rtol, plan.setting.atol)
+        longest_steps(plan.max_step, plan.t_end)
         return tuple(np.linspace(0.0, plan.t_end, plan.samples).tolist()), 0.0, 1
     given = (plan.setting.integrator, plan.t_end, plan.setting.dt, plan.samples, MOST_STEPS)
     dt, every = check_steps(*given)
