@@ -37,13 +37,19 @@ def chain_of_pinocchio(
     return model
 
 
-def paired(rounds: int, *calls: Callable[[], object]) -> np.ndarray:
-    """Times of calls, (rounds, calls), s, by turns."""
+def paired(rounds: int, *calls: Callable[[], object], warm: bool = False) -> np.ndarray:
+    """Times of calls, (rounds, calls), s, by turns.
+
+    warm  whether each is made twice and the second is timed, so that none pays for the data that
+          the one before has put into the caches
+    """
     times = np.empty((rounds, len(calls)))
     for call in calls:
         call()
     for row in times:
         for j, call in enumerate(calls):
+            if warm:
+                call()
             start = time.perf_counter()
             call()
             row[j] = time.perf_counter() - start

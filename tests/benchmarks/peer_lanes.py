@@ -157,7 +157,7 @@ def table(
             except ImportError:
                 continue
             assert np.abs(theirs - found).max() < 1e-9 * np.abs(found).max()
-        times = dict(zip(calls, paired(rounds, *calls.values()).T, strict=True))
+        times = dict(zip(calls, paired(rounds, *calls.values(), warm=True).T, strict=True))
         words = [f"{np.min(times['ours']) / COLUMNS * 1e6:.3g}"]
         for peer in ("Pinocchio", *peers):
             if peer in times:
