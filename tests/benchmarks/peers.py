@@ -293,7 +293,7 @@ def runs(rounds: int) -> None:
         for most in ERRORS:
             methods = (case.by_taylor, case.by_c, case.by_heyoka, case.by_scipy)
             calls = [case.loosest(method, most) for method in methods]
-            columns = iter(paired(rounds, *(call for call in calls if call)).T)
+            columns = iter(paired(rounds, *(call for call in calls if call), warm=True).T)
             times = [next(columns) if call else None for call in calls]
             row(
                 case.name,
