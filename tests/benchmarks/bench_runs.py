@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
+from scipy.integrate import DOP853 as ScipyDOP853
 
 import eomgen
 from eomgen.api.given import check, read
 from eomgen.native.accelerator import Accelerator
 from eomgen.run.integrate import integrate
+from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.module import as_problem
 from eomgen.run.problem import Problem
 
@@ -138,3 +140,19 @@ def test_stiff(benchmark: BenchmarkFixture, scene: str, method: str, backend: st
     given = (problem, method, LENGTHS[scene])
     run = benchmark.pedantic(integrate, given, options, rounds=3, warmup_rounds=1)
     assert run.finished
+
+
+@pytest.mark.benchmark(group="DOP853 in Python")
+@pytest.mark.parametrize("solver", ["eomgen", "SciPy"])
+@pytest.mark.parametrize("name", ["double_pendulum", "two_body"])
+def test_dop853_in_python(benchmark: BenchmarkFixture, name: str, solver: str) -> None:
+    """The loop of DOP853 over the NumPy module: ours, and SciPy's."""
+    module = eomgen.load(eomgen.generate(name))
+    kind = {"eomgen": DormandPrince8, "SciPy": ScipyDOP853}[solver]
+
+    def run() -> None:
+        steps = kind(module.derivative, 0.0, module.initial_state(), 10.0, rtol=1e-9, atol=1e-12)
+        while steps.status == "running":
+            steps.step()
+
+    benchmark(run)

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from eomgen.run.integrators import dop853_written_out as written_out
 from eomgen.run.integrators.dop853_coefficients import (
     DENSE,
     DENSE_STAGES,
@@ -53,6 +54,8 @@ TOO_SHORT = "Required step size is less than spacing between numbers."
 _ADDED = tuple(
     np.ascontiguousarray(MATRIX[(j + 1 if j < 12 else j + 3) :, j, None]) for j in range(SLOPES)
 )
+
+_TERMS = written_out.terms_of((*SUMS[1:12], *SUMS[AT_END : SHORT_ERROR + 1]))
 
 
 class DormandPrince8:
@@ -98,6 +101,8 @@ class DormandPrince8:
             (slope, factors, products[-len(factors) :], self._sums[-len(factors) :])
             for slope, factors in zip(self._slopes, _ADDED, strict=True)
         ]
+        few = 0 < len(y0) <= written_out.MOST
+        self._written = written_out.written_out(len(y0), _TERMS) if few else None
         self._step = (0.0, y0)
         self._dense: Callable[[FloatArray | float], FloatArray] | None = None
 
@@ -133,6 +138,11 @@ class DormandPrince8:
     def _attempt(self, t: float, y: FloatArray, h: float) -> FloatArray:
         """Compute slopes 0 to 11 of a step and the sums over them; returns the change of y."""
         sums = self._sums
+        if self._written:
+            later, end, long, short = self._written(self.fun, t, h, y.tolist(), self.f.tolist())
+            self._first = [self.f, *later]
+            sums[LONG_ERROR], sums[SHORT_ERROR] = long, short
+            return np.asarray(h * np.array(end))
         sums.fill(0.0)
         self._add(0, self.f)
         for i in range(1, 12):
@@ -165,6 +175,10 @@ class DormandPrince8:
     def _interpolant(self) -> Callable[[FloatArray | float], FloatArray]:
         h, y = self._step
         start, sums = self.t_old, self._sums
+        if self._written:
+            sums.fill(0.0)
+            for j, slope in enumerate(self._first):
+                self._add(j, slope)
         self._add(12, self.f)
         for i in range(13, SLOPES):
             row = AT_DENSE + i - 13
