@@ -35,6 +35,7 @@ def example_of(command: str) -> str | None:
 
 
 def path(text: str) -> Path:
+    """An argument that is a path; its name has no control characters."""
     if breaks_lines(text):
         raise argparse.ArgumentTypeError(f"{text} has a control character in its name")
     return Path(text)

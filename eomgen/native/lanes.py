@@ -62,6 +62,8 @@ def width() -> int:
 
 
 class Columns(ctypes.Structure):
+    """Numbers that are one for all members, or one for each (`many`)."""
+
     _fields_ = (("values", _POINTER), ("many", _LONG))
 
 

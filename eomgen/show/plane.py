@@ -122,6 +122,7 @@ def _turned(points: Array, angle: float) -> Array:
 
 
 def draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: int) -> None:
+    """Draw the bodies at one pose (nb, 3), with a share of ink from 0 to 1."""
     paper = motion.camera.background
     edge = mixed(paper, ink_on(paper), strength)
     for (x, y, angle), shapes in zip(pose, motion.shapes, strict=True):

@@ -159,6 +159,7 @@ class Fit:
 
 
 def skeleton(shape: Shape, at: Any) -> Iterator[Item]:
+    """Lines from a body's centre of mass to its joints; `at` gives positions in the drawing."""
     ends = [p for p in shape.joints if apart(at(p), at(shape.centre)) > 2]
     for end in ends:
         yield Line((at(shape.centre), at(end)), "body")
@@ -263,6 +264,7 @@ def numbers(model: Model, at: Sequence[Expr]) -> tuple[float, ...]:
 
 
 def apart(a: Point, b: Point) -> float:
+    """The distance of two points of a drawing."""
     return math.hypot(a[0] - b[0], a[1] - b[1])
 
 
