@@ -19,7 +19,9 @@ from paired import COLUMNS, chain, paired, row
 from peers import compiled_columns, library
 
 from eomgen.pipeline import generate
+from eomgen.run.module import load_module
 from eomgen.show.style import PALETTE, style, write_figure
+from eomgen.store import generated_code
 
 LINKS = (2, 5, 10, 20, 50, 100, 200, 400)
 NAMES = ("operations", "generation, s", "compilation, s", "call, µs")
@@ -31,7 +33,8 @@ def measured(count: int) -> tuple[float, float, float, float]:
     start = time.perf_counter()
     generate(model, jacobian=False)
     generation = time.perf_counter() - start
-    module, made, compilation = library(model)
+    module = load_module(generated_code(model).module, model.name)
+    made, compilation = library(model, False)
     y = np.random.default_rng(1).uniform(-0.1, 0.1, (len(module.STATES), COLUMNS))
     call, _ = compiled_columns(module, made, y)
     seconds = float(np.median(paired(5, call))) / COLUMNS
