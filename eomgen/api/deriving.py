@@ -13,7 +13,7 @@ def derive(source: Source, *, form: Form | None = None) -> Derivation:
     form  "velocity" for [q, v], "momentum" or "redundant" for the handout's states; by default the
           scene's. Trees of pins and free bodies in the plane have all three.
 
-    Small mechanisms have their equations and solution as SymPy matrices. Larger ones are told as
+    Small mechanisms have their equations and solution as SymPy matrices. Larger ones are derived as
     the articulated-body algorithm with their own bodies and joints. Raises `SceneError` for a form
     that the mechanism does not have.
     """

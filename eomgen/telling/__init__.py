@@ -1,1 +1,1 @@
-"""Derivations to be read: effects, recursions, impacts and state forms, told over symbols."""
+"""Derivations to be read: effects, recursions, impacts and state forms, shown over symbols."""
