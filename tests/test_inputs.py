@@ -130,6 +130,8 @@ def test_what_is_wrong_with_inputs_and_states_is_said(
     for other in ({"accuracy": 1e-6}, {"estimate": True}, {"guard": "stop"}, {"backend": "c"}):
         with pytest.raises(eomgen.RunError, match="with tables and functions of time"):
             eomgen.simulate(CART, inputs={"push": math.sin}, **other)
+    with pytest.raises(eomgen.RunError, match="inputs: Taylor series need constant inputs"):
+        eomgen.simulate(CART, inputs={"push": math.sin}, integrator="taylor")
 
 
 def test_a_run_from_another_state_is_not_continued_as_if_it_were_the_scenes(

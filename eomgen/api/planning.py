@@ -113,7 +113,7 @@ def plan_run(
     setting = None
     if not aims:
         setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
-    if varying is not None and setting and setting.integrator in ("taylor", "heyoka"):
+    if varying is not None and setting and _takes_series(setting.integrator):
         raise RunError(
             f"{reporter.argument('inputs')}: Taylor series need constant inputs or formulas of t; "
             "take --integrator DOP853 for tables and functions of time"
@@ -168,6 +168,14 @@ def _check_aims(
             f"{reporter.argument('resume')}: continues with a given method; leave "
             f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
         )
+
+
+def _takes_series(integrator: str) -> bool:
+    """Whether a method makes its steps by Taylor series."""
+    from eomgen.run.integrators import Adaptive, find_integrator
+
+    method = find_integrator(integrator)
+    return isinstance(method, Adaptive) and bool(method.series)
 
 
 def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:

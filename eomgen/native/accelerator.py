@@ -121,10 +121,7 @@ class Accelerator:
 
     def function(self, name: str, python: functions.Value) -> functions.Value:
         """An output as a function of time and state, which is compiled once that pays."""
-        compilable = functions.Compilable(
-            self._module, self._values, False, self._look, self._start
-        )
-        return compilable.function(name, python)
+        return self._compilable(self._module, None).function(name, python)
 
     def of(self, problem: Problem, module: Any = None) -> Problem:
         """The problem of the module, or of one with other constants, with its compiled steps and
@@ -184,8 +181,7 @@ class Accelerator:
 
     def powers(self, powers: Powers) -> Powers:
         """The same powers, which are compiled once that pays."""
-        compilable = self._compilable(self._module, None)
-        return replace(powers, powers=compilable.function("effect_powers", powers.powers))
+        return replace(powers, powers=self.function("effect_powers", powers.powers))
 
     def compile(self) -> None:
         """Compile the steps now, unless they are in the store, and each function at its first call.
