@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from eomgen.derivation.matrices import Matrices
     from eomgen.derivation.steps import Step
     from eomgen.derivation.symbols import Expr
+    from eomgen.exposition.derivation import Exposition
     from eomgen.program.passes import PassReport
     from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
-    from eomgen.telling.derivation import Telling
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Derivation:
     """
 
     model: Model
-    telling: "Telling"
+    exposition: "Exposition"
 
     @property
     def name(self) -> str:
@@ -52,12 +52,12 @@ class Derivation:
     @property
     def matrices(self) -> "Matrices":
         """The equations as matrices. Raises `SceneError` if they are too long to be written out."""
-        if self.telling.matrices is None:
+        if self.exposition.matrices is None:
             raise SceneError(
                 f"derive: M, V, G and F of {self.name} are too long to be written out; its steps "
                 "tell the algorithm, and the generated module computes them"
             )
-        return self.telling.matrices
+        return self.exposition.matrices
 
     @property
     def M(self) -> "Expr":
@@ -90,7 +90,7 @@ class Derivation:
     @property
     def steps(self) -> "tuple[Step, ...]":
         """The steps of the derivation, with number, title, explanation and equations."""
-        return self.telling.steps
+        return self.exposition.steps
 
     def text(self, *, encoding: str = "utf-8") -> str:
         """All steps as plain text, in ASCII if the encoding lacks Greek letters."""
@@ -102,18 +102,18 @@ class Derivation:
         """All steps as one LaTeX document."""
         from eomgen.show.derivation import as_latex
 
-        return as_latex(self.model, self.steps, self.telling.effects)
+        return as_latex(self.model, self.steps, self.exposition.effects)
 
     def html(self) -> str:
         """All steps as one HTML page."""
         from eomgen.show.derivation import as_html
 
-        return as_html(self.model, self.steps, self.telling.effects)
+        return as_html(self.model, self.steps, self.exposition.effects)
 
     def _repr_latex_(self) -> str:
         import sympy as sp
 
-        if self.telling.matrices is None:
+        if self.exposition.matrices is None:
             steps = f"M v̇ + V + G = F in {len(self.steps)} steps"
             return f"$\\text{{{steps}}}$"
         found = self.matrices

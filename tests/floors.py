@@ -28,7 +28,7 @@ FLOORS = (
     "model",
     "derivation",
     "dynamics",
-    "telling",
+    "exposition",
     "templating",
     "program",
     "codegen",

@@ -24,8 +24,8 @@ def derivation_of(
     model: Model, reporter: Reporter = SILENT, *, form: Form | None = None
 ) -> Derivation:
     """The derivation of a model. Raises `SceneError` as `derive` does."""
-    from eomgen.telling.derivation import tell  # imports SymPy
+    from eomgen.exposition.derivation import exposition_of  # imports SymPy
 
     with reporter.located(), reporter.waiting(f"deriving {model.name} …"):
         checked(model)
-        return Derivation(model, tell(model, form))
+        return Derivation(model, exposition_of(model, form))

@@ -6,13 +6,13 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.exposition.effects import DerivedEffect
+from eomgen.exposition.reading import read, reading_names
 from eomgen.model.model import Model
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
 from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, numbers, skeleton
-from eomgen.telling.effects import ToldEffect
-from eomgen.telling.reading import read, reading_names
 
 Expr = Any
 PANEL, PANEL_BODY = 230.0, 92.0
@@ -25,13 +25,13 @@ ROW = 15.0
 """Height of a line of the list of numbered loads."""
 
 
-def body_diagrams(model: Model, effects: Sequence[ToldEffect]) -> tuple[Drawing, ...]:
+def body_diagrams(model: Model, effects: Sequence[DerivedEffect]) -> tuple[Drawing, ...]:
     """The free-body diagram of each body: every force with its name in the equations."""
     pose = Pose(model)
     return tuple(_diagram(pose, shape, effects) for shape in pose.shapes(effects))
 
 
-def _diagram(pose: Pose, shape: Shape, effects: Sequence[ToldEffect]) -> Drawing:
+def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Drawing:
     model, body = pose.model, shape.body
     names = reading_names(model)
     found = [
@@ -148,7 +148,7 @@ def _unknown(joint: str, sign: int) -> Point:
 
 
 def _loads_on(
-    pose: Pose, shape: Shape, told: ToldEffect
+    pose: Pose, shape: Shape, told: DerivedEffect
 ) -> Iterator[tuple[Point, Point | None, Expr, str]]:
     """Start, direction (None for a torque), name and style of each load of an effect on a body."""
     model, body = pose.model, shape.body
@@ -180,7 +180,7 @@ def _loads_on(
 
 
 def _one_load(
-    pose: Pose, load: Load, told: ToldEffect
+    pose: Pose, load: Load, told: DerivedEffect
 ) -> Iterator[tuple[Point, Point | None, Expr, str]]:
     start = pose.point(load.body, numbers(pose.model, load.at))
     if any(load.force):
@@ -191,7 +191,7 @@ def _one_load(
         yield start, None, sp.Symbol(name), "force"
 
 
-def _joint_name(load: JointLoad, told: ToldEffect) -> Expr:
+def _joint_name(load: JointLoad, told: DerivedEffect) -> Expr:
     """The name of a load at a joint; the components of a torque at a ball share one."""
     several = [x for x in told.loads if isinstance(x, JointLoad) and x.joint == load.joint]
     if load.force.is_Symbol and len(several) == 1:

@@ -11,6 +11,7 @@ import sympy as sp
 from markupsafe import Markup
 
 from eomgen.derivation.steps import Equation, Step
+from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Model
 from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.drawing import Drawing, svg, tikz, tikz_colours
@@ -20,7 +21,6 @@ from eomgen.show.plain import PlainPrinter, minus_signs, printer
 from eomgen.show.prose import blocks, joined, pieces, signs
 from eomgen.show.sketches import mechanism_sketch
 from eomgen.show.tex import escaped, tex, tex_symbol
-from eomgen.telling.effects import ToldEffect
 from eomgen.templating import render
 
 WIDTH = 100
@@ -115,14 +115,14 @@ def _width(text: str) -> int:
     return max(len(line) for line in text.splitlines())
 
 
-def _figures(model: Model, effects: Sequence[ToldEffect]) -> Figures:
+def _figures(model: Model, effects: Sequence[DerivedEffect]) -> Figures:
     return {
         "mechanism": (mechanism_sketch(model, effects),),
         "bodies": body_diagrams(model, effects),
     }
 
 
-def as_latex(model: Model, steps: tuple[Step, ...], effects: Sequence[ToldEffect]) -> str:
+def as_latex(model: Model, steps: tuple[Step, ...], effects: Sequence[DerivedEffect]) -> str:
     """All steps as one LaTeX document, ready for `pdflatex`."""
     drawn = _figures(model, effects)
     sections = [
@@ -229,7 +229,7 @@ def _broken(e: Any, indent: float) -> Iterator[str]:
     yield line
 
 
-def as_html(model: Model, steps: tuple[Step, ...], effects: Sequence[ToldEffect]) -> str:
+def as_html(model: Model, steps: tuple[Step, ...], effects: Sequence[DerivedEffect]) -> str:
     """All steps as one HTML page with MathML and SVG, which browsers draw themselves."""
     drawn = _figures(model, effects)
     sections = [

@@ -10,8 +10,8 @@ from typing import Any
 import sympy as sp
 from sympy.simplify.radsimp import fraction
 
+from eomgen.exposition.spatial import ForceCross, MotionCross
 from eomgen.show.notation import parsed
-from eomgen.telling.spatial import ForceCross, MotionCross
 
 Expr = Any
 SUM, PRODUCT, POWER, ATOM = range(4)

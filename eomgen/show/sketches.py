@@ -11,12 +11,12 @@ from typing import Any
 import sympy as sp
 
 from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Body, Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import Load
 from eomgen.scene.joints import Free
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point
-from eomgen.telling.effects import ToldEffect
 
 Expr = Any
 OBLIQUE = 0.5
@@ -76,7 +76,7 @@ class Pose:
         """A point of a body on the paper."""
         return self.flat(self.state.position(body, tuple(at)))
 
-    def shapes(self, effects: Sequence[ToldEffect]) -> tuple[Shape, ...]:
+    def shapes(self, effects: Sequence[DerivedEffect]) -> tuple[Shape, ...]:
         """All bodies."""
         model, n = self.model, self.model.dimensions
         found = []
@@ -103,7 +103,7 @@ class Pose:
         return tuple(self.model.value(part) for part in parts)
 
 
-def _loads_at(body: str, effects: Sequence[ToldEffect]) -> Iterator[Load]:
+def _loads_at(body: str, effects: Sequence[DerivedEffect]) -> Iterator[Load]:
     """The loads on a body, and those of unit impulses of its rigid contacts."""
     for told in effects:
         contacts = (load for contact in told.contacts for load in contact.normal)
@@ -112,7 +112,7 @@ def _loads_at(body: str, effects: Sequence[ToldEffect]) -> Iterator[Load]:
                 yield load
 
 
-def mechanism_sketch(model: Model, effects: Sequence[ToldEffect]) -> Drawing:
+def mechanism_sketch(model: Model, effects: Sequence[DerivedEffect]) -> Drawing:
     """The mechanism with its frames, arms and angles."""
     pose = Pose(model)
     shapes = pose.shapes(effects)

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.exposition.derivation import used_bodies
+from eomgen.exposition.effects import DerivedEffect, derived_effects
+from eomgen.exposition.evaluate import Numbers, define, follow
+from eomgen.exposition.frames import frames_of
+from eomgen.exposition.poses import poses
+from eomgen.exposition.recursion import recursive_steps
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
-from eomgen.telling.derivation import used_bodies
-from eomgen.telling.effects import ToldEffect, told_effects
-from eomgen.telling.evaluate import Numbers, define, follow
-from eomgen.telling.frames import frames_of
-from eomgen.telling.poses import poses
-from eomgen.telling.recursion import recursive_steps
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def instant(model: Model, seed: int = 0, shake: float = 0.3) -> Instant:
     return Instant(solver, known)
 
 
-def follow_effects(model: Model, told: Sequence[ToldEffect], known: Numbers) -> None:
+def follow_effects(model: Model, told: Sequence[DerivedEffect], known: Numbers) -> None:
     """Poses, and what each effect says."""
     needed = dict.fromkeys(body for t in told for body in used_bodies(t))
     define(poses(model, frames_of(model), needed)[0], known)
@@ -59,7 +59,7 @@ def follow_effects(model: Model, told: Sequence[ToldEffect], known: Numbers) -> 
 
 def follow_recursion(model: Model, known: Numbers) -> tuple[list[float], list[float]]:
     """v̇ and F by the steps of the algorithm, in the order of v."""
-    told, frames = told_effects(model), frames_of(model)
+    told, frames = derived_effects(model), frames_of(model)
     follow_effects(model, told, known)
     for step in recursive_steps(model, frames, told):
         follow(step.equations, known)

@@ -30,7 +30,7 @@ HALVES = 8
 """Fractions with whole numerators up to this and denominator 2 or 4 are written as fractions."""
 
 
-class TellingScalars(Scalars):
+class SymbolicScalars(Scalars):
     """SymPy expressions as scalars: what has cases stays a function or a case distinction."""
 
     def number(self, value: Any) -> Expr:

@@ -10,8 +10,8 @@ from eomgen.derivation.forms import StateForm, state_form
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr, over_coordinates
+from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Model
-from eomgen.telling.effects import ToldEffect
 
 FORMS = {
     "redundant": "The redundant state (1): all that is known of every body, {count} numbers.",
@@ -107,7 +107,9 @@ def _used(
     yield from reversed(kept)
 
 
-def form_step(model: Model, form: str, written: WrittenForm, extra: Iterable[ToldEffect]) -> Step:
+def form_step(
+    model: Model, form: str, written: WrittenForm, extra: Iterable[DerivedEffect]
+) -> Step:
     """The last step: Y, and Ẏ line by line."""
     states, rates = list(written.states), list(written.rates)
     states += (real(x.name) for x in model.states)

@@ -19,23 +19,23 @@ from eomgen.derivation.projected.steps import projected_steps
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation, Step, handout_steps, readable
 from eomgen.derivation.supported import MOST_REPORTED, why_not_closed, why_not_pins
+from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
-from eomgen.derivation.told_scalars import TellingScalars
 from eomgen.errors import SceneError
+from eomgen.exposition.effects import DerivedEffect, derived_effects, equations_of, with_symbols
+from eomgen.exposition.frames import frames_of
+from eomgen.exposition.impacts import impact_steps
+from eomgen.exposition.mechanism import NamingMechanism, Notes
+from eomgen.exposition.poses import poses
+from eomgen.exposition.reading import numbered, read_all, reading_names
+from eomgen.exposition.recursion import recursive_steps
+from eomgen.exposition.state_forms import form_step, momentum_form, plain_form, velocity_form
 from eomgen.language.formula import names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import Load
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import Form
-from eomgen.telling.effects import ToldEffect, equations_of, told_effects, with_symbols
-from eomgen.telling.frames import frames_of
-from eomgen.telling.impacts import impact_steps
-from eomgen.telling.mechanism import Notes, TellingMechanism
-from eomgen.telling.poses import poses
-from eomgen.telling.reading import numbered, read_all, reading_names
-from eomgen.telling.recursion import recursive_steps
-from eomgen.telling.state_forms import form_step, momentum_form, plain_form, velocity_form
 
 HANDOUT = (
     'Numbers in brackets up to (36) are those of the handout that this derivation follows: "CS229 '
@@ -82,21 +82,21 @@ ALREADY = (
 
 
 @dataclass(frozen=True)
-class Telling:
+class Exposition:
     """The steps of a derivation, and its equations as matrices unless they are too long."""
 
     steps: tuple[Step, ...]
     matrices: Matrices | None
-    effects: tuple[ToldEffect, ...]
+    effects: tuple[DerivedEffect, ...]
 
 
-def tell(model: Model, form: Form | None = None) -> Telling:
-    """Derive a model and tell it in a state form, by default the scene's.
+def exposition_of(model: Model, form: Form | None = None) -> Exposition:
+    """Derive a model and explain it in a state form, by default the scene's.
 
     Raises `SceneError` for a form that the mechanism does not have.
     """
     form = form or model.form
-    effects = told_effects(model)
+    effects = derived_effects(model)
     bare = replace(with_symbols(model, effects), form=form)
     small = len(model.bodies) <= MOST_REPORTED
     why_not = why_not_pins(bare) or ("" if small else f"it has more than {MOST_REPORTED} bodies")
@@ -109,7 +109,9 @@ def tell(model: Model, form: Form | None = None) -> Telling:
     return _recursive(model, effects)
 
 
-def _of_pins(model: Model, bare: Model, effects: tuple[ToldEffect, ...], form: Form) -> Telling:
+def _of_pins(
+    model: Model, bare: Model, effects: tuple[DerivedEffect, ...], form: Form
+) -> Exposition:
     equations = derive(bare)
     names = _names(model, readable(equations))
     names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
@@ -129,10 +131,10 @@ def _of_pins(model: Model, bare: Model, effects: tuple[ToldEffect, ...], form: F
         *steps[place:],
         *(_renamed(step, names) for step in numbered(ends, 39)),
     ]
-    return Telling(tuple(steps), _whole(of_pins(equations), model, effects), effects)
+    return Exposition(tuple(steps), _whole(of_pins(equations), model, effects), effects)
 
 
-def _of_any(model: Model, bare: Model, effects: tuple[ToldEffect, ...]) -> Telling:
+def _of_any(model: Model, bare: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
     equations = derive_projected(bare)
     names = reading_names(model)
     found = list(projected_steps(equations))
@@ -155,10 +157,10 @@ def _of_any(model: Model, bare: Model, effects: tuple[ToldEffect, ...]) -> Telli
     ]
     whole = numbered([replace(step, number="") for step in steps])
     intro = Step("", "Beside the handout", PROJECTED, ())
-    return Telling((intro, *whole), _whole(of_projected(equations), model, effects), effects)
+    return Exposition((intro, *whole), _whole(of_projected(equations), model, effects), effects)
 
 
-def _recursive(model: Model, effects: tuple[ToldEffect, ...]) -> Telling:
+def _recursive(model: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
     names = reading_names(model)
     frames = frames_of(model)
     state = [
@@ -179,11 +181,11 @@ def _recursive(model: Model, effects: tuple[ToldEffect, ...]) -> Telling:
     ]
     told = (_renamed(step, names) for step in steps)
     intro = Step("", "Beside the handout", RECURSIVE, ())
-    return Telling((intro, *numbered(list(told))), None, effects)
+    return Exposition((intro, *numbered(list(told))), None, effects)
 
 
 def _effect_steps(
-    model: Model, effects: Sequence[ToldEffect], *, every: bool = False
+    model: Model, effects: Sequence[DerivedEffect], *, every: bool = False
 ) -> Iterator[Step]:
     """Poses and motions that the effects use, and each effect with its forces.
 
@@ -217,7 +219,7 @@ def _effect_steps(
         )
 
 
-def used_bodies(told: ToldEffect) -> Iterator[str]:
+def used_bodies(told: DerivedEffect) -> Iterator[str]:
     """The bodies whose pose or motion the formulas of an effect, or its use, need."""
     yield from told.bodies
     weight = told.kept and told.effect.type == "gravity"
@@ -227,7 +229,7 @@ def used_bodies(told: ToldEffect) -> Iterator[str]:
     yield from (load.body for load in loads if isinstance(load, Load) and load.body != WORLD)
 
 
-def _loads_as_they_are(told: ToldEffect) -> list[Equation]:
+def _loads_as_they_are(told: DerivedEffect) -> list[Equation]:
     """The loads of an effect that no motion changes, with the names of the scene."""
     lines = []
     for load in told.loads:
@@ -243,11 +245,11 @@ def _loads_as_they_are(told: ToldEffect) -> list[Equation]:
 
 def prescribed_motion(model: Model) -> list[Equation]:
     """Driven coordinates with their rates and accelerations, and locked ones."""
-    names = TellingMechanism(model, Notes()).names
+    names = NamingMechanism(model, Notes()).names
     found = []
     for c in model.prescribed:
         used = {name: names[name] for name in names_in(c.value) if name != "t"}
-        x, v, a = with_rates(c.value, used, names["t"], TellingScalars())
+        x, v, a = with_rates(c.value, used, names["t"], SymbolicScalars())
         found.append(Equation(real(c.position.name), x))
         if not c.locked:
             found.append(Equation(real(c.velocity.name), v))
@@ -294,7 +296,7 @@ def _numbered_within(steps: Iterator[Step], number: str) -> list[Step]:
     return [replace(step, number=f"({number}.{i})") for i, step in enumerate(steps, 1)]
 
 
-def _whole(found: Matrices, model: Model, effects: Sequence[ToldEffect]) -> Matrices:
+def _whole(found: Matrices, model: Model, effects: Sequence[DerivedEffect]) -> Matrices:
     """The matrices with the forces of the effects written out."""
     needed = dict.fromkeys(body for told in effects for body in used_bodies(told))
     more, _ = poses(model, frames_of(model), needed)

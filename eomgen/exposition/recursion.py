@@ -14,15 +14,11 @@ import sympy as sp
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
-from eomgen.model.model import Model
-from eomgen.scene.effects import Gravity
-from eomgen.scene.effects.base import JointLoad, Load
-from eomgen.scene.joints.base import WORLD
-from eomgen.telling.effects import ToldEffect
-from eomgen.telling.frames import Frame
-from eomgen.telling.mechanism import AXES, Notes, TellingMechanism, rotation_symbols
-from eomgen.telling.poses import frame_name
-from eomgen.telling.spatial import (
+from eomgen.exposition.effects import DerivedEffect
+from eomgen.exposition.frames import Frame
+from eomgen.exposition.mechanism import AXES, NamingMechanism, Notes, rotation_symbols
+from eomgen.exposition.poses import frame_name
+from eomgen.exposition.spatial import (
     ForceCross,
     MotionCross,
     cut,
@@ -31,6 +27,10 @@ from eomgen.telling.spatial import (
     motion_transform,
     rigid_inertia,
 )
+from eomgen.model.model import Model
+from eomgen.scene.effects import Gravity
+from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints.base import WORLD
 
 ABOUT = (
     "The algorithm is one page for any tree: R. Featherstone, Rigid Body Dynamics Algorithms "
@@ -46,7 +46,7 @@ class Recursion:
 
     model: Model
     frames: tuple[Frame, ...]
-    told: tuple[ToldEffect, ...]
+    told: tuple[DerivedEffect, ...]
 
     @property
     def size(self) -> int:
@@ -83,7 +83,7 @@ class Recursion:
 
 
 def recursive_steps(
-    model: Model, frames: tuple[Frame, ...], told: tuple[ToldEffect, ...]
+    model: Model, frames: tuple[Frame, ...], told: tuple[DerivedEffect, ...]
 ) -> Iterator[Step]:
     """The steps of the algorithm, frame by frame."""
     r = Recursion(model, frames, told)
@@ -388,7 +388,7 @@ def _accelerations(r: Recursion, k: int) -> Iterator[Equation]:
 
 def _falling(r: Recursion) -> Expr:
     """Minus the acceleration of uniform gravity."""
-    mechanism: Any = TellingMechanism(r.model, Notes())
+    mechanism: Any = NamingMechanism(r.model, Notes())
     total = sp.zeros(r.model.dimensions, 1)
     for told in r.told:
         if isinstance(told.effect, Gravity) and told.kept:

@@ -8,9 +8,8 @@ import sympy as sp
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr
-from eomgen.model.model import Model
-from eomgen.telling.frames import Frame
-from eomgen.telling.mechanism import (
+from eomgen.exposition.frames import Frame
+from eomgen.exposition.mechanism import (
     AXES,
     crossed,
     omega_symbols,
@@ -19,6 +18,7 @@ from eomgen.telling.mechanism import (
     turned,
     velocity_symbols,
 )
+from eomgen.model.model import Model
 
 
 def poses(
@@ -33,15 +33,15 @@ def poses(
             while k >= 0:
                 needed.add(k)
                 k = frames[k].parent
-    told = _Told([], [], {})
+    collected = _Collected([], [], {})
     for k in sorted(needed):
-        _pose(model, frames, k, told)
-    return told.definitions, told.equations
+        _pose(model, frames, k, collected)
+    return collected.definitions, collected.equations
 
 
 @dataclass
-class _Told:
-    """What has been told: definitions, the same as equations, and what needs no name of its own."""
+class _Collected:
+    """What has been collected: definitions, equations, and what needs no name of its own."""
 
     definitions: list[Definition]
     equations: list[Equation]
@@ -67,7 +67,7 @@ def frame_name(model: Model, frame: Frame) -> str:
     return model.bodies[frame.body].name if frame.body >= 0 else frame.name
 
 
-def _pose(model: Model, frames: Sequence[Frame], k: int, told: _Told) -> None:
+def _pose(model: Model, frames: Sequence[Frame], k: int, collected: _Collected) -> None:
     size, frame = model.dimensions, frames[k]
     name = frame_name(model, frame)
     zero = (sp.Integer(0),) * size
@@ -81,56 +81,56 @@ def _pose(model: Model, frames: Sequence[Frame], k: int, told: _Told) -> None:
         origin = tuple(real(f"o_{parent.name},{axis}") for axis in AXES[:size])
         speed = tuple(real(f"odot_{parent.name},{axis}") for axis in AXES[:size])
     named = frame.body >= 0
-    _define_rotation(model, frames, k, told)
+    _define_rotation(model, frames, k, collected)
     rotation, omega = rotation_symbols(name, size), omega_symbols(name, size)
     spin = _spin(frame, rotation, size)
-    told.define(omega, [a + b for a, b in zip(base_omega, spin, strict=True)], always=named)
+    collected.define(omega, [a + b for a, b in zip(base_omega, spin, strict=True)], always=named)
     own = tuple(real(f"o_{frame.name},{axis}") for axis in AXES[:size])
     own_speed = tuple(real(f"odot_{frame.name},{axis}") for axis in AXES[:size])
     reach = turned(base, list(frame.offset)[:size])
-    told.define(own, [a + b for a, b in zip(origin, reach, strict=True)], always=False)
+    collected.define(own, [a + b for a, b in zip(origin, reach, strict=True)], always=False)
     arm = [a - b for a, b in zip(own, origin, strict=True)] if parent is not None else list(own)
     carried = crossed(base_omega, arm) if parent is not None else zero
     slide = zero
     if frame.kind == "prismatic":
         slide = turned(rotation, [part * frame.v[0] for part in list(frame.axis)[:size]])
     total = [a + b + c for a, b, c in zip(speed, carried, slide, strict=True)]
-    told.define(own_speed, total, always=False)
+    collected.define(own_speed, total, always=False)
     if frame.body >= 0:
         place, moving = position_symbols(name, size), velocity_symbols(name, size)
         centre = turned(rotation, list(frame.centre)[:size])
-        told.define(place, [a + b for a, b in zip(own, centre, strict=True)], always=True)
+        collected.define(place, [a + b for a, b in zip(own, centre, strict=True)], always=True)
         lever = [a - b for a, b in zip(place, own, strict=True)]
         more = crossed(omega, lever) if any(frame.centre) else zero
-        told.define(moving, [a + b for a, b in zip(own_speed, more, strict=True)], always=True)
+        collected.define(moving, [a + b for a, b in zip(own_speed, more, strict=True)], always=True)
 
 
-def _define_rotation(model: Model, frames: Sequence[Frame], k: int, told: _Told) -> None:
+def _define_rotation(model: Model, frames: Sequence[Frame], k: int, collected: _Collected) -> None:
     """The angle of a planar frame, or the rotation matrix of one in space."""
     frame, size = frames[k], model.dimensions
     name, named = frame_name(model, frame), frame.body >= 0
     above = frame_name(model, frames[frame.parent]) if frame.parent >= 0 else ""
     if size == 2:
         base = real(f"psi_{above}") if above else sp.Integer(0)
-        told.define((real(f"psi_{name}"),), (base + frame.angle,), always=named)
+        collected.define((real(f"psi_{name}"),), (base + frame.angle,), always=named)
         return
     for symbol, value in frame.defined:
-        told.define((symbol,), (value,), always=True)
+        collected.define((symbol,), (value,), always=True)
     entries = rotation_symbols(name, size)
-    base = rotation_symbols(above, size).xreplace(told.short) if above else sp.eye(3)
+    base = rotation_symbols(above, size).xreplace(collected.short) if above else sp.eye(3)
     if not named and frame.rotation == sp.eye(3):
-        told.short.update(zip(entries, base, strict=True))
+        collected.short.update(zip(entries, base, strict=True))
         return
-    told.definitions.extend(zip(entries, base * frame.rotation, strict=True))
+    collected.definitions.extend(zip(entries, base * frame.rotation, strict=True))
     matrix = sp.MatrixSymbol(f"W_{name}", 3, 3)
     if base == sp.eye(3) or frame.rotation == sp.eye(3):
-        told.equations.append(Equation(matrix, base * frame.rotation))
+        collected.equations.append(Equation(matrix, base * frame.rotation))
         return
     own = sp.MatrixSymbol(f"R_{frame.name}", 3, 3)
-    told.equations.append(Equation(own, sp.ImmutableMatrix(frame.rotation)))
+    collected.equations.append(Equation(own, sp.ImmutableMatrix(frame.rotation)))
     whole = sp.MatrixSymbol(f"W_{above}", 3, 3)
     shared = base == rotation_symbols(above, size)
-    told.equations.append(Equation(matrix, sp.MatMul(whole if shared else base, own)))
+    collected.equations.append(Equation(matrix, sp.MatMul(whole if shared else base, own)))
 
 
 def _spin(frame: Frame, rotation: Expr, size: int) -> tuple[Expr, ...]:

@@ -12,8 +12,8 @@ import sympy as sp
 
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
+from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
-from eomgen.derivation.told_scalars import TellingScalars
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import Model, dofs_of
 from eomgen.scalars.exact import Real
@@ -21,7 +21,7 @@ from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
 
 AXES = "xyz"
-SCALARS = TellingScalars()
+SCALARS = SymbolicScalars()
 
 
 @dataclass
@@ -47,7 +47,7 @@ class Notes:
         return f"{self.suffix}{number}"
 
 
-class TellingMechanism:
+class NamingMechanism:
     """A model over symbols that a person reads: see `scene.effects.base.Mechanism`."""
 
     def __init__(self, model: Model, notes: Notes) -> None:

@@ -11,6 +11,8 @@ import sympy as sp
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr
+from eomgen.exposition.mechanism import AXES, NamingMechanism, Notes
+from eomgen.exposition.reading import dotted
 from eomgen.language.formula import Name
 from eomgen.model.model import Model
 from eomgen.scene.effects import Driven, Effect
@@ -25,14 +27,12 @@ from eomgen.scene.effects.base import (
     Vector,
 )
 from eomgen.scene.joints.base import WORLD
-from eomgen.telling.mechanism import AXES, Notes, TellingMechanism
-from eomgen.telling.reading import dotted
 
 AnyLoad = Load | JointLoad
 
 
 @dataclass(frozen=True)
-class ToldEffect:
+class DerivedEffect:
     """One effect by its formulas.
 
     definitions  symbols that its formulas use, each over those before it, its forces last
@@ -57,12 +57,12 @@ class ToldEffect:
         return inspect.cleandoc(type(self.effect).__doc__ or "")
 
 
-def told_effects(model: Model) -> tuple[ToldEffect, ...]:
+def derived_effects(model: Model) -> tuple[DerivedEffect, ...]:
     """All effects of a model, in order; drives are constraints and have no formula of their own."""
     return tuple(_told(model, effect) for effect in model.effects if not isinstance(effect, Driven))
 
 
-def _told(model: Model, effect: Effect) -> ToldEffect:
+def _told(model: Model, effect: Effect) -> DerivedEffect:
     notes = Notes(effect.name)
     _run(model, effect, notes)
     notes = Notes(effect.name, totals=notes.counts)
@@ -76,7 +76,7 @@ def _told(model: Model, effect: Effect) -> ToldEffect:
         (real(dotted(state.name, "dot")), rate)
         for state, rate in zip(effect.states(model.dimensions), states, strict=True)
     )
-    return ToldEffect(
+    return DerivedEffect(
         effect, tuple(definitions), tuple(loads), kept, rates, contacts, tuple(notes.bodies)
     )
 
@@ -84,7 +84,7 @@ def _told(model: Model, effect: Effect) -> ToldEffect:
 def _run(
     model: Model, effect: Effect, notes: Notes
 ) -> tuple[list[AnyLoad], tuple[Expr, ...], tuple[Contact, ...]]:
-    mechanism: Any = TellingMechanism(model, notes)
+    mechanism: Any = NamingMechanism(model, notes)
     loads = [x for x in effect.loads(mechanism) if isinstance(x, JointLoad) or x.body != WORLD]
     return loads, effect.rates(mechanism), effect.contacts(mechanism)
 
@@ -203,7 +203,7 @@ class StandIn(EffectTable):
         return True
 
 
-def with_symbols(model: Model, told: Sequence[ToldEffect]) -> Model:
+def with_symbols(model: Model, told: Sequence[DerivedEffect]) -> Model:
     """The model with a stand-in for each effect that depends on the motion."""
     effects: list[Any] = []
     inputs = list(model.inputs)

@@ -12,13 +12,18 @@ import numpy as np
 import pytest
 from campaign import some
 from effect_cases import CASES, TRIED, Case
+from followed import follow_effects, follow_recursion, instant
 from test_driven import given
-from told import follow_effects, follow_recursion, instant
 
 import eomgen
 from eomgen.cli import main
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.exposition.derivation import exposition_of, prescribed_motion
+from eomgen.exposition.effects import derived_effects
+from eomgen.exposition.evaluate import array, define, number
+from eomgen.exposition.impacts import impact_steps
+from eomgen.exposition.reading import dotted
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.results import Derivation
@@ -26,11 +31,6 @@ from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scen
 from eomgen.show.derivation import as_html, as_latex, as_text
 from eomgen.show.prose import blocks, pieces
 from eomgen.show.terms import explained
-from eomgen.telling.derivation import prescribed_motion, tell
-from eomgen.telling.effects import told_effects
-from eomgen.telling.evaluate import array, define, number
-from eomgen.telling.impacts import impact_steps
-from eomgen.telling.reading import dotted
 
 ROUNDING = 1e-9
 SHOWN = some(("two_body_forced", "bouncing_two_body", "furuta_pendulum", "walker_motors"),
@@ -177,8 +177,8 @@ BY = {
 def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
     """M v̇ + V + G = F and its solution, F written out."""
     model = model_of(BY[by])
-    told, at = tell(model), instant(model)
-    bare = tell(replace(model, effects=model.effects[:1], states=()))
+    told, at = exposition_of(model), instant(model)
+    bare = exposition_of(replace(model, effects=model.effects[:1], states=()))
     found, other = told.matrices, bare.matrices
     assert found is not None and other is not None
     for letter in "MVG":
@@ -196,7 +196,7 @@ def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
 def test_the_derivative_of_a_state_form(scene: str, form: Any) -> None:
     """Ẏ as it is written out is the module's `derivative` in this form: 12 numbers, 8, [q, v]."""
     module: Any = eomgen.load(eomgen.generate(scene, form=form))
-    last = tell(model_of(scene), form).steps[-1]
+    last = exposition_of(model_of(scene), form).steps[-1]
     first, second, *lines = last.equations
     assert len(first.right) == {"redundant": 12, "momentum": 8, "velocity": 8}[form]
     rng = np.random.default_rng(5)
@@ -240,7 +240,7 @@ def test_the_impulse_equations() -> None:
     """Gap, opening speed and slip of each contact, against the solver's rows."""
     model = model_of("bouncing_two_body")
     at = instant(model)
-    told = told_effects(model)
+    told = derived_effects(model)
     follow_effects(model, told, at.known)
     steps = list(impact_steps(model, told))
     assert len(steps) == 4 and {"v^+", "P_II"} <= {e.left.name for e in steps[0].equations}
@@ -263,7 +263,7 @@ def test_three_formats(scene: str) -> None:
     long = len(found.steps) > 40
     steps = tuple(s for i, s in enumerate(found.steps) if s.figure or not long or i % 5 == 1)
     page, paper = (
-        write(found.model, steps, found.telling.effects) for write in (as_html, as_latex)
+        write(found.model, steps, found.exposition.effects) for write in (as_html, as_latex)
     )
     text = as_text(found.model, steps)
     assert paper.isascii()
@@ -288,12 +288,12 @@ def test_no_character_is_lost_on_paper() -> None:
     """Descriptions of all effects have LaTeX for every letter: a question mark would be a loss."""
     for case in CASES[:: some(4, 1)]:
         model = model_of(case.text())
-        for told in told_effects(model):
-            paper = as_latex(model, (tell_words(told.words),), ())
+        for told in derived_effects(model):
+            paper = as_latex(model, (report_words(told.words),), ())
             assert "?" not in paper, told.effect.type
 
 
-def tell_words(words: str) -> Any:
+def report_words(words: str) -> Any:
     """A step of words alone."""
     from eomgen.derivation.steps import Step
 

@@ -1,4 +1,4 @@
-"""Told equations in numbers: each in its order, at given values of what they start from."""
+"""The equations of an exposition in numbers, in order, from given values."""
 
 import math
 from collections.abc import Iterable
@@ -9,8 +9,8 @@ import sympy as sp
 
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr
+from eomgen.exposition.spatial import ForceCross, MotionCross
 from eomgen.scalars.functions import BY_MATH
-from eomgen.telling.spatial import ForceCross, MotionCross
 
 Numbers = dict[str, Any]
 """Floats of symbols and arrays of matrix symbols, by name."""

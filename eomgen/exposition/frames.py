@@ -13,12 +13,12 @@ from eomgen.derivation.projected.constraints import about, of_quaternion
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
+from eomgen.exposition.mechanism import NamingMechanism, Notes
 from eomgen.language.formula import Formula
 from eomgen.model.model import Body, JointIndex, Model
 from eomgen.scalars.exact import direction, orientation, quarters, radians
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import Geared, Primitive
-from eomgen.telling.mechanism import Notes, TellingMechanism
 
 ORIGIN = sp.zeros(3, 1)
 
@@ -72,7 +72,7 @@ def frames_of(model: Model) -> tuple[Frame, ...]:
     """All frames, parents first."""
     found: list[Frame] = []
     last: list[int] = []
-    symbols = TellingMechanism(model, Notes())
+    symbols = NamingMechanism(model, Notes())
     locked = dict(model.locked)
     for k, index in enumerate(model.joint_indices):
         last.append(_add(found, last, k, index, model, symbols, locked))
@@ -85,7 +85,7 @@ def _add(
     k: int,
     index: JointIndex,
     model: Model,
-    symbols: TellingMechanism,
+    symbols: NamingMechanism,
     locked: dict[str, float],
 ) -> int:
     body, joint = index.body, index.body.joint
@@ -143,7 +143,7 @@ def _add(
 
 
 def _motion(
-    primitive: Primitive | None, q: Sequence[Expr], joint: str, symbols: TellingMechanism
+    primitive: Primitive | None, q: Sequence[Expr], joint: str, symbols: NamingMechanism
 ) -> tuple[Expr, Expr, Expr]:
     """Rotation, displacement and axis of a joint primitive at its coordinates."""
     if primitive is None:
@@ -161,17 +161,17 @@ def _scale(q: Sequence[Expr]) -> Expr:
     return 2 / sum(x**2 for x in q)
 
 
-def _vector(parts: tuple[Formula, ...], symbols: TellingMechanism) -> Expr:
+def _vector(parts: tuple[Formula, ...], symbols: NamingMechanism) -> Expr:
     x, y, *z = (symbols.value(part) for part in parts)
     return sp.Matrix([x, y, *(z or [0])])
 
 
-def _armature(joint: Geared, symbols: TellingMechanism) -> Expr:
+def _armature(joint: Geared, symbols: NamingMechanism) -> Expr:
     inertia = symbols.value(joint.motor_inertia)
     return inertia * (symbols.value(joint.gear_ratio) ** 2 if joint.gear_ratio else 1)
 
 
-def _inertia(body: Body, symbols: TellingMechanism) -> Expr:
+def _inertia(body: Body, symbols: NamingMechanism) -> Expr:
     entries = [symbols.value(entry) for entry in body.inertia_com]
     if len(entries) == 1:
         return sp.diag(0, 0, entries[0])

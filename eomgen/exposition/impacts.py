@@ -7,16 +7,16 @@ import sympy as sp
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
-from eomgen.model.model import Model
-from eomgen.scene.effects.base import Contact, JointLoad, Load
-from eomgen.telling.effects import ToldEffect
-from eomgen.telling.mechanism import (
+from eomgen.exposition.effects import DerivedEffect
+from eomgen.exposition.mechanism import (
     crossed,
     omega_symbols,
     rotation_symbols,
     turned,
     velocity_symbols,
 )
+from eomgen.model.model import Model
+from eomgen.scene.effects.base import Contact, JointLoad, Load
 
 LAW = (
     "A rigid contact exerts no force while its gap g is positive. Where g becomes 0 with u_n < 0 "
@@ -31,7 +31,7 @@ LAW = (
 )
 
 
-def impact_steps(model: Model, told: Sequence[ToldEffect]) -> Iterator[Step]:
+def impact_steps(model: Model, told: Sequence[DerivedEffect]) -> Iterator[Step]:
     """The impulse equations, and the gap and the speeds of each contact."""
     contacts = [contact for t in told for contact in t.contacts]
     if not contacts:
