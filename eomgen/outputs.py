@@ -83,6 +83,12 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         ),
         contacts=True,
     ),
+    "constraint_forces": OutputSpec(
+        ("constraints",),
+        "Multiplier of each of `CONSTRAINTS`, N or N m: its force in the direction of the row.",
+        needs="constraints",
+        contacts=True,
+    ),
     "driving_forces": OutputSpec(
         ("driven",),
         "Driving force or torque of each of `DRIVEN` on the child, N or N m.",

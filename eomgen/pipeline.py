@@ -14,6 +14,7 @@ from eomgen.codegen.choice import Candidate, Choice, choose
 from eomgen.codegen.derive import record
 from eomgen.codegen.interface import Interface, interface_of
 from eomgen.codegen.system import System, optimised
+from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -117,4 +118,4 @@ def compile_model(model: Model) -> str:
 
 def compile_scene(scene: Scene) -> str:
     """The source of a scene's module. Raises `SceneError` as `elaborate` and `generate` do."""
-    return compile_model(elaborate(scene))
+    return compile_model(assembled(elaborate(scene)))

@@ -21,6 +21,7 @@ FLOORS = (
     "language",
     "scene.joints",
     "scene.effects",
+    "scene.constraints",
     "outputs",
     "routes",
     "integrators",

@@ -156,13 +156,14 @@ MISTAKES = [
         None,
         JOINT.format("extra", "world", "hand"),
         "joints[2].child: 'hand' is the child of joints[1] too; "
-        "in a tree each body has one joint to its parent",
+        "in a tree each body has one joint to its parent; give one of the two loop = true",
     ),
     (
         'parent = "world"',
         'parent = "hand"',
         "joints[0].parent: 'hand' is itself a descendant of the child 'arm': "
-        "the joints make a cycle; connect one of its bodies to the world",
+        "the joints make a cycle; give one of them loop = true, and connect one of its bodies to "
+        "the world",
     ),
     (
         None,
@@ -355,7 +356,7 @@ MISTAKES = [
      "joints[1].motor_inertia: -1e-05 is negative; give a number >= 0 in kg m^2"),
     (WRIST, 'name = "wrist"\ntype = "weld"\nmotor_inertia = 1e-5',
      "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
-     "orientation_deg, orientation, type"),
+     "orientation_deg, orientation, loop, type"),
     (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b"]',
      "joints[1].coordinates[2]: missing; the list is too short"),
     (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b", "a"]\n',
@@ -590,10 +591,10 @@ MISTAKES_IN_SPACE = [
      "effects[1].joint: 'wrist' is a ball joint and has no angle"),
     (BALL, BALL + "\nmotor_inertia = 1e-5",
      "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
-     "orientation_deg, orientation, type"),
+     "orientation_deg, orientation, loop, type"),
     (BALL, BALL + '\ncoordinate = "a"',
      "joints[1].coordinate: unknown key; known here: name, parent, child, r_parent, r_child, "
-     "orientation_deg, orientation, type"),
+     "orientation_deg, orientation, loop, type"),
     (f'{BALL}\nparent = "arm"\nchild = "hand"\nr_parent = [0.5, 0, 0]\nr_child = [-0.1, 0, 0]',
      'name = "wrist"\ntype = "free"\nparent = "arm"\nchild = "hand"',
      "joints[1].parent: unknown value 'arm'; known: world"),

@@ -47,8 +47,7 @@ def test_all_outputs_in_a_list() -> None:
         ('"revolute", parent = "world"', '"free"', "effects[1].joint: 'pivot' is a free joint, "
          "which 'motor' does not act on; name a joint that moves and is not free"),
         ('child = "rod"', 'child = "world"', "joints[0].child: 'world' is the ground, which has "
-         "no parent; name it as the parent, and give no body a second joint: closed loops are not "
-         "supported"),
+         "no parent; name it as the parent, or give the joint loop = true if it closes a loop"),
         ("g = 9.81 }", 'g = 9.81, direction = [1, -1] }', "route: 'closed' needs the closed form, "
          "and it takes no 'gravity' with a direction of its own ('gravity'); leave it out"),
     ],

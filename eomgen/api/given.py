@@ -10,10 +10,11 @@ from typing import Any, Literal
 import numpy as np
 
 from eomgen.api.reporter import SILENT, Reporter
+from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import RunError, SceneError, nearest
 from eomgen.language.base import identifier
-from eomgen.model.elaborate import elaborate, outputs_for
+from eomgen.model.elaborate import available_in, elaborate, outputs_for
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
 from eomgen.scene.reader import find_scene, parse_scene, read_scene, read_tables, scene_text
@@ -64,7 +65,7 @@ def model_of(scene: Scene, source: Source) -> Model:
         path = find_scene(source) if isinstance(source, str) else Path(source)
         reporter = Reporter(scene=path.name, text=lambda: scene_text(path))
     with reporter.located():
-        return checked(elaborate(scene))
+        return checked(assembled(elaborate(scene)))
 
 
 def checked(model: Model, reporter: Reporter = SILENT) -> Model:
@@ -87,7 +88,7 @@ def modelled(
     The mass matrix is not checked. Raises `SceneError`.
     """
     with reporter.located():
-        model = elaborate(scene)
+        model = assembled(elaborate(scene))
         for notice in model.notices:
             reporter.note_scene(notice)
         return overridden(model, form=form, route=route, outputs=outputs, reporter=reporter)
@@ -110,9 +111,7 @@ def overridden(
         return model
     check_outputs(outputs, reporter)
     argument = reporter.argument("outputs")
-    chosen = outputs_for(
-        outputs, argument, model.points, model.inputs, model.parameters, model.driven
-    )
+    chosen = outputs_for(outputs, argument, available_in(model))
     return replace(model, outputs=chosen)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError, nearest
-from eomgen.model.elaborate import outputs_for
+from eomgen.model.elaborate import available_in, outputs_for
 from eomgen.model.model import Model
 from eomgen.outputs import DERIVATIVES, OUTPUTS, Size
 from eomgen.run.trajectory import Saved, Trajectory
@@ -47,7 +47,7 @@ def wanted_outputs(
             hint = nearest(name, known) or f"; known: {', '.join(known)}"
             raise RunError(f"{argument}: no '{name}' can be saved{hint}")
         found += GROUPS.get(name, (name,))
-    return outputs_for(found, argument, model.points, model.inputs, model.parameters, model.driven)
+    return outputs_for(found, argument, available_in(model))
 
 
 def recorded(

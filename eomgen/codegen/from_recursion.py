@@ -2,6 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
+from eomgen.codegen.constraints import (
+    constraint_forces,
+    constraint_loads,
+    constraint_outputs,
+)
 from eomgen.codegen.contacts import contact_labels, contact_outputs
 from eomgen.codegen.jacobians import matrices
 from eomgen.codegen.recording import Recording
@@ -41,6 +46,8 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
             record.dynamics, tape, record.route, record.forward, record.position_rates
         )
         nodes, extra = nodes | more, extra | more_extra
+    if model.constraints:
+        nodes |= constraint_outputs(record)
     return recorded(
         model,
         record.route,
@@ -103,7 +110,7 @@ def _joint_forces(record: Recording) -> list[Node]:
         (f.force[0], f.force[1], f.moment[2])
         if record.model.dimensions == 2
         else (*f.force, *f.moment)
-        for f in reactions(record.dynamics, record.vd)
+        for f in reactions(record.dynamics, record.vd, constraint_loads(record))
     ]
     return [x for row in rows for x in row]
 
@@ -180,6 +187,7 @@ OBSERVED: Mapping[str, Callable[[Recording], list[Node]]] = {
     "momentum": _momentum,
     "centre_of_mass": _centre_of_mass,
     "joint_forces": _joint_forces,
+    "constraint_forces": constraint_forces,
     "body_poses": _poses,
     "body_velocities": _velocities,
     "point_positions": lambda record: _points(record, _point_position),

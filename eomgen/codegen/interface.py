@@ -16,6 +16,10 @@ ABOUT = {
     "jacobian": JACOBIAN.about,
     "gaps": "Gap of each of `CONTACTS`, m or rad; negative if they overlap.",
     "gap_rates": "Time derivative of each of `gaps`, m/s or rad/s.",
+    "constraint_residuals": "Each of `CONSTRAINTS`: how far it is from being met, m or rad.",
+    "constraint_rates": "Rate of each of `CONSTRAINTS`, m/s or rad/s.",
+    "project_position": "Coordinates (nq,) after one Newton step towards the constraints.",
+    "project_velocity": "Velocities (nv,) that meet the constraints, the nearest.",
     "switching_functions": "`derivative` changes its branch where one of these passes 0.",
     "switching_functions_of_time": "As `switching_functions`; these depend on time only.",
 }
@@ -81,6 +85,7 @@ class Interface:
     joints          names of the joints that transmit constraint forces
     driven, locked  prescribed coordinates
     contacts        rigid contacts
+    constraints     name and unit of the multiplier of each row of the constraints
     left_out        terms that the scene leaves out of the equations, one line each
     """
 
@@ -104,6 +109,7 @@ class Interface:
     driven: tuple[Given, ...]
     locked: tuple[Given, ...]
     contacts: tuple[ContactLabel, ...]
+    constraints: tuple[tuple[str, str], ...]
     left_out: tuple[str, ...]
 
 
@@ -130,11 +136,12 @@ def interface_of(system: System) -> Interface:
         quaternions=tuple(model.quaternions) if model.form == "velocity" else (),
         effects=tuple((effect.name, effect.type) for effect in model.effects),
         bodies=tuple(body.name for body in model.bodies),
-        joints=tuple(body.joint.name for body in model.holding),
+        joints=model.force_joints,
         points=tuple(point.name for point in model.points),
         driven=tuple(map(_given, model.driven)),
         locked=tuple(_given(c) for c in model.prescribed if c.locked),
         contacts=system.contacts,
+        constraints=model.rows,
         left_out=tuple(left_out),
     )
 

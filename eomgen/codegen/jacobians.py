@@ -41,7 +41,7 @@ def matrices(record: Recording, *, with_jacobian: bool) -> Matrices:
         before = len(record.tape.steps)
         rows = _matrix(record, name) if _is_small(record, name) else None
         steps = len(record.tape.steps) - before
-        if rows is None or (ROUTES[record.route].differentiated and steps > LARGEST_JACOBIAN):
+        if rows is None or (_differentiated(record) and steps > LARGEST_JACOBIAN):
             rows, found.extra[name] = _along_direction(record, by)
         shape = (len(record.rates), len(by))
         found.nodes[name] = (shape, [node for row in rows for node in row])
@@ -55,6 +55,11 @@ def _variables(record: Recording, name: str) -> list[Node]:
         "input_jacobian": list(record.inputs.values()),
         "parameter_jacobian": list(record.parameters.values()),
     }[name]
+
+
+def _differentiated(record: Recording) -> bool:
+    """Whether the steps that compute v̇ are differentiated; those of constraints always are."""
+    return ROUTES[record.route].differentiated or bool(record.model.constraints)
 
 
 def _is_small(record: Recording, name: str) -> bool:
@@ -79,7 +84,7 @@ def _along_direction(
     directions = [record.input(f"d__{node.step.value}", Stage.INPUTS) for node in by]
     names = names_of_inputs(directions)
     seeds = {x.index: d for x, d in zip(by, directions, strict=True)}
-    if ROUTES[record.route].differentiated:
+    if _differentiated(record):
         return [[node] for node in tangent(record.rates, seeds)], names
     d, inputs = record.dynamics, record.velocity_inputs("vd")
     accelerations = {x.index: vd for x, vd in zip(inputs, record.vd, strict=True)}
@@ -99,7 +104,7 @@ def _matrix(record: Recording, name: str) -> list[list[Node]]:
     d, tape = record.dynamics, record.tape
     zero = tape.constant(0.0)
     by = _variables(record, name)
-    if ROUTES[record.route].differentiated:
+    if _differentiated(record):
         return jacobian(record.rates, by)
     factors = d.factors
     applied = jacobian(d.applied_force, by)

@@ -1,7 +1,8 @@
 """Recording of a model's dynamics on a tape, up to the derivative of the state."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
+from eomgen.dynamics.constraints import position_rates
 from eomgen.dynamics.dynamics import Forward, Values
 from eomgen.dynamics.kinematics import Axes
 from eomgen.dynamics.regrouping import RegroupedDynamics
@@ -55,7 +56,7 @@ class Recording:
         self.forward: Forward
         self.forward = self.dynamics.forward(route) if forward is None else forward(self)
         self.vd = self.dynamics.vd = self.forward(None)
-        self.position_rates = _position_rates(model, self.q, self.v, self.tape)
+        self.position_rates = position_rates(self.dynamics)
         self.rates = [*self.position_rates, *self.vd, *self.dynamics.state_rates]
 
     def input(self, name: str, stage: Stage) -> Node:
@@ -66,21 +67,3 @@ class Recording:
         """One further input for each velocity, named after it with a prefix."""
         names = (f"{prefix}__{c.name}" for c in self.model.velocities)
         return [self.input(name, Stage.INPUTS) for name in names]
-
-
-def _position_rates(model: Model, q: Sequence[Node], v: Sequence[Node], tape: Tape) -> list[Node]:
-    """q̇: the velocity of each coordinate, or ½ q ∘ ω for a quaternion q, with ω in body axes."""
-    rates: list[Node] = []
-    half = tape.constant(0.5)
-    for index in model.joint_indices:
-        rates += [v[j] for _, j in index.plain if j < len(v)]
-        if index.quaternion:
-            w, x, y, z = (q[i] for i in index.quaternion)
-            a, b, c = (half * v[j] for j in index.spin)
-            rates += [
-                -(x * a + y * b + z * c),
-                w * a + y * c - z * b,
-                w * b + z * a - x * c,
-                w * c + x * b - y * a,
-            ]
-    return rates

@@ -57,10 +57,11 @@ def output_shape(name: str, model: Model) -> tuple[int, ...]:
     sizes = {
         "nv": len(model.velocities),
         "bodies": len(model.bodies),
-        "joints": len(model.holding),
+        "joints": len(model.force_joints),
         "effects": len(model.effects),
         "driven": len(model.driven),
         "points": len(model.points),
+        "constraints": len(model.rows),
         "dimensions": model.dimensions,
     }
     return shape_of(name, model.dimensions, sizes)

@@ -48,6 +48,8 @@ def why_not_plain(model: Model) -> str:
     """
     for c in model.prescribed:
         return f"it takes no {'locked' if c.locked else 'driven'} coordinate ('{c.position.name}')"
+    for constraint in model.constraints:
+        return f"it closes no loops ('{constraint.name}')"
     for words in model.leave_out:
         return f"it leaves nothing out ('{words}')"
     for effect in model.effects:

@@ -315,7 +315,7 @@ def _in_many_digits(model: Model, *, nudge: bool) -> Callable[[Values], tuple[li
             q, v = ([near(x, nudge, rng) for x in own] for own in (values.q, values.v))
             near_by = Values(parameters, inputs, q, v, states, scalars.number(0.0))
             d = Dynamics(own[nudge], near_by, scalars, "own", linkage)
-            return out_of_bits(d.articulated_forward())
+            return out_of_bits(d.vd)
 
     def exactly(values: Values) -> tuple[list[Any], float]:
         true = forward(values, 0.0)

@@ -25,8 +25,10 @@ from eomgen.dynamics.composite import (
     mass_entries,
     solved,
 )
+from eomgen.dynamics.constraints import Forward, constrained
 from eomgen.dynamics.kinematics import TreeKinematics
 from eomgen.dynamics.linkage import make_linkage
+from eomgen.dynamics.loads import power_of
 from eomgen.dynamics.mechanism_state import MechanismState, Values
 from eomgen.dynamics.motion import (
     Acceleration,
@@ -47,9 +49,6 @@ from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
 
 __all__ = ["Dynamics", "Forward", "Values"]
-
-Forward = Callable[[Sequence[Scalar] | None], list[Scalar]]
-"""v̇ (nv,) under the effects and further generalised forces (nv,), or None for none."""
 
 
 class Dynamics(MechanismState):
@@ -126,10 +125,12 @@ class Dynamics(MechanismState):
                     if isinstance(load, JointLoad):
                         joints.append(load)
                     elif load.body != WORLD:
-                        points.append(self._point_force(load))
+                        points.append(self.point_force(load))
         return tuple(points), tuple(joints)
 
-    def _point_force(self, load: Load) -> fc.PointForce:
+    def point_force(self, load: Load) -> fc.PointForce:
+        """A load as a force on a body, in space."""
+
         def in_space(force: Vector, torque: Vector) -> tuple[Vec, Vec]:
             return self._in_space(force), torque_in_space(torque, self.scalars)
 
@@ -192,7 +193,7 @@ class Dynamics(MechanismState):
     @cached_property
     def vd(self) -> list[Scalar]:
         """v̇ (nv,) under the effects."""
-        return self.articulated_forward()
+        return self.forward("aba")(None)
 
     @cached_property
     def driving_forces(self) -> list[Scalar]:
@@ -225,7 +226,9 @@ class Dynamics(MechanismState):
     def forward(self, route: str) -> Forward:
         """Forward dynamics by the recursion of a route."""
         found: Forward = getattr(self, f"{ROUTES[route].recursion}_forward")
-        return found
+        if not self.model.constraints:
+            return found
+        return constrained(self, found, self.response(route))
 
     def response(self, route: str) -> Callable[[Sequence[Scalar]], list[Scalar]]:
         """A function that computes M⁻¹ f of generalised impulses or forces f by the recursion of a
@@ -360,16 +363,7 @@ class Dynamics(MechanismState):
 
     def power_of(self, loads: Iterable[Load | JointLoad]) -> Scalar:
         """The power of loads, W; for unit loads it is their speed, m/s or rad/s."""
-        power = self.scalars.number(0.0)
-        for load in loads:
-            if isinstance(load, JointLoad):
-                power = power + load.force * self.rate(load.joint, load.coordinate)
-                continue
-            for force, speed in zip(load.force, self.velocity(load.body, load.at), strict=True):
-                power = power + force * speed
-            for torque, rate in zip(load.torque, self.angular_velocity(load.body), strict=False):
-                power = power + torque * rate
-        return power
+        return power_of(self, loads)
 
     @cached_property
     def contacts(self) -> tuple[Contact, ...]:

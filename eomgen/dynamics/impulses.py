@@ -15,70 +15,17 @@ kinetic energy never grows. A contact that sticks has no slip before it rebounds
 friction, and leaves the slip -e u_n A_tn / A_nn.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
-from eomgen.dynamics import forces as fc
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.observables import arm
-from eomgen.dynamics.vectors import Vec, add, cross, in_space, torque_in_space, zeros
+from eomgen.dynamics.loads import AnyLoad, generalised, scaled
 from eomgen.scalars.protocol import Scalar, Scalars
-from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
-from eomgen.scene.joints.base import WORLD
-
-AnyLoad = Load | JointLoad
+from eomgen.scene.effects.base import Contact, Load
 
 LEAST = 1e-300
 """The least denominator: where it is used the numerator is 0, or the quotient is not used."""
 IMMOVABLE = 1e-12
 """Along a direction whose part of A is at most this, the mechanism cannot move: it is rounding."""
-
-
-def scaled(loads: Iterable[AnyLoad], k: Scalar) -> list[AnyLoad]:
-    """The loads times k."""
-    found: list[AnyLoad] = []
-    for load in loads:
-        if isinstance(load, JointLoad):
-            found.append(JointLoad(load.joint, k * load.force, load.coordinate))
-        else:
-            force, torque = (tuple(k * part for part in x) for x in (load.force, load.torque))
-            found.append(Load(load.body, force, load.at, load.kind, torque))
-    return found
-
-
-def generalised(d: Dynamics, loads: Iterable[AnyLoad]) -> list[Scalar]:
-    """Jᵀ f of loads: the forces on the velocities, driven ones too, that do the same work."""
-    loads = list(loads)
-    wrenches = _wrenches(d, [load for load in loads if isinstance(load, Load)])
-    parts = fc.generalised(d.kinematics, fc.carried(d.kinematics, wrenches), d.moved)
-    for load in loads:
-        if isinstance(load, JointLoad):
-            i = d.joint_indices[load.joint].v[load.coordinate]
-            if i < d.moved:
-                parts[i] = parts[i] + load.force
-    return parts
-
-
-def _wrenches(d: Dynamics, loads: Iterable[Load]) -> list[fc.Wrench]:
-    """Loads as a wrench on each frame: summed in world axes, then rotated once for each frame."""
-    nothing = zeros(d.scalars)
-    points: dict[tuple[str, Vector], tuple[Vec, Vec]] = {}
-    for load in loads:
-        force, torque = points.get((load.body, load.at), (nothing, nothing))
-        more = torque_in_space(load.torque, d.scalars)
-        points[load.body, load.at] = add(force, in_space(load.force, d.scalars)), add(torque, more)
-    sums: dict[int, fc.Wrench] = {}
-    for (body, at), (force, torque) in points.items():
-        frame = -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame
-        if frame >= 0:
-            own = in_space(at, d.scalars)
-            reach = arm(d.linkage, d.kinematics, d.index[body], own, d.scalars)
-            wrench = fc.Wrench(add(torque, cross(reach, force)), force)
-            sums[frame] = fc.total(sums[frame], wrench) if frame in sums else wrench
-    wrenches = [fc.Wrench(nothing, nothing)] * len(d.kinematics.links)
-    for frame, f in sums.items():
-        rotated = (d.kinematics.from_world(frame, part) for part in (f.moment, f.force))
-        wrenches[frame] = fc.Wrench(*rotated)
-    return wrenches
 
 
 def rough(d: Dynamics, contact: Contact) -> tuple[tuple[Load, ...], ...]:

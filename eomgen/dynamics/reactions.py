@@ -9,18 +9,26 @@ from eomgen.dynamics.vectors import (
     Vec,
     add,
     cross,
+    in_space,
     product,
     scale,
     sub,
     times,
+    torque_in_space,
     transposed,
     zeros,
 )
 from eomgen.scalars.protocol import Scalar
+from eomgen.scene.constraints import LoopJoint
+from eomgen.scene.effects.base import Load
+from eomgen.scene.joints.base import WORLD
 
 
-def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
-    """The wrench of each joint on its parent, at the joint's point on the child, in world axes.
+def reactions(
+    dynamics: Dynamics, vd: Sequence[Scalar], of_constraints: Sequence[Sequence[Load]] = ()
+) -> list[Wrench]:
+    """The wrench of each of the model's `force_joints` on its parent, at the joint's point on the
+    child, in world axes. `of_constraints` are the loads of each constraint on bodies.
 
     Leaves first: the joint's wrench on its child is what the child's subtree needs for its
     acceleration, beyond weight and loads. It includes the motor, which acts between the joint's two
@@ -53,7 +61,8 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
         force = scale(mount.mass, there)
         moment = add(times(inertia, alpha), cross(w, times(inertia, w)))
         sums.append(Wrench(add(moment, cross(sub(centre, point), force)), force))
-    for load in dynamics.loads[0]:
+    held = [x for loads in of_constraints for x in loads if x.body != WORLD]
+    for load in (*dynamics.loads[0], *map(dynamics.point_force, held)):
         k = load.body
         arm = sub(dynamics.point_position(k, load.at), joints[k])
         f = sums[k]
@@ -67,8 +76,25 @@ def reactions(dynamics: Dynamics, vd: Sequence[Scalar]) -> list[Wrench]:
             moment = add(f.moment, add(g.moment, cross(arm, g.force)))
             sums[parent] = Wrench(moment, add(f.force, g.force))
     holding = {body.name for body in model.holding}
-    return [
+    of_tree = [
         Wrench(sub(nothing, f.moment), sub(nothing, f.force))
         for body, f in zip(model.bodies, sums, strict=True)
         if body.name in holding
     ]
+    pairs = zip(model.constraints, of_constraints, strict=bool(of_constraints))
+    return of_tree + [_of_loop(dynamics, c, f) for c, f in pairs if isinstance(c, LoopJoint)]
+
+
+def _of_loop(dynamics: Dynamics, loop: LoopJoint, loads: Sequence[Load]) -> Wrench:
+    """The wrench of a loop joint on its parent, at the joint's point on the child."""
+    scalars, joint = dynamics.scalars, loop.joint
+    at = tuple(dynamics.value(part) for part in joint.r_child)
+    point = in_space(dynamics.position(joint.child, at), scalars)
+    whole = Wrench(zeros(scalars), zeros(scalars))
+    for load in loads:
+        if load.body == joint.parent:
+            there = in_space(dynamics.position(load.body, load.at), scalars)
+            force, torque = in_space(load.force, scalars), torque_in_space(load.torque, scalars)
+            moment = add(torque, cross(sub(there, point), force))
+            whole = Wrench(add(whole.moment, moment), add(whole.force, force))
+    return whole

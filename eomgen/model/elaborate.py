@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 from eomgen.errors import SceneError, check_known
 from eomgen.language.conditions import PRINTED, ROUNDING, Condition, of_inertia, require
@@ -18,10 +18,11 @@ from eomgen.model.model import Body, Model, Point, prescribed_of, velocities_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.orientation import oriented
 from eomgen.model.prescribed import locked_values
-from eomgen.model.tree import Link, links_of
+from eomgen.model.tree import Link, closes, closing_joints, links_of
 from eomgen.outputs import OUTPUTS
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.chains import written_out
+from eomgen.scene.constraints import Constraint, closing
 from eomgen.scene.effects import Effect
 from eomgen.scene.schema import BodyTable, Scene
 
@@ -40,7 +41,8 @@ def elaborate(scene: Scene) -> Model:
     scope = replace(scope, sliding=sliding_in(bodies, n))
     effects, of_effects = effects_in_force(scene, bodies, scope)
     points, of_points = _points(scene, bodies, scope)
-    found = joined([Bindings(own), of_bodies, of_effects, of_points])
+    constraints, of_constraints = _loops(scene, bodies, scope)
+    found = joined([Bindings(own), of_bodies, of_effects, of_points, of_constraints])
     inputs, states = inputs_and_states(scene, effects, scope)
     if not any(body.velocities for body in bodies):
         raise SceneError("joints: nothing can move; give at least one that is no weld")
@@ -55,9 +57,8 @@ def elaborate(scene: Scene) -> Model:
             "leave one free"
         )
     start = initial_state(scene.initial, bodies, prescribed)
-    driven = [c for c in prescribed if not c.locked]
     lengths = (line for link in links for line in axis_notices(link.joint, link.joint_location))
-    return Model(
+    model = Model(
         name=scene.name,
         title=scene.title or scene.name,
         dimensions=n,
@@ -70,7 +71,7 @@ def elaborate(scene: Scene) -> Model:
         states=states,
         initial_q=start.q,
         initial_v=start.v,
-        outputs=outputs_for(scene.outputs, "outputs[{}]", points, inputs, found.parameters, driven),
+        outputs=(),
         form=scene.form,
         route=scene.route,
         locked=tuple(locked.items()),
@@ -79,35 +80,28 @@ def elaborate(scene: Scene) -> Model:
             (name, scene.locked[f"{name}_deg"]) for name in locked if name not in scene.locked
         ),
         leave_out=scene.leave_out,
+        constraints=constraints,
+        held=start.given if constraints else (),
         notices=(
             *dict.fromkeys(lengths),
             *dict.fromkeys(notice for body in bodies for notice in body.notices),
             *start.notices,
         ),
     )
+    return replace(model, outputs=outputs_for(scene.outputs, "outputs[{}]", available_in(model)))
 
 
 def outputs_for(
-    wanted: Literal["all"] | Sequence[str],
-    location: str,
-    points: Collection[object],
-    inputs: Collection[object],
-    parameters: Collection[object],
-    driven: Collection[object],
+    wanted: Literal["all"] | Sequence[str], location: str, available: Mapping[str, Collection[Any]]
 ) -> tuple[str, ...]:
     """The outputs to generate, in the order of `OUTPUTS`.
 
-    `wanted` is "all" or names in `OUTPUTS`. "all" leaves out outputs that need points, inputs,
-    parameters or driven joints that the model lacks; such an output asked for by name raises
-    `SceneError`. `location` is a format string for the location of a name, by its index.
+    `wanted` is "all" or names in `OUTPUTS`. "all" leaves out outputs that need what the model
+    lacks: `available` holds what it has of each kind, see `available_in`. Such an output asked for
+    by name raises `SceneError`. `location` is a format string for the location of a name, by its
+    index.
     """
     needs = {name: spec.needs for name, spec in OUTPUTS.items() if spec.needs}
-    available = {
-        "points": points,
-        "inputs": inputs,
-        "parameters": parameters,
-        "driven joints": driven,
-    }
     if wanted == "all":
         return tuple(name for name in OUTPUTS if name not in needs or available[needs[name]])
     for i, name in enumerate(wanted):
@@ -116,6 +110,17 @@ def outputs_for(
                 f"{location.format(i)}: '{name}' is about {needs[name]}, and there are none"
             )
     return in_order(wanted)
+
+
+def available_in(model: Model) -> dict[str, Collection[Any]]:
+    """What a model has of all that outputs may need."""
+    return {
+        "points": model.points,
+        "inputs": model.inputs,
+        "parameters": model.parameters,
+        "driven joints": model.driven,
+        "constraints": model.constraints,
+    }
 
 
 def in_order(outputs: Collection[str]) -> tuple[str, ...]:
@@ -140,6 +145,8 @@ def _moving(scene: Scene) -> tuple[str, ...]:
     """The names of all variables: time, coordinates, velocities, inputs and extra states."""
     names = ["t"]
     for joint, _ in written_out(scene)[1]:
+        if closes(joint):
+            continue
         both = (*joint.positions(scene.dimensions), *joint.velocities(scene.dimensions))
         names += [coordinate.name for coordinate in both]
     names += [i.name for i in own_inputs(scene)]
@@ -233,6 +240,21 @@ def _points(
         points.append(Point(point.name, index[point.body], place))
         found.append(bindings)
     return tuple(points), joined(found)
+
+
+def _loops(
+    scene: Scene, bodies: Sequence[Body], scope: Scope
+) -> tuple[tuple[Constraint, ...], Bindings]:
+    """The constraints of the joints that close loops, and their bindings."""
+    centres = {body.name: body.com for body in bodies if body.com}
+    loops, found = list[Constraint](), list[Bindings]()
+    for joint, location in closing_joints(scene):
+        turned, kept = oriented(joint, location, scene.dimensions, scope)
+        joint = normalised_joint(turned, location, scene.dimensions)
+        joint, bindings = bind(joint, joint.name, location, scope)
+        loops.append(closing(joint_from_centres(joint, centres), location, scene.dimensions))
+        found += [bindings, Bindings(conditions=kept)]
+    return tuple(loops), joined(found)
 
 
 def _check_symbols(

@@ -14,11 +14,14 @@ from eomgen.scene.schema import Initial
 
 @dataclass(frozen=True)
 class Start:
-    """The initial `q` (nq,) and `v` (nv,), and a notice for each quaternion that was scaled."""
+    """The initial `q` (nq,) and `v` (nv,), a notice for each quaternion that was scaled, and the
+    names of the coordinates and velocities that the scene gives.
+    """
 
     q: tuple[float, ...]
     v: tuple[float, ...]
     notices: tuple[str, ...]
+    given: tuple[str, ...] = ()
 
 
 def initial_state(
@@ -40,7 +43,18 @@ def initial_state(
             notices += _length_notice(parts, names[0])
             is_given = not isinstance(given.q, dict) or any(name in given.q for name in names)
             values |= zip(names, _unit(parts, names[0], is_given), strict=True)
-    return Start(tuple(values.values()), v, tuple(notices))
+    names = [*_given(given.q, coordinates), *_given(given.v, velocities_of(bodies, prescribed))]
+    return Start(tuple(values.values()), v, tuple(notices), tuple(names))
+
+
+def _given(
+    given: Sequence[float] | dict[str, float], coordinates: Sequence[Coordinate]
+) -> list[str]:
+    """The names of those that a list or a table gives, in order."""
+    names = [c.name for c in coordinates]
+    if not isinstance(given, dict):
+        return names
+    return [name for name in names if name in given or f"{name}_deg" in given]
 
 
 def _unit(parts: Sequence[float], first: str, is_given: bool) -> list[float]:

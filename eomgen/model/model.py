@@ -12,6 +12,7 @@ from eomgen.language.formula import Constant, Formula, evaluate
 from eomgen.language.quantity import Parameter
 from eomgen.scalars.exact import Real, radians
 from eomgen.scalars.floats import FloatScalars
+from eomgen.scene.constraints import Constraint, LoopJoint
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import ExtraState, Input
 from eomgen.scene.joints import Free, Joint, Revolute
@@ -171,6 +172,9 @@ class Model:
     locked      locked coordinates by name, with their values
     locked_deg  locked angles by name, as the scene gives them in degrees: 90 is exact, π/2 is not
     notices     what elaboration corrected, one line each
+    constraints what closes loops or restricts motions besides the joints of the tree
+    held        names of coordinates and velocities whose initial values the scene gives
+    dropped     names of rows of constraints that follow from the others
     """
 
     name: str
@@ -192,6 +196,31 @@ class Model:
     locked_deg: tuple[tuple[str, float], ...] = ()
     leave_out: tuple[LeftOut, ...] = ()
     notices: tuple[str, ...] = ()
+    constraints: tuple[Constraint, ...] = ()
+    held: tuple[str, ...] = ()
+    dropped: tuple[str, ...] = ()
+
+    @cached_property
+    def every_row(self) -> tuple[tuple[str, str], ...]:
+        """The name of each row of the constraints, dropped ones too, and its multiplier's unit."""
+        return tuple(
+            row for constraint in self.constraints for row in constraint.row_names(self.dimensions)
+        )
+
+    @cached_property
+    def rows(self) -> tuple[tuple[str, str], ...]:
+        """The same without the dropped ones."""
+        return tuple(row for row in self.every_row if row[0] not in self.dropped)
+
+    @cached_property
+    def loops(self) -> tuple[LoopJoint, ...]:
+        """The joints that close loops."""
+        return tuple(c for c in self.constraints if isinstance(c, LoopJoint))
+
+    @property
+    def force_joints(self) -> tuple[str, ...]:
+        """Names of the joints that transmit constraint forces: those of the tree, then loops."""
+        return (*(b.joint.name for b in self.holding), *(loop.name for loop in self.loops))
 
     @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from eomgen.errors import SceneError, check_known
 from eomgen.model.names import check_names
 from eomgen.scene.chains import written_out
-from eomgen.scene.joints import Joint
+from eomgen.scene.joints import Free, Joint
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import BodyTable, Scene
 
@@ -27,14 +27,14 @@ class Link:
 def links_of(scene: Scene) -> tuple[Link, ...]:
     """The links of a scene and its chains, sorted by depth in the tree and then as in the scene.
 
-    Raises `SceneError` for duplicate or unknown names, and unless the joints form a tree whose root
-    is the world.
+    Raises `SceneError` for duplicate or unknown names, and unless the joints that close no loop
+    form a tree whose root is the world.
     """
     bodies, joints = written_out(scene)
     check_names([(body.name, location) for body, location in bodies])
     check_names([(joint.name, location) for joint, location in joints])
     locations = {body.name: location for body, location in bodies}
-    parent_joint = _parent_joints(locations, joints)
+    parent_joint = _parent_joints(locations, [pair for pair in joints if not closes(pair[0])])
     depth = _depths(parent_joint)
     order = sorted(bodies, key=lambda body: depth[body[0].name])
     index = {WORLD: -1, **{body.name: k for k, (body, _) in enumerate(order)}}
@@ -42,6 +42,33 @@ def links_of(scene: Scene) -> tuple[Link, ...]:
         Link(body, location, *parent_joint[body.name], index[parent_joint[body.name][0].parent])
         for body, location in order
     )
+
+
+def closes(joint: Joint) -> bool:
+    """Whether a joint closes a loop instead of carrying its child."""
+    return not isinstance(joint, Free) and joint.loop
+
+
+def closing_joints(scene: Scene) -> list[tuple[Joint, str]]:
+    """The joints that close loops, each with its location.
+
+    Raises `SceneError` for an unknown body, or a body held to itself.
+    """
+    bodies, joints = written_out(scene)
+    anchors = dict.fromkeys([WORLD, *(body.name for body, _ in bodies)])
+    found = list[tuple[Joint, str]]()
+    for joint, location in joints:
+        if isinstance(joint, Free) or not joint.loop:
+            continue
+        for key, name in (("parent", joint.parent), ("child", joint.child)):
+            check_known(name, f"{location}.{key}", anchors, "body")
+        if joint.parent == joint.child:
+            raise SceneError(
+                f"{location}.child: '{joint.child}' is also the parent; a loop joint holds two "
+                "bodies together"
+            )
+        found.append((joint, location))
+    return found
 
 
 def _parent_joints(
@@ -57,7 +84,7 @@ def _parent_joints(
         if joint.child == WORLD:
             raise SceneError(
                 f"{location}.child: '{WORLD}' is the ground, which has no parent; name it as the "
-                "parent, and give no body a second joint: closed loops are not supported"
+                "parent, or give the joint loop = true if it closes a loop"
             )
         check_known(joint.child, f"{location}.child", bodies, "body")
         if joint.parent != WORLD:
@@ -66,7 +93,7 @@ def _parent_joints(
             other = parent_joint[joint.child][1]
             raise SceneError(
                 f"{location}.child: '{joint.child}' is the child of {other} too; "
-                "in a tree each body has one joint to its parent"
+                "in a tree each body has one joint to its parent; give one of the two loop = true"
             )
         parent_joint[joint.child] = (joint, location)
     for name, location in bodies.items():
@@ -89,7 +116,8 @@ def _depths(parent_joint: Mapping[str, tuple[Joint, str]]) -> dict[str, int]:
                 joint, location = parent_joint[name]
                 raise SceneError(
                     f"{location}.parent: '{joint.parent}' is itself a descendant of the child "
-                    f"'{name}': the joints make a cycle; connect one of its bodies to the world"
+                    f"'{name}': the joints make a cycle; give one of them loop = true, and connect "
+                    "one of its bodies to the world"
                 )
             path[name] = None
             name = parent_joint[name][0].parent

@@ -13,6 +13,7 @@ from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
 from eomgen.run.origin import Origin
 from eomgen.run.problem import Contacts, Explain, FloatArray, Problem, Switching, unexplained
+from eomgen.run.projection import projection_of
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 
@@ -123,6 +124,7 @@ def as_problem(
     first = dict(zip(module.STATES, initial.tolist(), strict=True))
     size = float(mechanism_size(module.UNITS, values, first))
     switching = _switching(module, parameters, inputs)
+    projection = projection_of(module, parameters, inputs, size)
     return Problem(
         name=module.NAME,
         states=module.STATES,
@@ -141,6 +143,7 @@ def as_problem(
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
         columns=hasattr(module, "_along"),
         timed=_depends_on_time(module),
+        project=projection.onto if projection else None,
     )
 
 

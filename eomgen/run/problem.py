@@ -115,6 +115,8 @@ class Problem:
     compiled    steps of `derivative` in compiled code; None if there are none
     series      makes the Taylor series of the solutions, by the name of the method that takes them;
                 raises `RunError` where that is not possible
+    project     (t, y, unit) -> (ny,), the nearest state on the constraints, see `run.projection`;
+                None if there are none
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
     quaternion in it is 0.
@@ -139,6 +141,9 @@ class Problem:
     timed: bool = True
     compiled: Compiled | None = None
     series: Mapping[str, Callable[[], Series]] = field(default_factory=dict)
+    project: (
+        Callable[[float, FloatArray, Callable[[FloatArray], FloatArray]], FloatArray] | None
+    ) = None
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)
@@ -166,6 +171,14 @@ class Problem:
         """The number of positions if these are the first states; else 0."""
         count = len(self.positions)
         return count if self.positions == tuple(range(count)) else 0
+
+    def projected(self, t: float, y: FloatArray) -> FloatArray:
+        """The state `y` at t with normalised quaternions, on the constraints if there are any.
+
+        Raises `StepFailure` if the constraints cannot be met near the state.
+        """
+        y = self.unit(y)
+        return y if self.project is None else self.project(t, y, self.unit)
 
     def unit(self, y: FloatArray) -> FloatArray:
         """The state `y` (ny,) with normalised quaternions; those that are not finite stay as is.

@@ -128,6 +128,11 @@ def adaptive_steps(
     Raises `RunError` if `dt` is given, or `max_step` is invalid.
     """
     check_no_step(asked.integrator, asked.dt)
+    if problem.project and not method.one_step:
+        raise RunError(
+            f"integrator: {asked.integrator} continues from earlier steps, which leave the "
+            "constraints of loops; take DOP853, or Rodas5P if the motion is stiff"
+        )
     if method.series:
         check_series(problem, asked.integrator, method.series)
     times = np.linspace(asked.t_start, asked.t_end, asked.samples or ADAPTIVE_SAMPLES)

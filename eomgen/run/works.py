@@ -127,7 +127,7 @@ class Account:
         def state(time: float) -> FloatArray:
             s = (time - t) / length
             bend = (s - 1) * ((1 - 2 * s) * change + (s - 1) * slope + s * end)
-            return problem.unit(y + (time - t) * (change + bend))
+            return problem.projected(time, y + (time - t) * (change + bend))
 
         return state
 

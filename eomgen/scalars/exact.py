@@ -191,6 +191,27 @@ def image_of_axis(a: Matrix, k: int, length: Real) -> tuple[Real, ...]:
         return tuple(whole(row[k] * mpfr(length)) for row in a)
 
 
+def image(a: Matrix, vector: Sequence[Real]) -> tuple[Real, ...]:
+    """The image of a vector under a rotation."""
+    with exactly():
+        return tuple(
+            whole(sum((x * mpfr(y) for x, y in zip(row, vector, strict=True)), ZERO)) for row in a
+        )
+
+
+def inner(a: Sequence[Real], b: Sequence[Real]) -> Real:
+    """a · b."""
+    with exactly():
+        return whole(sum((mpfr(x) * mpfr(y) for x, y in zip(a, b, strict=True)), ZERO))
+
+
+def perpendiculars(axis: tuple[float, float, float]) -> tuple[tuple[Real, ...], tuple[Real, ...]]:
+    """Two unit vectors that are perpendicular to an axis and to each other."""
+    rotation, k = to_axis(axis)
+    one, other = (image_of_axis(rotation, (k + n) % 3, ONE) for n in (1, 2))
+    return one, other
+
+
 def transposed(a: Matrix) -> Matrix:
     """aᵀ, the rotation back."""
     return matrix([[a[j][i] for j in AXES] for i in AXES])

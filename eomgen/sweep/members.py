@@ -179,7 +179,7 @@ class _Prepared:
             for name, value in states.items():
                 initial[self.module.STATES.index(name)] = value
             problem = replace(problem, initial=initial)
-            problem = replace(problem, initial=problem.unit(initial))
+            problem = replace(problem, initial=problem.projected(0.0, initial))
         return own.of(problem) if own else problem
 
     def _run(self, problem: Problem) -> Trajectory:

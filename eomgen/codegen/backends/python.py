@@ -122,6 +122,8 @@ def module(program: Program, interface: Interface) -> str:
         "driven": repr(tuple(c.name for c in interface.driven)) if interface.driven else "",
         "points": repr(interface.points),
         "contacts": [(c.name, c.effect) for c in interface.contacts],
+        "constraints": repr(tuple(n for n, _ in interface.constraints)),
+        "constrained": bool(interface.constraints),
         "impact": written.get("impact"),
         "held": written.get("held"),
         "costs": [(name, json.dumps(counts)) for name, counts in costs.items()],
@@ -254,9 +256,10 @@ def _plain(text: str) -> str:
 def _units(interface: Interface) -> list[tuple[str, str]]:
     entries = [(s.name, s.unit) for s in (*interface.states, *interface.inputs)]
     entries += [(p.name, _plain(p.unit)) for p in interface.parameters]
-    # If a contact and a parameter have the same name, UNITS has the unit of the parameter.
+    # Of a contact and a parameter of the same name, UNITS has the unit of the parameter.
     taken = {name for name, _ in entries}
-    return entries + [(c.name, c.unit) for c in interface.contacts if c.name not in taken]
+    others = [(c.name, c.unit) for c in interface.contacts] + list(interface.constraints)
+    return entries + [pair for pair in others if pair[0] not in taken]
 
 
 def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
@@ -286,6 +289,10 @@ def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
     if interface.contacts:
         lines += ["", "Contacts that strike, each with the unit of its gap and its effect:"]
         lines += _table([(c.name, c.unit, c.effect) for c in interface.contacts])
+        lines += [""]
+    if interface.constraints:
+        lines += ["", "Constraints, each with the unit of its force:"]
+        lines += _table([(name, unit, "") for name, unit in interface.constraints])
         lines += [""]
     lines += interface.left_out
     lines += textwrap.wrap(

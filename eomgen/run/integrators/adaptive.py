@@ -147,7 +147,9 @@ def _samples(problem: Problem, step: Step, times: FloatArray) -> list[tuple[floa
     """The rows of a step at times after its start; at its end no dense output is needed."""
     within = times[times < step.end]
     states = step.states(within) if within.size else ()
-    samples = list(zip(within.tolist(), map(problem.unit, states), strict=True))
+    samples = list(
+        zip(within.tolist(), map(problem.projected, within.tolist(), states), strict=True)
+    )
     return samples + [(step.end, step.last)] * (times.size - within.size)
 
 
@@ -216,7 +218,7 @@ class _Stepper:
             solver.turn()
         dense = cache(solver.dense_output)
         t, y, _ = self._before
-        end = self._problem.unit(solver.y.copy())
+        end = self._problem.projected(float(solver.t), solver.y.copy())
         return Step(t, float(solver.t), y, end, lambda times: dense()(times).T)
 
     def retry(self, step: Step) -> Retry | None:
@@ -271,7 +273,8 @@ class _Stepper:
             reached = self.solver.status == "finished"
             cut = not reached and self.until != self.t_end
             memory |= {"until": self.until if cut else np.inf, **self.branches.memory}
-        t, y = float(self.solver.t), self._problem.unit(self.solver.y.copy())
+        t = float(self.solver.t)
+        y = self._problem.projected(t, self.solver.y.copy())
         return partial(continuation, t, y, memory)
 
     def _memory(self) -> dict[str, Any]:
@@ -309,4 +312,4 @@ def _restored(value: Any, kind: type) -> Any:
 
 def _between(problem: Problem, step: Step, t: float) -> FloatArray:
     """The state at a time within a step, by dense output, which is computed on first use."""
-    return problem.unit(step.states(t))
+    return problem.projected(t, step.states(t))

@@ -81,7 +81,7 @@ def advances(
             if i == steps:
                 monitor.finish(checked)
         y, lost = _sum(y, step + lost)
-        y = problem.unit(y)
+        y = problem.projected(end, y)
         t, regular = end, True
         samples = [(t, y)] if i == steps or i % every == 0 else []
         continuation = partial(_continuation, mark, y, lost) if whole else None
@@ -94,7 +94,7 @@ def _continuation(t: float, y: FloatArray, lost: FloatArray) -> Resume:
 
 def _shorter(change: Change, problem: Problem, t: float, y: FloatArray, end: float) -> FloatArray:
     """The state at `end` by a single step from `t`."""
-    return problem.unit(y + change(problem, t, y, end - t)) if end > t else y
+    return problem.projected(end, y + change(problem, t, y, end - t)) if end > t else y
 
 
 def _sum(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:

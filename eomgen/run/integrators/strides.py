@@ -197,7 +197,7 @@ def _within(
     problem: Problem, states: Callable[[int, float], FloatArray], i: int, t: float
 ) -> FloatArray:
     """The state at a time in step i."""
-    return problem.unit(states(i, t))
+    return problem.projected(t, states(i, t))
 
 
 def _unknown(t: float) -> FloatArray:

@@ -96,6 +96,12 @@ class JointTable(Table):
         "z, or a matrix of three rows; in rad, as '90 deg', or formulas of parameters, whose "
         "values are then fixed",
     )
+    loop: bool = Field(
+        default=False,
+        strict=True,
+        description="whether it closes a loop: it then holds two bodies that other joints carry, "
+        "and adds no coordinates",
+    )
 
 
 class Geared(JointTable):

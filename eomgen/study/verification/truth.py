@@ -71,4 +71,4 @@ class Truth:
             {name: MP.mpf(value) for name, value in self.model.defaults.items()},
             {i.name: MP.mpf(0) for i in self.model.inputs},
         )
-        return np.array(Dynamics(self.model, values, Digits()).factored_forward(), dtype=object)
+        return np.array(Dynamics(self.model, values, Digits()).forward("ldl")(None), dtype=object)

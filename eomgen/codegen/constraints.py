@@ -1,0 +1,45 @@
+"""Outputs of models with constraints: residuals, projections, and the forces of constraints."""
+
+from eomgen.codegen.recording import Recording
+from eomgen.codegen.system import OutputNodes
+from eomgen.dynamics import constraints
+from eomgen.dynamics.loads import scaled
+from eomgen.program.tape import Node
+from eomgen.routes import ROUTES
+from eomgen.scene.effects.base import Load
+
+
+def constraint_outputs(record: Recording) -> OutputNodes:
+    """What a run needs to keep the constraints."""
+    d = record.dynamics
+    respond = d.response(record.route)
+    nodes = {
+        "constraint_residuals": constraints.residuals(d),
+        "constraint_rates": constraints.rates(d),
+        "project_position": constraints.projected_position(d, respond),
+        "project_velocity": constraints.projected_velocity(d, respond),
+    }
+    return {name: ((len(part),), part) for name, part in nodes.items()}
+
+
+def constraint_forces(record: Recording) -> list[Node]:
+    """The multipliers of the rows, N or N m."""
+    if not record.model.rows:
+        return []
+    d, recursion = record.dynamics, ROUTES[record.route].recursion
+    free = getattr(d, f"{recursion}_forward")
+    return constraints.multipliers(d, free, d.response(record.route))
+
+
+def constraint_loads(record: Recording) -> list[list[Load]]:
+    """The loads on bodies of each constraint of the model, under the effects."""
+    found: list[list[Load]] = []
+    forces = dict(
+        zip((name for name, _ in record.model.rows), constraint_forces(record), strict=True)
+    )
+    for constraint in record.model.constraints:
+        names = (name for name, _ in constraint.row_names(record.model.dimensions))
+        rows = zip(names, constraint.rows(record.dynamics), strict=True)
+        loads = (x for name, row in rows if name in forces for x in scaled(row.loads, forces[name]))
+        found.append([x for x in loads if isinstance(x, Load)])
+    return found

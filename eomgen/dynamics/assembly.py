@@ -1,0 +1,297 @@
+"""Assembly: an initial state that meets the constraints, and which rows follow from others.
+
+Coordinates that the scene gives are kept and the others found; if it gives all, or what it gives
+cannot be kept, none is. Newton's method with least-squares steps starts from the scene's values and
+then from seeded states around them; of the positions found the one nearest to the scene's is taken.
+Rows that depend on others are found where the constraints are met, at several positions along the
+motion: a linkage such as Bennett's moves only because its rows depend on each other there.
+"""
+
+import math
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.dynamics import constraints
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.loads import generalised
+from eomgen.dynamics.mechanism_state import Values
+from eomgen.errors import SceneError
+from eomgen.model.model import Model
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scene.joints import Free
+
+Array = NDArray[np.float64]
+
+STEPS = 60
+"""Most steps of Newton's method from one start."""
+CLOSED = 1e-12
+"""A residual relative to the mechanism's size that is rounding."""
+STARTS = (0.0, *(0.1,) * 6, *(0.5,) * 10, *(2.0,) * 30)
+"""How far the starts are from the scene's values, rad, or in sizes."""
+ENOUGH = 6
+"""So many positions found suffice to take the nearest."""
+INDEPENDENT = 1e-7
+"""A row that leaves less than this of itself beside the others follows from them."""
+ALONG = (0.0, 0.05, 0.1, -0.05, 0.2)
+"""Positions along the motion at which rows are compared, rad, or in sizes."""
+MOVED = 1e-9
+"""A change of a given value that is not reported."""
+
+
+@dataclass(frozen=True)
+class _Mechanism:
+    """A model's constraints as functions of the coordinates. Residuals and steps are in sizes."""
+
+    model: Model
+    size: float
+
+    def dynamics(self, q: Array, v: Sequence[float] | None = None) -> Dynamics:
+        model = self.model
+        inputs = {i.name: i.default for i in model.inputs}
+        states = {x.name: x.initial for x in model.states}
+        speeds = [0.0] * len(model.velocities) if v is None else list(v)
+        values = Values(model.defaults, inputs, q.tolist(), speeds, states, 0.0)
+        return Dynamics(model, values, FloatScalars())
+
+    def residuals(self, q: Array) -> Array:
+        found = np.array(constraints.residuals(self.dynamics(q)))
+        return np.asarray(found / self._units)
+
+    def jacobian(self, q: Array) -> Array:
+        """J (nc, nv) in sizes."""
+        d = self.dynamics(q)
+        rows = [generalised(d, row.loads)[: d.nv] for row in constraints.rows_of(d)]
+        matrix = np.array(rows, dtype=np.float64).reshape(len(rows), d.nv)
+        scaled: Array = matrix * self.lengths / self._units[:, np.newaxis]
+        return scaled
+
+    def moved(self, q: Array, step: Array) -> Array:
+        """q after a step (nv,) of the velocities' directions, in sizes; quaternions stay unit."""
+        rates = constraints.position_rates(self.dynamics(q), (step * self.lengths).tolist())
+        found: Array = q + np.array(rates, dtype=np.float64)
+        for indices in map(list, self.model.quaternions):
+            found[indices] /= np.linalg.norm(found[indices])
+        return found
+
+    def upright(self, q: Array) -> bool:
+        """Whether no loop is closed with a part turned by half a turn."""
+        d = self.dynamics(q)
+        return all(cosine > 0 for loop in self.model.loops for cosine in loop.upright(d))
+
+    @property
+    def lengths(self) -> Array:
+        """The size of each velocity's coordinate: 1 for an angle."""
+        return np.array([self.size if c.unit == "m/s" else 1.0 for c in self.model.velocities])
+
+    @property
+    def _units(self) -> Array:
+        return np.array([self.size if unit == "N" else 1.0 for _, unit in self.model.rows])
+
+
+def assembled(model: Model) -> Model:
+    """The model with an initial state that meets its constraints, without rows that follow from
+    others, and with a notice of what was changed.
+
+    Raises `SceneError`, naming the loop and by how much it stays open, if the constraints cannot be
+    met, or if they leave no freedom.
+    """
+    if not model.constraints:
+        return model
+    mechanism = _Mechanism(model, _size(model))
+    start = np.array(model.initial_q)
+    free = _free(model)
+    q = _closed(mechanism, start, free)
+    notices = list[str]()
+    if q is None and not free.all():
+        q = _closed(mechanism, start, np.ones(len(free), dtype=bool))
+        if q is None or not _complete(model):
+            raise SceneError(_open(mechanism, start, free))
+        notices += _changes(model, start, q)
+    if q is None:
+        raise SceneError(_open(mechanism, start, free))
+    dropped = _dependent(mechanism, q)
+    model = replace(model, initial_q=tuple(q.tolist()), dropped=dropped)
+    if len(model.rows) >= len(model.velocities):
+        raise SceneError(
+            f"joints: the loops hold everything: {len(model.rows)} independent constraints on "
+            f"{len(model.velocities)} velocities; leave one out"
+        )
+    if dropped:
+        notices.append(
+            f"constraints: {', '.join(dropped)} follow{'s' * (len(dropped) == 1)} from the others "
+            "and left out; the forces of these loops are then not unique"
+        )
+    v, more = _speeds(replace(mechanism, model=model), q)
+    return replace(model, initial_v=v, notices=(*model.notices, *notices, *more))
+
+
+def _size(model: Model) -> float:
+    """A typical length of the mechanism, m."""
+    joints = [*(body.joint for body in model.bodies), *(loop.joint for loop in model.loops)]
+    parts = [
+        part
+        for joint in joints
+        if not isinstance(joint, Free)
+        for part in (*joint.r_parent, *joint.r_child)
+    ]
+    return max((abs(model.value(part)) for part in parts), default=0.0) or 1.0
+
+
+def _free(model: Model) -> NDArray[np.bool_]:
+    """Which velocities' coordinates may change in assembly: those that the scene does not give."""
+    held = set(model.held)
+    found = np.ones(len(model.velocities), dtype=bool)
+    for index in model.joint_indices:
+        names = [c.name for c in index.body.positions]
+        for i, j in index.plain:
+            if j < len(found) and names[index.q.index(i)] in held:
+                found[j] = False
+        if held & set(names[index.body.plain :]):
+            found[list(index.spin)] = False
+    return found
+
+
+def _complete(model: Model) -> bool:
+    """Whether the scene gives every coordinate, so that its values may be rounded."""
+    return not _free(model).any()
+
+
+def _closed(mechanism: _Mechanism, start: Array, free: NDArray[np.bool_]) -> Array | None:
+    """The closed position nearest to a start; None if none is found."""
+    if not free.any():
+        return start if np.abs(mechanism.residuals(start)).max() <= CLOSED else None
+    rng, found = random.Random(11), list[Array]()
+    for spread in STARTS:
+        step = np.array([rng.uniform(-spread, spread) if may else 0.0 for may in free])
+        q = _newton(mechanism, mechanism.moved(start, step), free)
+        if q is not None and mechanism.upright(q):
+            found.append(q)
+            if spread == 0.0 or len(found) >= ENOUGH:
+                break
+    return min(found, key=lambda q: float(np.abs(q - start).max())) if found else None
+
+
+def _newton(mechanism: _Mechanism, q: Array, free: NDArray[np.bool_]) -> Array | None:
+    """The end of Newton's method with damped least-squares steps; None if it does not converge."""
+    g = mechanism.residuals(q)
+    damping, last = 0.0, math.inf
+    for _ in range(STEPS):
+        size = float(np.abs(g).max())
+        if size <= CLOSED and size >= 0.5 * last:
+            return q
+        last = size
+        matrix = np.where(free, mechanism.jacobian(q), 0.0)
+        normal = matrix @ matrix.T + damping * np.eye(len(g))
+        step = -matrix.T @ np.linalg.lstsq(normal, g, rcond=1e-14)[0]
+        length = float(np.abs(step).max())
+        step *= min(1.0, 0.5 / length) if length else 1.0
+        there = mechanism.moved(q, step)
+        after = mechanism.residuals(there)
+        if float(after @ after) > float(g @ g) and size > CLOSED:
+            damping = max(10 * damping, 1e-6)
+            last = math.inf
+            if damping > 1e6:
+                return None
+            continue
+        q, g, damping = there, after, damping / 10 if damping > 1e-12 else 0.0
+    return q if float(np.abs(g).max()) <= 10 * CLOSED else None
+
+
+def _open(mechanism: _Mechanism, start: Array, free: NDArray[np.bool_]) -> str:
+    """What cannot close, and by how much at least."""
+    q, g = start, mechanism.residuals(start)
+    for _ in range(200):
+        matrix = np.where(free, mechanism.jacobian(q), 0.0)
+        step = -matrix.T @ np.linalg.solve(matrix @ matrix.T + 1e-3 * np.eye(len(g)), g)
+        there = mechanism.moved(q, step * min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300)))
+        after = mechanism.residuals(there)
+        if float(after @ after) >= float(g @ g):
+            break
+        q, g = there, after
+    model = mechanism.model
+    worst = int(np.abs(g).argmax())
+    name, unit = model.rows[worst]
+    gap = abs(float(g[worst])) * (mechanism.size if unit == "N" else 1.0)
+    held = ", ".join(model.held)
+    given = f" with {held} as given" if held else ""
+    return (
+        f"initial.q: the constraints cannot be met{given}: {name} stays open by "
+        f"{gap:.3g} {'m' if unit == 'N' else 'rad'}; change lengths"
+        f"{', or give fewer coordinates' if held else ' or the start'}"
+    )
+
+
+def _changes(model: Model, start: Array, q: Array) -> list[str]:
+    """A notice of the greatest change of a given coordinate."""
+    k = int(np.abs(q - start).argmax())
+    change = abs(float(q[k] - start[k]))
+    if change <= MOVED:
+        return []
+    c = model.coordinates[k]
+    return [
+        f"initial.q: moved to meet the constraints, by at most {change:.2g} {c.unit} "
+        f"({c.name}): give fewer coordinates to keep these"
+    ]
+
+
+def _dependent(mechanism: _Mechanism, q: Array) -> tuple[str, ...]:
+    """The names of rows that follow from those before them wherever the constraints are met."""
+    places = [q]
+    for step in ALONG[1:]:
+        matrix = mechanism.jacobian(q)
+        free = np.linalg.svd(matrix)[2][np.linalg.matrix_rank(matrix, tol=INDEPENDENT) :]
+        for direction in free:
+            there = _newton(mechanism, mechanism.moved(q, step * direction),
+                            np.ones(len(direction), dtype=bool))  # fmt: skip
+            if there is not None:
+                places.append(there)
+    matrices = [mechanism.jacobian(place) for place in places]
+    kept: list[int] = []
+    for i in range(len(mechanism.model.rows)):
+        if any(_adds(matrix, kept, i) for matrix in matrices):
+            kept.append(i)
+    return tuple(name for i, (name, _) in enumerate(mechanism.model.rows) if i not in kept)
+
+
+def _adds(matrix: Array, kept: Sequence[int], i: int) -> bool:
+    """Whether a row is independent of those kept."""
+    row = matrix[i]
+    if not kept:
+        return bool(np.linalg.norm(row) > INDEPENDENT)
+    basis = matrix[list(kept)]
+    rest = row - np.linalg.lstsq(basis.T, row, rcond=INDEPENDENT)[0] @ basis
+    return bool(np.linalg.norm(rest) > INDEPENDENT * max(float(np.linalg.norm(row)), 1e-3))
+
+
+def _speeds(mechanism: _Mechanism, q: Array) -> tuple[tuple[float, ...], list[str]]:
+    """Velocities that meet the constraints: those given are kept, the others found, the least."""
+    model = mechanism.model
+    given = np.array(model.initial_v)
+    held = np.array([c.name in set(model.held) for c in model.velocities])
+    d = mechanism.dynamics(q, given.tolist())
+    rate = np.array(constraints.rates(d))
+    matrix = mechanism.jacobian(q) / mechanism.lengths
+    rate = rate / np.array([mechanism.size if unit == "N" else 1.0 for _, unit in model.rows])
+    for free in (~held, np.ones(len(held), dtype=bool)):
+        change = -np.linalg.lstsq(np.where(free, matrix, 0.0), rate, rcond=1e-10)[0]
+        left = float(np.abs(matrix @ change + rate).max())
+        if left <= 1e-9 * max(1.0, float(np.abs(rate).max())):
+            moved = float(np.abs(change[held]).max(initial=0.0))
+            if free.all() and held.any() and not held.all() and moved > MOVED:
+                break
+            notices = []
+            if moved > MOVED:
+                k = int((np.abs(change) * held).argmax())
+                c = model.velocities[k]
+                notices = [
+                    f"initial.v: changed to meet the constraints, by at most {moved:.2g} {c.unit} "
+                    f"({c.name})"
+                ]
+            return tuple((given + change).tolist()), notices
+    raise SceneError(
+        "initial.v: the velocities given contradict the constraints; give fewer of them"
+    )
