@@ -21,6 +21,7 @@ class RouteSpec:
     differentiated  whether derivatives of v̇ are taken of the steps that compute it; else inverse
                     dynamics is differentiated and solved with the factors of M
     last            whether `auto` tries it only if all others lose too many digits
+    loops           whether it is for mechanisms with constraints only
     """
 
     about: str
@@ -29,6 +30,7 @@ class RouteSpec:
     frame_axes: bool = False
     differentiated: bool = False
     last: bool = False
+    loops: bool = False
 
 
 ROUTES: dict[str, RouteSpec] = {
@@ -44,6 +46,11 @@ ROUTES: dict[str, RouteSpec] = {
         "factored",
     ),
     "aba": RouteSpec("articulated bodies: the cost grows linearly with the tree", "articulated"),
+    "independent": RouteSpec(
+        "for loops: dependent velocities solved for, one equation for each degree of freedom",
+        "independent",
+        loops=True,
+    ),
     "orthogonal": RouteSpec(
         "orthogonal elimination on Gauss's principle: keeps digits where masses or angles are "
         "uneven",
@@ -53,3 +60,8 @@ ROUTES: dict[str, RouteSpec] = {
         last=True,
     ),
 }
+
+
+def routes_for(loops: bool) -> list[str]:
+    """The routes for mechanisms with or without constraints, in order."""
+    return [name for name, spec in ROUTES.items() if loops or not spec.loops]

@@ -13,7 +13,7 @@ from eomgen.model.model import Model
 from eomgen.program.passes import optimise
 from eomgen.program.program import Program, cost, interpreter
 from eomgen.program.tape import TIME
-from eomgen.routes import ROUTES
+from eomgen.routes import ROUTES, routes_for
 from eomgen.scalars.floats import ArrayScalars
 
 MOST_LOST = 4.0
@@ -130,7 +130,8 @@ def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _A
             candidates.append(_candidate(name, _operations(attempts[name].alone)))
     least, fewest = least_factoring(model), math.inf
     # Routes that factor M come last, because a lower bound of their operations is known.
-    others = [name for name, spec in ROUTES.items() if not (spec.symbolic or spec.last)]
+    there = {name: ROUTES[name] for name in routes_for(bool(model.constraints))}
+    others = [name for name, spec in there.items() if not (spec.symbolic or spec.last)]
     for name in sorted(others, key=_factors):
         if _factors(name) and least > fewest:
             words = f"not tried: factoring alone takes {least} operations"

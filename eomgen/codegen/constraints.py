@@ -5,19 +5,18 @@ from eomgen.codegen.system import OutputNodes
 from eomgen.dynamics import constraints
 from eomgen.dynamics.loads import scaled
 from eomgen.program.tape import Node
-from eomgen.routes import ROUTES
 from eomgen.scene.effects.base import Load
 
 
 def constraint_outputs(record: Recording) -> OutputNodes:
     """What a run needs to keep the constraints."""
     d = record.dynamics
-    respond = d.response(record.route)
+    held = d.constrained(record.route)
     nodes = {
         "constraint_residuals": constraints.residuals(d),
         "constraint_rates": constraints.rates(d),
-        "project_position": constraints.projected_position(d, respond),
-        "project_velocity": constraints.projected_velocity(d, respond),
+        "project_position": held.position(),
+        "project_velocity": held.velocity(),
     }
     return {name: ((len(part),), part) for name, part in nodes.items()}
 
@@ -26,9 +25,7 @@ def constraint_forces(record: Recording) -> list[Node]:
     """The multipliers of the rows, N or N m."""
     if not record.model.rows:
         return []
-    d, recursion = record.dynamics, ROUTES[record.route].recursion
-    free = getattr(d, f"{recursion}_forward")
-    return constraints.multipliers(d, free, d.response(record.route))
+    return record.dynamics.constrained(record.route).multipliers()
 
 
 def constraint_loads(record: Recording) -> list[list[Load]]:

@@ -38,6 +38,8 @@ INDEPENDENT = 1e-7
 """A row that leaves less than this of itself beside the others follows from them."""
 ALONG = (0.0, 0.05, 0.1, -0.05, 0.2)
 """Positions along the motion at which rows are compared, rad, or in sizes."""
+LEAST_PIVOT = 1e-3
+"""A coordinate that the scene gives is solved for where other pivots would be smaller than this."""
 MOVED = 1e-9
 """A change of a given value that is not reported."""
 
@@ -125,8 +127,10 @@ def assembled(model: Model) -> Model:
             f"constraints: {', '.join(dropped)} follow{'s' * (len(dropped) == 1)} from the others "
             "and left out; the forces of these loops are then not unique"
         )
-    v, more = _speeds(replace(mechanism, model=model), q)
-    return replace(model, initial_v=v, notices=(*model.notices, *notices, *more))
+    mechanism = replace(mechanism, model=model)
+    v, more = _speeds(mechanism, q)
+    pivots = _pivots(mechanism.jacobian(q), _free(model))
+    return replace(model, initial_v=v, pivots=pivots, notices=(*model.notices, *notices, *more))
 
 
 def _size(model: Model) -> float:
@@ -265,6 +269,28 @@ def _adds(matrix: Array, kept: Sequence[int], i: int) -> bool:
     basis = matrix[list(kept)]
     rest = row - np.linalg.lstsq(basis.T, row, rcond=INDEPENDENT)[0] @ basis
     return bool(np.linalg.norm(rest) > INDEPENDENT * max(float(np.linalg.norm(row)), 1e-3))
+
+
+def _pivots(matrix: Array, free: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
+    """Rows and columns in the order of elimination. Of the entries that are not small, in columns
+    of `free` velocities if there are such, the one is taken whose row has the fewest others.
+    """
+    work, found = matrix.copy(), list[tuple[int, int]]()
+    rows, columns = list(range(len(matrix))), list(range(matrix.shape[1]))
+    while rows:
+        there = np.abs(work[np.ix_(rows, columns)])
+        for allowed in (np.array([free[j] for j in columns]), np.ones(len(columns), dtype=bool)):
+            entries = np.where(allowed, there, 0.0)
+            if entries.max() > LEAST_PIVOT * there.max():
+                break
+        large = entries >= 0.1 * entries.max()
+        counts = (there > INDEPENDENT).sum(axis=1)
+        a, b = min(zip(*np.nonzero(large), strict=True), key=lambda at: (counts[at[0]], *at))
+        i, j = rows.pop(int(a)), columns.pop(int(b))
+        found.append((i, j))
+        for k in rows:
+            work[k] -= work[k, j] / work[i, j] * work[i]
+    return tuple(found)
 
 
 def _speeds(mechanism: _Mechanism, q: Array) -> tuple[tuple[float, ...], list[str]]:

@@ -1,16 +1,11 @@
-"""Forward dynamics under constraints: loops, and whatever else restricts the motion of the tree.
+"""Constraints at a state: their rows, what they take for the accelerations, and factored matrices.
 
-With J the matrix of the constraints' rates by the velocities, ġ = J v + drift, the multipliers λ
-follow from g̈ = 0 (range-space method; Featherstone 2008, 8.5):
-
-    M v̇ + h = F + Jᵀ λ,    J v̇ + β = 0,    A λ = -(J v̇₀ + β),    A = J M⁻¹ Jᵀ
-
-v̇₀ is the acceleration without constraints, β is g̈ at v̇ = 0. M⁻¹ is applied by the recursion of the
-route, so that the tree's mass matrix is not needed. A has a row for each constraint. It is
-symmetric, and positive definite if these are independent; its factors L D Lᵀ are written out.
+J is the matrix of the constraints' rates by the velocities: ġ = J v + drift and g̈ = J v̇ + β, where
+β is what g̈ is at v̇ = 0. Two formulations solve M v̇ + h = F + Jᵀ λ with g̈ = 0: `range_space` and
+`null_space`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.loads import generalised, power_of
@@ -18,11 +13,6 @@ from eomgen.dynamics.mechanism_state import MechanismState, Values
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.constraints.base import Row
-
-Forward = Callable[[Sequence[Scalar] | None], list[Scalar]]
-"""v̇ (nv,) under the effects and further generalised forces (nv,), or None for none."""
-Response = Callable[[Sequence[Scalar]], list[Scalar]]
-"""M⁻¹ f (nv,) of generalised forces f."""
 
 
 def rows_of(d: MechanismState) -> list[Row]:
@@ -34,65 +24,9 @@ def rows_of(d: MechanismState) -> list[Row]:
     return [row for name, row in zip(names, found, strict=True) if name not in d.model.dropped]
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
-    """The constraints of a mechanism at a state, with A factored.
-
-    jacobian   J, a row (nv,) for each constraint
-    responses  M⁻¹ Jᵀ, a column (nv,) for each
-    factors    of A
-    """
-
-    rows: Sequence[Row]
-    jacobian: Sequence[Sequence[Scalar]]
-    responses: Sequence[Sequence[Scalar]]
-    factors: "Factored"
-    scalars: Scalars
-
-    def impulses(self, residuals: Sequence[Scalar]) -> list[Scalar]:
-        """λ with A λ = -residuals."""
-        return self.factors.solved([-x for x in residuals])
-
-    def changed(self, by: Sequence[Scalar], impulses: Sequence[Scalar]) -> list[Scalar]:
-        """`by` + M⁻¹ Jᵀ λ."""
-        found = list(by)
-        for impulse, response in zip(impulses, self.responses, strict=True):
-            found = [x + impulse * y for x, y in zip(found, response, strict=True)]
-        return found
-
-
-def held(d: MechanismState, response: Response) -> Held:
-    """The constraints at a state; `response` applies M⁻¹."""
-    rows = rows_of(d)
-    jacobian = [generalised(d, row.loads)[: d.nv] for row in rows]
-    responses = [response(row) for row in jacobian]
-    count = range(len(rows))
-    matrix = [[inner(jacobian[i], responses[j], d.scalars) for j in count[: i + 1]] for i in count]
-    names = [name for name, _ in d.model.rows]
-    return Held(rows, jacobian, responses, factored(matrix, names, d.scalars), d.scalars)
-
-
-def constrained(d: MechanismState, forward: Forward, response: Response) -> Forward:
-    """Forward dynamics under the constraints, from that without them."""
-
-    def found(tau: Sequence[Scalar] | None) -> list[Scalar]:
-        free = forward(tau)
-        at = held(d, response)
-        return at.changed(free, _multipliers(d, at, free))
-
-    return found
-
-
-def multipliers(d: MechanismState, forward: Forward, response: Response) -> list[Scalar]:
-    """The multipliers λ of the rows under the effects, N or N m; `forward` has no constraints."""
-    return _multipliers(d, held(d, response), forward(None))
-
-
-def _multipliers(d: MechanismState, at: Held, free: Sequence[Scalar]) -> list[Scalar]:
-    bend = accelerations_at_rest(d)
-    return at.impulses(
-        [inner(row, free, d.scalars) + b for row, b in zip(at.jacobian, bend, strict=True)]
-    )
+def jacobian_of(d: MechanismState, rows: Sequence[Row]) -> list[list[Scalar]]:
+    """J: for each row its derivative by each velocity of the state, (nv,)."""
+    return [generalised(d, row.loads)[: d.nv] for row in rows]
 
 
 def residuals(d: MechanismState) -> list[Scalar]:
@@ -145,25 +79,11 @@ def position_rates(d: MechanismState, v: Sequence[Scalar] | None = None) -> list
     return rates
 
 
-def projected_position(d: MechanismState, response: Response) -> list[Scalar]:
-    """q after one Newton step towards g = 0, the nearest in the metric of M."""
-    at = held(d, response)
-    still = [d.scalars.number(0.0)] * d.nv
-    step = position_rates(d, at.changed(still, at.impulses(residuals(d))))
-    return [x + dx for x, dx in zip(d.values.q, step, strict=True)]
-
-
-def projected_velocity(d: MechanismState, response: Response) -> list[Scalar]:
-    """v with ġ = 0, the nearest in the metric of M."""
-    at = held(d, response)
-    return at.changed(d.values.v, at.impulses(rates(d)))
-
-
-# The factors of A.
+# Factors.
 
 
 @dataclass(frozen=True, eq=False)
-class Factored:
+class Symmetric:
     """A = L D Lᵀ with unit lower triangular L; entries of L that are 0 are left out."""
 
     d: Sequence[Scalar]
@@ -184,7 +104,7 @@ class Factored:
 
 def factored(
     matrix: Sequence[Sequence[Scalar]], names: Sequence[str], scalars: Scalars
-) -> Factored:
+) -> Symmetric:
     """The factors of a symmetric positive definite matrix, given by its lower triangle."""
     pivots: list[Scalar] = []
     lower: list[dict[int, Scalar]] = []
@@ -200,7 +120,60 @@ def factored(
                 work[i] = work[i] - own[j] * work[j]
         lower.append(own)
         pivots.append(scalars.named(work[i], f"pivot_{names[i]}"))
-    return Factored(pivots, lower)
+    return Symmetric(pivots, lower)
+
+
+@dataclass(frozen=True, eq=False)
+class Square:
+    """A = L U with unit lower triangular L, in the given order; entries that are 0 are left out."""
+
+    pivots: Sequence[Scalar]
+    lower: Sequence[dict[int, Scalar]]
+    upper: Sequence[dict[int, Scalar]]
+
+    def solved(self, right: Sequence[Scalar]) -> list[Scalar]:
+        """x with A x = right."""
+        x = list(right)
+        for i, row in enumerate(self.lower):
+            for j, entry in row.items():
+                x[i] = x[i] - entry * x[j]
+        for i in reversed(range(len(x))):
+            for j, entry in self.upper[i].items():
+                x[i] = x[i] - entry * x[j]
+            x[i] = x[i] / self.pivots[i]
+        return x
+
+    def solved_transposed(self, right: Sequence[Scalar]) -> list[Scalar]:
+        """x with Aᵀ x = right."""
+        x = list(right)
+        for i, row in enumerate(self.upper):
+            x[i] = x[i] / self.pivots[i]
+            for j, entry in row.items():
+                x[j] = x[j] - entry * x[i]
+        for i in reversed(range(len(x))):
+            for j, entry in self.lower[i].items():
+                x[j] = x[j] - entry * x[i]
+        return x
+
+
+def triangular(
+    matrix: Sequence[Sequence[Scalar]], names: Sequence[str], scalars: Scalars
+) -> Square:
+    """The factors of a matrix whose rows and columns are in the order of elimination."""
+    work = [list(row) for row in matrix]
+    pivots: list[Scalar] = []
+    lower: list[dict[int, Scalar]] = [{} for _ in work]
+    upper: list[dict[int, Scalar]] = []
+    for k, row in enumerate(work):
+        pivots.append(scalars.named(row[k], f"pivot_{names[k]}"))
+        entries = {j: row[j] for j in range(k + 1, len(row)) if not scalars.is_zero(row[j])}
+        upper.append(entries)
+        for i in range(k + 1, len(work)):
+            if not scalars.is_zero(work[i][k]):
+                factor = lower[i][k] = work[i][k] / pivots[k]
+                for j, entry in entries.items():
+                    work[i][j] = work[i][j] - factor * entry
+    return Square(pivots, lower, upper)
 
 
 def inner(a: Sequence[Scalar], b: Sequence[Scalar], scalars: Scalars) -> Scalar:

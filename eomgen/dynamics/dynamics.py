@@ -12,7 +12,7 @@ accelerations, without gyroscopic torques, and joint forces follow from the same
 energies and poses still use the velocities. Energy is not conserved then.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 from eomgen.dynamics import forces as fc
@@ -25,7 +25,6 @@ from eomgen.dynamics.composite import (
     mass_entries,
     solved,
 )
-from eomgen.dynamics.constraints import Forward, constrained
 from eomgen.dynamics.kinematics import TreeKinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.loads import power_of
@@ -37,7 +36,9 @@ from eomgen.dynamics.motion import (
     kinetic_energy,
     velocities,
 )
+from eomgen.dynamics.null_space import NullSpace
 from eomgen.dynamics.orthogonal import Elimination
+from eomgen.dynamics.range_space import Forward, RangeSpace, Response
 from eomgen.dynamics.solids import Solid, centres, ranked, solids
 from eomgen.dynamics.vectors import Vec, no_matrix, sub, torque_in_space, zeros
 from eomgen.routes import ROUTES
@@ -225,16 +226,37 @@ class Dynamics(MechanismState):
 
     def forward(self, route: str) -> Forward:
         """Forward dynamics by the recursion of a route."""
+        if self.model.constraints:
+            return self.constrained(route).forward
         found: Forward = getattr(self, f"{ROUTES[route].recursion}_forward")
-        if not self.model.constraints:
-            return found
-        return constrained(self, found, self.response(route))
+        return found
 
-    def response(self, route: str) -> Callable[[Sequence[Scalar]], list[Scalar]]:
+    def constrained(self, route: str) -> RangeSpace | NullSpace:
+        """The constraints, solved with the recursion of a route."""
+        if route not in self._constrained:
+            recursion = ROUTES[route].recursion
+            self._constrained[route] = (
+                NullSpace(self, self.mass_entries, self._right, self._fall)
+                if ROUTES[route].loops
+                else RangeSpace(
+                    self,
+                    getattr(self, f"{recursion}_forward"),
+                    getattr(self, f"{recursion}_response"),
+                )
+            )
+        return self._constrained[route]
+
+    @cached_property
+    def _constrained(self) -> dict[str, RangeSpace | NullSpace]:
+        return {}
+
+    def response(self, route: str) -> Response:
         """A function that computes M⁻¹ f of generalised impulses or forces f by the recursion of a
-        route.
+        route; under constraints the change of the velocities, which keep these.
         """
-        found: Callable[[Sequence[Scalar]], list[Scalar]]
+        if self.model.constraints:
+            return self.constrained(route).response
+        found: Response
         found = getattr(self, f"{ROUTES[route].recursion}_response")
         return found
 
@@ -247,10 +269,14 @@ class Dynamics(MechanismState):
 
     def factored_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by the LᵀDL factors of the mass matrix."""
+        right = self._right(tau)
+        return self._with_gravity(solved(self.factors, right))
+
+    def _right(self, tau: Sequence[Scalar] | None) -> list[Scalar]:
+        """F - h with generalised forces `tau`, without the weight of trees on a free joint."""
         carried = fc.carried(self.kinematics, self._bias_wrenches(self.inertias))
         bias = fc.generalised(self.kinematics, carried, self.moved)[: self.nv]
-        right = [a - b for a, b in zip(self._generalised_forces(tau), bias, strict=True)]
-        return self._with_gravity(solved(self.factors, right))
+        return [a - b for a, b in zip(self._generalised_forces(tau), bias, strict=True)]
 
     def orthogonal_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by orthogonal elimination, in the frames' own axes."""
@@ -313,6 +339,14 @@ class Dynamics(MechanismState):
         """The wrenches that would make v̇ = 0, for the inertias of the given links."""
         inertial = fc.inertial(links, self._reference_accelerations, self.scalars)
         return [fc.less(a, b) for a, b in zip(inertial, self.wrenches, strict=True)]
+
+    @cached_property
+    def _fall(self) -> list[Scalar]:
+        """The accelerations (nv,) of trees on a free joint by uniform gravity."""
+        found = [self.scalars.number(0.0)] * self.nv
+        for i in self._free_roots:
+            found[i : i + self.dimensions] = self.down[: self.dimensions]
+        return found
 
     def _with_gravity(self, vd: Sequence[Scalar]) -> list[Scalar]:
         """v̇ plus the gravity of trees on a free joint, with the names of its components."""

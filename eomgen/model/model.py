@@ -175,6 +175,8 @@ class Model:
     constraints what closes loops or restricts motions besides the joints of the tree
     held        names of coordinates and velocities whose initial values the scene gives
     dropped     names of rows of constraints that follow from the others
+    pivots      for each row of the constraints, in the order of elimination, its index and that of
+                the velocity that is solved for by it
     """
 
     name: str
@@ -199,6 +201,7 @@ class Model:
     constraints: tuple[Constraint, ...] = ()
     held: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
+    pivots: tuple[tuple[int, int], ...] = ()
 
     @cached_property
     def every_row(self) -> tuple[tuple[str, str], ...]:

@@ -14,7 +14,7 @@ from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.routes import ROUTES
+from eomgen.routes import routes_for
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route, Scene, Simulation
@@ -129,7 +129,7 @@ def bill(
     Raises `SceneError` or `RunError` if the scene cannot be compiled or evaluated at its start.
     """
     whole = _compiled(elaborate(counted(scene)))
-    tries = {route: _try(whole, route) for route in ROUTES}
+    tries = {route: _try(whole, route) for route in routes_for(bool(whole.model.constraints))}
     models = [bare(scene), *(part.model for part in parts), *(m for m, _ in tries.values())]
     made: list[_Made | None] = [whole]
     for model in models:

@@ -7,7 +7,7 @@ from eomgen.codegen.system import System
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.routes import ROUTES
+from eomgen.routes import routes_for
 from eomgen.run.module import GeneratedModule, load_module
 
 
@@ -23,7 +23,7 @@ def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
     """Every route that the model admits except `but`, and the reasons why others are missing."""
     made: dict[str, Made] = {}
     missing: dict[str, str] = {}
-    for route in ROUTES:
+    for route in routes_for(bool(model.constraints)):
         if route == but:
             continue
         words = why_not_compared(model, route)
