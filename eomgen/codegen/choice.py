@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from eomgen.codegen.derive import Derived, derive, record
 from eomgen.derivation.supported import why_not_closed, why_not_tried
+from eomgen.dynamics.closed_positions import safely_dependent
 from eomgen.dynamics.digits import ALL, Route, digits_lost
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.errors import SceneError
@@ -133,6 +134,10 @@ def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _A
     there = {name: ROUTES[name] for name in routes_for(bool(model.constraints))}
     others = [name for name, spec in there.items() if not (spec.symbolic or spec.last)]
     for name in sorted(others, key=_factors):
+        if ROUTES[name].loops and not safely_dependent(model):
+            words = "not taken: the velocities it solves for do not follow from others everywhere"
+            candidates.append(Candidate(name, None, words))
+            continue
         if _factors(name) and least > fewest:
             words = f"not tried: factoring alone takes {least} operations"
             candidates.append(Candidate(name, None, words))

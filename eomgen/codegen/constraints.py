@@ -17,6 +17,7 @@ def constraint_outputs(record: Recording) -> OutputNodes:
         "constraint_rates": constraints.rates(d),
         "project_position": held.position(),
         "project_velocity": held.velocity(),
+        "constraint_margins": held.margins(),
     }
     return {name: ((len(part),), part) for name, part in nodes.items()}
 

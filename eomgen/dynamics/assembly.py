@@ -45,13 +45,19 @@ MOVED = 1e-9
 
 
 @dataclass(frozen=True)
-class _Mechanism:
+class Closure:
     """A model's constraints as functions of the coordinates. Residuals and steps are in sizes."""
 
     model: Model
     size: float
 
+    @classmethod
+    def of(cls, model: Model) -> "Closure":
+        """Those of a model, in its own size."""
+        return cls(model, _size(model))
+
     def dynamics(self, q: Array, v: Sequence[float] | None = None) -> Dynamics:
+        """The mechanism at q, at rest unless v is given."""
         model = self.model
         inputs = {i.name: i.default for i in model.inputs}
         states = {x.name: x.initial for x in model.states}
@@ -60,6 +66,7 @@ class _Mechanism:
         return Dynamics(model, values, FloatScalars())
 
     def residuals(self, q: Array) -> Array:
+        """g of each row, (nc,)."""
         found = np.array(constraints.residuals(self.dynamics(q)))
         return np.asarray(found / self._units)
 
@@ -103,7 +110,7 @@ def assembled(model: Model) -> Model:
     """
     if not model.constraints:
         return model
-    mechanism = _Mechanism(model, _size(model))
+    mechanism = Closure.of(model)
     start = np.array(model.initial_q)
     free = _free(model)
     q = _closed(mechanism, start, free)
@@ -164,14 +171,14 @@ def _complete(model: Model) -> bool:
     return not _free(model).any()
 
 
-def _closed(mechanism: _Mechanism, start: Array, free: NDArray[np.bool_]) -> Array | None:
+def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array | None:
     """The closed position nearest to a start; None if none is found."""
     if not free.any():
         return start if np.abs(mechanism.residuals(start)).max() <= CLOSED else None
     rng, found = random.Random(11), list[Array]()
     for spread in STARTS:
         step = np.array([rng.uniform(-spread, spread) if may else 0.0 for may in free])
-        q = _newton(mechanism, mechanism.moved(start, step), free)
+        q = newton(mechanism, mechanism.moved(start, step), free)
         if q is not None and mechanism.upright(q):
             found.append(q)
             if spread == 0.0 or len(found) >= ENOUGH:
@@ -179,7 +186,7 @@ def _closed(mechanism: _Mechanism, start: Array, free: NDArray[np.bool_]) -> Arr
     return min(found, key=lambda q: float(np.abs(q - start).max())) if found else None
 
 
-def _newton(mechanism: _Mechanism, q: Array, free: NDArray[np.bool_]) -> Array | None:
+def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | None:
     """The end of Newton's method with damped least-squares steps; None if it does not converge."""
     g = mechanism.residuals(q)
     damping, last = 0.0, math.inf
@@ -205,7 +212,7 @@ def _newton(mechanism: _Mechanism, q: Array, free: NDArray[np.bool_]) -> Array |
     return q if float(np.abs(g).max()) <= 10 * CLOSED else None
 
 
-def _open(mechanism: _Mechanism, start: Array, free: NDArray[np.bool_]) -> str:
+def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     """What cannot close, and by how much at least."""
     q, g = start, mechanism.residuals(start)
     for _ in range(200):
@@ -242,14 +249,14 @@ def _changes(model: Model, start: Array, q: Array) -> list[str]:
     ]
 
 
-def _dependent(mechanism: _Mechanism, q: Array) -> tuple[str, ...]:
+def _dependent(mechanism: Closure, q: Array) -> tuple[str, ...]:
     """The names of rows that follow from those before them wherever the constraints are met."""
     places = [q]
     for step in ALONG[1:]:
         matrix = mechanism.jacobian(q)
         free = np.linalg.svd(matrix)[2][np.linalg.matrix_rank(matrix, tol=INDEPENDENT) :]
         for direction in free:
-            there = _newton(mechanism, mechanism.moved(q, step * direction),
+            there = newton(mechanism, mechanism.moved(q, step * direction),
                             np.ones(len(direction), dtype=bool))  # fmt: skip
             if there is not None:
                 places.append(there)
@@ -293,7 +300,7 @@ def _pivots(matrix: Array, free: NDArray[np.bool_]) -> tuple[tuple[int, int], ..
     return tuple(found)
 
 
-def _speeds(mechanism: _Mechanism, q: Array) -> tuple[tuple[float, ...], list[str]]:
+def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]:
     """Velocities that meet the constraints: those given are kept, the others found, the least."""
     model = mechanism.model
     given = np.array(model.initial_v)

@@ -79,6 +79,22 @@ def position_rates(d: MechanismState, v: Sequence[Scalar] | None = None) -> list
     return rates
 
 
+def relative(d: MechanismState, pivots: Sequence[Scalar], sizes: Sequence[Scalar]) -> list[Scalar]:
+    """Each row's pivot relative to the sum of the sizes of the rows of its constraint that have the
+    same unit: a row may vanish in a singular position.
+    """
+    of = {
+        name: (constraint.name, unit)
+        for constraint in d.model.constraints
+        for name, unit in constraint.row_names(d.model.dimensions)
+    }
+    kinds = [of[name] for name, _ in d.model.rows]
+    sums: dict[tuple[str, str], Scalar] = {}
+    for kind, size in zip(kinds, sizes, strict=True):
+        sums[kind] = sums[kind] + size if kind in sums else size
+    return [pivot / sums[kind] for kind, pivot in zip(kinds, pivots, strict=True)]
+
+
 # Factors.
 
 

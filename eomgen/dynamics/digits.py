@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.dynamics.closed_positions import closed_positions
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.frames import Linkage
 from eomgen.dynamics.kinematics import Axes
@@ -84,7 +85,14 @@ def digits_lost(
     finite number at a state loses all digits; a state where none does is left out.
     """
     rng = random.Random(6)
-    q = [_position(model, kind, rng) for kind in KINDS for _ in range(EACH)]
+    if model.constraints:
+        closed = closed_positions(model) or (np.array(model.initial_q),)
+        q = [
+            closed[n * len(closed) // (EACH * len(KINDS))].tolist()
+            for n in range(EACH * len(KINDS))
+        ]
+    else:
+        q = [_position(model, kind, rng) for kind in KINDS for _ in range(EACH)]
     v = [[n % 2 * rng.uniform(-1.5, 1.5) for _ in model.velocities] for n in range(len(q))]
     pushes = [{i.name: rng.uniform(-PUSH, PUSH) for i in model.inputs} for _ in q]
     still = model

@@ -21,6 +21,7 @@ from eomgen.dynamics.constraints import (
     jacobian_of,
     position_rates,
     rates,
+    relative,
     residuals,
     rows_of,
     triangular,
@@ -134,6 +135,15 @@ class NullSpace:
         over = [needed[j] - right[j] for j in self._dependent]
         found = self._factors.solved_transposed(over)
         return [x for _, x in sorted(zip(self._order, found, strict=True), key=_first)]
+
+    def margins(self) -> list[Scalar]:
+        """The square of each pivot relative to the rows of J of its kind: 0 where its velocity does
+        not follow from the others.
+        """
+        pairs = sorted(zip(self._order, self._factors.pivots, strict=True), key=_first)
+        rows = sorted(zip(self._order, self._jacobian, strict=True), key=_first)
+        squares = [inner(row, row, self._scalars) for _, row in rows]
+        return relative(self._d, [pivot * pivot for _, pivot in pairs], squares)
 
     def response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """The change of the velocities by generalised impulses; the constraints stay met."""

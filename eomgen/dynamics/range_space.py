@@ -11,12 +11,14 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from eomgen.dynamics.constraints import (
+    Symmetric,
     accelerations_at_rest,
     factored,
     inner,
     jacobian_of,
     position_rates,
     rates,
+    relative,
     residuals,
     rows_of,
 )
@@ -48,14 +50,26 @@ class RangeSpace:
         """M⁻¹ Jᵀ, a column (nv,) for each row of J."""
         return [self._respond(row) for row in self._jacobian]
 
-    def _impulses(self, along: Sequence[Scalar]) -> list[Scalar]:
-        """λ with A λ = -`along`."""
+    @cached_property
+    def _matrix(self) -> list[list[Scalar]]:
+        """The lower triangle of A."""
         J, count = self._jacobian, range(len(self._jacobian))
-        matrix = [
+        return [
             [inner(J[i], self._responses[j], self._scalars) for j in count[: i + 1]] for i in count
         ]
+
+    @cached_property
+    def _factors(self) -> Symmetric:
         names = [name for name, _ in self._d.model.rows]
-        return factored(matrix, names, self._scalars).solved([-x for x in along])
+        return factored(self._matrix, names, self._scalars)
+
+    def _impulses(self, along: Sequence[Scalar]) -> list[Scalar]:
+        """λ with A λ = -`along`."""
+        return self._factors.solved([-x for x in along])
+
+    def margins(self) -> list[Scalar]:
+        """What is left of each row of A beside those before it, by the rows of its kind."""
+        return relative(self._d, self._factors.d, [row[-1] for row in self._matrix])
 
     def _changed(self, by: Sequence[Scalar], impulses: Sequence[Scalar]) -> list[Scalar]:
         """`by` + M⁻¹ Jᵀ λ."""

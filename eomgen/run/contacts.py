@@ -13,7 +13,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from eomgen.run.complementarity import complementary
-from eomgen.run.integrators.interface import StepFailure
+from eomgen.run.failure import StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
 
 TOLERANCE = 1e-9

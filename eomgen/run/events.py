@@ -32,7 +32,8 @@ from eomgen.run.contacts import (
     still,
     strikes,
 )
-from eomgen.run.integrators.interface import Advance, Begin, Resume, StepFailure
+from eomgen.run.failure import StepFailure
+from eomgen.run.integrators.interface import Advance, Begin, Resume
 from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.roots import root
 from eomgen.run.trajectory import Event

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance, Begin, StepFailure
+from eomgen.run.failure import StepFailure
+from eomgen.run.integrators.interface import Advance, Begin
 from eomgen.run.problem import FloatArray, Problem
 
 LOST = 1e-8

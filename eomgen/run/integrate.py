@@ -16,6 +16,7 @@ from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_i
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
+from eomgen.run.projection import watched
 from eomgen.run.stepping import (
     ANEW,
     Asked,
@@ -275,6 +276,8 @@ def _advances(
             max_steps=asked.max_steps,
             resume=resume,
         )
+    if problem.projection:
+        advances = watched(problem.projection, advances, t_start, problem.initial)
     return monitored(monitor, advances, t_start, problem.initial) if monitor else advances
 
 

@@ -143,7 +143,7 @@ def as_problem(
         operations={name: module.COST[name]["total"] for name in COUNTED & set(module.COST)},
         columns=hasattr(module, "_along"),
         timed=_depends_on_time(module),
-        project=projection.onto if projection else None,
+        projection=projection,
     )
 
 

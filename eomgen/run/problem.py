@@ -12,6 +12,7 @@ from eomgen.errors import RunError
 from eomgen.run.compiled import Compiled, Series
 from eomgen.run.intervals import Interval
 from eomgen.run.origin import Origin
+from eomgen.run.projection import Projection
 
 FloatArray = NDArray[np.float64]
 """An array of 64-bit floats, such as a state."""
@@ -115,8 +116,7 @@ class Problem:
     compiled    steps of `derivative` in compiled code; None if there are none
     series      makes the Taylor series of the solutions, by the name of the method that takes them;
                 raises `RunError` where that is not possible
-    project     (t, y, unit) -> (ny,), the nearest state on the constraints, see `run.projection`;
-                None if there are none
+    projection  onto the constraints; None if there are none
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
     quaternion in it is 0.
@@ -141,9 +141,7 @@ class Problem:
     timed: bool = True
     compiled: Compiled | None = None
     series: Mapping[str, Callable[[], Series]] = field(default_factory=dict)
-    project: (
-        Callable[[float, FloatArray, Callable[[FloatArray], FloatArray]], FloatArray] | None
-    ) = None
+    projection: Projection | None = None
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)
@@ -178,7 +176,7 @@ class Problem:
         Raises `StepFailure` if the constraints cannot be met near the state.
         """
         y = self.unit(y)
-        return y if self.project is None else self.project(t, y, self.unit)
+        return y if self.projection is None else self.projection.onto(t, y, self.unit)
 
     def unit(self, y: FloatArray) -> FloatArray:
         """The state `y` (ny,) with normalised quaternions; those that are not finite stay as is.

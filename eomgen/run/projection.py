@@ -6,19 +6,25 @@ of the mass matrix (Hairer and Wanner II, VII.2; Eich 1993). The order of the me
 error of the constraints adds up.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from eomgen.run.integrators.interface import StepFailure
-from eomgen.run.problem import FloatArray
+from eomgen.run.failure import StepFailure
+
+FloatArray = NDArray[np.float64]
 
 MOST = 12
 """Most steps of Newton's method after a step; two suffice where steps are accurate."""
 MET = 1e-15
 """A residual relative to the mechanism's size that is rounding, beside the last one."""
+SINGULAR, NEAR = 1e-9, 0.05
+"""A margin that counts as 0; and one below which the least margin is searched between steps."""
+SEARCH = 60
+"""Evaluations of that search."""
 CLOSE = 1e-9
 """The largest residual that is left where Newton's method ends, in sizes."""
 
@@ -32,6 +38,8 @@ class Projection:
     residuals   (t, y) -> (nc,), m or rad
     position    (t, y) -> (nq,), the coordinates after a step of Newton's method
     velocity    (t, y) -> (nv,), the velocities that meet the constraints
+    margins     (t, y) -> (nc,), how far each row is from following from others, at most 1; 0 in a
+                singular position
     """
 
     names: tuple[str, ...]
@@ -39,6 +47,7 @@ class Projection:
     residuals: Callable[[float, FloatArray], FloatArray]
     position: Callable[[float, FloatArray], FloatArray]
     velocity: Callable[[float, FloatArray], FloatArray]
+    margins: Callable[[float, FloatArray], FloatArray]
     coordinates: int
 
     def onto(self, t: float, y: FloatArray, unit: Callable[[FloatArray], FloatArray]) -> FloatArray:
@@ -83,5 +92,89 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
         residuals=lambda t, y: module.constraint_residuals(t, y, parameters, inputs),
         position=lambda t, y: module.project_position(t, y, parameters, inputs),
         velocity=lambda t, y: module.project_velocity(t, y, parameters, inputs),
+        margins=lambda t, y: module.constraint_margins(t, y, parameters, inputs),
         coordinates=len(module.POSITIONS),
     )
+
+
+class Part(Protocol):
+    """A step, as far as it is watched."""
+
+    @property
+    def t(self) -> float:
+        """Its end."""
+
+    @property
+    def y(self) -> FloatArray:
+        """The state there."""
+
+    @property
+    def within(self) -> Callable[[float], FloatArray]:
+        """The state at a time within it."""
+
+
+Steps = TypeVar("Steps", bound=Part)
+
+
+def watched(
+    projection: Projection, advances: Iterator[Steps], t: float, y: FloatArray
+) -> Iterator[Steps]:
+    """The steps of a run from (t, y), which ends where the mechanism is singular.
+
+    The margins are evaluated after each step. Where their least has a small minimum it is searched
+    within the steps around it, so that no singular position is passed over. Raises `StepFailure`
+    there.
+    """
+    start, margin, before, last = t, _least(projection, t, y), float("inf"), None
+    for advance in advances:
+        here = _least(projection, advance.t, advance.y)
+        if advance.t > start:
+            if margin < before and margin < here and margin < NEAR and last is not None:
+                _search(projection, last, advance)
+            before, margin, last = margin, here, (start, advance)
+            start = advance.t
+        else:  # a strike
+            before, margin, last = float("inf"), here, None
+        _check(projection, advance.t, advance.y)
+        yield advance
+
+
+def _search(projection: Projection, last: tuple[float, Part], advance: Part) -> None:
+    """Look for a singular position in two steps, by golden section."""
+    begin, first = last
+
+    def state(t: float) -> FloatArray:
+        return (first if t < first.t else advance).within(t)
+
+    a, b = begin, advance.t
+    ratio = (5**0.5 - 1) / 2
+    c, d = b - ratio * (b - a), a + ratio * (b - a)
+    at_c, at_d = _least(projection, c, state(c)), _least(projection, d, state(d))
+    for _ in range(SEARCH):
+        if at_c < at_d:
+            b, d, at_d = d, c, at_c
+            c = b - ratio * (b - a)
+            at_c = _least(projection, c, state(c))
+        else:
+            a, c, at_c = c, d, at_d
+            d = a + ratio * (b - a)
+            at_d = _least(projection, d, state(d))
+        if min(at_c, at_d) < SINGULAR:
+            break
+    best = c if at_c < at_d else d
+    _check(projection, best, state(best))
+
+
+def _check(projection: Projection, t: float, y: FloatArray) -> None:
+    margins = projection.margins(t, y)
+    worst = int(np.argmin(margins))
+    if margins[worst] < SINGULAR:
+        raise StepFailure(
+            f"the mechanism is singular at t = {t:.6g} s: constraint {projection.names[worst]} "
+            "follows from the others there, as at a dead point or a change point",
+            "take another start, or lengths that do not line up",
+        )
+
+
+def _least(projection: Projection, t: float, y: FloatArray) -> float:
+    return float(projection.margins(t, y).min())

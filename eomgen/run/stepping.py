@@ -128,7 +128,7 @@ def adaptive_steps(
     Raises `RunError` if `dt` is given, or `max_step` is invalid.
     """
     check_no_step(asked.integrator, asked.dt)
-    if problem.project and not method.one_step:
+    if problem.projection and not method.one_step:
         raise RunError(
             f"integrator: {asked.integrator} continues from earlier steps, which leave the "
             "constraints of loops; take DOP853, or Rodas5P if the motion is stiff"

@@ -16,12 +16,12 @@ import numpy as np
 
 from eomgen.run.branches import BranchMonitor, Retry, Step
 from eomgen.run.compiled import Steps
+from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import (
     Adaptive,
     Advance,
     Remark,
     Resume,
-    StepFailure,
     always,
 )
 from eomgen.run.integrators.stability import UnstableStepError, stiffness

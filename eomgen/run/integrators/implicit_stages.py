@@ -17,8 +17,9 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.elimination import factored
-from eomgen.run.integrators.interface import FixedStep, StepFailure
+from eomgen.run.integrators.interface import FixedStep
 from eomgen.run.integrators.tableau import ButcherTableau
 from eomgen.run.problem import FloatArray, Problem
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.errors import RunError
+from eomgen.run.failure import StepFailure
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Event
 
@@ -28,17 +28,6 @@ SMALLEST_RTOL = 2.3e-14
 SHORTER = "take a smaller --dt, or an implicit or adaptive method (--integrator Radau)"
 LOOSER = "try another --integrator, or a looser --rtol and --atol"
 """Remedies for runs that fail."""
-
-
-class StepFailure(RunError):
-    """A step that cannot be made: the `reason`, and the `remedy`, what to change, or ""."""
-
-    def __init__(self, reason: str, remedy: str = "") -> None:
-        super().__init__("; ".join(filter(None, (reason, remedy))))
-        self.reason, self.remedy = reason, remedy
-
-    def __reduce__(self) -> tuple[type, tuple[str, ...]]:
-        return type(self), (self.reason, self.remedy)
 
 
 class EndedRunError(StepFailure):

@@ -17,7 +17,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.integrators.interface import Change, Stability, StepFailure
+from eomgen.run.failure import StepFailure
+from eomgen.run.integrators.interface import Change, Stability
 from eomgen.run.problem import FloatArray, Problem
 
 UNSTABLE = 1.25

@@ -1,0 +1,14 @@
+"""The failure of a step."""
+
+from eomgen.errors import RunError
+
+
+class StepFailure(RunError):
+    """A step that cannot be made: the `reason`, and the `remedy`, what to change, or ""."""
+
+    def __init__(self, reason: str, remedy: str = "") -> None:
+        super().__init__("; ".join(filter(None, (reason, remedy))))
+        self.reason, self.remedy = reason, remedy
+
+    def __reduce__(self) -> tuple[type, tuple[str, ...]]:
+        return type(self), (self.reason, self.remedy)
