@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 from eomgen.dynamics.frames import Linkage
 from eomgen.dynamics.kinematics import Axes, TreeKinematics, tree_kinematics
@@ -19,8 +20,10 @@ from eomgen.dynamics.vectors import Vec, in_space, times, zeros
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import JointIndex, Model, dofs_of
+from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars
+from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
@@ -136,6 +139,33 @@ class MechanismState:
     def value(self, formula: Formula, **names: Scalar) -> Scalar:
         """A quantity."""
         return evaluate(formula, {**self.names, **names} if names else self.names, self.scalars)
+
+    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
+        """A formula with its derivatives, by dual numbers along one coordinate at a time."""
+        duals, one = Duals(self.scalars), self.scalars.number(1.0)
+        still = {name: duals.still(x) for name, x in self.names.items()}
+        used = set(names_in(formula))
+
+        def slope(name: str) -> Scalar:
+            along = {**still, name: Dual(self.names[name], one)}
+            return evaluate(formula, along, duals).rate
+
+        slopes = []
+        for index in self.model.joint_indices:
+            own = index.body.positions if by == "positions" else index.body.velocities
+            slopes += [
+                (index.body.joint.name, i, slope(c.name))
+                for i, c in enumerate(own)
+                if c.name in used
+            ]
+        zero = self.scalars.number(0.0)
+        rates = {c.name: zero for body in self.model.bodies for c in body.velocities}
+        return Partials(
+            self.value(formula),
+            tuple(slopes),
+            slope("t") if "t" in used else zero,
+            self.value(formula, **rates),
+        )
 
     def input(self, name: str) -> Scalar:
         """An input."""

@@ -16,7 +16,7 @@ LARGEST = 2000
 Repeated subexpressions count each time: the program computes them once, but every pass over the
 formula visits each of them.
 """
-TABLES = ("bodies", "joints", "chains", "points", "effects")
+TABLES = ("bodies", "joints", "chains", "points", "effects", "constraints")
 """The tables of a scene whose formulas may use definitions."""
 
 

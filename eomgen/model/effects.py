@@ -13,8 +13,9 @@ from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, dofs_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
+from eomgen.scene.constraints import ConstraintTable
 from eomgen.scene.effects import Driven, Effect, Gravity
-from eomgen.scene.effects.base import ExtraState, Input
+from eomgen.scene.effects.base import EffectTable, ExtraState, Input
 from eomgen.scene.joints import Prismatic, Revolute
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import Scene
@@ -65,36 +66,65 @@ def effects_in_force(
     effect that names something unknown or cannot act on what it names.
     """
     check_names([(effect.name, f"effects[{i}]") for i, effect in enumerate(scene.effects)])
-    dofs = dofs_of(bodies, scene.dimensions)
-    names_of_dofs = {b.joint.name: [c.name for c in b.positions] for b in bodies}
-    known = _known_names(scene, bodies, dofs)
-    names = [body.name for body in bodies]
-    centres = {body.name: body.com for body in bodies if body.com}
-    types = {b.joint.name: b.joint.type for b in bodies}
+    resolver = _Resolver(scene, bodies, scope)
     effects: list[Effect] = []
     found: list[Bindings] = []
-    for i, effect in enumerate(scene.effects):
+    for i, given in enumerate(scene.effects):
         location = f"effects[{i}]"
-        if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
+        if isinstance(given, Gravity) and any(isinstance(other, Gravity) for other in effects):
             raise SceneError(f"{location}.type: a second 'gravity'; give one")
-        given = effect.model_fields_set
-        _check_names_in(effect, location, known, types)
-        effect.check_dofs(dofs, names_of_dofs, location)
+        effect, bindings = resolver.resolved(given, location, effects)
+        found.append(bindings)
+        effects.append(effect)
+    return tuple(effects), joined(found)
+
+
+def constraints_in_force(
+    scene: Scene, bodies: Sequence[Body], scope: Scope
+) -> tuple[tuple[ConstraintTable, ...], Bindings]:
+    """The constraints that a scene lists, likewise."""
+    location = "constraints[{}]"
+    check_names([(c.name, location.format(i)) for i, c in enumerate(scene.constraints)])
+    resolver = _Resolver(scene, bodies, scope)
+    pairs = [resolver.resolved(c, location.format(i), ()) for i, c in enumerate(scene.constraints)]
+    return tuple(c for c, _ in pairs), joined(bindings for _, bindings in pairs)
+
+
+AnyEffect = TypeVar("AnyEffect", bound=EffectTable)
+
+
+class _Resolver:
+    """Resolves the names of effects in a scene and its bodies."""
+
+    def __init__(self, scene: Scene, bodies: Sequence[Body], scope: Scope) -> None:
+        self._scene, self._bodies, self._scope = scene, bodies, scope
+        self._dofs = dofs_of(bodies, scene.dimensions)
+        self._dof_names = {b.joint.name: [c.name for c in b.positions] for b in bodies}
+        self._known = _known_names(scene, bodies, self._dofs)
+        self._names = [body.name for body in bodies]
+        self._centres = {body.name: body.com for body in bodies if body.com}
+        self._types = {b.joint.name: b.joint.type for b in bodies}
+
+    def resolved(
+        self, effect: AnyEffect, location: str, before: Sequence[Effect]
+    ) -> tuple[AnyEffect, Bindings]:
+        """An effect after those `before` it, with all it names known, and its bindings."""
+        dimensions, given = self._scene.dimensions, effect.model_fields_set
+        _check_names_in(effect, location, self._known, self._types)
+        effect.check_dofs(self._dofs, self._dof_names, location)
         vectors = {
-            field: with_components(value, ZERO, scene.dimensions, f"{location}.{field}")
+            field: with_components(value, ZERO, dimensions, f"{location}.{field}")
             for field in effect.vector_fields
             if isinstance(value := getattr(effect, field), tuple)
         }
-        effect = effect.replaced(**vectors).checked(scene.dimensions, location)
+        effect = effect.replaced(**vectors).checked(dimensions, location)
         if isinstance(effect, Driven):
-            check_drive(effect, location, bodies, effects, scope)
-        effect, bindings = bind(effect, effect.name, location, scope)
-        effect = effect_from_centres(effect, given, names, centres, location)
+            check_drive(effect, location, self._bodies, before, self._scope)
+        effect, bindings = bind(effect, effect.name, location, self._scope)
+        effect = effect_from_centres(effect, given, self._names, self._centres, location)
         conditions = tuple(effect.conditions(location))
-        require(conditions, bindings.values(scope))
-        found += [bindings, Bindings(conditions=conditions)]
-        effects.append(effect)
-    return tuple(effects), joined(found)
+        require(conditions, bindings.values(self._scope))
+        return effect, joined([bindings, Bindings(conditions=conditions)])
 
 
 def check_contacts(effects: Sequence[Effect], bodies: Sequence[str]) -> None:
@@ -126,7 +156,7 @@ def _known_names(
 
 
 def _check_names_in(
-    effect: Effect,
+    effect: EffectTable,
     location: str,
     known: Mapping[str, tuple[str, Collection[str]]],
     types: Mapping[str, str],
@@ -140,13 +170,15 @@ def _check_names_in(
             if "joint" in what and name in types and name not in names:
                 one = what if fields == "joint_fields" else f"{what} and is not free"
                 raise SceneError(
-                    f"{spot}: '{name}' is a {types[name]} joint, which '{effect.type}' does "
+                    f"{spot}: '{name}' is a {types[name]} joint, which '{effect.type_name}' does "
                     f"not act on; name a {one}"
                 )
             check_known(name, spot, names, what)
 
 
-def _names_in(effect: Effect, fields: Sequence[str], location: str) -> Iterator[tuple[str, str]]:
+def _names_in(
+    effect: EffectTable, fields: Sequence[str], location: str
+) -> Iterator[tuple[str, str]]:
     """Each name that some fields hold, with its location. A field is a name, a list or a table."""
     for field in fields:
         value = getattr(effect, field)

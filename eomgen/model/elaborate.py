@@ -9,7 +9,13 @@ from eomgen.language.conditions import PRINTED, ROUNDING, Condition, of_inertia,
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Parameter, with_components
 from eomgen.model.definitions import with_definitions
-from eomgen.model.effects import check_contacts, effects_in_force, inputs_and_states, sliding_in
+from eomgen.model.effects import (
+    check_contacts,
+    constraints_in_force,
+    effects_in_force,
+    inputs_and_states,
+    sliding_in,
+)
 from eomgen.model.frames import Centres, from_centre, joint_from_centres
 from eomgen.model.geometry import axis_notices, entries_of_inertia, normalised_joint
 from eomgen.model.initial import initial_state
@@ -245,7 +251,9 @@ def _points(
 def _loops(
     scene: Scene, bodies: Sequence[Body], scope: Scope
 ) -> tuple[tuple[Constraint, ...], Bindings]:
-    """The constraints of the joints that close loops, and their bindings."""
+    """The constraints of the joints that close loops, then those that the scene lists, and their
+    bindings.
+    """
     centres = {body.name: body.com for body in bodies if body.com}
     loops, found = list[Constraint](), list[Bindings]()
     for joint, location in closing_joints(scene):
@@ -254,7 +262,9 @@ def _loops(
         joint, bindings = bind(joint, joint.name, location, scope)
         loops.append(closing(joint_from_centres(joint, centres), location, scene.dimensions))
         found += [bindings, Bindings(conditions=kept)]
-    return tuple(loops), joined(found)
+    others, of_others = constraints_in_force(scene, bodies, scope)
+    check_names([(c.name, "constraints") for c in (*loops, *others)])
+    return (*loops, *others), joined([*found, of_others])
 
 
 def _check_symbols(

@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from eomgen.errors import SceneError
 from eomgen.language.formula import ZERO, Apply, Constant, Formula
-from eomgen.scene.effects import BodyContact, Effect
+from eomgen.scene.effects import BodyContact
+from eomgen.scene.effects.base import EffectTable
 from eomgen.scene.joints import Free, Joint
 
+AnyEffect = TypeVar("AnyEffect", bound=EffectTable)
 Vector = tuple[Formula, ...]
 Centres = Mapping[str, Vector]
 """For each body that has a frame of its own the centre of mass in it, m."""
@@ -32,8 +34,12 @@ def joint_from_centres(joint: Joint, centres: Centres) -> Joint:
 
 
 def effect_from_centres(
-    effect: Effect, given: Collection[str], bodies: Sequence[str], centres: Centres, location: str
-) -> Effect:
+    effect: AnyEffect,
+    given: Collection[str],
+    bodies: Sequence[str],
+    centres: Centres,
+    location: str,
+) -> AnyEffect:
     """An effect with the points that are `given`, by field, from centres of mass; those that are
     absent are there already.
 
@@ -56,7 +62,7 @@ def effect_from_centres(
     return effect.replaced(**fields) if fields else effect
 
 
-def _named(effect: Effect, fields: Sequence[str], bodies: Sequence[str]) -> list[str]:
+def _named(effect: EffectTable, fields: Sequence[str], bodies: Sequence[str]) -> list[str]:
     """The bodies that some fields name."""
     names: list[str] = []
     for field in fields:

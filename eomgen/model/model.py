@@ -12,7 +12,7 @@ from eomgen.language.formula import Constant, Formula, evaluate
 from eomgen.language.quantity import Parameter
 from eomgen.scalars.exact import Real, radians
 from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.constraints import Constraint, LoopJoint
+from eomgen.scene.constraints import Constraint, ConstraintTable, LoopJoint
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import ExtraState, Input
 from eomgen.scene.joints import Free, Joint, Revolute
@@ -334,7 +334,9 @@ class Model:
         """Every quantity of bodies, joints, points and effects, in order."""
         for body in self.bodies:
             yield from (body.mass, *body.inertia_com)
-        for table in (*(body.joint for body in self.bodies), *self.effects):
+        joints = (*(body.joint for body in self.bodies), *(loop.joint for loop in self.loops))
+        listed = (c for c in self.constraints if isinstance(c, ConstraintTable))
+        for table in (*joints, *self.effects, *listed):
             for field in type(table).model_fields:
                 value = getattr(table, field)
                 for part in value if isinstance(value, tuple) else (value,):

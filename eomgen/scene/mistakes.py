@@ -160,7 +160,7 @@ _UNION_MEMBERS = (
     "ParameterTable",
     "InputTable",
 )
-_TAGGED = {"joints", "effects", "shapes"}
+_TAGGED = {"joints", "effects", "constraints", "shapes"}
 
 
 def _location(parts: tuple[int | str, ...]) -> str:

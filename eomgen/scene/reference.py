@@ -12,6 +12,7 @@ from eomgen.language.base import Table
 from eomgen.language.formula import CONSTANTS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint
 from eomgen.scalars.functions import FUNCTIONS
+from eomgen.scene.constraints import AnyConstraint
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
 from eomgen.scene.look import Camera, Shape
@@ -27,7 +28,7 @@ from eomgen.scene.schema import (
 )
 
 HEAD = """\
-# Scenes: their tables, joints, effects and shapes
+# Scenes: their tables, joints, effects, constraints and shapes
 
 `eomgen reference` prints this page. It lists each key with its unit and its default; a key that is
 not marked as needed may be left out. A quantity is a number, which becomes a parameter of the
@@ -59,13 +60,14 @@ def reference(kind: str | None = None) -> str:
     groups = {
         "Joints": by_type(Joint),
         "Effects": by_type(Effect),
+        "Constraints": by_type(AnyConstraint),
         "Shapes": by_type(Shape),
     }
     if kind is not None:
         known = {name: table for tables in groups.values() for name, table in tables.items()}
         if kind not in known:
             hint = nearest(kind, known) or f"; known: {', '.join(known)}"
-            raise SceneError(f"no joint, effect or shape is of type '{kind}'{hint}")
+            raise SceneError(f"no joint, effect, constraint or shape is of type '{kind}'{hint}")
         return "\n".join(_section(kind, known[kind]))
     functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
     constants = ", ".join(f"`{name}`" for name in CONSTANTS)

@@ -10,6 +10,7 @@ from eomgen.language.base import ByName, Identifier, Number, Positive, Table, Te
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
 from eomgen.routes import ROUTES
+from eomgen.scene.constraints import AnyConstraint
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
 from eomgen.scene.look import Camera, Shape
@@ -252,6 +253,9 @@ class Scene(Table):
     )
     effects: Annotated[tuple[Effect, ...], Field(max_length=MOST)] = Field(
         default=(), description="effects: forces, contacts, controllers, drives"
+    )
+    constraints: Annotated[tuple[AnyConstraint, ...], Field(max_length=MOST)] = Field(
+        default=(), description="constraints: rods, couplings, equations, rolling"
     )
     locked: Annotated[ByName, Field(max_length=MOST)] = Field(
         default={},

@@ -1,9 +1,10 @@
 """The interface of constraints: scalar equations of the motion, each kept by a multiplier."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
+from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Load, Mechanism, Scalar
 
 
@@ -24,6 +25,28 @@ class Row:
     drift: Scalar | None = None
 
 
+@dataclass(frozen=True)
+class Partials:
+    """A formula of the motion and its derivatives by the coordinates, or the velocities, of joints.
+
+    slopes   joint, index of its coordinate or velocity, and the derivative
+    by_time  the derivative by t alone
+    at_rest  the value where all velocities are 0
+    """
+
+    value: Scalar
+    slopes: tuple[tuple[str, int, Scalar], ...]
+    by_time: Scalar
+    at_rest: Scalar
+
+
+class Linkage(Mechanism, Protocol):
+    """What constraints can read of a mechanism."""
+
+    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
+        """A formula with its derivatives by coordinates or by velocities."""
+
+
 class Constraint(Protocol):
     """What closes a loop or restricts a motion."""
 
@@ -34,7 +57,7 @@ class Constraint(Protocol):
     def row_names(self, dimensions: int) -> Sequence[tuple[str, str]]:
         """The name and the unit of the multiplier of each of its rows."""
 
-    def rows(self, mechanism: Mechanism) -> Sequence[Row]:
+    def rows(self, mechanism: Linkage) -> Iterable[Row]:
         """Its scalar constraints, over the mechanism's scalars, in the order of `row_names`."""
 
 
@@ -47,6 +70,6 @@ class ConstraintTable(EffectTable):
         """The name and the unit of the multiplier of each row."""
         raise NotImplementedError
 
-    def rows(self, mechanism: Mechanism) -> Sequence[Row]:
+    def rows(self, mechanism: Linkage) -> Iterable[Row]:
         """Its scalar constraints."""
         raise NotImplementedError

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from eomgen.errors import SceneError
 from eomgen.scalars import exact
-from eomgen.scene.constraints.base import Row
-from eomgen.scene.effects.base import Load, Mechanism, Scalar, Vector
+from eomgen.scene.constraints.base import Linkage, Row
+from eomgen.scene.effects.base import Load, Scalar, Vector
 from eomgen.scene.effects.vectors import cross, dot, negative, sub
 from eomgen.scene.joints import (
     Ball,
@@ -64,17 +64,17 @@ class LoopJoint:
         names = [(word, "N") for word in words] + [(word, "N m") for word in angles]
         return [(f"{self.name}_{word}", unit) for word, unit in names]
 
-    def rows(self, mechanism: Mechanism) -> Sequence[Row]:
+    def rows(self, mechanism: Linkage) -> Sequence[Row]:
         """Positions first, then orientations."""
         return [*self._positions(mechanism), *self._orientations(mechanism)]
 
-    def upright(self, mechanism: Mechanism) -> list[Scalar]:
+    def upright(self, mechanism: Linkage) -> list[Scalar]:
         """Cosines that are 1 where the child is not turned by half a turn; see `rows`."""
         return [dot(a, b) for a, b in self._alike(mechanism)]
 
     # Positions.
 
-    def _positions(self, mechanism: Mechanism) -> Iterator[Row]:
+    def _positions(self, mechanism: Linkage) -> Iterator[Row]:
         parent, child = self.joint.parent, self.joint.child
         at_parent = tuple(mechanism.value(part) for part in self.joint.r_parent)
         at_child = tuple(mechanism.value(part) for part in self.joint.r_child)
@@ -97,7 +97,7 @@ class LoopJoint:
             )
             yield Row(dot(e, d), loads)
 
-    def _held(self, mechanism: Mechanism) -> list[Vector] | None:
+    def _held(self, mechanism: Linkage) -> list[Vector] | None:
         """World directions in which a joint that slides holds its point; None if it holds it in
         all.
         """
@@ -114,7 +114,7 @@ class LoopJoint:
 
     # Orientations.
 
-    def _orientations(self, mechanism: Mechanism) -> Iterator[Row]:
+    def _orientations(self, mechanism: Linkage) -> Iterator[Row]:
         for a, b, cosine in self._across(mechanism):
             if mechanism.dimensions == 2:
                 residual, torque = cross(a, b)[0], (dot(a, b),)
@@ -127,7 +127,7 @@ class LoopJoint:
             )
             yield Row(residual, loads)
 
-    def _across(self, mechanism: Mechanism) -> list[tuple[Vector, Vector, Scalar]]:
+    def _across(self, mechanism: Linkage) -> list[tuple[Vector, Vector, Scalar]]:
         """Pairs of directions, of the parent and of the child, that keep an angle, and its cosine;
         in the plane, that stay parallel, and 0.
         """
@@ -151,7 +151,7 @@ class LoopJoint:
             (self._on_parent(mechanism, a), self._on_child(mechanism, b), cosine) for a, b in pairs
         ]
 
-    def _alike(self, mechanism: Mechanism) -> list[tuple[Vector, Vector]]:
+    def _alike(self, mechanism: Linkage) -> list[tuple[Vector, Vector]]:
         """Pairs of directions that are the same where the joint is closed."""
         joint = self.joint
         if isinstance(joint, Ball | Universal):
@@ -173,13 +173,13 @@ class LoopJoint:
             return spatial(joint.axis or Z)
         return None
 
-    def _on_parent(self, mechanism: Mechanism, direction: Direction) -> Vector:
+    def _on_parent(self, mechanism: Linkage, direction: Direction) -> Vector:
         """A direction of the joint's axes on the parent, in world axes."""
         turned = exact.image(exact.orientation(self.joint.orientation_deg), direction)
         parts = tuple(map(mechanism.number, turned))[: mechanism.dimensions]
         return mechanism.outward(self.joint.parent, parts)
 
-    def _on_child(self, mechanism: Mechanism, direction: Direction) -> Vector:
+    def _on_child(self, mechanism: Linkage, direction: Direction) -> Vector:
         """A direction of the joint's axes on the child, in world axes."""
         parts = tuple(map(mechanism.number, direction))[: mechanism.dimensions]
         return mechanism.outward(self.joint.child, parts)

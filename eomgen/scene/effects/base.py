@@ -232,6 +232,11 @@ class EffectTable(Table):
 
     name: Identifier
 
+    @property
+    def type_name(self) -> str:
+        """Its `type` in scenes."""
+        return str(getattr(self, "type", ""))
+
     def checked(self, dimensions: int, location: str) -> Self:
         """The effect itself, or a copy with fields adapted to `dimensions`.
 
