@@ -137,7 +137,7 @@ def _of_pins(
 def _of_any(model: Model, bare: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
     equations = derive_projected(bare)
     names = reading_names(model)
-    found = list(projected_steps(equations))
+    found = [_renamed(step, names) for step in projected_steps(equations)]
     place = next(i for i, step in enumerate(found) if step.title == "Closed form")
     solved = {line.left.name: line.right for line in found[place].equations}
     rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
