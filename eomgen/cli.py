@@ -122,7 +122,9 @@ def _parser(
     _form(check)
     derive = command("derive", commands.derive, "print the derivation, step by step")
     derive.add_argument(
-        "--format", choices=("text", "latex", "html"), default="text", help="what is written"
+        "--format",
+        choices=("text", "latex", "html"),
+        help="what is written (by the ending of FILE, .html or .tex; else text)",
     )
     derive.add_argument(
         "--form",
@@ -232,8 +234,9 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=…",
         action="append",
         default=[],
-        help="a parameter, state or input: LOW:HIGH:COUNT, LOW:HIGH:COUNT:log or A,B,…; with "
-        "--sample uniform:LOW:HIGH, loguniform:LOW:HIGH or normal:MEAN:DEVIATION",
+        help="a parameter, state or input, or NAME_deg, an angle in degrees: LOW:HIGH:COUNT, "
+        "LOW:HIGH:COUNT:log or A,B,…; with --sample uniform:LOW:HIGH, loguniform:LOW:HIGH or "
+        "normal:MEAN:DEVIATION",
     )
     parser.add_argument("--sample", metavar="N", type=int, help="draw N members, instead of a grid")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of the sample")

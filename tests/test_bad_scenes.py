@@ -84,7 +84,10 @@ SINGULAR = (
 
 # What is replaced, by what (or None: appended), and the message without the file's name.
 MISTAKES = [
-    ("name = \"swing\"", "name = swing", "is not TOML: Invalid value (at line 1, column 8)"),
+    ("name = \"swing\"", "name = swing", "is not TOML: Invalid value (at line 1, column 8); "
+     "a text stands in quotes"),
+    ("[[bodies]]", "[bodies]", "is not TOML: Cannot overwrite a value (at line 8, column 9); "
+     "a key stands once in a table; lists of tables have double brackets, [[effects]]"),
     ("mass = 0.5", "mas = 0.5", "bodies[1].mas: unknown key (did you mean 'mass'?)"),
     ("[initial]", "[inital]", "inital: unknown key (did you mean 'initial'?)"),
     ("mass = 0.5", "", "bodies[1].mass: missing; every such table needs it"),
@@ -300,6 +303,12 @@ MISTAKES = [
     ("inertia_com = 0.02", 'inertia_com = "m*"',
      "bodies[1].inertia_com: 'm*' is not a formula at column 3; write for example '2*m_A' or "
      "'l_A/2'"),
+    ("inertia_com = 0.02", 'inertia_com = "0.02 kg m^2"',
+     "bodies[1].inertia_com: '0.02 kg m^2' has '^' at column 10, which is not allowed; write ** "
+     "for a power"),
+    ("inertia_com = 0.02", 'inertia_com = "200 g"',
+     "bodies[1].inertia_com: '200 g' is not a formula at column 5; write the number alone, in SI "
+     "units, or * to multiply"),
     ("inertia_com = 0.02", 'inertia_com = "I"',
      "bodies[1].inertia_com: unknown parameter 'I'; give it a value in [parameters]"),
     ("inertia_com = 0.02", "inertia_com = [0.02]",
@@ -798,6 +807,9 @@ def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: 
         f"eomgen: {tmp_path}: is a folder; give a scene file in it\n"
     )
     (tmp_path / "picture.toml").write_bytes(b"\x89PNG\xff")
+    for mistake in ("picture", "pictures.toml"):
+        assert main(["check", str(tmp_path / mistake)]) == 1
+        assert "picture.toml'?)" in capsys.readouterr().err
     assert main(["check", str(tmp_path / "picture.toml")]) == 1
     assert capsys.readouterr().err == "eomgen: picture.toml: is not UTF-8 text (byte 0)\n"
 

@@ -114,6 +114,17 @@ def test_a_file_that_only_mentions_this_program_is_not_ours(
             assert main(["derive", "pendulum", "--format", form, "-o", target]) == 0
 
 
+def test_the_ending_of_a_file_says_the_format(tmp_path: Path) -> None:
+    """A page into .html and LaTeX into .tex, unless a format is asked for."""
+    begins = {"a.html": "<!doctype html>", "a.tex": "% Generated", "a.txt": "Simple pendulum"}
+    for name, begin in begins.items():
+        assert main(["derive", "pendulum", "-o", str(tmp_path / name)]) == 0
+        assert (tmp_path / name).read_text("utf-8").startswith(begin)
+    target = str(tmp_path / "a.html")
+    assert main(["derive", "pendulum", "--format", "text", "-o", target]) == 0
+    assert (tmp_path / "a.html").read_text("utf-8").startswith(begins["a.txt"])
+
+
 def test_only_our_own_files_are_removed(tmp_path: Path) -> None:
     """Pictures of an earlier run go; a stranger's file, or none, is left alone."""
     ours, theirs = tmp_path / "ours.html", tmp_path / "theirs.html"

@@ -14,6 +14,7 @@ from eomgen.api.given import Source, Values, check_name, check_time, model_of, r
 from eomgen.api.planning import Backend
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
+from eomgen.api.states import state_names
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
@@ -32,7 +33,7 @@ from eomgen.run.integrators.fixed_step import count_steps
 from eomgen.run.problem import FloatArray
 from eomgen.scene.schema import Scene
 from eomgen.study.accuracy.trial import Setting
-from eomgen.sweep.design import Design, Law, grid, listed, sampled
+from eomgen.sweep.design import Design, Law, grid, in_radians, listed, sampled
 from eomgen.sweep.ensemble import Ensemble
 from eomgen.sweep.execute import chunk_size, execute
 from eomgen.sweep.layout import Memory, bytes_each, layout_of, worded
@@ -89,8 +90,8 @@ def ensemble(
 ) -> Ensemble:
     """Run a scene many times, with other parameters, initial states or inputs.
 
-    vary        lists of values by name of a parameter, a state or an input, one for each member;
-                or `grid(...)` or `sampled(...)`
+    vary        lists of values by name of a parameter, a state or an input, one for each member,
+                `<name>_deg` of an angle in degrees; or `grid(...)` or `sampled(...)`
     t_end, integrator, dt, rtol, atol, max_step  as for `simulate`
     parameters, inputs  values that all members have
     outputs     functions of the module to compute: "kinetic_energy" for example
@@ -157,6 +158,7 @@ def plan_sweep(
         scene.simulation, integrator, dt=dt, rtol=rtol, atol=atol, reporter=reporter
     )
     fixed = values_of(model, parameters, inputs, reporter)
+    design = in_radians(design, _degrees(model))
     for name in design.names:
         if any(name in values for values in fixed):
             raise RunError(f"{argument('vary')}: {name} is also given a fixed value; leave one out")
@@ -172,6 +174,14 @@ def plan_sweep(
         max_step,
         backend,
     )
+
+
+def _degrees(model: Model) -> dict[str, str]:
+    """The names of angles in degrees, unless something else has them, with those in radians."""
+    plain = len(model.coordinates) + len(model.velocities) + len(model.states)
+    others = {*model.defaults, *(i.name for i in model.inputs)}
+    angles = state_names(model)[plain:]
+    return {name: name.removesuffix("_deg") for name in angles if name not in others}
 
 
 def run_sweep(

@@ -1,6 +1,7 @@
 """The command `derive`."""
 
 import sys
+from pathlib import Path
 
 from eomgen.api.deriving import derivation_of
 from eomgen.commands.shared import Arguments, read_model, reporter_of
@@ -13,13 +14,19 @@ def derive(given: Arguments) -> int:
     if given.output is not None:
         check_writable(given.output, force=given.force)
     found = derivation_of(model, reporter_of(given, given.scene), form=given.state_form)
-    if given.format == "text":
+    kind = given.format or _kind(given.output)
+    if kind == "text":
         text = found.text(encoding="utf-8" if given.output else sys.stdout.encoding)
     else:
-        text = found.latex() if given.format == "latex" else found.html()
+        text = found.latex() if kind == "latex" else found.html()
     if given.output is None:
         print(text)
     else:
         write_whole(given.output, text, force=given.force)
         print(f"wrote {given.output}")
     return 0
+
+
+def _kind(output: Path | None) -> str:
+    """What is written to a file, by its ending."""
+    return {".html": "html", ".tex": "latex"}.get(output.suffix if output else "", "text")

@@ -163,12 +163,18 @@ def _law(name: str, text: str) -> Law:
 
 
 def _numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
-    try:
-        values = [float(part) for part in parts]
-    except ValueError:
-        values = [np.nan]
-    if not np.isfinite(values).all():
-        raise RunError(f"--vary {name}={text}: has something that is not a finite number")
+    values = []
+    for part in parts:
+        try:
+            value = float(part)
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value):
+            raise RunError(
+                f"--vary {name}={text}: '{part}' is not a finite number; write LOW:HIGH:COUNT, or "
+                "A,B,… for single values"
+            )
+        values.append(value)
     return values
 
 

@@ -94,6 +94,9 @@ _REMEDIES = {
     "!=": "compare with <, <=, > or >=",
 }
 _EXAMPLE = "write for example '2*m_A' or 'l_A/2'"
+_MEASURED = re.compile(r" *[-+]?[0-9.]+(?:[eE][+-]?[0-9]+)? +[A-Za-z]")
+"""A number followed by a word, as in '2.5 kg'."""
+_ALONE = "write the number alone, in SI units, or * to multiply"
 
 
 def parse(text: str) -> Formula:
@@ -116,7 +119,8 @@ def parse(text: str) -> Formula:
         tree = ast.parse(plain, mode="eval")
     except SyntaxError as error:
         column = start - 1 + (error.offset or len(plain) + 1)  # 0 stands for the end
-        raise FormulaError(f"is not a formula at column {column}; {_EXAMPLE}") from None
+        remedy = _ALONE if _MEASURED.match(text) else _EXAMPLE
+        raise FormulaError(f"is not a formula at column {column}; {remedy}") from None
     except (RecursionError, MemoryError):
         raise FormulaError(f"is nested deeper than {DEEPEST}") from None
     return _formula(tree.body, 0, start)
@@ -147,7 +151,7 @@ def _check_tokens(text: str) -> None:
 def _refuse(word: str, column: int) -> NoReturn:
     remedy = _REMEDIES.get(word)
     if remedy is None and word[0].isdigit():
-        remedy = "write numbers as 1000.0 or 1e3, and * to multiply"
+        remedy = "write numbers without a unit, as 1000.0 or 1e3, and * to multiply"
     tail = f"; {remedy}" if remedy else ""
     raise FormulaError(f"has {word!r} at column {column}, which is not allowed{tail}")
 

@@ -31,7 +31,7 @@ def values_by_name(
                 raise SceneError(f"{location}.{key}: {degrees[key]} is given too; give one of them")
             values[degrees[key]] = math.radians(value)
         else:
-            hint = nearest(key, names) or f"; known: {listed(names)}"
+            hint = nearest(key, (*names, *degrees)) or f"; known: {listed(names)}"
             raise SceneError(f"{location}.{key}: no coordinate has this name{hint}")
     return values
 

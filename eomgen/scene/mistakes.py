@@ -129,6 +129,8 @@ def _line(detail: ErrorDetails) -> str:
         case "list_of_no_lists":
             return f"{location}: has entries that are no lists; give a list of lists"
         case "string_type" | "tuple_type" | "dict_type" | "model_type" | "model_attributes_type":
+            if kind == "tuple_type" and isinstance(detail["input"], dict):
+                return f"{location}: is one table, not a list; write [[{location}]]"
             wanted = {"string_type": "a text", "tuple_type": "a list"}.get(kind, "a table")
             return f"{location}: {value} is not {wanted}; give one"
         case _:

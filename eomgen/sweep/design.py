@@ -103,6 +103,19 @@ def sampled(
     return _checked(Design(tuple(laws), np.array(columns).T.copy()))
 
 
+def in_radians(design: Design, degrees: Mapping[str, str]) -> Design:
+    """The design with angles in radians that it names in degrees: `degrees` gives the name of each.
+
+    Raises `RunError` if an angle is named twice.
+    """
+    names = tuple(degrees.get(name, name) for name in design.names)
+    if len({*names}) < len(names):
+        raise RunError("vary: an angle is given twice, in radians and in degrees; leave one out")
+    scales = [np.pi / 180 if name in degrees else 1.0 for name in design.names]
+    axes = tuple(axis * scale for axis, scale in zip(design.axes, scales, strict=False))
+    return Design(names, design.values * scales, axes)
+
+
 def _checked(design: Design) -> Design:
     count = len(design.values)
     if not 0 < count <= MOST or not design.names:

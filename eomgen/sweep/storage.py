@@ -181,7 +181,9 @@ def opened(
     check_folder(folder)
     if path.exists():
         if _digest(path) != about["digest"]:
-            raise RunError(f"{folder}: holds another sweep; choose another folder with -o")
+            raise RunError(
+                f"{folder}: holds another sweep; remove it, or choose another folder with -o"
+            )
     else:
         if any(folder.iterdir()):
             raise RunError(f"{folder}: is no empty folder; choose another one with -o")
