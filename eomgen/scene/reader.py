@@ -48,7 +48,8 @@ def find_scene(scene: str) -> Path:
         beside = sorted(file.name for file in path.parent.glob("*.toml"))
         names = built_in_names()
         hint = f" (did you mean '{path}.toml'?)" if f"{path.name}.toml" in beside else ""
-        hint = hint or nearest(scene, (*names, *beside)) or f"; known: {', '.join(names)}"
+        hint = hint or nearest(scene, names) or nearest(path.name, beside)
+        hint = hint or f"; known: {', '.join(names)}"
         raise SceneError(f"{scene}: no such file, nor a built-in scene{hint}")
     return path
 
