@@ -16,7 +16,7 @@ EXAMPLES = {
     "schema": "eomgen schema > scene.schema.json",
     "reference": "eomgen reference contact",
     "check": "eomgen check two_body",
-    "derive": "eomgen derive two_body --format html -o two_body.html",
+    "derive": "eomgen derive two_body -o two_body.html",
     "generate": "eomgen generate two_body pendulum -o modules",
     "simulate": "eomgen simulate cart_pole --set l=0.4 --state theta=0.3 --input push=3*sin(t)",
     "view": "eomgen view double_pendulum",
