@@ -114,8 +114,12 @@ def test_a_file_that_only_mentions_this_program_is_not_ours(
             assert main(["derive", "pendulum", "--format", form, "-o", target]) == 0
 
 
-def test_the_ending_of_a_file_says_the_format(tmp_path: Path) -> None:
-    """A page into .html and LaTeX into .tex, unless a format is asked for."""
+def test_the_ending_of_a_file_says_the_format(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A page into .html and LaTeX into .tex, unless a format is asked for; never a PDF."""
+    assert main(["derive", "pendulum", "-o", str(tmp_path / "a.pdf")]) == 1
+    assert "a.tex, of which pdflatex makes a PDF" in capsys.readouterr().err
     begins = {"a.html": "<!doctype html>", "a.tex": "% Generated", "a.txt": "Simple pendulum"}
     for name, begin in begins.items():
         assert main(["derive", "pendulum", "-o", str(tmp_path / name)]) == 0

@@ -28,7 +28,9 @@ from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.results import Derivation
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
+from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.derivation import as_html, as_latex, as_text
+from eomgen.show.drawing import Label, Line
 from eomgen.show.prose import blocks, pieces
 from eomgen.show.terms import explained
 
@@ -315,6 +317,71 @@ def test_forces_in_sketches_have_the_names_of_the_equations() -> None:
 def labels(text: str) -> list[str]:
     """The labels of a drawing."""
     return [part.strip() for part in text.split("|")]
+
+
+def test_weights_point_down_and_forces_along_rails() -> None:
+    """In free-body diagrams, also where other forces act at the same point, and on both bodies."""
+    held = """
+    name = "held"
+    initial = { q = { swing_deg = 35, reach = 0.3 } }
+    bodies = [
+        { name = "arm", mass = 2.0, inertia_com = 0 },
+        { name = "hand", mass = 1.0, inertia_com = 0 },
+    ]
+    effects = [
+        { type = "gravity", g = 9.81 },
+        { type = "pd", name = "servo", joint = "rail", target = 0.5, stiffness = 9.0 },
+    ]
+    [[joints]]
+    name = "pin"
+    type = "revolute"
+    parent = "world"
+    child = "arm"
+    r_child = [0, 1]
+    coordinate = "swing"
+    [[joints]]
+    name = "rail"
+    type = "prismatic"
+    parent = "arm"
+    child = "hand"
+    axis = [0, -1]
+    coordinate = "reach"
+    """
+    model = model_of(held)
+    angles = {}
+    for drawing in body_diagrams(model, derived_effects(model)):
+        for line, label in zip(drawing.items, drawing.items[1:], strict=False):
+            if isinstance(line, Line) and line.arrow and isinstance(label, Label):
+                (x0, y0), (x1, y1) = line.points
+                angles[str(label.text)] = np.degrees(np.arctan2(y1 - y0, x1 - x0))
+    for name, degrees in {
+        "gravity_g*m_arm": -90.0,
+        "gravity_g*m_hand": -90.0,
+        "tau_servo": -55.0,
+        "-tau_servo": 125.0,
+    }.items():
+        assert angles[name] == pytest.approx(degrees, abs=1e-6), name
+
+
+def test_one_name_for_a_mass_in_all_steps() -> None:
+    """A mass without a name is m_<body>, in sketches and in every step."""
+    text = eomgen.derive(
+        {
+            "name": "slider",
+            "bodies": [{"name": "cart", "mass": 2.0, "inertia_com": 0}],
+            "joints": [
+                {
+                    "name": "rail",
+                    "type": "prismatic",
+                    "parent": "world",
+                    "child": "cart",
+                    "axis": [0.6, 0.8],
+                }
+            ],
+            "effects": [{"type": "gravity", "g": 9.81}],
+        }
+    ).text()
+    assert "m_cart" in text and "cart_mass" not in text
 
 
 def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

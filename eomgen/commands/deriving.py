@@ -5,16 +5,17 @@ from pathlib import Path
 
 from eomgen.api.deriving import derivation_of
 from eomgen.commands.shared import Arguments, read_model, reporter_of
+from eomgen.errors import RunError
 from eomgen.files import check_writable, write_whole
 
 
 def derive(given: Arguments) -> int:
     """Print or write the derivation as text, LaTeX or HTML."""
+    kind = given.format or _kind(given.output)
     model, _ = read_model(given.scene, given)
     if given.output is not None:
         check_writable(given.output, force=given.force)
     found = derivation_of(model, reporter_of(given, given.scene), form=given.state_form)
-    kind = given.format or _kind(given.output)
     if kind == "text":
         text = found.text(encoding="utf-8" if given.output else sys.stdout.encoding)
     else:
@@ -28,5 +29,10 @@ def derive(given: Arguments) -> int:
 
 
 def _kind(output: Path | None) -> str:
-    """What is written to a file, by its ending."""
-    return {".html": "html", ".tex": "latex"}.get(output.suffix if output else "", "text")
+    """What is written to a file, by its ending. Raises `RunError` for a PDF."""
+    if output is None:
+        return "text"
+    if output.suffix == ".pdf":
+        tex = output.with_suffix(".tex")
+        raise RunError(f"-o {output}: write {tex}, of which pdflatex makes a PDF")
+    return {".html": "html", ".tex": "latex"}.get(output.suffix, "text")

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import sympy as sp
 
 from eomgen.exposition.effects import DerivedEffect
 from eomgen.exposition.reading import read, reading_names
-from eomgen.model.model import Model
+from eomgen.model.model import Model, dofs_of
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
@@ -50,16 +51,16 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Draw
 
     forces: list[tuple[Point, Point, Expr, str]] = []
     torques: dict[Point, dict[Expr, None]] = {}
-    if shape.own is not None:
-        name = body.joint.name
-        forces.append((at(shape.own), _unknown(name, -1), -sp.Symbol(f"f_{name}"), "force"))
-    for name, p in shape.others:
-        forces.append((at(p), _unknown(name, 1), sp.Symbol(f"f_{name}"), "force"))
     for start, direction, label, style in found:
         if direction is None:
             torques.setdefault(at(start), {})[label] = None
         else:
             forces.append((at(start), direction, label, style))
+    if shape.own is not None:
+        name = body.joint.name
+        forces.append((at(shape.own), _unknown(name, -1), -sp.Symbol(f"f_{name}"), "force"))
+    for name, p in shape.others:
+        forces.append((at(p), _unknown(name, 1), sp.Symbol(f"f_{name}"), "force"))
     items: list[Item] = [*skeleton(shape, at)]
     items.append(Dot(at(shape.centre), 3.2, True))
     items += (Dot(at(p), 4.2, False, "arm") for p in shape.joints)
@@ -113,7 +114,9 @@ def _drawn_forces(
     panel: float,
     numbers: Mapping[Expr, str],
 ) -> Iterator[Item]:
-    """Arrows with names or numbers; those at one point fan out if they have the same direction."""
+    """Arrows with names or numbers. Of those at one point with the same direction the first has it
+    and the others fan out, so forces of known direction come first.
+    """
     used: list[tuple[Point, float]] = []
     taken = [*busy, *(start for start, *_ in forces)]
     for start, direction, label, style in forces:
@@ -142,8 +145,10 @@ def _drawn_forces(
 
 
 def _unknown(joint: str, sign: int) -> Point:
-    """A direction for a force that is not known yet: opposite on the two bodies."""
-    angle = math.radians(35 + 40 * (sum(map(ord, joint)) % 3))
+    """A direction for a force that is not known yet: opposite on the two bodies, and neither along
+    a weight nor along a horizontal force.
+    """
+    angle = math.radians((35, 60, 130)[sum(map(ord, joint)) % 3])
     return (sign * math.cos(angle), sign * math.sin(angle))
 
 
@@ -166,17 +171,35 @@ def _loads_on(
             if load.body == body.name:
                 yield from _one_load(pose, load, told)
         elif load.joint == body.joint.name and shape.own is not None:
-            yield shape.own, None, _joint_name(load, told), "force"
+            yield shape.own, _slide(pose, load), _joint_name(load, told), "force"
         else:
             for name, p in shape.others:
                 if name == load.joint:
-                    yield p, None, -_joint_name(load, told), "force"
+                    along = _slide(pose, load)
+                    back = None if along is None else (-along[0], -along[1])
+                    yield p, back, -_joint_name(load, told), "force"
     for contact in told.contacts:
         for side in contact.normal:
             if isinstance(side, Load) and side.body == body.name:
                 start = pose.point(body.name, numbers(model, side.at))
                 direction = _direction(pose, side.force)
                 yield start, direction, sp.Symbol(f"P_{contact.name}"), "impulse"
+
+
+def _slide(pose: Pose, load: JointLoad) -> Point | None:
+    """Where the child goes when the coordinate of a load grows; None if it turns."""
+    model = pose.model
+    if dofs_of(model.bodies, model.dimensions)[load.joint][load.coordinate] != "prismatic":
+        return None
+    joint = next(x for x in model.joint_indices if x.body.joint.name == load.joint)
+    q = list(model.initial_q)
+    q[joint.q[load.coordinate]] += 1.0
+    centre = (0.0,) * model.dimensions
+    ends = (
+        x.point(joint.body.name, centre) for x in (pose, Pose(replace(model, initial_q=tuple(q))))
+    )
+    (x0, y0), (x1, y1) = ends
+    return (x1 - x0, y1 - y0)
 
 
 def _one_load(
