@@ -347,20 +347,44 @@ def test_weights_point_down_and_forces_along_rails() -> None:
     axis = [0, -1]
     coordinate = "reach"
     """
-    model = model_of(held)
-    angles = {}
-    for drawing in body_diagrams(model, derived_effects(model)):
-        for line, label in zip(drawing.items, drawing.items[1:], strict=False):
-            if isinstance(line, Line) and line.arrow and isinstance(label, Label):
-                (x0, y0), (x1, y1) = line.points
-                angles[str(label.text)] = np.degrees(np.arctan2(y1 - y0, x1 - x0))
-    for name, degrees in {
-        "gravity_g*m_arm": -90.0,
-        "gravity_g*m_hand": -90.0,
-        "tau_servo": -55.0,
-        "-tau_servo": 125.0,
-    }.items():
-        assert angles[name] == pytest.approx(degrees, abs=1e-6), name
+    disc = """
+    name = "disc"
+    initial = { q = { a = 0.1, c_deg = 50 } }
+    bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.1 }]
+    [[effects]]
+    type = "pd"
+    name = "servo"
+    joint = "table"
+    coordinate = "b"
+    target = 0.5
+    stiffness = 9.0
+    [[joints]]
+    name = "table"
+    type = "planar"
+    parent = "world"
+    child = "disc"
+    orientation_deg = 20
+    coordinates = ["a", "b", "c"]
+    """
+    expected = {
+        held: {
+            "gravity_g*m_arm": -90.0,
+            "gravity_g*m_hand": -90.0,
+            "tau_servo": -55.0,
+            "-tau_servo": 125.0,
+        },
+        disc: {"tau_servo": 110.0},
+        disc + "[locked]\nb = 0.3": {"tau_servo": 110.0},
+    }
+    for text, directions in expected.items():
+        model, angles = model_of(text), {}
+        for drawing in body_diagrams(model, derived_effects(model)):
+            for line, label in zip(drawing.items, drawing.items[1:], strict=False):
+                if isinstance(line, Line) and line.arrow and isinstance(label, Label):
+                    (x0, y0), (x1, y1) = line.points
+                    angles[str(label.text)] = np.degrees(np.arctan2(y1 - y0, x1 - x0))
+        for name, degrees in directions.items():
+            assert angles[name] == pytest.approx(degrees, abs=1e-6), name
 
 
 def test_one_name_for_a_mass_in_all_steps() -> None:

@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import sympy as sp
 
 from eomgen.exposition.effects import DerivedEffect
 from eomgen.exposition.reading import read, reading_names
-from eomgen.model.model import Model, dofs_of
+from eomgen.model.model import Model
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints.planar import Planar
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
 from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, numbers, skeleton
 
@@ -189,17 +189,16 @@ def _loads_on(
 def _slide(pose: Pose, load: JointLoad) -> Point | None:
     """Where the child goes when the coordinate of a load grows; None if it turns."""
     model = pose.model
-    if dofs_of(model.bodies, model.dimensions)[load.joint][load.coordinate] != "prismatic":
+    body = next(body for body in model.bodies if body.joint.name == load.joint)
+    found = body.joint.primitives(model.dimensions)[load.coordinate : load.coordinate + 1]
+    if not found or found[0].kind != "prismatic":  # a ball has three coordinates, one primitive
         return None
-    joint = next(x for x in model.joint_indices if x.body.joint.name == load.joint)
-    q = list(model.initial_q)
-    q[joint.q[load.coordinate]] += 1.0
-    centre = (0.0,) * model.dimensions
-    ends = (
-        x.point(joint.body.name, centre) for x in (pose, Pose(replace(model, initial_q=tuple(q))))
-    )
-    (x0, y0), (x1, y1) = ends
-    return (x1 - x0, y1 - y0)
+    x, y, z = found[0].axis
+    if isinstance(body.joint, Planar):  # its axes are those before it turns
+        angle = float(pose.state.coordinate(load.joint, 2))
+        c, s = math.cos(angle), math.sin(angle)
+        x, y = c * x + s * y, c * y - s * x
+    return pose.flat(pose.state.outward(body.name, (x, y, z)[: model.dimensions]))
 
 
 def _one_load(
