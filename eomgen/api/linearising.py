@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, values_of
+from eomgen.api.inputs import Inputs, constant_inputs
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, state_names, values_by_index
 from eomgen.errors import RunError
@@ -27,7 +28,7 @@ class Point:
     at: Place = "equilibrium"
     state: Values | None = None
     parameters: Values | None = None
-    inputs: Values | None = None
+    inputs: Inputs | None = None
     hold: Sequence[str] = ()
     trim: Sequence[str] = ()
 
@@ -54,7 +55,7 @@ def linearise(
     at: Place = "equilibrium",
     state: Values | None = None,
     parameters: Values | None = None,
-    inputs: Values | None = None,
+    inputs: Inputs | None = None,
     hold: Sequence[str] = (),
     trim: Sequence[str] = (),
 ) -> "Linearisation":
@@ -94,7 +95,8 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
     at, hold, trim = point.at, point.hold, point.trim
     if at not in ("equilibrium", "rest", "initial"):
         raise RunError(f"{reporter.argument('at')}: '{at}' is none of equilibrium, rest, initial")
-    parameters, inputs = values_of(model, point.parameters, point.inputs, reporter)
+    constants = constant_inputs(point.inputs, reporter)
+    parameters, inputs = values_of(model, point.parameters, constants, reporter)
     _, module = compiled(model, reporter=reporter)
     with reporter.located():
         problem = problem_of(module, parameters or None, inputs or None, model)

@@ -2,8 +2,8 @@
 
 A joint with several primitives is a chain of frames, all but the last massless. A weld adds no
 frame, and neither does a locked coordinate: the body is on its parent's frame. The axes of a frame
-are those of its body, rotated so that the axis of the primitive is a coordinate axis. An orientation
-by formulas of parameters is a fixed frame of its own before those of its joint.
+are those of its body, rotated so that the axis of the primitive is a coordinate axis. A joint whose
+orientation is given by formulas of parameters has a fixed frame for it, before its others.
 """
 
 from collections.abc import Callable, Mapping, Sequence
