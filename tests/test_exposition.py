@@ -327,10 +327,25 @@ def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_large_mechanisms_have_steps_and_no_matrices() -> None:
+    """What is said instead can be copied: it gives the numbers of M, V, G and F."""
     found = derived("human_figure")
     assert len(found.steps) > 30
-    with pytest.raises(eomgen.SceneError, match="too long to be written out"):
+    with pytest.raises(eomgen.SceneError, match="too long to be written out") as error:
         _ = found.M
+    _, code, _ = str(error.value).split("`")
+    *statements, last = code.split("; ")
+    names = {"eomgen": eomgen, "scene": "human_figure"}
+    exec("; ".join(statements), names)
+    M, V, G, F = eval(last, names)
+    n = len(found.model.velocities)
+    assert M.shape == (n, n) and np.linalg.eigvalsh(M).min() > 0
+    y = names["m"].initial_state()
+    left = M @ names["m"].derivative(0.0, y)[-n:] + V + G
+    assert np.abs(left - F).max() < 1e-9 * np.abs(G).max()
+    rope = 'name = "rope"\n[[chains]]\nname = "link"\ncount = 7\nmass = 1\ninertia_com = 1\n'
+    rope += "r_parent = [0.1, 0]\nr_child = [-0.1, 0]\n"
+    with pytest.raises(eomgen.SceneError, match="there are 7; use velocity; a module has it"):
+        eomgen.derive(rope, form="momentum")
 
 
 def test_words() -> None:
