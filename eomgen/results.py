@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.errors import SceneError
 from eomgen.files import check_writable, write_whole
+from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import FloatArray
@@ -269,6 +270,7 @@ class Run:
 
     def __getitem__(self, state: str) -> FloatArray:
         """One state over time, (n,). Raises `KeyError` for an unknown name."""
+        state = identifier(state)
         if state not in self.states:
             raise KeyError(f"no state '{state}'; known: {', '.join(self.states)}")
         return self.y[:, self.states.index(state)]

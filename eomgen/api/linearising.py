@@ -10,6 +10,7 @@ from eomgen.api.inputs import Inputs, constant_inputs
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, state_names, values_by_index
 from eomgen.errors import RunError
+from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
@@ -92,7 +93,8 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
     from eomgen.linear.linearise import is_steady
     from eomgen.linear.linearise import linearise as linearised
 
-    at, hold, trim = point.at, point.hold, point.trim
+    at = point.at
+    hold, trim = (tuple(map(identifier, names)) for names in (point.hold, point.trim))
     if at not in ("equilibrium", "rest", "initial"):
         raise RunError(f"{reporter.argument('at')}: '{at}' is none of equilibrium, rest, initial")
     constants = constant_inputs(point.inputs, reporter)

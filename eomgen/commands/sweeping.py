@@ -32,6 +32,7 @@ from eomgen.commands.shared import (
 )
 from eomgen.errors import InterruptedRunError, RunError, nearest
 from eomgen.files import check_folder, check_writable
+from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import terminal_progress
 from eomgen.scene.reader import read_scene
@@ -105,7 +106,7 @@ def _shown(given: Arguments, plan: SweepPlan, reporter: Reporter) -> str:
     """What the figure shows. Raises `RunError` for an unknown name."""
     _, functions = compiled(plan.model, asked=plan.outputs, reporter=reporter)
     known = dict.fromkeys((*functions.STATES, *plan.outputs, *plan.design.names))
-    of: str = given.of or next(iter(known))
+    of = identifier(given.of) if given.of else next(iter(known))
     if of not in known:
         raise RunError(f"--of: unknown name '{of}'{nearest(of, known)}; known: {', '.join(known)}")
     return of

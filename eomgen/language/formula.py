@@ -8,7 +8,7 @@ import ast
 import keyword
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -223,6 +223,29 @@ def _small_whole(power: Formula) -> bool:
         and power.value.is_integer()
         and 0 <= power.value <= LARGEST_POWER
     )
+
+
+def meant(formula: Formula, known: Collection[str]) -> str:
+    """A hint if a difference spells a known name with - for _; else "".
+
+    Names are written with _ in formulas, where - subtracts.
+    """
+
+    def spelled(part: Formula) -> str:
+        match part:
+            case Name(name):
+                return name
+            case Constant(value) if value >= 0 and value.is_integer():
+                return str(int(value))
+            case Apply("-", (first, second)):
+                return f"{spelled(first)}_{spelled(second)}"
+        return " "
+
+    if isinstance(formula, Apply):
+        if (name := spelled(formula)) in known:
+            return f" (did you mean '{name}'? In formulas - subtracts)"
+        return next(filter(None, (meant(part, known) for part in formula.operands)), "")
+    return ""
 
 
 def names_in(formula: Formula) -> Iterator[str]:

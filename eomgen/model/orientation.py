@@ -7,7 +7,7 @@ from eomgen.errors import SceneError, nearest
 from eomgen.language.angles import degrees_of
 from eomgen.language.base import LARGEST
 from eomgen.language.conditions import Condition, require, value_of
-from eomgen.language.formula import Apply, Constant, Formula, names_in
+from eomgen.language.formula import Apply, Constant, Formula, meant, names_in
 from eomgen.model.names import Scope
 from eomgen.scalars.exact import Matrix, radians, rotation_about
 from eomgen.scene.joints import Free, Joint
@@ -84,7 +84,8 @@ def turns_of(angles: Sequence[Formula]) -> list[tuple[int, Formula | Matrix]]:
 def _value(formula: Formula, at: str, scope: Scope) -> float:
     for name in names_in(formula):
         if name not in scope.values:
-            hint = nearest(name, scope.values) or "; give it a value in [parameters]"
+            hint = meant(formula, scope.values) or nearest(name, scope.values)
+            hint = hint or "; give it a value in [parameters]"
             raise SceneError(f"{at}: unknown parameter '{name}'{hint}")
     value = value_of(formula, scope.values)
     if not abs(value) <= LARGEST:
