@@ -213,7 +213,7 @@ torque = "wind_speed - left_pin_angle"
 def test_a_name_is_taken_with_either_sign(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """`-` and `_` are one name wherever one is asked for; in formulas - subtracts, which is said."""
+    """`-` and `_` are one name wherever one is asked for; in formulas - subtracts."""
     run = eomgen.simulate(
         DASHED, parameters={"arm-1": 3.0}, inputs={"wind-speed": 1.0}, state={"left-pin_angle": 0.5}
     )

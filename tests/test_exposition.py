@@ -105,6 +105,14 @@ body = "b"
 axes = "body"
 force = {force}
 [[effects]]
+type = "spring"
+name = "rope"
+body_1 = "world"
+body_2 = "b"
+at_2 = {r}
+stiffness = 3.0
+rest_length = 0.1
+[[effects]]
 type = "motor"
 name = "drive"
 joint = "pin"

@@ -230,22 +230,26 @@ def meant(formula: Formula, known: Collection[str]) -> str:
 
     Names are written with _ in formulas, where - subtracts.
     """
+    if not isinstance(formula, Apply):
+        return ""
+    words = _difference(formula)
+    for length in range(len(words), 1, -1):
+        for start in range(len(words) - length + 1):
+            if (name := "_".join(words[start : start + length])) in known:
+                return f" (did you mean '{name}'? In formulas - subtracts)"
+    return next(filter(None, (meant(part, known) for part in formula.operands)), "")
 
-    def spelled(part: Formula) -> str:
-        match part:
-            case Name(name):
-                return name
-            case Constant(value) if value >= 0 and value.is_integer():
-                return str(int(value))
-            case Apply("-", (first, second)):
-                return f"{spelled(first)}_{spelled(second)}"
-        return " "
 
-    if isinstance(formula, Apply):
-        if (name := spelled(formula)) in known:
-            return f" (did you mean '{name}'? In formulas - subtracts)"
-        return next(filter(None, (meant(part, known) for part in formula.operands)), "")
-    return ""
+def _difference(formula: Formula) -> list[str]:
+    """The names and whole numbers of a - b - c; a space stands for anything else."""
+    match formula:
+        case Name(name):
+            return [name]
+        case Constant(value) if value >= 0 and value.is_integer():
+            return [str(int(value))]
+        case Apply("-", (first, second)):
+            return [*_difference(first), *_difference(second)]
+    return [" "]
 
 
 def names_in(formula: Formula) -> Iterator[str]:
