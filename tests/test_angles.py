@@ -144,11 +144,15 @@ def test_formulas_of_an_orientation_stay_a_rotation() -> None:
 
 
 def test_angles_have_units_wherever_they_are(capsys: pytest.CaptureFixture[str]) -> None:
-    """Initial and locked coordinates, limits, rest angles, `--state`."""
+    """Initial and locked coordinates, limits, rest angles, parameters, `--state`."""
     model = eomgen.check(arm('limits = ["-90 deg", "1.5 rad"]', '"30 deg"', '"-20 deg"'))
     assert model.defaults["spring_rest"] == math.radians(30)
     assert model.initial_q == (math.radians(-20),)
     assert model.bodies[0].joint.limits == (-math.pi / 2, 1.5)
+    steep = eomgen.check(
+        arm('orientation = [0, "tilt", 0]').replace("tilt = 0.3", 'tilt = "40 deg"')
+    )
+    assert steep.defaults["tilt"] == math.radians(40)
     held = eomgen.check('locked = { pin_angle = "90 deg" }\n' + TWO)
     assert held.locked_deg == (("pin_angle", 90.0),)
     run = ["linearise", "cart_pole", "--at", "initial", "--state"]
