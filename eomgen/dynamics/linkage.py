@@ -101,21 +101,11 @@ def _drafted(
                 angle = exact.total(angle, exact.radians(joint.orientation_deg))
             point = vector(joint.r_child)
             if isinstance(joint, Geared):
-                armature = value(joint.motor_inertia)
-                if joint.gear_ratio is not None:
-                    armature = value(joint.gear_ratio) * value(joint.gear_ratio) * armature
+                armature = _armature(joint, value)
             if joint.orientation is not None:
                 held = _held(rows_of(joint.orientation), value, scalars)
-                drafts.append(
-                    replace(
-                        held,
-                        name=f"{body.name}_orientation",
-                        parent=frame,
-                        offset=at,
-                        fixed=axes,
-                        angle=angle,
-                    )
-                )
+                place = {"parent": frame, "offset": at, "fixed": axes, "angle": angle}
+                drafts.append(replace(held, name=f"{body.name}_orientation", **place))
                 frame, axes, angle, at = len(drafts) - 1, EYE, ZERO, zeros(scalars)
         primitives = joint.primitives(model.dimensions)
         for i, primitive in enumerate(primitives):
@@ -166,6 +156,14 @@ def _drafted(
             )
         )
     return drafts, mounts
+
+
+def _armature(joint: Geared, value: Callable[[Formula], Scalar]) -> Scalar:
+    """The reflected inertia of a motor's rotor, kg m² or kg."""
+    inertia = value(joint.motor_inertia)
+    if joint.gear_ratio is None:
+        return inertia
+    return value(joint.gear_ratio) * value(joint.gear_ratio) * inertia
 
 
 def _held(
