@@ -10,7 +10,13 @@ from pathlib import Path
 
 from eomgen import commands
 from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
-from eomgen.options import add_folder, add_force, add_simulation, add_values
+from eomgen.options import (
+    add_folder,
+    add_force,
+    add_inputs,
+    add_parameters,
+    add_simulation,
+)
 from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
 from eomgen.text import one_line
@@ -159,6 +165,7 @@ def _parser(
         default=10.0,
         help="length of the motions that are compared, s",
     )
+    add_inputs(costing)
     add_folder(costing)
     add_force(costing)
     _linearisation(
@@ -266,7 +273,8 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", default="", help="run on the workers of a Dask scheduler"
     )
-    add_values(parser)
+    add_parameters(parser)
+    add_inputs(parser)
     add_folder(parser)
     add_force(parser)
 
@@ -282,7 +290,8 @@ def _accuracy(parser: argparse.ArgumentParser) -> None:
         "--time", metavar="S", type=float, default=300.0, help="start no run after this, s"
     )
     parser.add_argument("--fresh", action="store_true", help="use no runs of an earlier call")
-    add_values(parser)
+    add_parameters(parser)
+    add_inputs(parser)
     half = parser.add_mutually_exclusive_group()
     half.add_argument("--arithmetic", action="store_true", help="only rounding errors, no runs")
     half.add_argument("--no-arithmetic", action="store_true", help="only runs, no rounding errors")
@@ -326,6 +335,7 @@ def _verification(parser: argparse.ArgumentParser) -> None:
         const=Path("generated"),
         help="write the report beside the module, in DIR (generated)",
     )
+    add_inputs(parser)
     add_force(parser)
 
 
@@ -357,7 +367,8 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="an input whose value is searched as well",
     )
-    add_values(parser)
+    add_parameters(parser)
+    add_inputs(parser, constant=True)
     _route(parser)
     parser.add_argument(
         "-o", "--output", metavar="FILE", type=path, help="write A and B to FILE.npz or FILE.csv"

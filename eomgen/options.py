@@ -25,13 +25,25 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_values(parser: argparse.ArgumentParser) -> None:
-    """Values of parameters and inputs."""
+def add_parameters(parser: argparse.ArgumentParser) -> None:
+    """Values of parameters."""
     parser.add_argument(
         "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
     )
+
+
+def add_inputs(parser: argparse.ArgumentParser, *, constant: bool = False) -> None:
+    """Inputs, or constant ones alone."""
+    varying = (
+        "an input: a number or a formula of t, 'push=3*sin(t)'; or FILE.csv with columns t and "
+        "names, between whose times inputs are linear"
+    )
     parser.add_argument(
-        "--input", metavar="NAME=X", action="append", default=[], help="constant value of an input"
+        "--input",
+        metavar="NAME=X",
+        action="append",
+        default=[],
+        help="constant value of an input" if constant else varying,
     )
 
 
@@ -107,9 +119,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_start(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
-    )
+    add_parameters(parser)
     parser.add_argument(
         "--state",
         metavar="NAME=X",
@@ -117,11 +127,4 @@ def _add_start(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="value of a state at the start; NAME_deg in degrees (the scene's initial state)",
     )
-    parser.add_argument(
-        "--input",
-        metavar="NAME=X",
-        action="append",
-        default=[],
-        help="an input: a number or a formula of t, 'push=3*sin(t)'; or FILE.csv with columns t "
-        "and names, between whose times inputs are linear",
-    )
+    add_inputs(parser)

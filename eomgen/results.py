@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.errors import SceneError
 from eomgen.files import check_writable, write_whole
+from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import FloatArray
@@ -28,12 +29,21 @@ if TYPE_CHECKING:
     from eomgen.study.accuracy.search import Choice
 
 
+NUMBERS = (
+    "m = eomgen.load(eomgen.generate(scene, outputs=['mass_matrix', 'velocity_force', "
+    "'gravity_force', 'applied_force'])); y = m.initial_state(); m.mass_matrix(0.0, y), "
+    "m.velocity_force(0.0, y), m.gravity_force(0.0, y), m.applied_force(0.0, y)"
+)
+"""How to compute M, V, G and F of a `scene` where they are not written out."""
+
+
 @dataclass(frozen=True)
 class Derivation:
     """Equations of motion M v̇ + V + G = F as SymPy expressions, and the steps of their derivation.
 
     `matrices` has the equations and the symbols of coordinates `q`, velocities `v` and
-    accelerations `a`. A mechanism that is told as an algorithm has none: see `steps`.
+    accelerations `a`. A mechanism whose steps are those of an algorithm has none; the functions
+    `mass_matrix`, `velocity_force`, `gravity_force`, `applied_force` of its module give numbers.
     """
 
     model: Model
@@ -54,8 +64,8 @@ class Derivation:
         """The equations as matrices. Raises `SceneError` if they are too long to be written out."""
         if self.exposition.matrices is None:
             raise SceneError(
-                f"derive: M, V, G and F of {self.name} are too long to be written out; its steps "
-                "tell the algorithm, and the generated module computes them"
+                f"derive: M, V, G and F of {self.name} are too long to be written out as "
+                f"expressions; a module computes their numbers: `{NUMBERS}`"
             )
         return self.exposition.matrices
 
@@ -260,6 +270,7 @@ class Run:
 
     def __getitem__(self, state: str) -> FloatArray:
         """One state over time, (n,). Raises `KeyError` for an unknown name."""
+        state = identifier(state)
         if state not in self.states:
             raise KeyError(f"no state '{state}'; known: {', '.join(self.states)}")
         return self.y[:, self.states.index(state)]

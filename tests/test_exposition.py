@@ -81,6 +81,67 @@ def test_each_effect_by_its_formulas(case: Case) -> None:
     assert_close(states, at.solver.state_rates)
 
 
+STEERED = """
+name = "steered"
+dimensions = {n}
+inputs = ["thrust", "wind"]
+parameters = {{ k = 3.0, lean = 0.4 }}
+definitions = {{ gust = "wind if q_1 > thrust else max(t, 0.2)" }}
+bodies = [
+    {{ name = "a", mass = "k", inertia_com = {inertia} }},
+    {{ name = "b", mass = 1, inertia_com = {inertia} }},
+]
+joints = [
+    {{ name = "pin", type = "revolute", parent = "world", child = "a", r_child = {r}, \
+coordinate = "q_1", orientation = {turned} }},
+    {{ name = "rail", type = "prismatic", parent = "a", child = "b", r_parent = {r}, \
+axis = {axis}, orientation = {turned} }},
+]
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "external_force"
+name = "rotor"
+body = "b"
+axes = "body"
+force = {force}
+[[effects]]
+type = "spring"
+name = "rope"
+body_1 = "world"
+body_2 = "b"
+at_2 = {r}
+stiffness = 3.0
+rest_length = 0.1
+[[effects]]
+type = "motor"
+name = "drive"
+joint = "pin"
+torque = "k*sin(t) + thrust*cos(q_1) - wind*abs(q_1_dot) + gust + tanh(rail_slide)"
+"""
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_formulas_of_inputs_and_time_beside_orientations_of_parameters(n: int) -> None:
+    """Inputs of the scene, definitions, time and turned joints: what the numeric solver has."""
+    text = STEERED.format(
+        n=n,
+        inertia=[0.1, 0.2, 0.15] if n == 3 else 0.1,
+        r=[0.3, 0.1, -0.2][:n],
+        axis=[0.6, 0.8, 0.0][:n],
+        turned='["lean", "45 deg", "-k*lean"]' if n == 3 else '"-lean"',
+        force=["3*thrust + wind", "thrust*sin(t)", "gust"][:n],
+    )
+    model = model_of(text)
+    at = instant(model)
+    rates, forces = follow_recursion(model, at.known)
+    assert_close(forces, at.solver.applied_force)
+    assert_close(rates, at.solver.articulated_forward())
+    found = eomgen.derive(text)
+    assert "thrust" in found.text() and "thrust" in found.latex() and "thrust" in found.html()
+
+
 @pytest.mark.parametrize("seed", range(some(4, 30)))
 def test_driven_and_locked_joints(seed: int) -> None:
     """Trees of any joints: what is prescribed is a motion, not an unknown."""
@@ -418,10 +479,25 @@ def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_large_mechanisms_have_steps_and_no_matrices() -> None:
+    """What is said instead can be copied: it gives the numbers of M, V, G and F."""
     found = derived("human_figure")
     assert len(found.steps) > 30
-    with pytest.raises(eomgen.SceneError, match="too long to be written out"):
+    with pytest.raises(eomgen.SceneError, match="too long to be written out") as error:
         _ = found.M
+    _, code, _ = str(error.value).split("`")
+    *statements, last = code.split("; ")
+    names = {"eomgen": eomgen, "scene": "human_figure"}
+    exec("; ".join(statements), names)
+    M, V, G, F = eval(last, names)
+    n = len(found.model.velocities)
+    assert M.shape == (n, n) and np.linalg.eigvalsh(M).min() > 0
+    y = names["m"].initial_state()
+    left = M @ names["m"].derivative(0.0, y)[-n:] + V + G
+    assert np.abs(left - F).max() < 1e-9 * np.abs(G).max()
+    rope = 'name = "rope"\n[[chains]]\nname = "link"\ncount = 7\nmass = 1\ninertia_com = 1\n'
+    rope += "r_parent = [0.1, 0]\nr_child = [-0.1, 0]\n"
+    with pytest.raises(eomgen.SceneError, match="there are 7; use velocity; a module has it"):
+        eomgen.derive(rope, form="momentum")
 
 
 def test_words() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check_name, check_time, model_of, read, values_of
+from eomgen.api.inputs import Inputs, for_members
 from eomgen.api.planning import Backend
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
@@ -28,6 +29,7 @@ from eomgen.run.checks import (
     check_tolerances,
     longest_steps,
 )
+from eomgen.run.inputs import InputsOfTime
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.fixed_step import count_steps
 from eomgen.run.problem import FloatArray
@@ -63,6 +65,7 @@ class SweepPlan:
     t_end: float
     parameters: Mapping[str, float]
     inputs: Mapping[str, float]
+    varying: InputsOfTime | None
     outputs: tuple[str, ...]
     samples: int
     max_step: float | None
@@ -79,7 +82,7 @@ def ensemble(
     rtol: float | None = None,
     atol: float | None = None,
     parameters: Values | None = None,
-    inputs: Values | None = None,
+    inputs: Inputs | None = None,
     outputs: Sequence[str] = (),
     samples: int = 2,
     max_step: float | None = None,
@@ -93,7 +96,9 @@ def ensemble(
     vary        lists of values by name of a parameter, a state or an input, one for each member,
                 `<name>_deg` of an angle in degrees; or `grid(...)` or `sampled(...)`
     t_end, integrator, dt, rtol, atol, max_step  as for `simulate`
-    parameters, inputs  values that all members have
+    parameters, inputs  values that all members have; inputs may also be formulas of t, the motion
+                and parameters, or the path of a table, as for `simulate`; with a table nothing is
+                compiled
     outputs     functions of the module to compute: "kinetic_energy" for example
     samples     number of rows that are kept, about; 2 keeps the ends alone
     backend     "numpy": run in Python; "c": compile at once; "auto": compile if that pays
@@ -105,7 +110,7 @@ def ensemble(
     A member that stops or is refused is a row that says so. The results do not depend on backend,
     workers or scheduler. Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene = read(source)
+    scene, constants, varying = for_members(read(source), inputs)
     design = vary if isinstance(vary, Design) else listed(vary)
     plan = plan_sweep(
         scene,
@@ -117,7 +122,8 @@ def ensemble(
         rtol=rtol,
         atol=atol,
         parameters=parameters,
-        inputs=inputs,
+        inputs=constants,
+        varying=varying,
         outputs=outputs,
         samples=samples,
         max_step=max_step,
@@ -139,6 +145,7 @@ def plan_sweep(
     atol: float | None = None,
     parameters: Values | None = None,
     inputs: Values | None = None,
+    varying: InputsOfTime | None = None,
     outputs: Sequence[str] = (),
     samples: int = 2,
     max_step: float | None = None,
@@ -159,8 +166,14 @@ def plan_sweep(
     )
     fixed = values_of(model, parameters, inputs, reporter)
     design = in_radians(design, _degrees(model))
+    if varying is not None and backend == "c":
+        raise RunError(
+            f"{argument('inputs')}: with a table nothing is compiled; give a formula of t, or "
+            "leave the backend out"
+        )
+    tables = [name for name, x in (varying.given if varying else {}).items() if callable(x)]
     for name in design.names:
-        if any(name in values for values in fixed):
+        if any(name in values for values in (*fixed, tables)):
             raise RunError(f"{argument('vary')}: {name} is also given a fixed value; leave one out")
     return SweepPlan(
         scene,
@@ -169,6 +182,7 @@ def plan_sweep(
         setting,
         t_end,
         *fixed,
+        varying,
         tuple(outputs),
         samples,
         max_step,
@@ -212,6 +226,7 @@ def run_sweep(
         kinds=tuple(_kind(name, model, state_names, reporter) for name in plan.design.names),
         parameters=plan.parameters,
         inputs=plan.inputs,
+        varying=plan.varying,
         outputs=plan.outputs,
         t_end=plan.t_end,
         times=times,
@@ -291,7 +306,7 @@ def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] |
     from eomgen.native.compiler import find_compiler
     from eomgen.store import interfaced_program_of
 
-    if plan.backend == "numpy":
+    if plan.backend == "numpy" or plan.varying is not None:
         return None
     if plan.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
         reporter.note(f"steps of {plan.setting.integrator} are not compiled, but their derivatives")

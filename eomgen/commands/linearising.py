@@ -10,7 +10,7 @@ from eomgen.api.states import state_names
 from eomgen.commands.shared import (
     Arguments,
     assignments,
-    given_values,
+    given_inputs,
     located,
     print_listed,
     print_wrapped,
@@ -36,14 +36,14 @@ def linearise(given: Arguments) -> int:
     """Print the linearisation, its modes, stability and controllability; write A and B."""
     model, _ = read_model(given.scene, given)
     model = linearisable(model)
-    parameters, inputs = given_values(given, model)
+    parameters = assignments(given.set, model.defaults, "--set")
     if given.output is not None:
         check_writable(given.output, force=given.force)
         if given.output.suffix not in (".npz", ".csv"):
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
     with located(given.scene):
         state = assignments(given.state, state_names(model), "--state")
-    point = Point(given.at, state, parameters, inputs, given.hold, given.trim)
+    point = Point(given.at, state, parameters, given_inputs(given.input), given.hold, given.trim)
     found = linearised_at(model, point, reporter_of(given, given.scene))
     linearisation = found.linearisation
     reduced = linearisation.reduced()

@@ -72,8 +72,8 @@ def why_not_pins(model: Model) -> str:
             return f"it is for pins and free bodies, and '{joint.name}' is {joint.type}"
         if isinstance(joint, Revolute) and joint.motor_inertia != ZERO:
             return f"it takes no motor_inertia, and '{joint.name}' has one"
-        if isinstance(joint, Revolute) and joint.orientation_deg != 0.0:
-            return f"it takes no orientation_deg, and '{joint.name}' has one"
+        if isinstance(joint, Revolute) and (joint.orientation_deg or joint.orientation):
+            return f"it takes no orientation, and '{joint.name}' has one"
         if model.value(body.mass) == 0.0:
             return f"it divides by masses, and that of '{body.name}' is 0"
         if model.value(body.moment) == 0.0 and (

@@ -99,9 +99,13 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
     effects = derived_effects(model)
     bare = replace(with_symbols(model, effects), form=form)
     small = len(model.bodies) <= MOST_REPORTED
-    why_not = why_not_pins(bare) or ("" if small else f"it has more than {MOST_REPORTED} bodies")
+    long = f"it is written out for up to {MOST_REPORTED} bodies, and there are {len(model.bodies)}"
+    why_not = why_not_pins(bare) or ("" if small else long)
     if form != "velocity" and why_not:
-        raise SceneError(f"form: no derivation in the form '{form}': {why_not}; use velocity")
+        module = f"; a module has it: eomgen generate --form {form}" if why_not == long else ""
+        raise SceneError(
+            f"form: no derivation in the form '{form}': {why_not}; use velocity{module}"
+        )
     if not why_not:
         return _of_pins(model, bare, effects, form)
     if small and not why_not_closed(bare):

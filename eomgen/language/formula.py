@@ -8,7 +8,7 @@ import ast
 import keyword
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -227,6 +227,33 @@ def _small_whole(power: Formula) -> bool:
         and power.value.is_integer()
         and 0 <= power.value <= LARGEST_POWER
     )
+
+
+def meant(formula: Formula, known: Collection[str]) -> str:
+    """A hint if a difference spells a known name with - for _; else "".
+
+    Names are written with _ in formulas, where - subtracts.
+    """
+    if not isinstance(formula, Apply):
+        return ""
+    words = _difference(formula)
+    for length in range(len(words), 1, -1):
+        for start in range(len(words) - length + 1):
+            if (name := "_".join(words[start : start + length])) in known:
+                return f" (did you mean '{name}'? In formulas - subtracts)"
+    return next(filter(None, (meant(part, known) for part in formula.operands)), "")
+
+
+def _difference(formula: Formula) -> list[str]:
+    """The names and whole numbers of a - b - c; a space stands for anything else."""
+    match formula:
+        case Name(name):
+            return [name]
+        case Constant(value) if value >= 0 and value.is_integer():
+            return [str(int(value))]
+        case Apply("-", (first, second)):
+            return [*_difference(first), *_difference(second)]
+    return [" "]
 
 
 def names_in(formula: Formula) -> Iterator[str]:

@@ -25,6 +25,7 @@ from eomgen.language.formula import (
     Formula,
     FormulaError,
     Name,
+    meant,
     names_in,
     parse,
 )
@@ -253,7 +254,8 @@ def _check_names(
             raise SceneError(f"{where}: '{name}' is predefined here; rename the parameter")
         if name not in known and name not in allowed:
             words = [*known, *allowed, *FUNCTIONS, *CONSTANTS]
-            hint = nearest(name, words) or "; give it a value in [parameters]"
+            hint = meant(formula, words) or nearest(name, words)
+            hint = hint or "; give it a value in [parameters]"
             if name in FUNCTIONS:
                 hint = f"; the function is written {name}({', '.join('xyz'[: FUNCTIONS[name]])})"
             raise SceneError(f"{where}: unknown parameter '{name}'{hint}")

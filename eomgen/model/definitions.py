@@ -6,7 +6,7 @@ from typing import Any
 
 from eomgen.errors import SceneError, nearest
 from eomgen.language.base import Table
-from eomgen.language.formula import CONSTANTS, DEEPEST, Apply, Formula, Name, names_in
+from eomgen.language.formula import CONSTANTS, DEEPEST, Apply, Formula, Name, meant, names_in
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.schema import Scene
 
@@ -50,7 +50,8 @@ def with_definitions(scene: Scene, motion: Sequence[str]) -> Scene:
 def _check_names(formula: Formula, known: Collection[str], location: str) -> None:
     for name in names_in(formula):
         if name not in known:
-            hint = nearest(name, (*known, *FUNCTIONS)) or "; give it a value in [parameters]"
+            hint = meant(formula, known) or nearest(name, (*known, *FUNCTIONS))
+            hint = hint or "; give it a value in [parameters]"
             raise SceneError(f"{location}: unknown parameter '{name}'{hint}")
 
 

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
 from eomgen.integrators import INTEGRATORS
-from eomgen.language.base import ByName, Identifier, Number, Positive, Table, Text
+from eomgen.language.base import (
+    AngleOrNumber,
+    ByName,
+    Identifier,
+    Number,
+    Positive,
+    Table,
+    Text,
+)
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
 from eomgen.routes import ROUTES
@@ -226,8 +234,11 @@ class Scene(Table):
         description="functions of the module beside derivative and jacobian",
     )
     form: Form = Field(default="velocity", description="state form")
-    parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
-        Field(default={}, description="named numbers, or tables of value, unit and about")
+    parameters: Annotated[
+        dict[Identifier, AngleOrNumber | ParameterTable], Field(max_length=MOST)
+    ] = Field(
+        default={},
+        description="named numbers, angles as '90 deg', or tables of value, unit and about",
     )
     inputs: Annotated[tuple[Identifier | InputTable, ...], Field(max_length=MOST)] = Field(
         default=(),

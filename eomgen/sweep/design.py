@@ -8,6 +8,7 @@ from statistics import NormalDist
 import numpy as np
 
 from eomgen.errors import RunError
+from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 
 MOST = 10_000_000
@@ -74,7 +75,7 @@ def listed(values: Mapping[str, Values]) -> Design:
     lengths = {len(column) for column in columns}
     if len(lengths) != 1 or any(column.ndim != 1 for column in columns):
         raise RunError("vary: give a list of values for each name, all of the same length")
-    return _checked(Design(tuple(values), np.array(columns).T.copy()))
+    return _checked(Design(tuple(map(identifier, values)), np.array(columns).T.copy()))
 
 
 def grid(axes: Mapping[str, Values]) -> Design:
@@ -84,7 +85,7 @@ def grid(axes: Mapping[str, Values]) -> Design:
     if not columns or not 0 < count <= MOST:
         raise RunError(f"vary: makes {count if columns else 0} members; 1 to {MOST} are possible")
     rows = np.stack([mesh.ravel() for mesh in np.meshgrid(*columns, indexing="ij")], axis=1)
-    return _checked(Design(tuple(axes), rows, columns))
+    return _checked(Design(tuple(map(identifier, axes)), rows, columns))
 
 
 def sampled(
@@ -100,7 +101,7 @@ def sampled(
     shares = np.random.default_rng(seed).random((count, len(laws)))
     known = [law if isinstance(law, Law) else Law(*law) for law in laws.values()]
     columns = [law.at(shares[:, i]) for i, law in enumerate(known)]
-    return _checked(Design(tuple(laws), np.array(columns).T.copy()))
+    return _checked(Design(tuple(map(identifier, laws)), np.array(columns).T.copy()))
 
 
 def in_radians(design: Design, degrees: Mapping[str, str]) -> Design:
@@ -120,6 +121,8 @@ def _checked(design: Design) -> Design:
     count = len(design.values)
     if not 0 < count <= MOST or not design.names:
         raise RunError(f"vary: makes {count} members; 1 to {MOST} are possible")
+    if len(set(design.names)) < len(design.names):
+        raise RunError("vary: a name is given twice")
     if not np.isfinite(design.values).all():
         raise RunError("vary: a value is not a finite number")
     return design

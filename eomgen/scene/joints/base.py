@@ -93,8 +93,7 @@ class JointTable(Table):
     orientation: Orientation | None = Field(
         default=None,
         description="the same: an angle, in space three about x, then y, z, a quaternion w, x, y, "
-        "z, or a matrix of three rows; in rad, as '90 deg', or formulas of parameters, whose "
-        "values are then fixed",
+        "z, or a matrix of three rows; in rad, as '90 deg', or formulas of parameters",
     )
 
 
