@@ -10,7 +10,14 @@ from pathlib import Path
 
 from eomgen import commands
 from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
-from eomgen.options import add_folder, add_force, add_simulation, add_values
+from eomgen.options import (
+    add_film,
+    add_folder,
+    add_force,
+    add_plot,
+    add_simulation,
+    add_values,
+)
 from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
 from eomgen.text import one_line
@@ -98,6 +105,9 @@ def _parser(
             found.append((name, added))
         if scenes == "scene":
             added.add_argument("scene", metavar="SCENE", help="file or built-in name")
+        elif scenes == "run":
+            text = "file that simulate wrote, .npz or .csv; or a scene, which is simulated first"
+            added.add_argument("scene", metavar="RUN", help=text)
         elif scenes == "scenes":
             added.add_argument("scenes", metavar="SCENE", nargs="*", help="file or built-in name")
         return added
@@ -138,6 +148,10 @@ def _parser(
         ("view", commands.view, "integrate, and open the animated page"),
     ):
         add_simulation(_code(_form(command(name, run, about))))
+    about = "draw a figure of a run for a paper: PNG, SVG or PDF"
+    add_plot(command("plot", commands.plot, about, "run"))
+    about = "make a film of a run: GIF, or MP4 with ffmpeg"
+    add_film(command("film", commands.film, about, "run"))
     about = "run a scene many times, with other parameters, initial states or inputs"
     _sweep(_route(_form(command("sweep", commands.sweep, about))))
     about = "compare the module with an independent solver and 60 digits"
