@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -110,7 +111,8 @@ def draw_map(
     named = np.unique(np.linspace(0, count - 1, FEW_NAMES - 1).round().astype(int))
     if every:
         named = np.arange(count)
-    axes.set_yticks(named, [labels[k] for k in named])
+    size = 7 if every else matplotlib.rcParams["ytick.labelsize"]
+    axes.set_yticks(named, [labels[k] for k in named], fontsize=size)
     axes.grid(visible=False)
     figure = axes.get_figure()
     assert figure is not None
