@@ -111,8 +111,8 @@ def draw_map(
     named = np.unique(np.linspace(0, count - 1, FEW_NAMES - 1).round().astype(int))
     if every:
         named = np.arange(count)
-    size = 7 if every else matplotlib.rcParams["ytick.labelsize"]
-    axes.set_yticks(named, [labels[k] for k in named], fontsize=size)
+    letters = 7 if every else matplotlib.rcParams["ytick.labelsize"]
+    axes.set_yticks(named, [labels[k] for k in named], fontsize=letters)
     axes.grid(visible=False)
     figure = axes.get_figure()
     assert figure is not None
