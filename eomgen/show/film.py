@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,9 @@ HEIGHT, WIDTH = 480, 960
 MARGIN = 0.06
 NARROWEST, WIDEST = 0.6, 4.0
 """Width of a film relative to its height, if it has no given size."""
-MOST_FRAMES = 10_000
+MOST_FRAMES = 5000
+COLOURS = 254
+"""Colours of a GIF beside that of its background."""
 SAMPLED = 200
 """Greatest number of samples at which the extent of a motion is measured."""
 
@@ -115,7 +118,9 @@ def save_film(
     width, height = width - width % 2, height - height % 2  # as MP4 needs them
     pictures = _counted(view.frames(rows, width, height), len(rows), progress)
     if path.suffix.lower() == ".gif":
-        data = _gif(pictures, fps, to_rgb(motion.camera.background))
+        few = [rows[0], rows[len(rows) // 2], rows[-1]]
+        paper = [round(255 * part) for part in to_rgb(motion.camera.background)]
+        data = _gif(pictures, view.frames(few, width, height), fps, paper)
     else:
         data = _mp4(pictures, (width, height), fps, _ffmpeg(path), path)
     write_whole(path, data, force=force)
@@ -218,24 +223,36 @@ def _extent(motion: Motion) -> Iterator[Array]:
                 yield corners @ np.array([[c, s], [-s, c]]) + np.array([x, y])
 
 
-def _gif(pictures: Iterable[Picture], fps: float, paper: tuple[float, float, float]) -> bytes:
-    """A GIF that is shown again and again."""
-    images = [Image.fromarray(picture) for picture in pictures]
-    # One palette for all, from the first, the middle and the last, so that no colour flickers.
-    few = [np.asarray(images[k]) for k in (0, len(images) // 2, -1)]
-    palette = Image.fromarray(np.concatenate(few)).quantize(255, dither=Image.Dither.NONE)
-    # Of its colours, averages of similar ones, that of the paper is to be exact.
-    colours = np.array(palette.getpalette()).reshape(-1, 3)
-    exact = np.round(255 * np.array(paper))
-    colours[np.abs(colours - exact).sum(axis=1).argmin()] = exact
-    palette.putpalette(colours.ravel().tolist())
-    first, *rest = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
+def _gif(
+    pictures: Iterable[Picture], some: Iterable[Picture], fps: float, paper: Sequence[int]
+) -> bytes:
+    """A GIF that is shown again and again.
+
+    some   pictures from which its colours are taken, the same in all frames: no colour flickers
+    paper  the colour of the background, which is exact; the others are averages of similar ones
+    """
+    few = Image.fromarray(np.concatenate(list(some)))
+    palette = few.quantize(COLOURS, dither=Image.Dither.NONE)
+    colours = np.zeros((COLOURS + 1, 3), dtype=int)
+    own = np.array(palette.getpalette()).reshape(-1, 3)[:COLOURS]
+    colours[: len(own)], colours[-1] = own, paper
+
+    def frame(picture: Picture) -> Image.Image:
+        indices = np.array(
+            Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+        )
+        indices[(picture == paper).all(axis=2)] = COLOURS
+        image = Image.fromarray(indices)
+        image.putpalette(colours.ravel().tolist())
+        return image
+
+    frames = map(frame, pictures)
     buffer = io.BytesIO()
-    first.save(
+    next(frames).save(
         buffer,
         format="GIF",
         save_all=True,
-        append_images=rest,
+        append_images=frames,
         duration=round(1000 / fps),
         loop=0,
         comment=b"eomgen",
@@ -270,6 +287,8 @@ def _mp4(
                 code = process.wait() or 1
             finally:
                 process.kill()
+                with suppress(OSError):
+                    process.stdin.close()
                 process.wait()
         if code:
             lines = said.read_text("utf-8", "replace").strip().splitlines() or ["no reason given"]

@@ -81,7 +81,8 @@ def draw_series(t: Array, found: Sequence[Quantity], size: Size) -> Figure:
         ):
             _draw_panel(axes, t, group, size.width)
         axes.set_xlabel("t, s")
-        figure.align_ylabels()
+        if not any(len(group) > MOST_CURVES for group in groups):  # the names of rows are wide
+            figure.align_ylabels()
         _settled(figure)
     return figure
 
@@ -118,10 +119,7 @@ def _draw_panel(axes: Axes, t: Array, group: Sequence[Quantity], width: float) -
             label=_named(quantity),
         )
     axes.margins(x=0)
-    what = _full(group[0]) if len(group) == 1 else plain(group[0].title)
-    # The name of an axis fits into the height of its panel.
-    between = ",\n" if len(what) + len(unit) > LONGEST and "$" not in what else ", "
-    axes.set_ylabel(between.join(filter(None, (what, unit))))
+    axes.set_ylabel(_beside(group, unit))
     widen(axes, values, max(quantity.size for quantity in group))
     if len(group) > 1:
         axes.legend(
@@ -134,6 +132,17 @@ def _draw_panel(axes: Axes, t: Array, group: Sequence[Quantity], width: float) -
             labelspacing=0.25,
             handletextpad=0.5,
         )
+
+
+def _beside(group: Sequence[Quantity], unit: str) -> str:
+    """The name of the vertical axis of a panel, in lines that fit into its height."""
+    first = group[0]
+    what = _full(first) if len(group) == 1 else plain(first.title)
+    if len(what) + len(unit) <= LONGEST or "$" in what:
+        return ", ".join(filter(None, (what, unit)))
+    if len(group) == 1 and first.title and first.label in what:
+        return f"{plain(first.title)}\n" + ", ".join(filter(None, (plain(first.label), unit)))
+    return ",\n".join(filter(None, (what, unit)))
 
 
 def _colour(quantity: Quantity, k: int | None) -> str:
@@ -199,7 +208,7 @@ def draw_strobe(motion: Motion, rows: Sequence[int], size: Size) -> Figure:
         figure = _figure(size, 0.75 * size.width)
         axes = figure.subplots()
         axes.set_facecolor(motion.camera.background)
-        (draw_plane if motion.dimensions == 2 else draw_space)(axes, motion, poses)
+        (draw_plane if motion.dimensions == 2 else draw_space)(axes, motion, poses, rows[-1] + 1)
         # Without a given height the picture is as high as what it shows.
         if size.height is None:
             _fit_height(figure, axes)

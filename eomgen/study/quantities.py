@@ -84,7 +84,7 @@ def outputs_of(names: Sequence[str], trajectory: Trajectory, argument: str) -> t
     found: list[str] = []
     for name in names:
         head = name.partition(".")[0]
-        if name in trajectory.states or head in ("t", "energy", "works", "inputs"):
+        if head in (*trajectory.states, *("t", "energy", "works", "inputs")):
             continue
         known = (*GROUPS, *SAVED)
         if head not in known:
