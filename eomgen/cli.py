@@ -31,7 +31,7 @@ DERIVED = "what was derived is kept for the next call"
 KEPT = {
     "accuracy": "the runs made so far are in the table, and the same command continues",
     **dict.fromkeys(("derive", "verify", "effects", "linearise"), DERIVED),
-    **dict.fromkeys(("simulate", "view"), DERIVED),
+    **dict.fromkeys(("simulate", "view", "plot", "film"), DERIVED),
 }
 """What an interrupt leaves, for commands that do not say so themselves."""
 
