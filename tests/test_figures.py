@@ -179,6 +179,32 @@ def test_older_files_are_read(cart: tuple[eomgen.Run, eomgen.Run], tmp_path: Pat
         eomgen.load_run(tmp_path / "none.csv")
 
 
+def test_files_of_others_are_refused(cart: tuple[eomgen.Run, eomgen.Run], tmp_path: Path) -> None:
+    """Whatever does not fit to the scene in a file, in one line."""
+    trajectory = cart[0].trajectory
+    setup = trajectory.setup
+    assert setup is not None
+    deep = "[" * 100_000
+    for changed, said in (
+        (replace(setup, scene=deep), "is damaged"),
+        (replace(setup, scene="3"), "is damaged"),
+        (replace(setup, scene='{"name": "x", "bodies": 3}'), "bodies"),
+        (replace(setup, parameters={"l": 0.4, "other": 1.0}), "not of its scene"),
+        (replace(setup, parameters={"l": float("nan")}), "not of its scene"),
+        (replace(setup, varying=np.zeros((3, 1))), "not of its scene"),
+        (replace(setup, scene=pendulum()), "not of its scene"),
+    ):
+        path = tmp_path / "other.npz"
+        save_npz(replace(trajectory, setup=changed), path)
+        with pytest.raises(eomgen.EomgenError, match=said):
+            eomgen.load_run(path)
+
+
+def pendulum() -> str:
+    """The text of another scene, as a file holds it."""
+    return json.dumps(tables_of(read_scene("pendulum")))
+
+
 def test_forces_under_held_contacts_are_left_out() -> None:
     """Their contact force is not known; before the first contact that is held they are there."""
     run = eomgen.simulate("bouncing_two_body", samples=301)

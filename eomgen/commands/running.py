@@ -156,16 +156,19 @@ def _print_energy(run: Run) -> None:
     """
     motion, total = run.motion, run.energy
     least = ROUNDING * float(np.abs([motion.kinetic_energy, motion.potential_energy]).max())
-    ends = [energy if abs(energy) > least else 0.0 for energy in (total[0], total[-1])]
-    print(f"    energy {ends[0]:.9g} J at the start, {ends[1]:.9g} J at the end")
+
+    def shown(energy: float) -> float:
+        return energy if abs(energy) > least else 0.0
+
+    print(f"    energy {shown(total[0]):.9g} J at the start, {shown(total[-1]):.9g} J at the end")
     if motion.works is None:
         return
     works, kinetic = motion.works[-1], motion.kinetic_energy
-    each = [f"{name} {work:.6g} J" for name, work in zip(motion.effects, works, strict=True)]
+    each = [f"{name} {shown(work):.6g} J" for name, work in zip(motion.effects, works, strict=True)]
     print_listed("    work: ", shortened(each))
     change = float(kinetic[-1] - kinetic[0])
     left = change - works.sum()
-    print(f"    kinetic energy changed by {change:.6g} J, {left:.2g} J unaccounted for")
+    print(f"    kinetic energy changed by {shown(change):.6g} J, {left:.2g} J unaccounted for")
 
 
 def _print_events(trajectory: Trajectory) -> None:

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from eomgen.errors import RunError
 from eomgen.run.problem import FloatArray
 from eomgen.study.observed import Observed
 from eomgen.study.recording import held_rows
@@ -69,7 +70,7 @@ def between(run: Observed) -> Between:
     t, y = run.trajectory.t, run.trajectory.y
     try:
         slopes = run.output("derivative", t, y)
-    except (ArithmeticError, ValueError):
+    except RunError:
         slopes = np.full_like(y, np.nan)
     slopes = np.where(held_rows(run.trajectory)[:, None], np.nan, slopes)
     return Between(t, y, slopes, tuple(getattr(run.functions, "QUATERNIONS", ())))

@@ -84,9 +84,15 @@ class Observed:
         return self.setup.parameters or None, np.array([np.interp(t, rows, u) for u in varying.T])
 
     def output(self, name: str, t: FloatArray, y: FloatArray) -> FloatArray:
-        """An output at states `y` (n, ny), (n, …); also "derivative"."""
-        with np.errstate(all="ignore"):
-            found = getattr(self.functions, name)(t, y.T, *self.values(t))
+        """An output at states `y` (n, ny), (n, …); also "derivative".
+
+        Raises `RunError` if the module refuses these states.
+        """
+        try:
+            with np.errstate(all="ignore"):
+                found = getattr(self.functions, name)(t, y.T, *self.values(t))
+        except (ValueError, ArithmeticError) as error:
+            raise RunError(f"{self.trajectory.name}: no {name} of this run: {error}") from None
         return np.moveaxis(np.asarray(found), -1, 0)
 
 
@@ -112,6 +118,21 @@ def observed(trajectory: Trajectory, outputs: Sequence[str] = ()) -> Observed:
     model = replace(model, outputs=in_order((*model.outputs, *SHOWN, *wanted)))
     code = generated_code(model)
     functions = load_module(code.module, model.name)
-    if tuple(functions.STATES) != trajectory.states:
-        raise RunError(f"{trajectory.name}: the states of this run are not those of its scene")
-    return Observed(scene, model, code, functions, trajectory)
+    found = Observed(scene, model, code, functions, trajectory)
+    _check(found)
+    return found
+
+
+def _check(run: Observed) -> None:
+    """Raise `RunError` for a file in which states or values are not those of its scene."""
+    trajectory, setup, inputs = run.trajectory, run.setup, run.functions.INPUTS
+    shape = (len(trajectory.t), len(inputs))
+    values = [*setup.parameters.values(), *setup.inputs.values()]
+    if (
+        tuple(run.functions.STATES) != trajectory.states
+        or not setup.parameters.keys() <= run.model.defaults.keys()
+        or not setup.inputs.keys() <= inputs.keys()
+        or not np.isfinite(values).all()
+        or (setup.varying is not None and setup.varying.shape != shape)
+    ):
+        raise RunError(f"{trajectory.name}: states or values of this run are not of its scene")
