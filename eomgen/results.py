@@ -290,8 +290,8 @@ class Run:
         self,
         of: str | Sequence[str] = (),
         *,
-        phase: Sequence[str] = (),
-        poincare: Sequence[str] = (),
+        phase: str | Sequence[str] = (),
+        poincare: str | Sequence[str] = (),
         at: str = "",
         direction: "Direction" = "rising",
         strobe: int | Sequence[float] = 0,
@@ -300,7 +300,7 @@ class Run:
         """A figure for a paper, as Matplotlib's `Figure`.
 
         of        quantities against time: states, "energy", outputs and their components, as
-                  "joint_forces.hinge.fx"
+                  "joint_forces.hinge.fx"; names, or a text of names with commas, here and below
         phase     two quantities, one against the other
         poincare  two quantities where the motion passes `at`, one against the other; or one, each
                   value against the one before
@@ -311,12 +311,12 @@ class Run:
 
         Without any of them all coordinates are drawn. Raises `RunError` for an unknown name.
         """
-        from eomgen.show.plotting import Wanted, plotted
+        from eomgen.show.plotting import Wanted, names_of, plotted
 
         wanted = Wanted(
-            tuple(of.replace(" ", "").split(",") if isinstance(of, str) and of else of),
-            tuple(phase),
-            tuple(poincare),
+            names_of(of),
+            names_of(phase),
+            names_of(poincare),
             at,
             direction,
             strobe if isinstance(strobe, int) else tuple(strobe),

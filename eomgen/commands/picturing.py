@@ -26,7 +26,7 @@ ROWS, MANY = 1001, 20_001
 
 def plot(given: Arguments) -> int:
     """Draw a figure of a run, and write it."""
-    from eomgen.show.plotting import Wanted, plotted
+    from eomgen.show.plotting import Wanted, names_of, plotted
     from eomgen.show.style import check_figure, write_figure
 
     target = _target(given, "_plot.png")
@@ -34,12 +34,12 @@ def plot(given: Arguments) -> int:
     if (given.times or given.count != 8) and not given.strobe:
         raise RunError("--times and --count are for --strobe; add it")
     wanted = Wanted(
-        of=_names(given.of),
-        phase=_names(given.phase),
-        poincare=_names(given.poincare),
+        of=names_of(given.of),
+        phase=names_of(given.phase),
+        poincare=names_of(given.poincare),
         at=given.at,
         direction=given.direction,
-        strobe=(_times(given.times) or given.count) if given.strobe else 0,
+        strobe=(_times(given.times) or given.count or -1) if given.strobe else 0,
         size=given.size,
     )
     run = _run_of(given)
@@ -112,16 +112,13 @@ def _run_of(given: Arguments) -> Run:
     run = run_plan(plan, reporter=reporter)
     if not run.finished:
         raise RunError(f"{run.model.name}: {run.message}")
+    print(f"{run.model.name}: simulated {run.t[-1]:g} s by {run.trajectory.integrator}")
     return run
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(filter(None, (word.strip() for word in text.split(","))))
 
 
 def _times(text: str) -> tuple[float, ...]:
     """The times of `--times`. Raises `RunError` for a text that is none."""
     try:
-        return tuple(float(word) for word in _names(text))
+        return tuple(float(word) for word in text.split(",") if word.strip())
     except ValueError:
         raise RunError(f"--times {text}: are no times; give seconds such as 0,0.5,1") from None

@@ -267,7 +267,7 @@ def _mp4(
     with tempfile.TemporaryDirectory() as folder:
         made, said = Path(folder) / "film.mp4", Path(folder) / "said"
         source = f"-f rawvideo -pix_fmt rgb24 -s {size[0]}x{size[1]} -r {fps:g} -i -".split()
-        target = ["-an", "-pix_fmt", "yuv420p", "-metadata", "comment=eomgen film"]
+        target = ["-an", "-pix_fmt", "yuv420p", "-q:v", "3", "-metadata", "comment=eomgen film"]
         command = [ffmpeg, "-loglevel", "error", *source, *target, "-fflags", "+bitexact"]
         with said.open("wb") as errors:
             process = subprocess.Popen(

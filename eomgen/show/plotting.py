@@ -46,6 +46,12 @@ class Wanted:
     size: str = "double"
 
 
+def names_of(given: str | Sequence[str]) -> tuple[str, ...]:
+    """Names that are given one by one, or as a text with commas."""
+    words = given.split(",") if isinstance(given, str) else given
+    return tuple(filter(None, (word.strip() for word in words)))
+
+
 @dataclass(frozen=True, eq=False)
 class Plotted:
     """A figure and a note on it, or ""."""
