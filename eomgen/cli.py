@@ -11,10 +11,12 @@ from pathlib import Path
 from eomgen import commands
 from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
 from eomgen.options import (
+    add_film,
     add_folder,
     add_force,
     add_inputs,
     add_parameters,
+    add_plot,
     add_simulation,
 )
 from eomgen.routes import ROUTES
@@ -30,7 +32,7 @@ DERIVED = "what was derived is kept for the next call"
 KEPT = {
     "accuracy": "the runs made so far are in the table, and the same command continues",
     **dict.fromkeys(("derive", "verify", "effects", "linearise"), DERIVED),
-    **dict.fromkeys(("simulate", "view"), DERIVED),
+    **dict.fromkeys(("simulate", "view", "plot", "film"), DERIVED),
 }
 """What an interrupt leaves, for commands that do not say so themselves."""
 
@@ -104,6 +106,9 @@ def _parser(
             found.append((name, added))
         if scenes == "scene":
             added.add_argument("scene", metavar="SCENE", help="file or built-in name")
+        elif scenes == "run":
+            text = "file that simulate wrote, .npz or .csv; or a scene, which is simulated first"
+            added.add_argument("scene", metavar="RUN", help=text)
         elif scenes == "scenes":
             added.add_argument("scenes", metavar="SCENE", nargs="*", help="file or built-in name")
         return added
@@ -146,6 +151,10 @@ def _parser(
         ("view", commands.view, "integrate, and open the animated page"),
     ):
         add_simulation(_code(_form(command(name, run, about))))
+    about = "draw a figure of a run for a paper: PNG, SVG or PDF"
+    add_plot(command("plot", commands.plot, about, "run"))
+    about = "make a film of a run: GIF, or MP4 with ffmpeg"
+    add_film(command("film", commands.film, about, "run"))
     about = "run a scene many times, with other parameters, initial states or inputs"
     _sweep(_route(_form(command("sweep", commands.sweep, about))))
     about = "compare the module with an independent solver and 60 digits"

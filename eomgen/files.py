@@ -31,8 +31,12 @@ SIGNATURES = (
     b"eomgen.npy",  # archives: their first member
     b"Software\0eomgen",  # PNG
     b"<dc:title>eomgen</dc:title>",  # SVG: who made it
+    b"% eomgen figure\n",  # PDF
+    b"!\xfe\x06eomgen\0",  # GIF: a comment
 )
 """Every file that this program writes has one of these in its first `SIGNED_WITHIN` bytes."""
+SIGNED_AT_END = b"eomgen film"
+"""What films have there instead, in their last bytes: the comment of an MP4 comes last."""
 SIGNED_WITHIN = 2048
 PIECE = 2**20
 """Bytes that are read in one call."""
@@ -103,7 +107,7 @@ def check_writable(path: Path, *, force: bool = False) -> None:
         if force:
             return
         with path.open("rb") as file:
-            ours = is_ours(file.read(SIGNED_WITHIN))
+            ours = is_ours(file.read(SIGNED_WITHIN)) or _ends_as_ours(file)
     except OSError as error:
         raise RunError(f"{path}: cannot be used: {error.strerror}") from None
     if not ours:
@@ -111,6 +115,13 @@ def check_writable(path: Path, *, force: bool = False) -> None:
             f"{path}: exists and was not written by eomgen; "
             "move it away, choose another name, or give --force"
         )
+
+
+def _ends_as_ours(file: BinaryIO) -> bool:
+    """Whether a file ends like a film of this program."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - SIGNED_WITHIN))
+    return SIGNED_AT_END in file.read(SIGNED_WITHIN)
 
 
 def check_folder(path: Path) -> None:

@@ -43,6 +43,8 @@ COMMANDS = {
     "accuracy": f"accuracy pendulum {QUICK} -o {{out}}",
     "effects": "effects pendulum --no-motion -o {out}",
     "linearise": "linearise cart_pole",
+    "plot": "plot pendulum --of theta,energy --t-end 0.1 -o {out}/p.pdf",
+    "film": "film pendulum --t-end 0.1 -o {out}/f.gif",
     "sweep": "sweep pendulum --vary theta=1,2 --t-end 0.1 --workers 1 -o {out}",
 }
 QUICKER = [name for name in COMMANDS if name != "accuracy"]
@@ -53,6 +55,8 @@ WRITES = {
     "simulate": 5,
     "view": 5,
     "accuracy": 3,
+    "plot": 1,
+    "film": 1,
     "sweep": 3,
     "effects": 1,
 }

@@ -6,16 +6,16 @@ from os import PathLike
 from typing import TYPE_CHECKING, Literal
 
 from eomgen.api.given import Values, values_of
-from eomgen.api.recording import wanted_outputs
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
 from eomgen.api.states import values_by_index
-from eomgen.errors import RunError
-from eomgen.model.elaborate import in_order
+from eomgen.errors import RunError, nearest
+from eomgen.model.elaborate import in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.results import Run
 from eomgen.run.inputs import InputsOfTime
 from eomgen.scene.schema import SHOWN, Scene
+from eomgen.study.recording import GROUPS, SAVED
 
 if TYPE_CHECKING:
     from eomgen.study.accuracy.trial import Setting
@@ -146,6 +146,24 @@ def plan_run(
         resume=resume,
         backend=backend,
     )
+
+
+def wanted_outputs(
+    names: Sequence[str], model: Model, reporter: Reporter = SILENT
+) -> tuple[str, ...]:
+    """The outputs that are needed to save what is named.
+
+    Raises `RunError` for an unknown name, or `SceneError` for one that the model lacks.
+    """
+    argument = reporter.argument("save")
+    found: list[str] = []
+    for name in names:
+        if name not in GROUPS and name not in SAVED:
+            known = (*GROUPS, *SAVED)
+            hint = nearest(name, known) or f"; known: {', '.join(known)}"
+            raise RunError(f"{argument}: no '{name}' can be saved{hint}")
+        found += GROUPS.get(name, (name,))
+    return outputs_for(found, argument, model.points, model.inputs, model.parameters, model.driven)
 
 
 def _check_aims(

@@ -10,7 +10,6 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, model_of, overridden, read
 from eomgen.api.inputs import Inputs, applied
 from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
-from eomgen.api.recording import recorded, unknown_forces
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, origin_from, split
 from eomgen.model.model import Model
@@ -21,6 +20,8 @@ from eomgen.run.problem import Problem
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.schema import Form, Route
 from eomgen.study.diagnosis import problem_of
+from eomgen.study.observed import setup_of
+from eomgen.study.recording import recorded, unknown_forces
 
 if TYPE_CHECKING:
     from eomgen.native.accelerator import Accelerator
@@ -168,11 +169,14 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
         estimate = by_second_run(case, trial)
         error = estimate.last
+    varying = plan.varying(trajectory.t).T if plan.varying else None
     if told := _why_not_compiled(plan, accelerator):
         warnings.append(told)
         reporter.note(told)
     trajectory = replace(
-        trajectory, saved=recorded(plan.save, model, functions, trajectory, values)
+        trajectory,
+        saved=recorded(plan.save, model, functions, trajectory, values),
+        setup=setup_of(plan.scene, model, plan.parameters, plan.inputs, varying=varying),
     )
     if told := unknown_forces(trajectory):
         warnings.append(told)
