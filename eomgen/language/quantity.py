@@ -199,7 +199,7 @@ def name_quantities(
             moving = _check_names(formula, where, known, allowed)
             if isinstance(formula, Constant) and formula.value != 0.0:
                 what = of_joint(str(info.description), slides)
-                about = f"{what} of {prefix}{suffix.replace('_', ', ', 1)}"
+                about = f"{prefix}: {what}{suffix.replace('_', ', ', 1)}"
                 name = f"{prefix}_{field}{suffix}"
                 parameters.append(Parameter(name, formula.value, unit, about, where))
                 formula = Name(name)
