@@ -82,9 +82,9 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
 
 def _joint_words(name: str, parent: str) -> str:
     """What the rotation R and the vector r of a joint are."""
-    turns = f"R_{name} turns axes of `{name}` into"
+    turns = f"R_{name} rotates axes of `{name}` into"
     if parent == WORLD:
-        place = f"r_{name} is the place of the centre of mass of `{name}` in the world"
+        place = f"r_{name} is the position of the centre of mass of `{name}` in the world"
         return f"{turns} the world's, and {place}."
     runs = f"r_{name} runs from the centre of mass of `{parent}` to that of `{name}`"
     return f"{turns} those of `{parent}`, and {runs}, axes of `{parent}`."
@@ -159,8 +159,8 @@ def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
     yield (
         "Virtual power",
-        "In every velocity that the joints leave free the forces of inertia do the work of the "
-        f"loads: m a for each body's force{weights}. Forces in the joints do none. This is "
+        "For every velocity that the joints leave free, the forces of inertia do the work of "
+        f"the loads: m a for each body's force{weights}. Forces in the joints do none. This is "
         "M dv/dt + V + G = F; first the mass matrix,",
         [(sp.Symbol("M"), terms.M)],
     )
