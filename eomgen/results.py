@@ -33,7 +33,7 @@ class Derivation:
     """Equations of motion M v̇ + V + G = F as SymPy expressions, and the steps of their derivation.
 
     `matrices` has the equations and the symbols of coordinates `q`, velocities `v` and
-    accelerations `a`. A mechanism that is told as an algorithm has none: see `steps`.
+    accelerations `a`. A mechanism derived as an algorithm has none: see `steps`.
     """
 
     model: Model
@@ -55,7 +55,7 @@ class Derivation:
         if self.exposition.matrices is None:
             raise SceneError(
                 f"derive: M, V, G and F of {self.name} are too long to be written out; its steps "
-                "tell the algorithm, and the generated module computes them"
+                "give the algorithm, and the generated module computes them"
             )
         return self.exposition.matrices
 

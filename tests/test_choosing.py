@@ -355,8 +355,8 @@ def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert main(["simulate", "pendulum", "--accuracy", "1e-16", "-o", str(tmp_path)]) == 1
     said = capsys.readouterr()
     assert re.fullmatch(
-        r"eomgen: --accuracy 1e-16: not reached, the best run's estimate is \S+: a double resolves "
-        r"theta only to \S+ of its range of motion; take a shorter --t-end\n",
+        r"eomgen: --accuracy 1e-16: not reached; the best run's error estimate is \S+: a double "
+        r"resolves theta only to \S+ of its range of motion; take a shorter --t-end\n",
         said.err,
     )
     assert (tmp_path / "pendulum.npz").exists()

@@ -262,7 +262,7 @@ def test_notices_and_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     scene.write_text(ARM, "utf-8")
     notices = [
         "eomgen: note: arm.toml:9: joints[0].axis: has length 2; taken as a direction of length 1",
-        "eomgen: note: arm.toml:13: initial.q: the quaternion from w_qw on has length 2; "
+        "eomgen: note: arm.toml:13: initial.q: the quaternion that starts at w_qw has length 2; "
         "scaled to 1",
     ]
     out = str(tmp_path / "out")
@@ -416,11 +416,11 @@ def test_outputs_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
             "momentum,",
             "eomgen: --outputs: no output ''; known: all, forward_dynamics, ",
         ),
-        ("cart_pole", "jacobian", "eomgen: --outputs: 'jacobian' is always there; leave it out"),
+        ("cart_pole", "jacobian", "eomgen: --outputs: 'jacobian' is always included; leave it out"),
         (
             "chain",
             "momentum,input_jacobian",
-            "eomgen: chain.toml: --outputs: 'input_jacobian' is about inputs, and there are none",
+            "eomgen: chain.toml: --outputs: 'input_jacobian' needs inputs, and there are none",
         ),
     ):
         command = ["generate", scene, "--outputs", outputs, "-o", out]

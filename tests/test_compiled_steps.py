@@ -176,5 +176,5 @@ def test_without_a_compiler_long_runs_say_so(
 
 
 def test_an_unknown_backend_is_refused() -> None:
-    with pytest.raises(RunError, match="backend: 'fortran' is none of auto, numpy, c"):
+    with pytest.raises(RunError, match="backend: 'fortran' is not one of auto, numpy, c"):
         eomgen.simulate("two_body", backend="fortran")  # type: ignore[arg-type]

@@ -689,7 +689,7 @@ BAD = {
         "effects[0].radius: -1 is negative; give a number >= 0 in m"
     ),
     (*SOFT, "friction = 0.3"): (
-        "effects[0].slip_speed: is missing; it smooths friction, give a small one in m/s"
+        "effects[0].slip_speed: is missing; it smooths friction; give a small value in m/s"
     ),
     (*SOFT, "slip_speed = 0.3"): (
         "effects[0].slip_speed: smooths friction, which is missing; give both"
@@ -713,7 +713,7 @@ BAD = {
         "effects[0].other: 'a' cannot touch itself; name another body or world"
     ),
     (*SOFT, "radii = { b = 0.3 }"): (
-        "effects[0].radii.b: is none of the bodies in contact; leave it out"
+        "effects[0].radii.b: is not one of the bodies in contact; leave it out"
     ),
     (*SOFT, EACH): (
         "effects[0].body: one body has no other to touch; give two or more in bodies"
@@ -741,7 +741,7 @@ BAD_STOPS = {
         "effects[0].stiffness: a restitution replaces it; give one"
     ),
     ("low = 0",): "effects[0].stiffness: missing; give it or a restitution",
-    ("restitution = 0.5",): "effects[0].low: missing, and high too; give one of them or both",
+    ("restitution = 0.5",): "effects[0].low: missing, as is high; give one of them or both",
 }
 
 

@@ -213,7 +213,7 @@ def test_powers_add_up() -> None:
         ),
         (
             SPRING + 'joints = "all"\ncoordinate = "pin_angle"\n',
-            "effects[0].coordinate: is one of a joint; name that as joint",
+            "effects[0].coordinate: belongs to one joint; name that joint as joint",
         ),
         (
             SPRING + 'joint = "ball"\nrest = 0.3\n',
@@ -230,11 +230,11 @@ def test_powers_add_up() -> None:
         ),
         (
             STOP + 'joints = "all"\nhigh = 1\nrestitution = 1\n',
-            "effects[0].joints: a rigid stop is of one joint; name it as joint",
+            "effects[0].joints: a rigid stop acts on one joint; name it as joint",
         ),
         (
             STOP + 'joint = "cross"\nhigh = 1\nrestitution = 1\n',
-            "effects[0].coordinate: missing; a rigid stop is of one coordinate, and 'cross' has "
+            "effects[0].coordinate: missing; a rigid stop acts on one coordinate, and 'cross' has "
             "cross_angle_1, cross_angle_2",
         ),
         (

@@ -615,7 +615,7 @@ BAD = {
     ),
     at_joint("joint_friction"): "effects[0].viscous: missing; give it, or coulomb and speed",
     at_joint("joint_friction", "coulomb = 1"): (
-        "effects[0].speed: missing; coulomb is smoothed as tanh(rate/speed), give a small one"
+        "effects[0].speed: missing; coulomb is smoothed as tanh(rate/speed); give a small value"
     ),
     at_joint("joint_friction", "coulomb = 1", "speed = 0"): (
         "effects[0].speed: 0 is not positive; give a number > 0 in m/s"
@@ -626,7 +626,7 @@ BAD = {
     at_joint("joint_stop", "low = 1", "high = 1", "stiffness = 1"): STOP.format(1, 1),
     at_joint("joint_stop", 'low = "pi"', "high = 1", "stiffness = 1"): STOP.format(3.14159, 1),
     at_joint("joint_stop", "stiffness = 1"): (
-        "effects[0].low: missing, and high too; give one of them or both"
+        "effects[0].low: missing, as is high; give one of them or both"
     ),
     at_joint("joint_stop", "low = 0", "stiffness = -1"): (
         "effects[0].stiffness: -1 is negative; give a number >= 0 in N/m"

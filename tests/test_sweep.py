@@ -261,13 +261,16 @@ def test_samples_follow_their_laws() -> None:
             "no output 'inverse_dynamics'",
         ),
         ("--vary bob_mass=1,2 --outputs all", "--outputs: name the functions to compute"),
-        ("--vary bob_mass=1,2 --workers 0", "--workers: 0 is no number of processes"),
+        (
+            "--vary bob_mass=1,2 --workers 0",
+            "--workers: 0 is not a number of processes; give 1 or more",
+        ),
         ("--vary bob_mass=1,2 --samples 1", "samples: 1 is too few"),
         ("--vary bob_mass=1,2 --t-end -1", "--t-end: -1 is not a positive time"),
         ("--vary bob_mass=1,2 --rtol 1e-20", "rtol: 1e-20 is too small"),
         ("--vary bob_mass=1,2 --dt 0.1", "dt: DOP853 chooses its own steps"),
         ("--vary bob_mass=1,2 --max-step -1", "max_step: -1 is not a positive step"),
-        ("--vary bob_mass=1,2 --backend x", "--backend: 'x' is none of auto, numpy, c"),
+        ("--vary bob_mass=1,2 --backend x", "--backend: 'x' is not one of auto, numpy, c"),
         ("--vary bob_mass=1:2:30000000", "is not a number of values from 1 to"),
     ],
 )

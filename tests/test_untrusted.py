@@ -27,7 +27,7 @@ from eomgen.text import LONGEST_LINE
 
 @pytest.fixture
 def strange(tmp_path: Path) -> Iterator[dict[str, Path]]:
-    """Things with a name that are no plain files."""
+    """Things with a name that are not plain files."""
     things = {name: tmp_path / name for name in ("pipe", "socket", "folder", "device", "endless")}
     os.mkfifo(things["pipe"])
     things["folder"].mkdir()
@@ -41,7 +41,7 @@ def strange(tmp_path: Path) -> Iterator[dict[str, Path]]:
 def test_only_plain_files_are_read(strange: dict[str, Path]) -> None:
     """Nothing waits for a pipe's other end, and nothing endless is read."""
     for path in strange.values():
-        with pytest.raises(RunError, match="no plain file; save what it holds to a file"):
+        with pytest.raises(RunError, match="not a plain file; save its content to a file"):
             read_plain(path, 10)
 
 
@@ -79,7 +79,7 @@ def test_a_scene_is_a_plain_file(
     """`check <(command)` is told what to do instead of being waited for."""
     assert main(["check", str(strange[kind])]) == 1
     said = capsys.readouterr().err
-    assert said.startswith(f"eomgen: {kind}: is a ") and "no plain file; save" in said
+    assert said.startswith(f"eomgen: {kind}: is a ") and "not a plain file; save" in said
 
 
 @pytest.mark.parametrize("kind", ["pipe", "socket", "device", "endless", "folder"])

@@ -168,15 +168,15 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
         estimate = by_second_run(case, trial)
         error = estimate.last
-    if told := _why_not_compiled(plan, accelerator):
-        warnings.append(told)
-        reporter.note(told)
+    if notice := _why_not_compiled(plan, accelerator):
+        warnings.append(notice)
+        reporter.note(notice)
     trajectory = replace(
         trajectory, saved=recorded(plan.save, model, functions, trajectory, values)
     )
-    if told := unknown_forces(trajectory):
-        warnings.append(told)
-        reporter.note(told)
+    if notice := unknown_forces(trajectory):
+        warnings.append(notice)
+        reporter.note(notice)
     model = model.with_parameters(plan.parameters)
     # What varies is not 0.
     pushing = dict.fromkeys(plan.varying.given, 1.0) if plan.varying else plan.inputs
@@ -204,7 +204,7 @@ def _error_of_choice(choice: "Choice | None") -> tuple[float, list[str]]:
     if choice.met:
         return choice.error, []
     why = choice.reason or UNKNOWN
-    return choice.error, [f"accuracy: not reached, the estimate is {choice.error:.1g}: {why}"]
+    return choice.error, [f"accuracy: not reached; the error estimate is {choice.error:.1g}: {why}"]
 
 
 def _problem(
@@ -259,7 +259,7 @@ def _why_not_compiled(plan: Plan, accelerator: "Accelerator | None") -> str:
     if accelerator and plan.backend == "c" and not accelerator.used:
         return (
             "nothing was computed in C: a parameter, or a constant computed from them, is too "
-            "small or too large for that"
+            "small or too large"
         )
     return ""
 

@@ -32,7 +32,7 @@ def values_by_index(model: Model, given: Values | None, reporter: Reporter) -> d
     option, names = reporter.argument("state"), state_names(model)
     if given and model.form != "velocity":
         raise RunError(
-            f"{option}: is for form = 'velocity'; of the form '{model.form}' change [initial]"
+            f"{option}: is for form = 'velocity'; in the form '{model.form}', change [initial]"
         )
     count = len(model.coordinates) + len(model.velocities) + len(model.states)
     found: dict[int, float] = {}
@@ -60,10 +60,13 @@ def initial_with(
     for indices in map(list, model.quaternions):
         length = float(np.linalg.norm(y[indices]))
         if not length:
-            raise RunError(f"{option}: the quaternion from {names[indices[0]]} on has no length")
+            raise RunError(
+                f"{option}: the quaternion that starts at {names[indices[0]]} has no length"
+            )
         if abs(length - 1) > UNIT_TOLERANCE:
             reporter.note_scene(
-                f"{option}: the quaternion from {names[indices[0]]} on has length {length:g}; "
+                f"{option}: the quaternion that starts at {names[indices[0]]} has length "
+                f"{length:g}; "
                 "scaled to 1"
             )
         y[indices] /= length

@@ -150,7 +150,7 @@ def plan_sweep(
     t_end = scene.simulation.t_end if t_end is None else t_end
     check_time(t_end, argument("t_end"))
     if backend not in ("auto", "numpy", "c"):
-        raise RunError(f"{argument('backend')}: '{backend}' is none of auto, numpy, c")
+        raise RunError(f"{argument('backend')}: '{backend}' is not one of auto, numpy, c")
     for name in outputs:
         check_name(name, [n for n in OUTPUTS if n not in DYNAMICS], argument("outputs"), "output")
     setting = setting_of(
@@ -184,7 +184,10 @@ def run_sweep(
 ) -> Ensemble:
     """Run a plan. Raises `RunError` if it cannot begin, or if workers fail."""
     if workers < 1:
-        raise RunError(f"{reporter.argument('workers')}: {workers} is no number of processes")
+        raise RunError(
+            f"{reporter.argument('workers')}: {workers} is not a number of processes; give 1 or "
+            "more"
+        )
     model = plan.model
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     state_names: tuple[str, ...] = functions.STATES
@@ -284,7 +287,8 @@ def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] |
     if plan.backend == "numpy":
         return None
     if plan.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
-        reporter.note(f"steps of {plan.setting.integrator} are not compiled, but their derivatives")
+        method = plan.setting.integrator
+        reporter.note(f"steps of {method} are not compiled, but their derivatives are")
     try:
         find_compiler()
     except RunError as error:

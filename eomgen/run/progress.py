@@ -76,7 +76,7 @@ def terminal_notice(text: str, expected: float | None = None) -> Iterator[None]:
             return
         began, over = time.monotonic(), threading.Event()
 
-        def tell() -> None:
+        def report() -> None:
             while not over.wait(TICK):
                 spent = time.monotonic() - began
                 left = f", about {rough_time(expected - spent)} left" if expected else ""
@@ -84,13 +84,13 @@ def terminal_notice(text: str, expected: float | None = None) -> Iterator[None]:
                     left = ", longer than last time"
                 write(f"{text} {rough_time(spent)}{left}")
 
-        teller = threading.Thread(target=tell, daemon=True)
-        teller.start()
+        reporter = threading.Thread(target=report, daemon=True)
+        reporter.start()
         try:
             yield
         finally:
             over.set()
-            teller.join()
+            reporter.join()
 
 
 @contextmanager

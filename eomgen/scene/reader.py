@@ -46,7 +46,7 @@ def find_scene(scene: str) -> Path:
         raise SceneError(f"{scene}: is a folder; give a scene file in it")
     if not there:
         hint = nearest(scene, built_in_names()) or f"; known: {', '.join(built_in_names())}"
-        raise SceneError(f"{scene}: no such file, nor a built-in scene{hint}")
+        raise SceneError(f"{scene}: no such file or built-in scene{hint}")
     return path
 
 

@@ -85,7 +85,7 @@ inputs = [{ name = "thrust", unit = "N", about = "of the engine" }, "wind"]
     name: Identifier
     unit: Annotated[str, Field(max_length=40, pattern=UNIT)] = Field(default="", description="unit")
     about: Text = Field(default="", description="one line of text")
-    default: Number = Field(default=0.0, description="its value unless given")
+    default: Number = Field(default=0.0, description="its value if none is given")
 
 
 class BodyTable(Table):
@@ -114,7 +114,8 @@ inertia_com = "m*l**2/12"
     )
     inertia_check: Literal["on", "off"] = Field(
         default="on",
-        description="whether to refuse an inertia that no body has, with a principal moment larger "
+        description="whether to refuse an inertia that no body can have, with a principal moment "
+        "larger "
         "than the other two together by more than 0.1 %",
     )
     shapes: tuple[Shape, ...] = Field(default=(), description="shapes in pictures")
@@ -142,9 +143,11 @@ r_child = [-0.05, 0]
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
     start: Vector = quantity("m", "first pin on the parent", default=(), validate_default=False)
-    r_parent: Vector = quantity("m", "pin on the link before")
+    r_parent: Vector = quantity("m", "pin on the previous link")
     r_child: Vector = quantity("m", "pin on the link itself")
-    axis: Numbers | None = Field(default=None, description="of the pins, in space; z if absent")
+    axis: Numbers | None = Field(
+        default=None, description="direction of the pins, in space; z if absent"
+    )
     shapes: tuple[Shape, ...] = Field(default=(), description="shapes of each link in pictures")
 
 

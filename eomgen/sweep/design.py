@@ -43,7 +43,7 @@ class Law:
 
     def __post_init__(self) -> None:
         if self.kind not in LAWS:
-            raise RunError(f"'{self.kind}' is no distribution; take one of {', '.join(LAWS)}")
+            raise RunError(f"'{self.kind}' is not a distribution; take one of {', '.join(LAWS)}")
         fits = math.isfinite(self.a) and math.isfinite(self.b)
         fits = fits and (self.b > 0 if self.kind == "normal" else self.a < self.b)
         if not fits or (self.kind == "loguniform" and self.a <= 0):

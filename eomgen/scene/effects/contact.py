@@ -121,7 +121,7 @@ dissipation = 0.2
     )
     stiffness: Quantity = quantity(
         "N/m or N/m^1.5",
-        "stiffness, which the soft laws need",
+        "stiffness; the soft laws need it",
         "nonnegative",
         default=ZERO,
         validate_default=False,
@@ -134,7 +134,7 @@ dissipation = 0.2
     )
     restitution: Quantity = quantity(
         "",
-        "coefficient of restitution, 0 to 1, which law 'impact' needs",
+        "coefficient of restitution, 0 to 1; law 'impact' needs it",
         default=ZERO,
         validate_default=False,
     )
@@ -162,7 +162,7 @@ dissipation = 0.2
         if needed not in given:
             raise wrong(needed, f"is missing; law '{self.law}' needs it")
         if "friction" in given and self.slip_speed is None:
-            raise wrong("slip_speed", "is missing; it smooths friction, give a small one in m/s")
+            raise wrong("slip_speed", "is missing; it smooths friction; give a small value in m/s")
         if "friction" not in given and self.slip_speed is not None:
             raise wrong("slip_speed", "smooths friction, which is missing; give both")
         return self
@@ -181,7 +181,7 @@ dissipation = 0.2
             raise wrong("other", f"'{self.other}' cannot touch itself; name another body or world")
         for name in self.radii:
             if name not in listed and self.bodies != "all":
-                raise wrong(f"radii.{name}", "is none of the bodies in contact; leave it out")
+                raise wrong(f"radii.{name}", "is not one of the bodies in contact; leave it out")
         return self
 
     def checked(self, dimensions: int, location: str) -> Self:

@@ -97,7 +97,7 @@ class OnJoints(EffectTable):
             what = "is missing" if self.joint is None else "is given beside 'joints'"
             raise wrong("joint", f"{what}; give one of joint, joints")
         if self.coordinate is not None and self.joint is None:
-            raise wrong("coordinate", "is one of a joint; name that as joint")
+            raise wrong("coordinate", "belongs to one joint; name that joint as joint")
         listed = self.joints if isinstance(self.joints, tuple) else ()
         for i, name in enumerate(listed):
             if name in listed[:i]:

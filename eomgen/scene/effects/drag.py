@@ -46,11 +46,11 @@ wind = ["3*sin(t)", 0]
     area: Quantity | None = quantity("m^2", "reference area", "nonnegative", default=None)
     coefficient: Quantity | None = quantity("", "drag coefficient", "nonnegative", default=None)
     turning_linear: Quantity = quantity(
-        "N m s/rad", "linear drag on turning", "nonnegative", default=ZERO, validate_default=False
+        "N m s/rad", "linear drag on rotation", "nonnegative", default=ZERO, validate_default=False
     )
     turning_quadratic: Quantity = quantity(
         "N m s^2/rad^2",
-        "quadratic drag on turning",
+        "quadratic drag on rotation",
         "nonnegative",
         default=ZERO,
         validate_default=False,

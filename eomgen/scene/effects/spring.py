@@ -62,7 +62,7 @@ rest_length = 0.5
     rest_length: Quantity = quantity("m", "rest length", default=ZERO, validate_default=False)
     tension_only: bool = Field(default=False, strict=True, description="whether it is a rope")
     law: Quantity | None = quantity(
-        "N", "pull in place of stiffness", sees=("motion", "stretch", "rate"), default=None
+        "N", "tension in place of stiffness", sees=("motion", "stretch", "rate"), default=None
     )
     allow_active: bool = Field(
         default=False, strict=True, description="whether stiffness and damping may be negative"

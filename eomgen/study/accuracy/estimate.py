@@ -24,8 +24,8 @@ from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
 LAST = 0.1
 """Part of a run's time, at its end, over which differences are taken."""
 NEAREST = 2
-"""Of the looser runs of a method, so many tell of the tightest run's error: errors of much looser
-ones may fall faster than theory says."""
+"""So many of the looser runs of a method are used to estimate the tightest run's error: errors of
+much looser ones may fall faster than theory says."""
 CAUTION = 0.8
 """If only one difference is known, the theoretical exponent is reduced by this factor."""
 MORE = 1.5
