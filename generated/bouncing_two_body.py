@@ -21,7 +21,7 @@ Parameters p, with the scene's values:
     l_B = 0.5                 m       joint to the centre of mass of B
     g = 9.81                  m/s^2   gravitational acceleration
     ground_radius = 0.08      m       ground: radius
-    ground_restitution = 0.8          ground: coefficient of restitution, 0 to 1; law 'impact' needs it
+    ground_restitution = 0.8          ground: coefficient of restitution, 0 to 1 (needed by law 'impact')
     ground_friction = 0.5             ground: coefficient of friction
     ground_slip_speed = 0.01  m/s     ground: speed within which friction is smoothed
 
