@@ -1,7 +1,7 @@
 """Scenes with something wrong in them, any number of them, and what must not come of any.
 
 A scene comes from a built-in one by a few changes: letters, lines, keys, values, formulas, from
-another scene or out of a list of what has broken readers before. Its number tells all of it.
+another scene or out of a list of what has broken readers before. Its number determines all of it.
 """
 
 import random

@@ -164,7 +164,7 @@ def test_a_run_is_that_of_the_command(tmp_path: Path) -> None:
 
 
 def test_a_run_is_followed_and_stopped() -> None:
-    """Told every step; what it is told is a copy; a true result ends the run there."""
+    """It is called at every step, with a copy; a true result ends the run there."""
     seen: list[float] = []
 
     def follow(t: float, y: np.ndarray) -> bool:

@@ -406,7 +406,7 @@ MISTAKES = [
     (None, 2 * '[[points]]\nname = "tip"\nbody = "arm"\n',
      "points[1].name: 'tip' is also the name of points[0]; give each its own"),
     *(('name = "swing"', f'name = "swing"\noutputs = ["momentum", "{name}"]',
-       f"outputs[1]: '{name}' is about {what}, and there are none")
+       f"outputs[1]: '{name}' needs {what}, and there are none")
       for name, what in (("point_positions", "points"), ("point_velocities", "points"),
                          ("point_jacobians", "points"), ("input_jacobian", "inputs"))),
     ('name = "swing"', 'name = "swing"\noutputs = ["momentun"]',
@@ -887,7 +887,7 @@ def test_two_scenes_of_one_name(scene: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_a_refusal_stops_no_other_scene(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Each refusal is told, the other modules are written, and the exit code is 1."""
+    """Each refusal is reported, the other modules are written, and the exit code is 1."""
     scene.write_text(GOOD)
     bad = scene.parent / "bad.toml"
     bad.write_text(GOOD.replace("mass = 0.5", "mass = -1"))

@@ -221,7 +221,8 @@ def test_beyond_the_floor_of_adaptive_methods(target: float) -> None:
 
 def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lorenz's over 50 s grows an error by 1e19: no run in doubles is right, and once DOP853 as
-    tight as it goes is wrong, no other method is asked; gauss_6 for so long that it tells, no more.
+    tight as it goes is wrong, no other method is asked; gauss_6 only for so long that its error
+    shows.
     """
 
     def derivative(t: float, y: FloatArray) -> FloatArray:
@@ -246,7 +247,7 @@ def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_steps_that_something_else_keeps_short() -> None:
-    """Two runs of the same steps tell nothing of their error."""
+    """Two runs of the same steps show nothing of their error."""
     case = case_of("pendulum")
     case = replace(case, kept={**case.kept, "max_step": 0.01})
     true = truth(replace(case, kept={**case.kept, "max_step": None}))
@@ -369,7 +370,7 @@ def test_a_wrong_run_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], integrator: str
 ) -> None:
     """At SciPy's default tolerances every method reports success on the light cart-pole and is
-    wrong (published errors 2.29, 0.086, 2.21, 3.85, 0.134): energy alone tells, and a second run.
+    wrong (published errors 2.29, 0.086, 2.21, 3.85, 0.134): only energy shows it, and a second run.
     """
     scene = tmp_path / "spiky.toml"
     scene.write_text(SPIKY)

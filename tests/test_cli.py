@@ -63,7 +63,9 @@ def test_a_digest_stands_for_a_module(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_check_says_which_module_is_stale(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Fresh, edited and missing modules are told apart; the exit code is 1; nothing is written."""
+    """Fresh, edited and missing modules are distinguished; the exit code is 1; nothing is
+    written.
+    """
     out = str(tmp_path)
     assert main(["generate", "pendulum", "two_body", "-o", out]) == 0
     edited = tmp_path / "two_body.py"
@@ -374,10 +376,10 @@ def test_the_route_is_explained(
     assert first[1].split()[:2] == ["route", "cost"]
     taken = [line.split() for line in first if line.endswith("<- taken")]
     assert len(taken) == 1
-    told = {line.split()[0]: line.split()[1] for line in first[2:5]}
-    assert set(told) == {"closed", "aba", "ldl"} and told["closed"] == "-"
+    counts = {line.split()[0]: line.split()[1] for line in first[2:5]}
+    assert set(counts) == {"closed", "aba", "ldl"} and counts["closed"] == "-"
     docstring = (tmp_path / "quadruped.py").read_text("utf-8")
-    assert int(taken[0][1]) == min(int(cost) for cost in told.values() if cost != "-")
+    assert int(taken[0][1]) == min(int(cost) for cost in counts.values() if cost != "-")
     assert re.search(r"One call of `derivative` takes \d+ operations", docstring)
 
     def never(model: object) -> None:

@@ -101,7 +101,7 @@ def test_a_run_goes_on_in_either() -> None:
 
 @compiler
 def test_each_step_is_followed() -> None:
-    """And the run ends at the very step at which it is told to."""
+    """And the run ends at the very step at which it is asked to."""
 
     def following(seen: list[tuple[float, bytes]]) -> Callable[[float, Any], bool]:
         def follow(t: float, y: Any) -> bool:

@@ -801,5 +801,5 @@ def test_what_starts_pressed_in_is_reported(
         f"stop 'end' starts 0.3 m deep, with {50 * 0.3**2:.3g} J in it",
     ]
     assert main(["check", str(scene)]) == 0
-    told = [line for line in capsys.readouterr().out.splitlines() if "starts" in line]
-    assert told == [f"at start    {line}" for line in expected]
+    reported = [line for line in capsys.readouterr().out.splitlines() if "starts" in line]
+    assert reported == [f"at start    {line}" for line in expected]

@@ -56,7 +56,7 @@ OMEGA = np.array([0.3, -0.7, 1.1])
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 0.4, 2.9])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_ball_is_pulled_back_about_the_axis_of_its_turn(angle: float, sign: float) -> None:
-    """-k θ n - c ω, whichever of its two quaternions tells the turn; energy ½ k θ²."""
+    """-k θ n - c ω, whichever of its two quaternions describes the rotation; energy ½ k θ²."""
     made = tree(SPRING + 'joint = "ball"\n')
     q = sign * np.array([math.cos(angle / 2), *(math.sin(angle / 2) * AXIS)])
     y = state([*q, 0.1, 0.2, 0.3], [*OMEGA, 0.5, 0.6, 0.7])

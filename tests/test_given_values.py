@@ -36,7 +36,9 @@ STILL = np.zeros(2)
 
 @pytest.mark.parametrize("order", list(permutations([0.0, -0.0, 1.0])))
 def test_answers_do_not_depend_on_earlier_calls(order: tuple[float, ...]) -> None:
-    """atan2 tells 0.0 from -0.0, though they are equal: so does what keeps constants by value."""
+    """atan2 distinguishes 0.0 from -0.0, though they are equal: so does what keeps constants by
+    value.
+    """
     source = quick(TURNED.format(a=1.0, torque="atan2(b, a)")).source
     module = load_module(source)
     for a in order:

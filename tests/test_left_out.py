@@ -405,7 +405,7 @@ def test_the_page_of_a_driven_scene_moves() -> None:
     np.testing.assert_allclose(found["paths"], np.array(expected)[:, :, :2], atol=1e-14)
 
 
-# What a user is told.
+# What is reported to a user.
 
 CART = (
     DOUBLE.replace('leave_out = ["velocity_forces"]\n', "")

@@ -298,8 +298,8 @@ def test_it_stands_alone(scene: str, real: str, tmp_path: Path) -> None:
     else:
         assert found == pytest.approx(wanted, rel=1e-4, abs=1e-4 * np.max(np.abs(wanted)))
     first = next(iter(python.PARAMETERS))
-    told = result(lambda: python.derivative(0.0, python.initial_state(), {first: -1.0}))
-    assert bool(refusal) == isinstance(told, str)
+    outcome = result(lambda: python.derivative(0.0, python.initial_state(), {first: -1.0}))
+    assert bool(refusal) == isinstance(outcome, str)
 
 
 def test_the_header_is_checked_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -538,7 +538,7 @@ mass = 0.2
 inertia_com = 0.01
 
 [[joints]]
-name = "told"
+name = "guided"
 type = "revolute"
 parent = "C"
 child = "D"
@@ -546,8 +546,8 @@ r_child = [-0.1, 0]
 
 [[effects]]
 type = "driven"
-name = "tell"
-joint = "told"
+name = "guide"
+joint = "guided"
 coordinate = "0.3*sin(2*t)"
 
 [[effects]]
@@ -562,11 +562,11 @@ name = "hold"
 joint = "hinge"
 stiffness = 3.0
 """
-"""What is added to two bodies that bounce: a rotor, a motor, a spring, a motion that is told."""
+"""What is added to two bodies that bounce: a rotor, a motor, a spring, a driven joint."""
 
 
 def test_every_output() -> None:
-    """Contacts, impacts, inputs, told motions, derivatives: all outputs are those of `aba`."""
+    """Contacts, impacts, inputs, driven joints, derivatives: all outputs are those of `aba`."""
     text = find_scene("bouncing_two_body").read_text()
     text = text.replace("outputs = []", 'outputs = "all"') + EVERYTHING
     ours, theirs = (

@@ -133,7 +133,7 @@ def test_what_was_stopped_goes_on(
     assert {path.name: path.read_bytes() for path in sorted(folder.iterdir())} == before
     with pytest.raises(RunError, match="holds another sweep; choose another folder"):
         eomgen.ensemble("two_body", design, folder=folder, **asked)
-    with pytest.raises(RunError, match="is no empty folder"):
+    with pytest.raises(RunError, match="is not an empty folder"):
         eomgen.ensemble("two_body", design, folder=tmp_path, **asked)
 
 
@@ -252,7 +252,7 @@ def test_samples_follow_their_laws() -> None:
         ),
         ("--vary bob_mass=normal:1:0 --sample 3", "give a mean and a positive deviation"),
         ("--vary bob_mass=2:1 --sample 3", "give two numbers, the smaller first"),
-        ("--vary bob_mass=odd:1:2 --sample 3", "'odd' is no distribution"),
+        ("--vary bob_mass=odd:1:2 --sample 3", "'odd' is not a distribution"),
         ("--vary bob_mass=1:2 --sample 0", "--sample: 0 is not a number from 1 to"),
         ("--vary bob_mass=1:2 --sample 2 --seed -1", "--seed: -1 is negative"),
         ("--vary bob_mass=1,2 --of x", "--of: unknown name 'x'"),
