@@ -257,7 +257,7 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         type=int,
         default=2,
-        help="rows to keep; 2 are the first and the last",
+        help="rows to keep; 2 keeps only the first and the last",
     )
     parser.add_argument(
         "--backend",

@@ -33,7 +33,7 @@ def applied(
     """A scene with the formulas given for some inputs in their place, the constants given for
     others, and all inputs if some of them are tables or functions.
 
-    Raises `RunError` for an unknown name, no formula, or a file that is no table of inputs.
+    Raises `RunError` for an unknown name, no formula, or a file that is not a table of inputs.
     """
     argument, known = reporter.argument("inputs"), [i.name for i in all_inputs(scene)]
     if inputs is None:
@@ -80,7 +80,7 @@ def read_table(path: Path, reporter: Reporter = SILENT) -> dict[str, Table]:
     """The inputs in a file of comma-separated values: a line with t and the names of inputs, then a
     line of numbers for each time, in ascending order. Between them the inputs are linear.
 
-    Raises `RunError`, which names the line, for a file that is no such table.
+    Raises `RunError`, which names the line, for a file that is not such a table.
     """
     argument = reporter.argument("inputs")
     try:

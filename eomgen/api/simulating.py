@@ -70,18 +70,20 @@ def simulate(
     parameters  values that replace those of the scene, by name
     state       values that replace those of the scene's initial state, by name; `<name>_deg` in
                 degrees
-    inputs      by name constant values; formulas of t, the motion and parameters, as "3*sin(t)",
-                which become part of the module; or functions of t. Or the path of a table with a
-                line t and names, then a line for each time; between them inputs are linear. With
-                tables and functions nothing is compiled. Others have their defaults
+    inputs      a mapping by name: constants; formulas of t, the motion and parameters, for example
+                "3*sin(t)", which become part of the module; or functions of t. Or the path of a
+                table whose first line has t and the names of inputs, and which has a line for each
+                time; between these times inputs are linear. With tables and functions nothing is
+                compiled. Inputs that are not given have their defaults
     form        state form; None: the scene's own
     route       to the equations; None: the scene's own
-    samples     number of rows that are kept, about
+    samples     approximate number of rows to keep
     max_step    longest step of an adaptive method, s
     works       also compute the work of each effect, J
-    save        what results hold beside states: "energy", "points", "poses", "works", "inputs", or
-                outputs by name, "joint_forces" for example; see `Run.saved`
-    guard       check rounding errors at each step, and "stop" where digits are lost, or "repair"
+    save        what to save beside the states: "energy", "points", "poses", "works", "inputs", or
+                outputs by name, for example "joint_forces"; see `Run.saved`
+    guard       check rounding errors at each step; where digits are lost, "stop" the run or
+                "repair" the step
     unstable    allow steps of an explicit fixed-step method that are too long for stability
     estimate    estimate the error by a second run
     resume      continue an earlier run: a `Run`, or its archive `.npz`

@@ -94,12 +94,12 @@ def ensemble(
     t_end, integrator, dt, rtol, atol, max_step  as for `simulate`
     parameters, inputs  values that all members have
     outputs     functions of the module to compute: "kinetic_energy" for example
-    samples     number of rows that are kept, about; 2 keeps the ends alone
+    samples     approximate number of rows to keep; 2 keeps only the first and the last
     backend     "numpy": run in Python; "c": compile at once; "auto": compile if that pays
     workers     number of processes, or threads if members run together in compiled code. With more
                 than one, a script needs `if __name__ == "__main__":`
     scheduler   address of a Dask scheduler whose workers run the members
-    folder      keeps what has run, so that the same call goes on after it was stopped
+    folder      where finished members are kept, so that the same call continues a stopped sweep
 
     A member that stops or is refused is a row that says so. The results do not depend on backend,
     workers or scheduler. Raises `SceneError`, or `RunError` for an invalid argument.

@@ -43,7 +43,7 @@ def verify(
 def horizon(source: Source, *, seconds: float = 60.0) -> "Horizon":
     """Estimate for how long a run in doubles follows the exact motion of a scene.
 
-    It is compared with a run in extended precision that takes at most `seconds`. Raises
+    The run is compared with one in extended precision that takes at most `seconds`. Raises
     `SceneError`, or `RunError` for an invalid argument.
     """
     scene = read(source)

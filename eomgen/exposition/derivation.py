@@ -171,7 +171,7 @@ def _recursive(model: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
     state += prescribed_motion(model)
     form = plain_form(model, [real(c.acceleration) for c in model.velocities])
     words = "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
-    words += "axes of its own body."
+    words += "axes of the body to which it belongs."
     steps = [
         Step("", "State", words, tuple(state), "mechanism"),
         Step("", "Free bodies", _free_words(model), (), "bodies"),

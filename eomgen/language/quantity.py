@@ -1,7 +1,7 @@
 """Quantities: numbers of a scene that stay symbolic in the generated module.
 
 A number is the default of a parameter that is named after its location. A text is a formula of the
-scene's `[parameters]`. The number 0 is no parameter: it is structural and is folded away.
+scene's `[parameters]`. The number 0 is not a parameter: it is structural and is folded away.
 """
 
 import math

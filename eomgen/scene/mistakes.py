@@ -68,7 +68,7 @@ def _weight(detail: ErrorDetails) -> int:
 
 
 def _hint(detail: ErrorDetails) -> str:
-    """A hint at a similar word. A number given as text is no typing error of the number."""
+    """A hint at a similar word. A number given as text is not a mistyped number."""
     given, known = str(detail["input"]), _expected(detail)
     return "" if given in known else nearest(given, known)
 

@@ -94,10 +94,10 @@ class BodyTable(Table):
     In the plane the inertia is a number; in space [xx, yy, zz], or [xx, yy, zz, xy, xz, yz], the
     entries of the matrix about the centre of mass in body axes.
 
-    Points of a body are given from its centre of mass; with `com` in a frame of its own, in which
-    the centre of mass is at `com`. Then joints without `r_parent` or `r_child` are at its origin.
-    Other points that are absent are the centre of mass, and so are the coordinates of a free joint
-    and the outputs of poses.
+    Points of a body are given relative to its centre of mass, or, with `com`, in the body's own
+    frame, in which the centre of mass is at `com`. Joints without `r_parent` or `r_child` are then
+    at the origin of that frame. All other points that are not given are at the centre of mass. The
+    coordinates of a free joint and the outputs of poses are those of the centre of mass, too.
     """
 
     example: ClassVar[str] = """
@@ -189,10 +189,10 @@ class Simulation(Table):
     """Settings of a run, which options of the command line override.
 
     Rigid contacts that close more slowly than `rest_speed`, m/s or rad/s, do not bounce; without
-    it, those that would rise by less than 5e-8 of the mechanism's size. Without `atol`, the
-    absolute tolerance of each state is 1e-12 of its size, which is estimated from the scene's
-    lengths and initial motion; or a thousandth of `rtol` of it if `rtol` is below 1e-9; but not
-    less than its rounding error.
+    it, contacts that would rise by less than 5e-8 of the mechanism's size do not. Without `atol`,
+    the absolute tolerance of each state is 1e-12 of the state's size, or `rtol`/1000 of it if
+    `rtol` is below 1e-9, but not less than the rounding error of the state. Sizes are estimated
+    from the scene's lengths and initial motion.
     """
 
     example: ClassVar[str] = """

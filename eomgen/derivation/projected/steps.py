@@ -47,7 +47,7 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     yield (
         "State",
         "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
-        "axes of its own body.",
+        "axes of the body to which it belongs.",
         [
             (sp.Symbol("q"), sp.Matrix([s.q])),
             (sp.Symbol("v"), sp.Matrix([s.v])),

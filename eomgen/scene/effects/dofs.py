@@ -16,7 +16,7 @@ from eomgen.scene.effects.vectors import dot, length, scale
 
 @dataclass(frozen=True)
 class Dof:
-    """One degree of freedom with a coordinate of its own, or the three of a ball joint together.
+    """One degree of freedom with its own coordinate, or the three of a ball joint together.
 
     first      index of its first velocity among those of the joint
     value      the coordinate, rad or m; for a ball joint the angle of rotation, 0 to π, about the

@@ -6,7 +6,7 @@ from eomgen.scene.effects.servo import Servo
 
 
 class Pd(Servo):
-    """A command c = k_p (target - q) + k_d (target_rate - v) to a joint; see `Servo`."""
+    """A command c = k_p (target - q) + k_d (target_rate - v) to a joint."""
 
     example: ClassVar[str] = """
 [[effects]]

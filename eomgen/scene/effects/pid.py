@@ -8,7 +8,7 @@ from eomgen.scene.effects.servo import Servo
 
 
 class Pid(Servo):
-    """c = k_p e + k_d (target_rate - v) + k_i z, dz/dt = e, e = target - q; see `Servo`.
+    """c = k_p e + k_d (target_rate - v) + k_i z, dz/dt = e, e = target - q.
 
     z is the state `<name>_integral`. While the command is limited, back-calculation prevents
     windup: dz/dt = e + (c_limited - c)/(k_i T), with the tracking time T, `tracking`, by default
