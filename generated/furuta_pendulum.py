@@ -17,7 +17,7 @@ Parameters p, with the scene's values:
     m_pendulum = 0.125  kg      mass of the pendulum
     l_pendulum = 0.34   m       length of the pendulum
     J_rotor = 4e-07     kg m^2  inertia of the motor's rotor about its axis
-    gear = 70.0                 turns of the rotor to one of the arm
+    gear = 70.0                 turns of the rotor for one turn of the arm
     g = 9.81            m/s^2   gravitational acceleration
 
 Effects: gravity, motor.
