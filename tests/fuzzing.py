@@ -23,7 +23,7 @@ from eomgen.text import LONGEST_LINE
 LONGEST = 3000
 """Letters of the scenes that are changed: long ones take long."""
 HANGS = 10.0
-"""After so many seconds of its own processor time a reader hangs; a busy machine is no hang."""
+"""After this many seconds of its own processor time a reader hangs; a busy machine is no hang."""
 VALUES = (
     *("0", "-1", "1e308", "-1e308", "nan", "inf", "-inf", "1e-320", "-0.0", "1_0", "0x1F", "true"),
     *("2026-01-01", "07:32:00", '""', "[]", "{}", "[[]]", "[1, 2, 3]", "[nan, 0]", '["m"]'),

@@ -20,7 +20,7 @@ COMMANDS = """\
 
 SCENE is a file or the name of a built-in scene (`eomgen list`). Exit codes: 0 done, 1 the scene or
 the run is at fault, with one line on standard error that says what to do, 2 wrong usage, 130
-interrupted. `eomgen COMMAND --help` prints the same.
+interrupted. `eomgen COMMAND --help` prints the same text. A default is given in brackets.
 """
 
 FUNCTIONS = """\

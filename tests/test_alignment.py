@@ -139,7 +139,7 @@ TILTS = {
     "axis of length 3": ("axis = [0, 4.2e-17, 3]", STRAIGHT, np.degrees(1.4e-17)),
     "gravity": ("axis = [0, 0, 1]", ASKEW, np.degrees(5e-10)),
 }
-"""Pins on an axis that stands off the vertical by so many degrees."""
+"""Pins on an axis that stands off the vertical by this many degrees."""
 
 
 def modules(text: str, *routes: str) -> dict[str, GeneratedModule]:

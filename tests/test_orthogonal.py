@@ -42,7 +42,7 @@ MISSED: dict[tuple[object, ...], dict[int, float]] = {
 }
 """Seeds of the trees that are known to miss `AT_RANDOM`, and what they are off by at most: 1 of
 2000 of hinges, 2 of 1200 of other joints, 1 of 1000 chains. A heavy row holds an axis of theirs by
-1e-3 only, or 1e-5: rotated with it first, a light row loses so many digits to the next that holds
+1e-3 only, or 1e-5: rotated with it first, a light row loses as many digits to the next that holds
 the axis well. The better order changes with the state.
 """
 LOOSE = 'type = "free"\nname = "j0"\nchild = "b0"'

@@ -252,8 +252,8 @@ def run_sweep(
 
 
 def _times(plan: SweepPlan) -> tuple[tuple[float, ...], float, int]:
-    """The times of the rows that are kept, s; for fixed steps also the step, and that each so many
-    are kept.
+    """The times of the rows that are kept, s; for fixed steps also the step, and the number of
+    steps from one row to the next.
     """
     method = find_integrator(plan.setting.integrator)
     if not isinstance(method, FixedStep):

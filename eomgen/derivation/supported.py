@@ -13,7 +13,7 @@ MOST_GENERAL_BODIES, MOST_GENERAL_VELOCITIES = 6, 15
 MOST_REPORTED = 6
 """The most bodies of a derivation that anyone would read; writing it takes half a minute."""
 FEW_BODIES, FEW_VELOCITIES = 3, 3
-"""Up to so many the closed form takes about a second, and is worth a try."""
+"""Up to this many the closed form takes about a second, and is worth a try."""
 
 
 def why_not_closed(model: Model) -> str:

@@ -88,14 +88,14 @@ class JointTable(Table):
         default=0.0,
         union_mode="left_to_right",
         description="orientation of the child's axes in the parent's where the coordinates are 0: "
-        "an angle; in space three, about x, then y, z",
+        "an angle; in space three angles about x, then y, z",
     )
 
     orientation: Orientation | None = Field(
         default=None,
-        description="the same: an angle, in space three about x, then y, z, a quaternion w, x, y, "
-        "z, or a matrix of three rows; in rad, as '90 deg', or formulas of parameters, whose "
-        "values are then fixed",
+        description="the same: an angle; in space three angles about x, then y, z, a quaternion w, "
+        "x, y, z, or a matrix of three rows. Angles are in rad or written as '90 deg'. Formulas of "
+        "parameters are allowed, whose values are then fixed",
     )
 
 
@@ -110,7 +110,7 @@ class Geared(JointTable):
         "", "turns of the rotor for one turn of the joint", default=None
     )
     limits: tuple[AngleOrNumber, AngleOrNumber] | None = Field(
-        default=None, description="range of the coordinate; reported, not enforced"
+        default=None, description="range of the coordinate; leaving it is reported, not prevented"
     )
 
 
