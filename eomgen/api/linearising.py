@@ -37,7 +37,7 @@ class Linearised:
     """A linearisation with what it was made from.
 
     module         the module that was linearised, of form 'velocity'
-    start          the given state (ny,), from which an equilibrium was searched
+    start          the given state (ny,), from which an equilibrium was searched for
     linearisation  A, B and the point
     steady         whether a given state moves steadily: no velocity changes
     """
