@@ -114,7 +114,7 @@ joints = [
         (arm(start='"1 m"'), "initial.q.pin_angle: '1 m' is not a number"),
         (TWO + '[initial.q]\nrail_slide = "3 deg"\n', "rail_slide_deg: no coordinate"),
         (TWO.replace("axis = [1, 0]", 'axis = [1, 0], limits = ["1 deg", 2]'), "is not a number"),
-        (arm('orientation_deg = [0, 0, 1]\norientation = [0, 0, "1 deg"]'), "is given too"),
+        (arm('orientation_deg = [0, 0, 1]\norientation = [0, 0, "1 deg"]'), "is also given"),
         (arm("orientation = 0.3"), "joints[0].orientation: is one angle; space takes 3"),
         (arm("orientation = [0, 0, 0, 0]"), "the quaternion has no length"),
         (arm("orientation = [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]"), "is not a rotation"),

@@ -218,7 +218,7 @@ def test_a_run_by_its_error() -> None:
         ({"inputs": {"push": 1.0}}, "inputs: no input 'push'; known: none"),
         ({"integrator": "rk5"}, "rk5"),
         ({"integrator": "rk4", "rtol": 1e-3}, "rtol, atol: rk4 takes equal steps; give dt instead"),
-        ({"accuracy": 1e-3, "budget": 1.0}, "a run has one aim"),
+        ({"accuracy": 1e-3, "budget": 1.0}, "a run has only one aim"),
         ({"accuracy": 1e-3, "dt": 1.0}, "accuracy, dt: accuracy chooses dt itself; leave one out"),
         ({"t_end": -1.0}, "t_end"),
     ],

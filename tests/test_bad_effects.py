@@ -291,7 +291,7 @@ def test_joints(kind: str) -> None:
     )
     if several:
         assert refusal(crane(kind, joints='["rail"]')) == (
-            "effects[0].joint: is given beside 'joints'; give one of joint, joints"
+            "effects[0].joint: is given in addition to 'joints'; give one of joint, joints"
         )
         assert refusal(crane(kind, joint=None, joints='["rail", "rail"]')) == (
             "effects[0].joints[1]: 'rail' is listed twice; leave one out"

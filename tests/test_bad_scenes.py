@@ -282,7 +282,7 @@ MISTAKES = [
     ('name = "swing"', 'name = "swing"\ntitle = "a\\u001b[31mb"',
      "title: 'a\\x1b[31mb' has a character at 2 that cannot be printed; remove it"),
     ("q = [0.1, 0.2]", "q = { wrist_angle = 0.1, wrist_angle_deg = 3.0 }",
-     "initial.q.wrist_angle_deg: wrist_angle is given too; give one of them"),
+     "initial.q.wrist_angle_deg: wrist_angle is also given; give only one of them"),
     ('m = { value = 1.0, unit = "kg"', 'm = { value = 1.0, unti = "kg"',
      "parameters.m.unti: unknown key (did you mean 'unit'?)"),
     ("r_child = [-0.1, 0]", "r_child = 3", "joints[1].r_child: 3 is not a list; give one"),

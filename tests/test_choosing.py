@@ -405,7 +405,7 @@ def test_no_false_alarm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         ("--accuracy 1e-6 --rtol 1e-6", "--accuracy chooses rtol itself; leave one out"),
         ("--accuracy 1e-6 --dt 0.1", "--accuracy chooses dt itself; leave one out"),
         ("--budget 2s --atol 1e-9", "--budget chooses atol itself; leave one out"),
-        ("--accuracy 1e-6 --budget 2s", "a run has one aim; give one of them"),
+        ("--accuracy 1e-6 --budget 2s", "a run has only one aim; give one of them"),
         ("--accuracy 0", "--accuracy: 0 is not between 0 and 0.1; give e.g. 1e-6"),
         ("--accuracy nan", "--accuracy: nan is not between 0 and 0.1; give e.g. 1e-6"),
         ("--accuracy 1", "--accuracy: 1 is not between 0 and 0.1; give e.g. 1e-6"),

@@ -738,7 +738,7 @@ BAD_STOPS = {
         "effects[0].restitution: 1.1 is not from 0 to 1; give one that is"
     ),
     ("low = 0", "restitution = 0.5", "stiffness = 9"): (
-        "effects[0].stiffness: a restitution replaces it; give one"
+        "effects[0].stiffness: a restitution replaces it; give only one of them"
     ),
     ("low = 0",): "effects[0].stiffness: missing; give it or a restitution",
     ("restitution = 0.5",): "effects[0].low: missing, as is high; give one of them or both",
@@ -796,9 +796,9 @@ def test_what_starts_pressed_in_is_reported(
     scene = tmp_path / "deep.toml"
     scene.write_text("".join(lines))
     expected = [
-        f"contact 'floor' starts 0.06 m deep, with {450 * 0.06**2:.3g} J in it",
-        f"contact 'wall' starts 0.16 m deep, with {360 * 0.16**2.5:.3g} J in it",
-        f"stop 'end' starts 0.3 m deep, with {50 * 0.3**2:.3g} J in it",
+        f"contact 'floor' starts 0.06 m deep, with {450 * 0.06**2:.3g} J stored in it",
+        f"contact 'wall' starts 0.16 m deep, with {360 * 0.16**2.5:.3g} J stored in it",
+        f"stop 'end' starts 0.3 m deep, with {50 * 0.3**2:.3g} J stored in it",
     ]
     assert main(["check", str(scene)]) == 0
     reported = [line for line in capsys.readouterr().out.splitlines() if "starts" in line]

@@ -201,7 +201,7 @@ def test_powers_add_up() -> None:
         (SPRING, "effects[0].joint: is missing; give one of joint, joints"),
         (
             SPRING + 'joint = "pin"\njoints = "all"\n',
-            "effects[0].joint: is given beside 'joints'; give one of joint, joints",
+            "effects[0].joint: is given in addition to 'joints'; give one of joint, joints",
         ),
         (
             SPRING + 'joints = ["pin", "crass"]\n',

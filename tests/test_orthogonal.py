@@ -438,7 +438,7 @@ def test_taken_where_masses_call_for_it() -> None:
     lines = heavy_tip.explanation()
     assert all("would lose" in line for line in lines if " operations a call" in line)
     assert lines[-1].startswith("orthogonal") and lines[-1].endswith("<- taken")
-    assert "keeps digits that bodies and joints take from others" in lines[-1]
+    assert "keeps digits that the other routes lose" in lines[-1]
     ordinary = compile_program(elaborate(parse_scene(tip(2.0, 2))))
     assert ordinary.system.route != "orthogonal"
     assert not any("digits" in line or "orthogonal" in line for line in ordinary.explanation())

@@ -50,7 +50,7 @@ def test_all_outputs_in_a_list() -> None:
          "no parent; name it as the parent, and give no body a second joint: closed loops are not "
          "supported"),
         ("g = 9.81 }", 'g = 9.81, direction = [1, -1] }', "route: 'closed' needs the closed form, "
-         "and it takes no 'gravity' with a direction of its own ('gravity'); leave it out"),
+         "and it takes no 'gravity' with its own direction ('gravity'); leave it out"),
     ],
 )  # fmt: skip
 def test_refusals_say_what_is_wrong(old: str, new: str, message: str) -> None:

@@ -595,7 +595,7 @@ BAD = {
     ),
     between("world", "b"): "effects[0].stiffness: missing; give it, or damping or a law",
     between("world", "b", "stiffness = 1", 'law = "stretch"'): (
-        "effects[0].stiffness: a law replaces it; give one of them"
+        "effects[0].stiffness: a law replaces it; give only one of them"
     ),
     between("world", "b", 'law = "3*strech"'): (
         "effects[0].law: unknown parameter 'strech' (did you mean 'stretch'?)"

@@ -157,7 +157,7 @@ def _check_aims(
     """Raise `RunError` for two aims, or for an aim with a tolerance, a step or an earlier run."""
     if len(aims) > 1:
         both = ", ".join(map(reporter.argument, aims))
-        raise RunError(f"{both}: a run has one aim; give one of them")
+        raise RunError(f"{both}: a run has only one aim; give one of them")
     for aim in map(reporter.argument, aims):
         for name, value in bounds.items():
             if value is not None:

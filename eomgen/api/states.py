@@ -41,7 +41,7 @@ def values_by_index(model: Model, given: Values | None, reporter: Reporter) -> d
         if index >= count:
             index, value = names.index(name.removesuffix("_deg")), math.radians(value)
         if index in found:
-            raise RunError(f"{option} {name}: {names[index]} is given too; give one of them")
+            raise RunError(f"{option} {name}: {names[index]} is also given; give only one of them")
         found[index] = value
     return found
 

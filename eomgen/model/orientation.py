@@ -29,7 +29,7 @@ def oriented(
         return joint, ()
     at = f"{location}.orientation"
     if "orientation_deg" in joint.model_fields_set:
-        raise SceneError(f"{at}: orientation_deg is given too; give one of them")
+        raise SceneError(f"{at}: orientation_deg is also given; give only one of them")
     rows = _rows(joint.orientation)
     values = [[_value(part, at, scope) for part in row] for row in rows]
     if dimensions == 2:

@@ -94,7 +94,7 @@ class OnJoints(EffectTable):
     @model_validator(mode="after")
     def _one_or_several(self) -> Self:
         if (self.joint is None) == (self.joints is None):
-            what = "is missing" if self.joint is None else "is given beside 'joints'"
+            what = "is missing" if self.joint is None else "is given in addition to 'joints'"
             raise wrong("joint", f"{what}; give one of joint, joints")
         if self.coordinate is not None and self.joint is None:
             raise wrong("coordinate", "belongs to one joint; name that joint as joint")

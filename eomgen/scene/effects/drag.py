@@ -70,7 +70,7 @@ wind = ["3*sin(t)", 0]
     def _coefficients_fit(self) -> Self:
         given = [key for key in MADE_OF if getattr(self, key) is not None]
         if given and self.quadratic != ZERO:
-            raise wrong("quadratic", f"is given beside '{given[0]}'; leave one of them out")
+            raise wrong("quadratic", f"is given in addition to '{given[0]}'; leave one of them out")
         missing = [key for key in MADE_OF if key not in given]
         if given and missing:
             raise wrong(missing[0], "is missing; give density, area and coefficient together")

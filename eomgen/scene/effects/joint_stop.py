@@ -58,7 +58,9 @@ damping = 1.0
             raise SceneError(f"{location}.stiffness: missing; give it or a restitution")
         for key in ("stiffness", "damping", "allow_active"):
             if self.restitution is not None and key in given:
-                raise SceneError(f"{location}.{key}: a restitution replaces it; give one")
+                raise SceneError(
+                    f"{location}.{key}: a restitution replaces it; give only one of them"
+                )
         return self
 
     def conditions(self, location: str) -> Iterator[Condition]:

@@ -183,4 +183,4 @@ def check_law(table: EffectTable, law: Formula | None, location: str) -> None:
     if law is None and not given & {"stiffness", "damping"}:
         raise SceneError(f"{location}.stiffness: missing; give it, or damping or a law")
     if law is not None and "stiffness" in given:
-        raise SceneError(f"{location}.stiffness: a law replaces it; give one of them")
+        raise SceneError(f"{location}.stiffness: a law replaces it; give only one of them")
