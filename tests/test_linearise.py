@@ -340,7 +340,7 @@ def test_a_figure_is_reported_in_short(capsys: pytest.CaptureFixture[str]) -> No
     assert main(["linearise", "hanging_figure", "--at", "rest"]) == 0
     out = capsys.readouterr().out
     assert "A is 76 x 76; -o FILE.npz or -o FILE.csv writes them" in out
-    assert "stays, or drifts, " in out and "stability   marginal" in out
+    assert "stays or drifts, " in out and "stability   marginal" in out
     assert max(map(len, out.splitlines())) <= 100
 
 

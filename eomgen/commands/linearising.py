@@ -173,7 +173,7 @@ def _mode(mode: Mode) -> tuple[str, str]:
     if mode.rate:
         time = math.log(2) / abs(mode.rate)
         return _number(mode.rate), f"{'doubles' if mode.rate > 0 else 'halves'} in {time:.4g} s"
-    return "0", "stays, or drifts"
+    return "0", "stays or drifts"
 
 
 def _number(x: float) -> str:

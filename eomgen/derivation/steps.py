@@ -189,7 +189,7 @@ def _solution(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
         "(37)",
         "Closed form",
         "Solved once, symbolically, for the angular acceleration α of every body. The pivots d "
-        "are sums of positive terms, so no division can fail at any pose; c couples a body to "
+        "are sums of positive terms, so no division can fail at any pose; c couples one body to "
         "another, b is its load, and M the mass of a whole tree.",
         _solved(equations),
     )

@@ -150,10 +150,10 @@ def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     if named:
         yield (
             "Parts of the motion",
-            "Named to keep what follows short: ω, u with a velocity as index are the partial "
-            "velocities, the motion of a body while this velocity is 1 and all others are 0; α, a "
-            "the accelerations that are left while all derivatives of velocities are 0; g is the "
-            "acceleration of gravity; W turns axes of a body into the world's.",
+            "These parts have names, to keep what follows short. ω, u with a velocity as index are "
+            "the partial velocities: the motion of a body while this velocity is 1 and all others "
+            "are 0. α, a are the accelerations that remain while all derivatives of velocities are "
+            "0. g is the acceleration of gravity, and W rotates axes of a body into the world's.",
             named,
         )
     weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
@@ -184,10 +184,12 @@ def _solution(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]
     yield (
         "Closed form",
         "Gauss: of all motions that the joints allow, the true one has the least sum of weighted "
-        "squares of the bodies' accelerations from free ones. Eliminated velocity by velocity, "
-        "from the leaves inwards, each pivot d is a sum of weighted squares: it vanishes at no "
-        "pose at which the mass matrix is regular. c couples a velocity to another, β is the "
-        "acceleration that it would need to stay behind, Q the force on it, f what of it is left.",
+        "squares of the differences between the bodies' accelerations and those of free bodies. "
+        "Velocities are eliminated one by one, from the leaves inwards. Each pivot d is a sum of "
+        "weighted squares, so it vanishes at no pose at which the mass matrix is regular. c "
+        "couples "
+        "one velocity to another, β is the acceleration that it would need to stay behind, Q is "
+        "the force on it, and f the part of Q that is left.",
         pairs,
     )
 
