@@ -94,7 +94,7 @@ def _parser(
         description="Equations of motion from a scene: derived, solved once, written as code.",
         epilog="SCENE is a file or the name of a built-in scene (eomgen list).",
     )
-    parser.add_argument("--version", action=Version, help="print the version and end")
+    parser.add_argument("--version", action=Version, help="print the version and exit")
     sub = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def command(
@@ -196,10 +196,12 @@ def _generation(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="all built-in scenes")
     parser.add_argument(
-        "--check", action="store_true", help="report which are stale, write nothing"
+        "--check", action="store_true", help="report which modules are stale; write nothing"
     )
     parser.add_argument(
-        "--explain", action="store_true", help="say why its route was chosen, and what each line is"
+        "--explain",
+        action="store_true",
+        help="say why the route was chosen, and what each line computes",
     )
     parser.add_argument("--report", action="store_true", help="say what each pass saved")
     add_force(parser)
@@ -270,7 +272,11 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument(
-        "--samples", metavar="N", type=int, default=2, help="rows to keep; 2 are the ends"
+        "--samples",
+        metavar="N",
+        type=int,
+        default=2,
+        help="rows to keep; 2 keeps only the first and the last",
     )
     parser.add_argument(
         "--backend",
@@ -278,7 +284,9 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="auto: compute in compiled C code if that pays; numpy: never; c: always",
     )
-    parser.add_argument("--workers", metavar="N", type=int, help="processes (one a core)")
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="number of processes (one per core)"
+    )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", default="", help="run on the workers of a Dask scheduler"
     )
@@ -298,7 +306,7 @@ def _accuracy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--time", metavar="S", type=float, default=300.0, help="start no run after this, s"
     )
-    parser.add_argument("--fresh", action="store_true", help="use no runs of an earlier call")
+    parser.add_argument("--fresh", action="store_true", help="do not use runs of earlier calls")
     add_parameters(parser)
     add_inputs(parser)
     half = parser.add_mutually_exclusive_group()
@@ -367,14 +375,14 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="a coordinate that keeps its value while an equilibrium is searched",
+        help="a coordinate that keeps its value while an equilibrium is searched for",
     )
     parser.add_argument(
         "--trim",
         metavar="INPUT",
         action="append",
         default=[],
-        help="an input whose value is searched as well",
+        help="an input whose value is searched for as well",
     )
     add_parameters(parser)
     add_inputs(parser, constant=True)

@@ -90,8 +90,8 @@ def _check_plain(about: os.stat_result, shown: str, error: type[EomgenError]) ->
         return
     kinds = {stat.S_IFIFO: "a pipe", stat.S_IFDIR: "a folder", stat.S_IFSOCK: "a socket"}
     raise error(
-        f"{shown}: is {kinds.get(kind, 'a device')}, no plain file; "
-        "save what it holds to a file and name that"
+        f"{shown}: is {kinds.get(kind, 'a device')}, not a plain file; "
+        "save its content to a file and name that file"
     )
 
 
@@ -103,7 +103,7 @@ def check_writable(path: Path, *, force: bool = False) -> None:
         if not path.exists():
             return
         if not path.is_file():
-            raise RunError(f"{path}: is no plain file; choose another name")
+            raise RunError(f"{path}: is not a plain file; choose another name")
         if force:
             return
         with path.open("rb") as file:
@@ -129,7 +129,7 @@ def check_folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RunError(f"{path}: cannot be made a folder: {error.strerror}") from None
+        raise RunError(f"{path}: the folder cannot be created: {error.strerror}") from None
     if not os.access(path, os.W_OK | os.X_OK):
         raise RunError(f"{path}: cannot be written to; choose another folder with -o")
 

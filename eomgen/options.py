@@ -21,7 +21,7 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         type=path,
         default=Path("out"),
-        help="folder of what is written",
+        help="output folder",
     )
 
 
@@ -78,7 +78,7 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
         choices=("stop", "repair"),
         nargs="?",
         const="stop",
-        help="check rounding at each step; stop (without a word) or repair where digits are lost",
+        help="check rounding at each step; where digits are lost, stop (the default) or repair",
     )
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument(
@@ -104,8 +104,8 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         "--save",
         metavar="A,B,…",
         default="",
-        help="what results hold beside states: energy, points, poses, works, inputs, or outputs by "
-        "name, joint_forces for example",
+        help="what to save beside the states: energy, points, poses, works, inputs, or outputs by "
+        "name, for example joint_forces",
     )
     parser.add_argument(
         "--parquet", action="store_true", help="also write the table as a Parquet file"

@@ -115,7 +115,7 @@ def test_names_may_have_dashes_and_a_hundred_letters(
     assert "'upper_arm'" in source and LONG in source and '"s_1_angle"' in source
     for old, new, message in (
         (LONG, LONG + "l" * 8, "is longer than 100 characters"),
-        (f'"{LONG}", mass', '"upper_arm", mass', "bodies[1].name: 'upper_arm' is the name of bodi"),
+        (f'"{LONG}", mass', '"upper_arm", mass', "bodies[1].name: 'upper_arm' is also the"),
         ("= 2.0", "= 2.0, upper_mass = 1", "parameters.upper_mass: is the same name as 'upper-ma"),
         ("s-1_angle =", "s-1_angle = 1, s_1_angle =", "initial.q"),
     ):

@@ -1,4 +1,4 @@
-"""Derivations as they are told: every scene, its effects, recursions, impacts, state forms."""
+"""Derivations as they are shown: every scene, its effects, recursions, impacts, state forms."""
 
 import re
 import unicodedata
@@ -71,7 +71,7 @@ def test_the_algorithm_followed_by_hand(scene: str) -> None:
 
 @pytest.mark.parametrize("case", TRIED[:: some(3, 1)], ids=lambda case: case.name)
 def test_each_effect_by_its_formulas(case: Case) -> None:
-    """Every type and key: forces and the rates of its states, by the formulas that are told."""
+    """Every type and key: forces and the rates of its states, by the formulas that are shown."""
     model = model_of(case.text())
     at = instant(model)
     rates, forces = follow_recursion(model, at.known)
@@ -240,9 +240,9 @@ BY = {
 def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
     """M v̇ + V + G = F and its solution, F written out."""
     model = model_of(BY[by])
-    told, at = exposition_of(model), instant(model)
+    exposition, at = exposition_of(model), instant(model)
     bare = exposition_of(replace(model, effects=model.effects[:1], states=()))
-    found, other = told.matrices, bare.matrices
+    found, other = exposition.matrices, bare.matrices
     assert found is not None and other is not None
     for letter in "MVG":
         assert getattr(found, letter) == getattr(other, letter)
@@ -303,9 +303,9 @@ def test_the_impulse_equations() -> None:
     """Gap, opening speed and slip of each contact, against the solver's rows."""
     model = model_of("bouncing_two_body")
     at = instant(model)
-    told = derived_effects(model)
-    follow_effects(model, told, at.known)
-    steps = list(impact_steps(model, told))
+    effects = derived_effects(model)
+    follow_effects(model, effects, at.known)
+    steps = list(impact_steps(model, effects))
     assert len(steps) == 4 and {"v^+", "P_II"} <= {e.left.name for e in steps[0].equations}
     solver: Dynamics = at.solver
     for step, contact in zip(steps[1:], solver.contacts, strict=True):
@@ -351,9 +351,9 @@ def test_no_character_is_lost_on_paper() -> None:
     """Descriptions of all effects have LaTeX for every letter: a question mark would be a loss."""
     for case in CASES[:: some(4, 1)]:
         model = model_of(case.text())
-        for told in derived_effects(model):
-            paper = as_latex(model, (report_words(told.words),), ())
-            assert "?" not in paper, told.effect.type
+        for derived in derived_effects(model):
+            paper = as_latex(model, (report_words(derived.words),), ())
+            assert "?" not in paper, derived.effect.type
 
 
 def report_words(words: str) -> Any:

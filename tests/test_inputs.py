@@ -102,9 +102,9 @@ def test_what_is_wrong_with_inputs_and_states_is_said(
         "--input push=3*y": "--input push: unknown name 'y'",
         "--input push=3*": "--input push: '3*' is not a formula at column 3",
         "--input push=__import__('os')": "--input push: \"__import__('os')\" has '__import__'",
-        "--input none.csv": "--input: none.csv:1: needs a first line with t and names",
-        "--input text.csv": "--input: text.csv:3: is not 2 finite numbers",
-        "--input order.csv": "--input: order.csv: its times t must ascend",
+        "--input none.csv": "--input: none.csv:1: needs a first line with t and the names",
+        "--input text.csv": "--input: text.csv:3: does not have 2 finite numbers",
+        "--input order.csv": "--input: order.csv: the times t must ascend",
         "--input who.csv": "--input: no input 'pull'",
         "--input missing.csv": "missing.csv: cannot be read",
         "--input push=push": "--input push: unknown name 'push'",
@@ -128,7 +128,7 @@ def test_what_is_wrong_with_inputs_and_states_is_said(
             eomgen.check(text)
         assert message in str(error.value)
     for other in ({"accuracy": 1e-6}, {"estimate": True}, {"guard": "stop"}, {"backend": "c"}):
-        with pytest.raises(eomgen.RunError, match="with tables and functions of time"):
+        with pytest.raises(eomgen.RunError, match="tables and functions of time do not go"):
             eomgen.simulate(CART, inputs={"push": math.sin}, **other)
     with pytest.raises(eomgen.RunError, match="inputs: Taylor series need constant inputs"):
         eomgen.simulate(CART, inputs={"push": math.sin}, integrator="taylor")

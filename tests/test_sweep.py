@@ -133,7 +133,7 @@ def test_what_was_stopped_goes_on(
     assert {path.name: path.read_bytes() for path in sorted(folder.iterdir())} == before
     with pytest.raises(RunError, match="holds another sweep; remove it, or choose another"):
         eomgen.ensemble("two_body", design, folder=folder, **asked)
-    with pytest.raises(RunError, match="is no empty folder"):
+    with pytest.raises(RunError, match="is not an empty folder"):
         eomgen.ensemble("two_body", design, folder=tmp_path, **asked)
 
 
@@ -273,7 +273,7 @@ def test_samples_follow_their_laws() -> None:
         ),
         ("--vary bob_mass=normal:1:0 --sample 3", "give a mean and a positive deviation"),
         ("--vary bob_mass=2:1 --sample 3", "give two numbers, the smaller first"),
-        ("--vary bob_mass=odd:1:2 --sample 3", "'odd' is no distribution"),
+        ("--vary bob_mass=odd:1:2 --sample 3", "'odd' is not a distribution"),
         ("--vary bob_mass=1:2 --sample 0", "--sample: 0 is not a number from 1 to"),
         ("--vary bob_mass=1:2 --sample 2 --seed -1", "--seed: -1 is negative"),
         ("--vary bob_mass=1,2 --of x", "--of: unknown name 'x'"),
@@ -282,13 +282,16 @@ def test_samples_follow_their_laws() -> None:
             "no output 'inverse_dynamics'",
         ),
         ("--vary bob_mass=1,2 --outputs all", "--outputs: name the functions to compute"),
-        ("--vary bob_mass=1,2 --workers 0", "--workers: 0 is no number of processes"),
+        (
+            "--vary bob_mass=1,2 --workers 0",
+            "--workers: 0 is not a number of processes; give 1 or more",
+        ),
         ("--vary bob_mass=1,2 --samples 1", "samples: 1 is too few"),
         ("--vary bob_mass=1,2 --t-end -1", "--t-end: -1 is not a positive time"),
         ("--vary bob_mass=1,2 --rtol 1e-20", "rtol: 1e-20 is too small"),
         ("--vary bob_mass=1,2 --dt 0.1", "dt: DOP853 chooses its own steps"),
         ("--vary bob_mass=1,2 --max-step -1", "max_step: -1 is not a positive step"),
-        ("--vary bob_mass=1,2 --backend x", "--backend: 'x' is none of auto, numpy, c"),
+        ("--vary bob_mass=1,2 --backend x", "--backend: 'x' is not one of auto, numpy, c"),
         ("--vary bob_mass=1:2:30000000", "is not a number of values from 1 to"),
     ],
 )

@@ -135,7 +135,7 @@ def test_npz_that_cannot_be_read(tmp_path):
     missing, foreign, older = (tmp_path / name for name in ("missing", "foreign", "older"))
     assert error_of(load_npz, missing) == f"{missing}: cannot be read: No such file or directory"
     foreign.write_bytes(b"PK\x03\x04 and so on")
-    assert error_of(load_npz, foreign) == f"{foreign}: is no trajectory written by eomgen"
+    assert error_of(load_npz, foreign) == f"{foreign}: is not a trajectory written by eomgen"
     older.write_bytes(packed({"eomgen": np.array("trajectory 1")}))
     assert error_of(load_npz, older) == (
         f"{older}: is in format 'trajectory 1', but this eomgen reads 'trajectory 5'; "

@@ -44,7 +44,7 @@ def applied(
     """A scene with the formulas given for some inputs in their place, the constants given for
     others, and all inputs if some of them are tables or functions.
 
-    Raises `RunError` for an unknown name, no formula, or a file that is no table of inputs.
+    Raises `RunError` for an unknown name, no formula, or a file that is not a table of inputs.
     """
     argument = reporter.argument("inputs")
     constants, formulas, varying = _by_kind(scene, inputs, reporter)
@@ -194,17 +194,17 @@ def read_table(path: Path, reporter: Reporter = SILENT) -> dict[str, Table]:
     """The inputs in a file of comma-separated values: a line with t and the names of inputs, then a
     line of numbers for each time, in ascending order. Between them the inputs are linear.
 
-    Raises `RunError`, which names the line, for a file that is no such table.
+    Raises `RunError`, which names the line, for a file that is not such a table.
     """
     argument = reporter.argument("inputs")
     try:
         text = read_plain(path, LARGEST_TABLE).decode("utf-8-sig")
         rows = list(csv.reader(text.splitlines()))
     except (UnicodeDecodeError, csv.Error) as error:
-        raise RunError(f"{argument}: {path}: is no table of text: {error}") from None
+        raise RunError(f"{argument}: {path}: is not a table of text: {error}") from None
     names = [word.strip() for word in rows[0]] if rows else []
     if "t" not in names or len(names) < 2:
-        raise RunError(f"{argument}: {path}:1: needs a first line with t and names of inputs")
+        raise RunError(f"{argument}: {path}:1: needs a first line with t and the names of inputs")
     if len(set(names)) < len(names):
         raise RunError(f"{argument}: {path}:1: a name is given twice")
     numbers = []
@@ -216,10 +216,12 @@ def read_table(path: Path, reporter: Reporter = SILENT) -> dict[str, Table]:
         except ValueError:
             values = []
         if len(values) != len(names) or not all(map(math.isfinite, values)):
-            raise RunError(f"{argument}: {path}:{line}: is not {len(names)} finite numbers")
+            raise RunError(f"{argument}: {path}:{line}: does not have {len(names)} finite numbers")
         numbers.append(values)
     table = np.array(numbers).reshape(-1, len(names))
     t = table[:, names.index("t")]
     if not len(t) or np.any(np.diff(t) <= 0):
-        raise RunError(f"{argument}: {path}: its times t must ascend; sort them, each once")
+        raise RunError(
+            f"{argument}: {path}: the times t must ascend; sort them, and give each only once"
+        )
     return {name: Table(t, table[:, i]) for i, name in enumerate(names) if name != "t"}

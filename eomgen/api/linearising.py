@@ -39,7 +39,7 @@ class Linearised:
     """A linearisation with what it was made from.
 
     module         the module that was linearised, of form 'velocity'
-    start          the given state (ny,), from which an equilibrium was searched
+    start          the given state (ny,), from which an equilibrium was searched for
     linearisation  A, B and the point
     steady         whether a given state moves steadily: no velocity changes
     """
@@ -68,8 +68,8 @@ def linearise(
                 degrees
     parameters  values that replace those of the scene, by name
     inputs      constant values, by name; others are 0
-    hold        coordinates that keep their values while an equilibrium is searched
-    trim        inputs whose values are searched as well
+    hold        coordinates that keep their values while an equilibrium is searched for
+    trim        inputs whose values are searched for as well
 
     Raises `SceneError`, or `RunError` for an invalid argument or if there is no equilibrium.
     """
@@ -96,7 +96,9 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
     at = point.at
     hold, trim = (tuple(map(identifier, names)) for names in (point.hold, point.trim))
     if at not in ("equilibrium", "rest", "initial"):
-        raise RunError(f"{reporter.argument('at')}: '{at}' is none of equilibrium, rest, initial")
+        raise RunError(
+            f"{reporter.argument('at')}: '{at}' is not one of equilibrium, rest, initial"
+        )
     constants = constant_inputs(point.inputs, reporter)
     parameters, inputs = values_of(model, point.parameters, constants, reporter)
     _, module = compiled(model, reporter=reporter)
@@ -106,7 +108,7 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
         u: Mapping[str, float] | FloatArray = inputs
         if at != "initial":
             settle = at == "rest"
-            with reporter.waiting(f"searching an equilibrium of {model.name} …"):
+            with reporter.waiting(f"searching for an equilibrium of {model.name} …"):
                 y, u = equilibrium(
                     module, y, inputs, parameters, hold=hold, trim=trim, settle=settle
                 )

@@ -100,12 +100,12 @@ def ensemble(
                 and parameters, or the path of a table, as for `simulate`; with a table nothing is
                 compiled
     outputs     functions of the module to compute: "kinetic_energy" for example
-    samples     number of rows that are kept, about; 2 keeps the ends alone
+    samples     approximate number of rows to keep; 2 keeps only the first and the last
     backend     "numpy": run in Python; "c": compile at once; "auto": compile if that pays
     workers     number of processes, or threads if members run together in compiled code. With more
                 than one, a script needs `if __name__ == "__main__":`
     scheduler   address of a Dask scheduler whose workers run the members
-    folder      keeps what has run, so that the same call goes on after it was stopped
+    folder      where finished members are kept, so that the same call continues a stopped sweep
 
     A member that stops or is refused is a row that says so. The results do not depend on backend,
     workers or scheduler. Raises `SceneError`, or `RunError` for an invalid argument.
@@ -158,7 +158,7 @@ def plan_sweep(
     t_end = scene.simulation.t_end if t_end is None else t_end
     check_time(t_end, argument("t_end"))
     if backend not in ("auto", "numpy", "c"):
-        raise RunError(f"{argument('backend')}: '{backend}' is none of auto, numpy, c")
+        raise RunError(f"{argument('backend')}: '{backend}' is not one of auto, numpy, c")
     for name in outputs:
         check_name(name, [n for n in OUTPUTS if n not in DYNAMICS], argument("outputs"), "output")
     setting = setting_of(
@@ -208,7 +208,10 @@ def run_sweep(
 ) -> Ensemble:
     """Run a plan. Raises `RunError` if it cannot begin, or if workers fail."""
     if workers < 1:
-        raise RunError(f"{reporter.argument('workers')}: {workers} is no number of processes")
+        raise RunError(
+            f"{reporter.argument('workers')}: {workers} is not a number of processes; give 1 or "
+            "more"
+        )
     model = plan.model
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     state_names: tuple[str, ...] = functions.STATES
@@ -274,8 +277,8 @@ def run_sweep(
 
 
 def _times(plan: SweepPlan) -> tuple[tuple[float, ...], float, int]:
-    """The times of the rows that are kept, s; for fixed steps also the step, and that each so many
-    are kept.
+    """The times of the rows that are kept, s; for fixed steps also the step, and the number of
+    steps from one row to the next.
     """
     method = find_integrator(plan.setting.integrator)
     if not isinstance(method, FixedStep):
@@ -309,7 +312,8 @@ def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] |
     if plan.backend == "numpy" or plan.varying is not None:
         return None
     if plan.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
-        reporter.note(f"steps of {plan.setting.integrator} are not compiled, but their derivatives")
+        method = plan.setting.integrator
+        reporter.note(f"steps of {method} are not compiled, but their derivatives are")
     try:
         find_compiler()
     except RunError as error:

@@ -51,8 +51,8 @@ def verify(
 def horizon(source: Source, *, seconds: float = 60.0, inputs: Inputs | None = None) -> "Horizon":
     """Estimate for how long a run in doubles follows the exact motion of a scene.
 
-    It is compared with a run in extended precision that takes at most `seconds`. `inputs` are as
-    for `verify`. Raises `SceneError`, or `RunError` for an invalid argument.
+    The run is compared with one in extended precision that takes at most `seconds`. `inputs` are
+    as for `verify`. Raises `SceneError`, or `RunError` for an invalid argument.
     """
     scene = all_in_formulas(read(source), inputs)
     return horizon_of(model_of(scene, source), scene.simulation, seconds=seconds)

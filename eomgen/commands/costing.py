@@ -97,7 +97,9 @@ def _print_items(bill: "Bill") -> None:
         print("    left out by the scene, with what it would add:")
         lines("left out")
     if {bill.bare_route, *(item.route for item in bill.items)} - {"", bill.route}:
-        print_wrapped("    ", f"(route): the route without it; with all of them it is {bill.route}")
+        print_wrapped(
+            "    ", f"(route): the route without this effect; with all effects it is {bill.route}"
+        )
 
 
 def _needed(item: "Item") -> str:

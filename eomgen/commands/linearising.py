@@ -78,8 +78,8 @@ def _print_point(
     nq = len(module.POSITIONS)
     kind = {
         "equilibrium": "an equilibrium",
-        "rest": "where it comes to rest",
-        "initial": "the state given",
+        "rest": "the state where it comes to rest",
+        "initial": "the given state",
     }
     print(f"{module.NAME}: linearised about {kind[at]}")
     velocities = range(nq, 2 * nq - len(module.QUATERNIONS))
@@ -92,7 +92,7 @@ def _print_point(
         after = f" ({_number(math.degrees(value))} deg)" if unit == "rad" and value else ""
         if (
             i >= velocities.stop and unit
-        ):  # a state of a controller: its name does not tell its unit
+        ):  # a state of a controller: its name does not give its unit
             after = f" {unit}"
         values.append(f"{name} = {_number(value)}{after}")
     print_listed("state       ", shortened(values, 80))
@@ -173,7 +173,7 @@ def _mode(mode: Mode) -> tuple[str, str]:
     if mode.rate:
         time = math.log(2) / abs(mode.rate)
         return _number(mode.rate), f"{'doubles' if mode.rate > 0 else 'halves'} in {time:.4g} s"
-    return "0", "stays, or drifts"
+    return "0", "stays or drifts"
 
 
 def _number(x: float) -> str:

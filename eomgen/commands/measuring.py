@@ -107,7 +107,7 @@ def _print_origin(found: Accuracy, seconds: float) -> None:
             "repeats them)"
         )
     if found.left_out:
-        print(f"    {seconds:g} s passed before finer runs of these; the same command continues:")
+        print(f"    {seconds:g} s passed before all runs were made; the same command makes these:")
         print_listed("        ", found.left_out)
 
 
@@ -125,14 +125,14 @@ def _draw(
     truth = bench.reference
     energy = ""
     if bench.energy is not None:
-        energy = "Energy drift, in parts of the motion's own"
+        energy = "Energy drift, relative to the motion's own"
     elif any(work.energy_drift >= 0 for work in shown):
         energy = "Energy unaccounted for at the end"
     floor, _ = bench.floors
     about = (
         f"{model.title or model.name}, {t_end:g} s, form {model.form}; "
         "time is the least of repeated runs, outputs off\n"
-        f"reference: its own error {truth.error:.1g}, errors are told apart from {floor:.1g} on; "
+        f"reference: its own error {truth.error:.1g}, errors are resolved down to {floor:.1g}; "
         f"{truth.origin.partition(';')[0]}"
     )
     save(Diagram(name, about, floor, energy, model.form == "redundant"), shown, path, force=force)

@@ -194,7 +194,7 @@ def _print_excursions(run: Run) -> None:
             f"farthest {out.farthest:.4g} {unit} at t = {out.at:.4g} s"
         )
     given = {c.position.name: "locked" if c.locked else "driven" for c in model.prescribed}
-    why = f"is no state of the form '{model.form}'"
+    why = f"is not a state of the form '{model.form}'"
     lines += [
         f"{name} has limits, but {f'is {given[name]}' if name in given else why}"
         for name in run.limits

@@ -147,7 +147,7 @@ def overlap_lines(model: Model) -> list[str]:
     """A line for each soft contact or stop that overlaps at the initial state."""
     return [
         f"{found.kind} '{found.effect}' starts {found.depth:.3g} {found.unit} deep, "
-        f"with {found.energy:.3g} J in it"
+        f"with {found.energy:.3g} J stored in it"
         for found in overlaps_at_start(model)
     ]
 

@@ -32,9 +32,9 @@ def with_definitions(scene: Scene, motion: Sequence[str]) -> Scene:
     known = (*scene.parameters, *motion, *CONSTANTS)
     for name, formula in scene.definitions.items():
         if name in known:
-            what = "a parameter" if name in scene.parameters else "something of the motion"
+            what = "a parameter" if name in scene.parameters else "a quantity of the motion"
             what = "a number" if name in CONSTANTS else what
-            raise SceneError(f"definitions.{name}: is the name of {what} too; rename one of them")
+            raise SceneError(f"definitions.{name}: is also the name of {what}; rename one of them")
         _check_names(formula, (*known, *scene.definitions), f"definitions.{name}")
     expanded = _expanded_definitions(scene.definitions)
     tables = {
@@ -71,7 +71,9 @@ def _expanded_definitions(definitions: Mapping[str, Formula]) -> dict[str, Formu
             elif missing in path:
                 cycle = [*path[path.index(missing) :], missing]
                 chain = ", ".join(f"{a} needs {b}" for a, b in pairwise(cycle))
-                raise SceneError(f"definitions.{missing}: is defined by itself: {chain}; break it")
+                raise SceneError(
+                    f"definitions.{missing}: is defined in terms of itself: {chain}; break it"
+                )
             else:
                 path.append(missing)
     return expanded
@@ -128,7 +130,7 @@ def _expanded_table(
                 if name in expanded and hidden:
                     raise SceneError(
                         f"{at}: '{hidden[0]}' of definition '{name}' is predefined here; "
-                        "rename it where it comes from"
+                        "rename it where it is defined"
                     )
             return _substituted(value, expanded)
 

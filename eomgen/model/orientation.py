@@ -25,13 +25,13 @@ def oriented(
     of the structure of the equations. One that depends on parameters stays, with `Constant` for
     what does not; and conditions on their values.
 
-    Raises `SceneError` for an unknown name, or what is no rotation.
+    Raises `SceneError` for an unknown name, or for what is not a rotation.
     """
     if isinstance(joint, Free) or joint.orientation is None:
         return joint, ()
     at = f"{location}.orientation"
     if "orientation_deg" in joint.model_fields_set:
-        raise SceneError(f"{at}: orientation_deg is given too; give one of them")
+        raise SceneError(f"{at}: orientation_deg is also given; give only one of them")
     rows = rows_of(joint.orientation)
     values = [[_value(part, at, scope) for part in row] for row in rows]
     if dimensions == 2:
@@ -105,8 +105,8 @@ def _of_matrix(rows: Sequence[Sequence[float]], at: str) -> tuple[float, ...]:
     off = max(map(abs, [*products, determinant - 1]))
     if not off <= NO_ROTATION:
         raise SceneError(
-            f"{at}: is no rotation: its rows are not of length 1, perpendicular and right-handed, "
-            f"by {off:.2g}; give more digits, or a quaternion"
+            f"{at}: is not a rotation: its rows must be perpendicular, right-handed and of length "
+            f"1, and are off by {off:.2g}; give more digits, or a quaternion"
         )
     if math.hypot(h, i) < NO_ROTATION:  # the angles about x and z turn about one axis
         return (0.0, math.copysign(90.0, -g), degrees_of(math.atan2(-b, e)))
@@ -118,7 +118,7 @@ def _of_quaternion(parts: Sequence[float], at: str) -> tuple[float, ...]:
     """Angles about x, y and z of a quaternion w, x, y, z of any length."""
     length = math.hypot(*parts)
     if not length:
-        raise SceneError(f"{at}: the quaternion has no length; give 1, 0, 0, 0 for no turn")
+        raise SceneError(f"{at}: the quaternion has no length; give 1, 0, 0, 0 for no rotation")
     w, x, y, z = (part / length for part in parts)
     alone = [i for i, part in enumerate((x, y, z)) if part]
     if len(alone) <= 1:  # about one axis, without rounding of products

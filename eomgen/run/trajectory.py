@@ -234,7 +234,7 @@ def load_npz(path: Path) -> Trajectory:
     """
     data = read_plain(path, LARGEST)
     if not is_ours(data):
-        raise RunError(f"{path}: is no trajectory written by eomgen")
+        raise RunError(f"{path}: is not a trajectory written by eomgen")
     # The errors that zipfile and NumPy raise for a broken archive have no common base class.
     try:
         members = unpacked(data)
@@ -293,7 +293,7 @@ def _trajectory(members: dict[str, Array]) -> Trajectory:
         setup=_setup(rest) if f"{SETUP}scene" in rest else None,
     )
     if rest:
-        raise ValueError("members that no trajectory has")
+        raise ValueError("members that trajectories do not have")
     return made
 
 
@@ -332,14 +332,14 @@ def _values(rest: dict[str, Array], prefix: str) -> list[dict[str, float]]:
 def _floats(array: Array, dimensions: int | None = None) -> FloatArray:
     """An array of doubles. Raises `ValueError` for another type or number of axes."""
     if array.dtype != np.float64 or dimensions not in (None, array.ndim):
-        raise ValueError("no doubles, or not in that shape")
+        raise ValueError("not doubles, or not in that shape")
     return array
 
 
 def _strings(array: Array, dimensions: int) -> list[Any]:
     """A list of texts, or of lists of texts. Raises `ValueError` for anything else."""
     if array.dtype.kind != "U" or array.ndim != dimensions:
-        raise ValueError("no texts, or not in that shape")
+        raise ValueError("not texts, or not in that shape")
     found: list[Any] = array.tolist()
     return found
 

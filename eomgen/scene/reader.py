@@ -50,7 +50,7 @@ def find_scene(scene: str) -> Path:
         hint = f" (did you mean '{path}.toml'?)" if f"{path.name}.toml" in beside else ""
         hint = hint or nearest(scene, names) or nearest(path.name, beside)
         hint = hint or f"; known: {', '.join(names)}"
-        raise SceneError(f"{scene}: no such file, nor a built-in scene{hint}")
+        raise SceneError(f"{scene}: no such file or built-in scene{hint}")
     return path
 
 

@@ -44,7 +44,7 @@ class Law:
 
     def __post_init__(self) -> None:
         if self.kind not in LAWS:
-            raise RunError(f"'{self.kind}' is no distribution; take one of {', '.join(LAWS)}")
+            raise RunError(f"'{self.kind}' is not a distribution; take one of {', '.join(LAWS)}")
         fits = math.isfinite(self.a) and math.isfinite(self.b)
         fits = fits and (self.b > 0 if self.kind == "normal" else self.a < self.b)
         if not fits or (self.kind == "loguniform" and self.a <= 0):
@@ -79,7 +79,8 @@ def listed(values: Mapping[str, Values]) -> Design:
 
 
 def grid(axes: Mapping[str, Values]) -> Design:
-    """All combinations of the values of each name. Raises `RunError` as `listed` does."""
+    """All combinations of the values of each name. Raises `RunError` if there are no
+    members or too many, or if a value is not finite."""
     columns = tuple(np.atleast_1d(np.asarray(axis, dtype=float)) for axis in axes.values())
     count = math.prod(len(column) for column in columns)
     if not columns or not 0 < count <= MOST:
@@ -91,7 +92,7 @@ def grid(axes: Mapping[str, Values]) -> Design:
 def sampled(
     laws: Mapping[str, Law | tuple[str, float, float]], count: int, seed: int = 0
 ) -> Design:
-    """So many members drawn from distributions: ("normal", mean, deviation), ("uniform", low, high)
+    """Draw `count` members from distributions: ("normal", mean, deviation), ("uniform", low, high)
     or ("loguniform", low, high). A longer sample begins with the shorter one.
 
     Raises `RunError` if the number is not positive, or nothing is varied.

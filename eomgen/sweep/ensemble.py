@@ -82,7 +82,7 @@ class Ensemble:
     def on_grid(self, name: str) -> FloatArray:
         """The same over the axes of a grid: (n1, n2, …). Raises `RunError` without a grid."""
         if not self.design.axes:
-            raise RunError("on_grid: the members are no grid")
+            raise RunError("on_grid: the members do not form a grid")
         values = self.of(name)
         return values.reshape(*map(len, self.design.axes), *values.shape[1:])
 

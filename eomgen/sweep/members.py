@@ -199,7 +199,7 @@ class _Prepared:
     def _run(self, problem: Problem) -> Trajectory:
         task = self.task
         run = integrate(problem, t_end=task.t_end, samples=len(task.times), **task.settings)
-        if run.outcome.kind == "interrupted":  # which is no result of the member's
+        if run.outcome.kind == "interrupted":  # which is not a result of the member
             raise KeyboardInterrupt
         return run
 

@@ -35,7 +35,7 @@ integral_gain = 10.0
         "N m/(rad s) | N/(m s)", "gain k_i of the deviation's integral", "positive"
     )
     tracking: Quantity | None = quantity(
-        "s", "time in which a cut-off command is tracked", "positive", default=None
+        "s", "tracking time of the protection against windup", "positive", default=None
     )
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:
