@@ -72,7 +72,7 @@ def effects_in_force(
     for i, given in enumerate(scene.effects):
         location = f"effects[{i}]"
         if isinstance(given, Gravity) and any(isinstance(other, Gravity) for other in effects):
-            raise SceneError(f"{location}.type: a second 'gravity'; give one")
+            raise SceneError(f"{location}.type: a second 'gravity'; give only one")
         effect, bindings = resolver.resolved(given, location, effects)
         found.append(bindings)
         effects.append(effect)

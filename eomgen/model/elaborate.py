@@ -30,6 +30,7 @@ from eomgen.scene.appearance import appearance_of
 from eomgen.scene.chains import written_out
 from eomgen.scene.constraints import Constraint, closing
 from eomgen.scene.effects import Effect
+from eomgen.scene.joints import Free
 from eomgen.scene.schema import BodyTable, Scene
 
 
@@ -51,7 +52,7 @@ def elaborate(scene: Scene) -> Model:
     found = joined([Bindings(own), of_bodies, of_effects, of_points, of_constraints])
     inputs, states = inputs_and_states(scene, effects, scope)
     if not any(body.velocities for body in bodies):
-        raise SceneError("joints: nothing can move; give at least one that is no weld")
+        raise SceneError("joints: nothing can move; give at least one that is not a weld")
     _check_symbols(n, found.parameters, links, bodies, effects, scene)
     check_contacts(effects, [body.name for body in bodies])
     locked = locked_values(scene.locked, bodies, effects)
@@ -113,7 +114,7 @@ def outputs_for(
     for i, name in enumerate(wanted):
         if name in needs and not available[needs[name]]:
             raise SceneError(
-                f"{location.format(i)}: '{name}' is about {needs[name]}, and there are none"
+                f"{location.format(i)}: '{name}' needs {needs[name]}, and there are none"
             )
     return in_order(wanted)
 
@@ -258,6 +259,11 @@ def _loops(
     loops, found = list[Constraint](), list[Bindings]()
     for joint, location in closing_joints(scene):
         turned, kept = oriented(joint, location, scene.dimensions, scope)
+        if not isinstance(turned, Free) and turned.orientation is not None:
+            raise SceneError(
+                f"{location}.orientation: depends on parameters; a joint that closes a loop takes "
+                "numbers"
+            )
         joint = normalised_joint(turned, location, scene.dimensions)
         joint, bindings = bind(joint, joint.name, location, scope)
         loops.append(closing(joint_from_centres(joint, centres), location, scene.dimensions))

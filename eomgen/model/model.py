@@ -338,10 +338,7 @@ class Model:
         listed = (c for c in self.constraints if isinstance(c, ConstraintTable))
         for table in (*joints, *self.effects, *listed):
             for field in type(table).model_fields:
-                value = getattr(table, field)
-                for part in value if isinstance(value, tuple) else (value,):
-                    if isinstance(part, Formula):
-                        yield part
+                yield from _formulas(getattr(table, field))
         for point in self.points:
             yield from point.at
 
@@ -378,6 +375,15 @@ class Model:
     def value(self, formula: Formula) -> float:
         """A quantity's value at the scene's parameter values."""
         return float(evaluate(formula, self.defaults, FloatScalars()))
+
+
+def _formulas(value: object) -> Iterator[Formula]:
+    """The formulas in a value and in its rows."""
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _formulas(part)
+    elif isinstance(value, Formula):
+        yield value
 
 
 def off_centre(joint: Joint) -> TypeGuard[Revolute]:

@@ -16,7 +16,7 @@ def _colour(text: str) -> str:
         and len(digits) == 6
         and all(c in "0123456789abcdefABCDEF" for c in digits)
     ):
-        raise ValueError("is no colour: write #rrggbb, for example '#3366cc'")
+        raise ValueError("is not a colour: write #rrggbb, for example '#3366cc'")
     return text
 
 
@@ -57,9 +57,9 @@ color = "#33658a"
     type: Literal["box"]
     size: Lengths = _metres("lengths of its edges")
     center: Point | None = _center()
-    angle: Number = Field(default=0.0, description="rad, in the plane")
+    angle: Number = Field(default=0.0, description="angle of rotation, rad, in the plane")
     orientation_deg: Angles = Field(
-        default=(0.0, 0.0, 0.0), description="about x, then y, then z, in space"
+        default=(0.0, 0.0, 0.0), description="rotation about x, then y, then z, in space"
     )
     color: Colour = _colour_field()
 
@@ -203,9 +203,11 @@ follow = "arm"
     height: Positive = _metres("height of the picture", default=4.0)
     follow: Identifier | None = Field(default=None, description="body that it follows")
     background: Colour = Field(default="#ffffff", description="colour of the background")
-    azimuth_deg: Number = Field(default=-60.0, description="in space")
+    azimuth_deg: Number = Field(
+        default=-60.0, description="direction of view, from x towards y, in space"
+    )
     elevation_deg: Annotated[Number, Field(ge=-90, le=90)] = Field(
-        default=20.0, description="in space"
+        default=20.0, description="direction of view, towards z, in space"
     )
 
 

@@ -1,5 +1,7 @@
 """The mechanism in the plane, as drawn in the figure."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -17,19 +19,28 @@ FILL, SURFACE, REACH = 0.08, 0.4, 0.25
 """Strength of the ink of fixed objects: their inside, their surface, the reach of a field."""
 
 
-def draw_plane(axes: Axes, motion: Motion) -> None:
-    """Draw the bodies at a few times, with increasing strength, and their paths."""
+def draw_plane(
+    axes: Axes,
+    motion: Motion,
+    rows: Sequence[tuple[int, float]] | None = None,
+    until: int | None = None,
+) -> None:
+    """Draw the bodies at a few times, with increasing strength, and their paths.
+
+    rows   the samples that are drawn, each with its strength; None: those of `instants`
+    until  the paths end before this sample
+    """
     paper = motion.camera.background
     axes.grid(color=mixed(paper, ink_on(paper), 0.1))
     for body in motion.traced:
         axes.plot(
-            *motion.places[:, body].T,
+            *motion.places[:until, body].T,
             color=motion.colours[body],
             linewidth=0.8,
             alpha=0.5,
             zorder=2,
         )
-    for order, (row, strength) in enumerate(instants(motion)):
+    for order, (row, strength) in enumerate(instants(motion) if rows is None else rows):
         draw_pose(axes, motion, motion.poses[row], strength, zorder=3 + order)
     for ball in motion.balls:
         draw_ball(axes, ball, np.array(ball.center), motion.camera)

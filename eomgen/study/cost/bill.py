@@ -10,6 +10,7 @@ from functools import partial
 from math import inf
 
 from eomgen.codegen.choice import why_not_compared
+from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -128,7 +129,7 @@ def bill(
 
     Raises `SceneError` or `RunError` if the scene cannot be compiled or evaluated at its start.
     """
-    whole = _compiled(elaborate(counted(scene)))
+    whole = _compiled(assembled(elaborate(counted(scene))))
     tries = {route: _try(whole, route) for route in routes_for(bool(whole.model.constraints))}
     models = [bare(scene), *(part.model for part in parts), *(m for m, _ in tries.values())]
     made: list[_Made | None] = [whole]

@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from eomgen.dynamics.assembly import assembled
 from eomgen.language.base import Table
 from eomgen.language.formula import Apply, Constant, Name, names_in
 from eomgen.language.rates import with_rates
@@ -43,7 +44,7 @@ def without_velocity_forces(scene: Scene) -> tuple[Variant, ...]:
     if scene.leave_out or scene.form != "velocity" or scene.route == "closed":
         return ()
     changed = scene.replaced(leave_out=("velocity_forces",))
-    return (Variant("velocity forces", elaborate(counted(changed)), "mechanism"),)
+    return (Variant("velocity forces", assembled(elaborate(counted(changed))), "mechanism"),)
 
 
 def complete(scene: Scene) -> tuple[Variant, ...]:
@@ -57,12 +58,12 @@ def complete(scene: Scene) -> tuple[Variant, ...]:
         count = len(scene.locked)
         label = f"{count} locked coordinate" + "s" * (count > 1)
         found.append((label, _started(scene, (None,)).replaced(locked={})))
-    return tuple(Variant(label, elaborate(counted(s)), "left out") for label, s in found)
+    return tuple(Variant(label, assembled(elaborate(counted(s))), "left out") for label, s in found)
 
 
 def _started(scene: Scene, by: Collection[str | None]) -> Scene:
     """The scene with initial values for coordinates driven by some effects, or locked (None)."""
-    model = elaborate(counted(scene))
+    model = assembled(elaborate(counted(scene)))
     q = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))
     v = dict(zip((c.name for c in model.velocities), model.initial_v, strict=True))
     for c in (c for c in model.prescribed if c.by in by):
@@ -89,7 +90,7 @@ def without_effects(scene: Scene, *, each: bool = False) -> tuple[Variant, ...]:
 
 def bare(scene: Scene) -> Model:
     """The mechanism without any effect."""
-    return elaborate(counted(removed(scene, scene.effects)))
+    return assembled(elaborate(counted(removed(scene, scene.effects))))
 
 
 def removed(scene: Scene, effects: Sequence[Effect]) -> Scene:
@@ -105,7 +106,7 @@ def _without(scene: Scene, group: Sequence[Effect]) -> Variant:
     brought = {i.name for effect in group for i in effect.inputs(scene.dimensions)}
     brought |= {x.name for effect in group for x in effect.states(scene.dimensions)}
     needed_by = tuple(e.name for e in rest.effects if brought.intersection(_names(e)))
-    model = None if needed_by else elaborate(counted(rest))
+    model = None if needed_by else assembled(elaborate(counted(rest)))
     return Variant(_label(group), model, needed_by=needed_by)
 
 
