@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.errors import RunError
-from eomgen.scene.look import Camera, Shape
+from eomgen.scene.look import BARE, Shape
+from eomgen.show.framing import View
+from eomgen.show.picture import Picture
 
 Array = NDArray[np.float64]
 
@@ -18,9 +20,6 @@ MOST_ROWS = 3000
 
 INSTANTS = 8
 """Number of times at which a still figure shows the mechanism."""
-
-BARE = "#4477aa"
-"""The colour of a body without shapes."""
 
 MOST_TRACES = 12
 """Greatest number of bodies whose paths are drawn: more paths would hide everything else."""
@@ -62,6 +61,7 @@ class Motion:
     works         done since the start by each effect, or by all of a type; None if not asked for
     planes, balls fixed obstacles that bodies touch or avoid
     keeps_energy  whether exact motion conserves energy
+    picture       of which the shapes are a part; its numbers are formulas of parameters
     """
 
     name: str
@@ -78,7 +78,7 @@ class Motion:
     kinetic_energy: Array  # (n,) J
     potential_energy: Array  # (n,) J
     joint_drift: Array  # (n, nj) m
-    camera: Camera
+    camera: View
     integrator: str
     finished: bool
     message: str
@@ -89,6 +89,7 @@ class Motion:
     planes: tuple[Plane, ...] = ()
     balls: tuple[Ball, ...] = ()
     keeps_energy: bool = True
+    picture: Picture | None = None
 
     def __post_init__(self) -> None:
         n, ny, nb, nj = len(self.t), len(self.states), len(self.bodies), len(self.joints)
@@ -121,7 +122,7 @@ class Motion:
     @property
     def colours(self) -> tuple[str, ...]:
         """A colour for each body, that of its first shape."""
-        return tuple(shapes[0].color if shapes else BARE for shapes in self.shapes)
+        return tuple((shapes[0].color if shapes else None) or BARE for shapes in self.shapes)
 
     @property
     def center(self) -> Array:

@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 
-from eomgen.show.motion import BARE, MOST_MARKS, Array, Motion, instants
+from eomgen.scene.look import BARE
+from eomgen.show.motion import MOST_MARKS, Array, Motion, instants
 from eomgen.show.plane import FILL, SURFACE, draw_ball
 from eomgen.show.raster import frame_around, render_solids
 from eomgen.show.solid import solids
