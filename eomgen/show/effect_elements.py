@@ -44,6 +44,7 @@ from eomgen.show.elements import (
     Wind,
 )
 from eomgen.show.formulas import constant, sum_of, times
+from eomgen.show.joint_axes import zero_direction
 
 COIL, SYMBOL = 0.06, 0.11
 """Radius of a coil, and of what is drawn at a joint, relative to the mechanism's size."""
@@ -180,14 +181,19 @@ def _at_joints(effect: JointSpring | JointStop | JointFriction, names: _Names) -
     for joint in effect.acted_on(names.dofs):
         k = names.joints[joint]
         positions = names.model.bodies[k].positions
+        zero = zero_direction(names.model, names.model.bodies[k])
         for index in range(len(names.dofs[joint])):
             if effect.coordinate not in (None, positions[index].name):
                 continue
             match effect:
                 case JointSpring(rest=rest):
-                    yield AtJoint("torsion", effect.name, k, index, names.symbol, rest=rest)
+                    yield AtJoint(
+                        "torsion", effect.name, k, index, names.symbol, rest=rest, zero=zero
+                    )
                 case JointStop(low=low, high=high):
-                    yield AtJoint("stop", effect.name, k, index, names.symbol, low=low, high=high)
+                    yield AtJoint(
+                        "stop", effect.name, k, index, names.symbol, low=low, high=high, zero=zero
+                    )
                 case _:
                     yield AtJoint("brake", effect.name, k, index, names.symbol)
 

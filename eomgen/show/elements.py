@@ -44,6 +44,9 @@ class AtJoint:
     motor    a motor, a servo (which has a controller), or a drive that prescribes the coordinate
     stop     limits `low` and `high`, either of which may be absent
     brake    friction
+
+    zero  at a revolute joint a unit vector across its axis, in the parent's axes, from which the
+          coordinate is counted: towards the child's centre of mass, if that is beside the axis
     """
 
     kind: Literal["torsion", "motor", "servo", "drive", "stop", "brake"]
@@ -54,6 +57,7 @@ class AtJoint:
     rest: Formula | None = None
     low: Formula | None = None
     high: Formula | None = None
+    zero: Vector | None = None
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,8 @@ class Weight:
 class Support:
     """What a joint with the world or a slider needs to be seen.
 
-    base  a mark at the point of the world that holds a joint
+    base  a mark at the point of the world that holds a joint; `axis` points to the ground, along
+          which the bodies are on the other side
     rail  a line on the parent (-1 for the world) through `at` along `axis`, unit, in the parent's
           axes, from `low` to `high`, m
     """

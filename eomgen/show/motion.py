@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.errors import RunError
-from eomgen.scene.look import BARE, Shape
+from eomgen.scene.look import BARE, Shape, numbers
 from eomgen.show.framing import View
+from eomgen.show.of_run import world_points
 from eomgen.show.picture import Picture
 
 Array = NDArray[np.float64]
@@ -62,6 +63,7 @@ class Motion:
     planes, balls fixed obstacles that bodies touch or avoid
     keeps_energy  whether exact motion conserves energy
     picture       of which the shapes are a part; its numbers are formulas of parameters
+    drawn         the picture with the values of these formulas
     """
 
     name: str
@@ -90,6 +92,7 @@ class Motion:
     balls: tuple[Ball, ...] = ()
     keeps_energy: bool = True
     picture: Picture | None = None
+    drawn: Picture | None = None
 
     def __post_init__(self) -> None:
         n, ny, nb, nj = len(self.t), len(self.states), len(self.bodies), len(self.joints)
@@ -162,6 +165,17 @@ def instants(motion: Motion) -> list[tuple[int, float]]:
     last = len(motion.t) - 1
     rows = np.unique(np.linspace(0, last, INSTANTS).round().astype(int)).tolist()
     return [(k, 1.0 if k == last else 0.14 + 0.45 * i / INSTANTS) for i, k in enumerate(rows)]
+
+
+def paths(motion: Motion) -> list[tuple[Array, str]]:
+    """The paths (n, 2) or (n, 3) of the traced points, m, world axes, with their colours."""
+    if motion.drawn is None:
+        return [(motion.places[:, body], motion.colours[body]) for body in motion.traced]
+    return [
+        (world_points(motion.poses, trace.body, np.array(numbers(trace.at))), color)
+        for trace in motion.drawn.traces
+        for color in [motion.drawn.bodies[trace.body].color]
+    ]
 
 
 def thinned(motion: Motion, most: int = MOST_ROWS) -> Motion:

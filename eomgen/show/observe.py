@@ -15,8 +15,8 @@ from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.framing import framed
 from eomgen.show.motion import Anchor, Motion
+from eomgen.show.of_run import with_run
 from eomgen.show.picture import picture_of
-from eomgen.show.rails import with_rails
 from eomgen.show.surroundings import balls_of, planes_of
 from eomgen.show.view import eye_axes
 
@@ -52,8 +52,9 @@ def observe(
     effects, works = trajectory.work_names, trajectory.works
     if works is not None:
         effects, works = works_by_type(model, effects, works)
-    picture = with_rails(picture_of(model, appearance), model, poses)
-    shapes = tuple(body.shapes for body in picture.valued(model.value).bodies)
+    picture = with_run(picture_of(model, appearance), model, poses)
+    drawn = picture.valued(model.value)
+    shapes = tuple(body.shapes for body in drawn.bodies)
     camera = appearance.camera
     eye = eye_axes(camera.azimuth_deg, camera.elevation_deg)
     parents = [body.parent for body in model.bodies]
@@ -84,6 +85,7 @@ def observe(
         balls=balls_of(model),
         keeps_energy=keeps_energy(model, inputs or {}),
         picture=picture,
+        drawn=drawn,
     )
 
 

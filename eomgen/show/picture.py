@@ -8,10 +8,8 @@ import numpy as np
 from eomgen.language.formula import ZERO, Constant, Formula
 from eomgen.model.frames import from_centre
 from eomgen.model.model import Body, Model
-from eomgen.scalars.exact import orientation
 from eomgen.scene.appearance import Appearance
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import spatial
 from eomgen.scene.look import Polygon, Rod, Shape
 from eomgen.show.body_points import BodyPoints, points_of, typical_length
 from eomgen.show.colours import body_colours
@@ -19,6 +17,7 @@ from eomgen.show.effect_elements import SYMBOL, elements_of
 from eomgen.show.elements import WORLD_INDEX, Element, Support, Vector
 from eomgen.show.formulas import constant, valued
 from eomgen.show.invented import invented_shapes, inventor_of
+from eomgen.show.joint_axes import joint_axis
 
 MOST_TRACES = 12
 """Greatest number of points whose paths are drawn: more paths would hide everything else."""
@@ -119,23 +118,14 @@ def _joint(model: Model, k: int, body: Body) -> DrawnJoint:
     if isinstance(joint, Free):
         return DrawnJoint(joint.name, joint.type, WORLD_INDEX, zero, k, zero, None)
     return DrawnJoint(
-        joint.name, joint.type, body.parent, joint.r_parent, k, joint.r_child, _axis(model, body)
+        joint.name,
+        joint.type,
+        body.parent,
+        joint.r_parent,
+        k,
+        joint.r_child,
+        joint_axis(model, body),
     )
-
-
-def _axis(model: Model, body: Body) -> Vector | None:
-    """The axis of a joint's first primitive, in the parent's axes; None without one."""
-    joint = body.joint
-    primitives = joint.primitives(model.dimensions)
-    if isinstance(joint, Free) or joint.type == "planar" or not primitives:
-        return None
-    first = primitives[0]
-    if first.kind == "spherical" or (model.dimensions == 2 and first.kind == "revolute"):
-        return None
-    axis = np.array(spatial(first.axis)) / np.linalg.norm(first.axis)
-    rows = orientation(joint.orientation_deg)
-    matrix = np.array([[float(entry) for entry in row] for row in rows])
-    return constant(*(matrix @ axis))
 
 
 def _supports(model: Model, size: float) -> list[Support]:
@@ -147,7 +137,7 @@ def _supports(model: Model, size: float) -> list[Support]:
             continue
         radius = Constant(SYMBOL * size)
         if joint.type in ("prismatic", "cylindrical"):
-            axis = _axis(model, body)
+            axis = joint_axis(model, body)
             assert axis is not None
             found.append(
                 Support("rail", k, body.parent, joint.r_parent, radius, axis[: model.dimensions])

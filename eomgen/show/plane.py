@@ -8,9 +8,10 @@ from matplotlib.patches import Polygon as Patch
 
 from eomgen.scene.look import BARE
 from eomgen.show.framing import View
-from eomgen.show.motion import MOST_MARKS, Array, Ball, Motion, instants
+from eomgen.show.motion import INSTANTS, MOST_MARKS, Array, Ball, Motion, instants, paths
 from eomgen.show.outlines import outline, turned
 from eomgen.show.style import ink_on, mixed
+from eomgen.show.symbols import Sight, strokes
 
 SPREAD = 20
 """Size of planes relative to that of the motion, since a wide view shows more than the motion."""
@@ -23,16 +24,11 @@ def draw_plane(axes: Axes, motion: Motion) -> None:
     """Draw the bodies at a few times, with increasing strength, and their paths."""
     paper = motion.camera.background
     axes.grid(color=mixed(paper, ink_on(paper), 0.1))
-    for body in motion.traced:
-        axes.plot(
-            *motion.places[:, body].T,
-            color=motion.colours[body],
-            linewidth=0.8,
-            alpha=0.5,
-            zorder=2,
-        )
+    for path, colour in paths(motion):
+        axes.plot(*path.T, color=colour, linewidth=0.8, alpha=0.5, zorder=2)
     for order, (row, strength) in enumerate(instants(motion)):
         draw_pose(axes, motion, motion.poses[row], strength, zorder=3 + order)
+    draw_symbols(axes, motion, np.eye(3))
     for ball in motion.balls:
         draw_ball(axes, ball, np.array(ball.center), motion.camera)
     _draw_planes(axes, motion)
@@ -40,6 +36,21 @@ def draw_plane(axes: Axes, motion: Motion) -> None:
     axes.margins(0.06)
     axes.set_xlabel("x, m")
     axes.set_ylabel("y, m")
+
+
+def draw_symbols(axes: Axes, motion: Motion, eye: Array) -> None:
+    """Draw springs, motors, supports and the like at the last pose, seen along the axes `eye`."""
+    if motion.drawn is None:
+        return
+    paper = motion.camera.background
+    ink = mixed(paper, ink_on(paper), 0.75)
+    for stroke in strokes(Sight(motion.drawn, motion.poses[-1], eye)):
+        order = 2.5 if stroke.behind else 3 + INSTANTS
+        lines = ":" if stroke.dashed else "-"
+        if stroke.closed:
+            axes.fill(*stroke.points.T, fc=paper, ec=ink, lw=stroke.weight, zorder=order)
+        else:
+            axes.plot(*stroke.points.T, color=ink, lw=stroke.weight, ls=lines, zorder=order)
 
 
 def draw_ball(axes: Axes, ball: Ball, center: Array, camera: View) -> None:

@@ -119,10 +119,7 @@ def solids(shapes: Sequence[Sequence[Shape]], height: float, budget: int) -> Sol
             break
         grain *= COARSER
     index = {key: k for k, key in enumerate(by_shape)}
-    of_bodies = (
-        tuple((index[s.replaced(color=None)], s.color or BARE) for s in g)
-        for g in shapes
-    )
+    of_bodies = (tuple((index[s.replaced(color=None)], s.color or BARE) for s in g) for g in shapes)
     return Solids(tuple(meshes) if by_shape else (), tuple(of_bodies))
 
 

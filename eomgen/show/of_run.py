@@ -1,4 +1,4 @@
-"""The ranges of a picture's rails, from the motion of what slides on them."""
+"""What a picture takes from a run: the ranges of rails, and the side of the ground at a joint."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from eomgen.language.formula import Constant, Formula
 from eomgen.model.model import Model
 from eomgen.show.elements import Element, Support
+from eomgen.show.formulas import constant
 from eomgen.show.picture import Picture
 
 Array = NDArray[np.float64]
@@ -16,21 +17,35 @@ BEYOND = 0.35
 """How much longer than the way of its slider a rail is at each end, relative to the size."""
 
 
-def with_rails(picture: Picture, model: Model, poses: Array) -> Picture:
-    """The picture with rails as long as the ways of sliders at the poses of a run."""
+def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
+    """The picture with rails as long as the ways of sliders at the poses of a run, and marks of the
+    ground on the other side of what they hold.
+    """
     finite = np.isfinite(poses.reshape(len(poses), -1)).all(axis=1)
     if not finite.any():
         return picture
 
     def ranged(element: Element) -> Element:
-        if not isinstance(element, Support) or element.kind != "rail":
+        if not isinstance(element, Support):
             return element
+        if element.kind == "base":
+            return replace(element, axis=_ground(picture, model, poses[finite], element))
         way = _way(picture, model, poses[finite], element)
         beyond = BEYOND * picture.size
         low, high = float(way.min()) - beyond, float(way.max()) + beyond
         return replace(element, low=Constant(low), high=Constant(high))
 
     return replace(picture, elements=tuple(map(ranged, picture.elements)))
+
+
+def _ground(picture: Picture, model: Model, poses: Array, base: Support) -> tuple[Formula, ...]:
+    """The unit vector down, or up if what the joint holds is below it most of the time."""
+    dimensions = poses.ndim - 1
+    heights = poses[..., 1] if dimensions == 2 else poses[..., 2, 3]
+    own = [k for k, root in enumerate(model.roots) if root == base.joint]
+    pin = model.value(picture.joints[base.joint].at_parent[-1])
+    below = float(np.median(heights[:, own].mean(axis=1))) < pin
+    return constant(*[0.0] * (dimensions - 1), 1.0 if below else -1.0)
 
 
 def _way(picture: Picture, model: Model, poses: Array, rail: Support) -> Array:
