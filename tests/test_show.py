@@ -21,11 +21,12 @@ from matplotlib.text import Text
 from eomgen import templating
 from eomgen.errors import RunError
 from eomgen.files import is_ours
-from eomgen.scene.look import Box, Camera, Disc, Polygon, Rod
+from eomgen.scene.look import Box, Disc, Polygon, Rod, numbers
 from eomgen.show.figure import draw_motion, save_figure
+from eomgen.show.framing import View
 from eomgen.show.motion import Motion, thinned
+from eomgen.show.outlines import outline
 from eomgen.show.page import render_page, save_page
-from eomgen.show.plane import outline
 from eomgen.show.style import GREEK, symbol, write_figure
 
 NASTY = "</script><img src=x onerror=alert(1)> <!-- $x^2$ \u2028 鎖 \x01 {{ t }}"
@@ -67,7 +68,7 @@ def swinging(n: int = 201, duration: float = 4.0, **changes: Any) -> Motion:
         kinetic_energy=kinetic,
         potential_energy=5.0 + 1e-9 * t / duration - kinetic,
         joint_drift=np.column_stack([zero, 1e-12 * t]),
-        camera=Camera(height=3.0, follow="pole"),
+        camera=View(height=3.0, follow="pole"),
         integrator="rk4, dt = 0.02 s",
         finished=True,
         message="",
@@ -109,7 +110,7 @@ def test_figure_shows_the_numbers() -> None:
 
 def test_outlines() -> None:
     triangle = Polygon(type="polygon", points=((0.0, 0.0), (2.0, 0.0), (0.0, 1.0)))
-    np.testing.assert_array_equal(outline(triangle), triangle.points)
+    np.testing.assert_array_equal(outline(triangle), [*map(numbers, triangle.points)])
     box = Box(type="box", size=(4.0, 2.0), center=(1.0, 0.0), angle=np.pi / 2)
     np.testing.assert_allclose(outline(box).min(axis=0), [0.0, -2.0], atol=1e-15)
     np.testing.assert_allclose(outline(box).max(axis=0), [2.0, 2.0], atol=1e-15)

@@ -23,6 +23,7 @@ from eomgen.program.tape import Stage, Tape
 from eomgen.scene.joints.base import Primitive
 from eomgen.scene.look import Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
 from eomgen.show.figure import draw_motion, save_figure
+from eomgen.show.framing import View
 from eomgen.show.motion import Motion, thinned
 from eomgen.show.observe import joint_drift
 from eomgen.show.page import render_page
@@ -77,7 +78,7 @@ def sliding(n: int = 31, **changes: Any) -> Motion:
         kinetic_energy=1 + t,
         potential_energy=1 - t,
         joint_drift=np.zeros((n, 1)),
-        camera=Camera(center=(0.0, 0.0, 1.0), height=3.0),
+        camera=View(center=(0.0, 0.0, 1.0), height=3.0),
         integrator="made up",
         finished=True,
         message="",
@@ -112,7 +113,7 @@ def chain(count: int = 100, n: int = 40) -> Motion:
         kinetic_energy=t,
         potential_energy=-t,
         joint_drift=1e-14 * (1 + np.outer(t, np.arange(count))),
-        camera=Camera(height=12.0),
+        camera=View(height=12.0),
         integrator="made up",
         finished=True,
         message="",
@@ -335,7 +336,7 @@ def test_the_floor_is_under_the_motion(lift: float, z: float) -> None:
     motion = sliding()
     motion.poses[..., 2, 3] += lift
     if lift > 1:
-        motion = replace(motion, camera=Camera(center=(0.0, 0.0, 51.0), height=3.0))
+        motion = replace(motion, camera=View(center=(0.0, 0.0, 51.0), height=3.0))
     floor = floor_under(motion, cast_of(solids(motion.shapes, 3.0, 1000)))
     assert floor.z == pytest.approx(z, abs=1e-3)
     lines = floor.lines()
@@ -421,7 +422,7 @@ def test_a_hundred_bodies_make_a_figure(tmp_path: Path) -> None:
         pytest.param({"n": 1, "joint_drift": np.zeros((1, 1))}, id="one sample"),
         pytest.param({"joints": (), "joint_drift": np.zeros((31, 0))}, id="no joint holds a point"),
         pytest.param(
-            {"camera": Camera(elevation_deg=-30.0, follow="arm", background="#102030")},
+            {"camera": View(elevation_deg=-30.0, follow="arm", background="#102030")},
             id="from below, on dark paper",
         ),
     ],

@@ -9,7 +9,7 @@ from eomgen.scene.appearance import Appearance, appearance_of
 from eomgen.scene.look import Box, Camera, Rod, Sphere
 from eomgen.scene.reader import parse_scene
 from eomgen.scene.schema import Simulation
-from eomgen.show.skeleton import shapes_of
+from eomgen.show.picture import shapes_of
 
 ARM = """\
 name = "arm"

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from eomgen.files import write_whole
-from eomgen.scene.look import Shape
+from eomgen.scene.look import Shape, number
+from eomgen.show.formulas import plain_data
 from eomgen.show.motion import Array, Motion, thinned
 from eomgen.show.solid import Indices, solids
 from eomgen.show.view import AMBIENT, GLOSS, LIGHT, cast_of, floor_under, patches
@@ -83,9 +84,10 @@ def save_page(
 
 def _in_plane(shape: Shape) -> dict[str, Any]:
     """A shape with its centre, which is the origin if the scene gives none."""
-    table = shape.model_dump(exclude={"orientation_deg"})
+    table: dict[str, Any] = plain_data(shape, number)
+    table.pop("orientation_deg", None)
     if "center" in table:
-        table["center"] = table["center"] or (0.0, 0.0)
+        table["center"] = table["center"] or [0.0, 0.0]
     return table
 
 
