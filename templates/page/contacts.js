@@ -344,7 +344,7 @@ const contacts = (() => {
       for (const k of all) if (now.slack[k] && gaps[k] > TOLERANCE) now.slack[k] = 0;
     }
 
-    return { now, begin, holding, strike, closing, opening, release, settle };
+    return { now, active: law.active, begin, holding, strike, closing, opening, release, settle };
   }
 
   return { make, complementary, root };

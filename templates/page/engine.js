@@ -186,7 +186,8 @@ const makeEngine = (mechanism, data) => {
   function guarded(action) {
     if (engine.error) return 0;
     try {
-      return action();
+      action();
+      return 1;
     } catch (error) {
       engine.error = `${error.message}`;
       return 0;
@@ -206,14 +207,13 @@ const makeEngine = (mechanism, data) => {
   }
 
   // Advance by so many seconds, in whole steps; stop after `budget` ms, and then do not catch up.
-  engine.advance = (seconds, budget = Infinity) => guarded(() => {
+  engine.advance = (seconds, budget = Infinity) => {
     goal = Math.max(goal, engine.t) + seconds;
     const from = performance.now();
     let made = 0;
     engine.behind = false;
-    while (mark() <= goal + 1e-9 * engine.dt) {
-      timed(toMark);
-      made += 1;
+    while (!engine.error && mark() <= goal + 1e-9 * engine.dt) {
+      made += guarded(() => timed(toMark));
       if (performance.now() - from > budget) {
         engine.behind = mark() <= goal;
         goal = engine.t;
@@ -221,12 +221,12 @@ const makeEngine = (mechanism, data) => {
       }
     }
     return made;
-  });
-  engine.step = () => guarded(() => {
-    timed(toMark);
+  };
+  engine.step = () => {
+    const made = guarded(() => timed(toMark));
     goal = engine.t;
-    return 1;
-  });
+    return made;
+  };
 
   engine.setMethod = (name, dt = engine.dt) => {
     const method = methods.find((m) => m.name === name);
@@ -330,7 +330,7 @@ const makeEngine = (mechanism, data) => {
     if (!grip || grip.body !== body || grip.at.some((x, i) => x !== at[i])) {
       engine.release();
       const mass = massAt(body, at);
-      if (!(mass > 0 && Number.isFinite(mass))) return 0;
+      if (!(mass > 0 && Number.isFinite(mass))) return;
       const rate = Math.min(PULL, 0.5 / engine.dt);
       const stiffness = mass * rate * rate;
       const size = data.drawing?.size ?? data.size ?? 1;
@@ -338,7 +338,6 @@ const makeEngine = (mechanism, data) => {
     }
     engine.grip.target = [...target];
     pullAt(engine.t, engine.y);
-    return 1;
   });
   engine.release = () => {
     if (!engine.grip) return;
