@@ -193,6 +193,9 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         estimate=estimate,
         begun=start.reported(trajectory) if start else "",
         compiled=accelerator is not None and accelerator.used,
+        simulation=plan.scene.simulation,
+        inputs=plan.inputs,
+        varying=plan.varying is not None,
     )
 
 

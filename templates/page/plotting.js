@@ -1,0 +1,3 @@
+// `makePlotting`: connects the plots with the run that is replayed or with the live motion.
+
+const makePlotting = () => ({ source() {}, append() {}, cursor() {}, restart() {}, repaint() {} });
