@@ -3,45 +3,45 @@
 
 const makePanels = (actions) => {
   const { byId, element } = tools;
-  const REACH = 3; // a slider reaches from the default divided by this to the default times this
+  const REACH = 4; // a slider reaches from the default divided by this to the default times this
   const own = DATA.parameters.map((parameter, index) => ({ ...parameter, index }));
   const switches = new Set(DATA.effects.map((effect) => effect.switch));
   const shown = own.filter(({ index }) => !switches.has(index));
   const inputs = DATA.inputs.slice(0, DATA.pointer ? DATA.pointer.first : undefined)
     .map((input, index) => ({ ...input, index }));
 
-  // The range of a slider around a default: never across 0 for a value that must keep its sign.
-  function rangeOf(value) {
-    if (value === 0) return [-10, 10];
-    const [one, other] = [value / REACH, value * REACH];
-    return value > 0 ? [Math.min(one, other), Math.max(one, other)] : [other, one];
-  }
+  // How a slider's place, -1 to 1, becomes a value: by a factor, so that a value keeps its sign; if
+  // the default is 0, by a multiple of 10.
+  const scaleOf = (base) => (base === 0
+    ? { at: (place) => 10 * place, place: (x) => x / 10 }
+    : { at: (place) => base * REACH ** place, place: (x) => (x / base > 0 ? Math.log(x / base) / Math.log(REACH) : -1) });
+
+  const plain = (x) => `${Number(x.toPrecision(6))}`; // as it is typed
 
   function rows(kind, quantities, set) {
     const list = byId(kind);
     return quantities.map((quantity) => {
       const { name, unit, about, value } = quantity;
       const id = `${kind}-${name}`;
-      const [low, high] = kind === "inputs" && value === 0 ? [-10, 10] : rangeOf(value);
-      const slider = element("input", { type: "range", id, min: low, max: high, step: "any", "data-name": name, "aria-label": about ? `${name}, ${about}` : name });
-      slider.value = value;
+      const scale = scaleOf(value);
+      const slider = element("input", { type: "range", id, min: -1, max: 1, step: 0.01, "data-name": name, "aria-label": about ? `${name}, ${about}` : name });
       const field = element("input", { type: "text", inputmode: "decimal", class: "field", "aria-label": `Value of ${name}${unit ? `, ${unit}` : ""}`, spellcheck: "false", autocomplete: "off" });
       const reset = element("button", { type: "button", class: "undo", "aria-label": `Reset ${name}`, title: "Reset" }, "↺");
       const write = (x) => {
-        field.value = numbers.short(x);
+        field.value = plain(x);
         field.classList.remove("wrong");
         reset.disabled = x === value;
+        slider.setAttribute("aria-valuetext", numbers.short(x, unit));
       };
       const change = (x) => {
-        if (!(x >= Number(slider.min))) slider.min = x;
-        if (!(x <= Number(slider.max))) slider.max = x;
-        slider.value = x;
+        slider.value = scale.place(x); // beyond its ends it stays there
         write(x);
         set(quantity.index, x);
       };
       slider.addEventListener("input", () => {
-        write(Number(slider.value));
-        set(quantity.index, Number(slider.value));
+        const x = scale.at(Number(slider.value));
+        write(x);
+        set(quantity.index, x);
       });
       field.addEventListener("change", () => {
         const typed = Number(field.value.trim().replace(",", ".").replace("−", "-"));
@@ -49,6 +49,7 @@ const makePanels = (actions) => {
         else field.classList.add("wrong");
       });
       reset.addEventListener("click", () => change(value));
+      slider.value = scale.place(value);
       write(value);
       list.append(element("div", { class: "quantity", title: about || name },
         element("label", { for: id }, name), slider, field, element("span", { class: "unit" }, numbers.unit(unit)), reset));
@@ -91,11 +92,11 @@ const makePanels = (actions) => {
   method.addEventListener("change", setMethod);
   step.addEventListener("change", setMethod);
   byId("step-half").addEventListener("click", () => {
-    step.value = numbers.short(Number(step.value) / 2);
+    step.value = plain(Number(step.value) / 2);
     setMethod();
   });
   byId("step-double").addEventListener("click", () => {
-    step.value = numbers.short(Number(step.value) * 2);
+    step.value = plain(Number(step.value) * 2);
     setMethod();
   });
 
@@ -103,7 +104,7 @@ const makePanels = (actions) => {
     showMethods(engine) {
       method.replaceChildren(...engine.methods.map(({ name, about }) => element("option", { value: name }, `${name}: ${about}`)));
       method.value = engine.method;
-      step.value = numbers.short(engine.dt * 1000);
+      step.value = plain(engine.dt * 1000);
     },
     setParameter: (name, x) => parameterRows.find((row) => row.name === name)?.change(x),
     setInput: (name, x) => inputRows.find((row) => row.name === name)?.change(x),

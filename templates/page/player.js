@@ -14,7 +14,7 @@ const player = (() => {
   const replay = makeReplay(mechanism);
   const values = makeValues();
   const slider = byId("time");
-  let engine = null; // made when it is needed first
+  const engine = DATA.live ? makeEngine(mechanism, DATA) : null;
   const clock = { time: replay ? replay.begin : 0, playing: false, stamp: 0, frames: [], mode: replay ? "replay" : "live" };
   const show = Object.fromEntries(SHOWS.map(([key, , on]) => [key, on]));
   const isLive = () => clock.mode === "live";
@@ -37,7 +37,8 @@ const player = (() => {
     try {
       const state = current();
       const grip = isLive() && engine.grip;
-      stage.draw(state.t, state.y, state.p, state.u, show, grip && grip.point ? [grip.point, grip.target] : null);
+      const pull = grip && grip.point ? [grip.point, grip.target] : null;
+      stage.draw(state.t, state.y, state.p, state.u, show, { pull, keep: isLive() });
       values.show({ ...state, energy: energyOf(state), playing: clock.playing, stepCost: isLive() ? engine.cost() : NaN });
       overlay.draw(state.t);
       plotting.cursor(state.t);
@@ -89,7 +90,6 @@ const player = (() => {
 
   function advance(seconds) {
     engine.advance(seconds, BUDGET);
-    stage.appendTraces();
     byId("behind").hidden = !engine.behind;
     afterSteps();
   }
@@ -121,7 +121,6 @@ const player = (() => {
     if (!isLive()) goTo(replay.neighbour(clock.time, direction));
     else if (direction > 0) {
       engine.step();
-      stage.appendTraces();
       afterSteps();
     }
     redraw();
@@ -136,6 +135,7 @@ const player = (() => {
     say("");
     values.restart();
     stage.clearTraces();
+    stage.fit();
     plotting.restart();
     redraw();
   }
@@ -152,11 +152,6 @@ const player = (() => {
   function setMode(mode) {
     if (mode === "replay" && !replay) return;
     if (mode === "live" && !DATA.live) return;
-    if (!engine && mode === "live") {
-      engine = makeEngine(mechanism, DATA);
-      engine.onSample = plotting.append;
-      panels.showMethods(engine);
-    }
     clock.mode = mode;
     document.body.dataset.mode = mode;
     for (const name of ["replay", "live"]) byId(`mode-${name}`).setAttribute("aria-pressed", String(mode === name));
@@ -278,7 +273,14 @@ const player = (() => {
   }
   listenToKeys({ canvas, stage, setPlaying, step, goTo, reset, zoom, redraw, pointer, clock, replay, isLive });
   byId("modes").hidden = !DATA.live || !replay;
-  byId("message").hidden = true;
+  say("");
+  if (engine) {
+    engine.onSample = (t, y) => {
+      stage.appendTraces([t, y, engine.p, engine.u]);
+      plotting.append(t, y);
+    };
+    panels.showMethods(engine);
+  }
   if (stage.failed) {
     byId("no-picture").textContent = stage.failed;
     byId("no-picture").hidden = false;

@@ -143,16 +143,22 @@ const makeStage = (canvas, mechanism) => {
 
   // What is needed of a state to draw it; arrays are copies.
   function look(given, seen = {}) {
-    const geometry = mechanism.geometry ? Float64Array.from(mechanism.geometry(...given)) : [];
+    const [t, , p] = given;
+    const geometry = mechanism.geometry ? Float64Array.from(mechanism.geometry(p, t)) : DATA.geometry ?? [];
     return { given, geometry, values: geometry, poses: Float64Array.from(mechanism.bodyPoses(...given)), seen, view };
   }
 
   // Draw a state. `show` says what: traces, joints, centres, forces, torques, velocities, reactions,
-  // shadows; `pull` is [point, target] in the world while a body is pulled.
-  stage.draw = (t, y, p, u, show, pull = null) => {
+  // shadows; `pull` is [point, target] in the world while a body is pulled. With `keep`, the view
+  // follows a mechanism that would leave the picture.
+  stage.draw = (t, y, p, u, show, { pull = null, keep = false } = {}) => {
     now = look([t, y, p, u], show);
     view.aim(now.poses);
     resize();
+    if (keep && view.follow === null && isGone()) {
+      view.follow = drawing.joints.findIndex(({ parent }) => parent < 0);
+      view.aim(now.poses);
+    }
     if (!renderer) return;
     now.pixel = 1 / view.scale();
     world.draw(view, size, now.poses, now.values, t, theme);
@@ -167,11 +173,20 @@ const makeStage = (canvas, mechanism) => {
     renderer.render(scene, camera);
   };
 
+  // Whether the centres of mass of all bodies are out of the picture.
+  const isGone = () => drawing.bodies.every((_, k) => {
+    const [x, y] = view.toScreen(center(now.poses, k));
+    return x < 0 || y < 0 || x > size[0] || y > size[1];
+  });
+
   // ---- Traces and scales of arrows ----
 
   stage.loadTraces = (times, stateAt) => traces.load(times, (i) => look(stateAt(i)));
   stage.clearTraces = () => traces.clear();
-  stage.appendTraces = () => now && traces.append(now.poses, now.geometry);
+  stage.appendTraces = (given) => {
+    const { poses, geometry } = look(given);
+    traces.append(poses, geometry);
+  };
   stage.calibrate = (states) => arrows.calibrate(states.map((given) => look(given)));
   stage.legend = (show) => arrows.legend(show);
 
