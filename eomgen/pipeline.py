@@ -126,7 +126,7 @@ class Live:
 
 def live(model: Model, geometry: Sequence[Formula] = ()) -> Live:
     """The functions of a model's page, of its interactive model; `geometry` are formulas of
-    parameters, the entries of the function of that name.
+    parameters and time, the entries of the function of that name.
     """
     check_nonsingular(model)
     found = live_system(model, geometry)

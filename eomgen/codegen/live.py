@@ -13,7 +13,7 @@ from eomgen.model.model import Model
 from eomgen.program.passes import optimise
 from eomgen.program.program import Output, Program, cost, finish, interpreter
 from eomgen.program.scalars import TapeScalars
-from eomgen.program.tape import Node, Stage, Tape
+from eomgen.program.tape import TIME, Node, Stage, Tape
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad
 from eomgen.scene.joints.base import WORLD
@@ -35,13 +35,14 @@ class LiveSystem:
 
 
 def live_system(model: Model, geometry: Sequence[Formula] = ()) -> LiveSystem:
-    """The program of a model's page; `geometry` are formulas of parameters that it evaluates."""
+    """The program of a model's page; `geometry` are formulas of parameters and time."""
     live = interactive(model)
     derived = choose(live, closed=False).derived
     record = Recording(live, derived.route, axes=derived.axes)
     system = from_recursion(record, jacobian=False)
     loads, nodes = _loads(record)
-    formulas = [evaluate(formula, record.parameters, record.scalars) for formula in geometry]
+    names = {**record.parameters, TIME: record.dynamics.values.time}
+    formulas = [evaluate(formula, names, record.scalars) for formula in geometry]
     more = {"loads": nodes, "geometry": formulas}
     outputs = {
         **system.program.outputs,
@@ -76,7 +77,7 @@ def _operations(model: Model, program: Program) -> tuple[int, dict[str, int]]:
 
     Constants in place of switches and pulls fold what does not act.
     """
-    switches, whole = switches_of(model), dict[str, float]()
+    switches = switches_of(model)
     live = interactive(model)
     pulls = {i.name: 0.0 for i in live.inputs[len(model.inputs) :]}
     all_on = dict.fromkeys(switches.values(), 1.0)

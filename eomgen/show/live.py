@@ -6,8 +6,10 @@ from typing import Any, Protocol
 from eomgen.model.interactive import interactive, switches_of
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
+from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.sizes import mechanism_size
 from eomgen.scene.schema import Simulation
+from eomgen.show.balance import keeps_energy
 
 
 class Code(Protocol):
@@ -32,9 +34,14 @@ def live_table(
     simulation: Simulation,
     *,
     inputs: Mapping[str, float] | None = None,
+    mean_step: float | None = None,
 ) -> dict[str, Any]:
     """The entries of the page's data that describe the mechanism, in the order of the functions'
-    arguments and results. `inputs` are values of inputs that are not their defaults.
+    arguments and results.
+
+    inputs     values of inputs that are not their defaults
+    mean_step  the mean step of a run of the scene by an adaptive method, s, which shows how fast
+               the motion is; None if there was none
     """
     live, switches = interactive(model), switches_of(model)
     parameters = [p.name for p in live.parameters]
@@ -84,7 +91,16 @@ def live_table(
         "size": float(mechanism_size(units, live.defaults, start)),
         "span": simulation.t_end,
         "restSpeed": simulation.rest_speed,
+        "keepsEnergy": keeps_energy(model, given),
+        "integrator": _integrator(simulation),
+        "meanStep": mean_step,
     }
+
+
+def _integrator(simulation: Simulation) -> dict[str, Any]:
+    """The method that the scene names, and its step, s; None if it chooses its steps."""
+    fixed = isinstance(find_integrator(simulation.integrator), FixedStep)
+    return {"name": simulation.integrator, "step": simulation.dt if fixed else None}
 
 
 def _kind(position: bool, moving: bool) -> str:

@@ -346,7 +346,23 @@ const makeEngine = (mechanism, data) => {
     engine.grip = null;
   };
 
-  engine.setMethod(data.liveMethod ?? "implicit_midpoint", data.liveStep ?? 0.01);
+  // ---- What it starts with ----
+
+  // The scene's own method, or one that keeps energy; where forces have corners, as of contacts, an
+  // explicit one. The step is a part of that which an adaptive method took.
+  function choice() {
+    const { name, step } = data.integrator ?? {};
+    const own = step && engine.methods.find((m) => m.name === name);
+    if (own) return [name, step];
+    const corners = mechanism.switchingFunctions || mechanism.contacts?.length;
+    const keeping = engine.methods.some((m) => m.name === "leapfrog") ? "leapfrog" : "implicit_midpoint";
+    const most = Math.min(Math.max((data.meanStep ?? 0.01) / (corners ? 2 : 6), 1e-4), 0.01);
+    const power = 10 ** Math.floor(Math.log10(most) + 1e-9);
+    const digit = [5, 2, 1].find((x) => x * power <= most * 1.0001) ?? 1;
+    return [corners ? "rk4" : keeping, Number((digit * power).toPrecision(1))];
+  }
+  const [method, step] = choice();
+  engine.setMethod(data.liveMethod ?? method, data.liveStep ?? step);
   engine.reset();
   return engine;
 };

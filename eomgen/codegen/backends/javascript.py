@@ -35,7 +35,7 @@ IN_PAGE = replace(
     DIALECT, reserved=RESERVED | {"K", "P", "between", "out", "i", "known", "prepare"}
 )
 """The dialect for functions in a page."""
-MOST = 600
+MOST = 300
 """Greatest number of lines of a function in a page: V8 does not optimise functions whose bytecode
 is longer than 60 KB."""
 
@@ -153,12 +153,11 @@ def mechanism(
         ],
         "fixed": constants.lines,
         "kernels": written,
-        "others": [
-            (in_page(name), "null")
+        "missing": [
+            in_page(name)
             for name in ("gaps", "gap_rates", "impact", "held", "switching_functions")
             if name not in program.outputs
-        ]
-        + [("initialState", "(p) => initialState(0, [], p, [])")],
+        ],
         "contacts": json.dumps(list(contacts)),
     }
     return render(TEMPLATES, "mechanism.js.jinja", context)
