@@ -94,7 +94,7 @@ const charts = (() => {
     const u = new uPlot({
       width: Math.max(box.clientWidth, 120),
       height: HEIGHT.time,
-      padding: [20, units.length > 1 ? 0 : 14, 0, 0],
+      padding: [20, units.length > 1 ? 0 : 22, 0, 0],
       legend: { show: false },
       scales,
       axes: [
@@ -219,7 +219,7 @@ const charts = (() => {
       mode: 2,
       width: Math.max(box.clientWidth, 120),
       height: HEIGHT.phase,
-      padding: [20, 14, 0, 0],
+      padding: [20, 22, 0, 0],
       legend: { show: false },
       scales: { x: { time: false, range: () => shown.x }, y0: { range: () => shown.y } },
       axes: [

@@ -92,8 +92,9 @@ const makePicker = (host, channels) => {
   const moves = { ArrowDown: 1, ArrowUp: -1, PageDown: 10, PageUp: -10 };
   dialog.addEventListener("keydown", (event) => {
     event.stopPropagation(); // the page has keys of its own
-    if (event.target === done) return;
-    if (event.key in moves && options.length) {
+    if (event.key === "Escape") dialog.close(); // a search field takes it to empty itself
+    else if (event.target === done) return;
+    else if (event.key in moves && options.length) {
       activate(Math.min(Math.max(active + moves[event.key], 0), options.length - 1));
     } else if (event.key === "Enter") choose();
     else return;

@@ -44,7 +44,7 @@ const makeSamples = (channels, { span = Infinity, spacing = 0, most = 2 ** 23 } 
   function makeRoom() {
     const kept = samples.end - samples.first;
     const from = at(samples.first);
-    if (from < capacity / 2) capacity = Math.max(256, 2 * capacity);
+    if (from <= capacity / 2) capacity = Math.max(256, 2 * capacity);
     const moved = (values, per) => {
       const larger = new Float64Array(capacity * per);
       larger.set(values.subarray(from * per, (from + kept) * per));
