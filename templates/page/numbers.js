@@ -60,7 +60,9 @@ const numbers = (() => {
   function ticks(values, step) {
     const largest = values.reduce((most, v) => Math.max(most, Math.abs(v)), 0);
     const exponent = largest === 0 || isPlain(exponentOf(largest)) ? 0 : exponentOf(largest);
-    const decimals = Math.min(12, Math.max(0, -Math.floor(Math.log10(step) - exponent + 1e-9)));
+    const apart = step * 10 ** -exponent;
+    let decimals = 0;
+    while (decimals < 12 && Math.abs(apart - Number(apart.toFixed(decimals))) > 1e-6 * apart) decimals += 1;
     const texts = values.map((v) => {
       const shown = (v * 10 ** -exponent).toFixed(decimals);
       return Number(shown) === 0 ? (0).toFixed(decimals) : minus(shown);
