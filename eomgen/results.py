@@ -299,12 +299,14 @@ class Run:
         from eomgen.show.drawing_data import drawing_data
         from eomgen.show.page_code import page_code
 
+        steps = self.trajectory.counts["steps"]
         return page_code(
             self.model,
             drawing_data(self.motion)[1],
             self.simulation,
             inputs=self.inputs,
             smooth=not self.varying,
+            mean_step=float(self.t[-1] - self.t[0]) / steps if steps else None,
             live=live,
         )
 

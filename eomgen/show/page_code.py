@@ -41,13 +41,14 @@ def page_code(
     *,
     inputs: Mapping[str, float] | None = None,
     smooth: bool = True,
+    mean_step: float | None = None,
     live: bool | None = None,
 ) -> PageCode:
     """The mechanism of a model's page; `geometry` are the formulas of its picture.
 
     A live one has functions for everything that the page can change. Otherwise they are those of
     the generated module. With `live` None it is live unless that fails or would be too large; with
-    true the errors of the derivation are raised.
+    true the errors of the derivation are raised. `mean_step` is that of the run, s.
     """
     why = ""
     if live is not False:
@@ -59,7 +60,9 @@ def page_code(
             why = str(error)
         else:
             if live or len(code.source) <= LONGEST:
-                table = live_table(model, code, simulation, inputs=inputs)
+                table = live_table(
+                    model, code, simulation, inputs=inputs, mean_step=mean_step
+                )
                 return PageCode(code.source, table, live=True, smooth=smooth)
             why = f"its functions would take {len(code.source) / 1e6:.1f} MB"
     return _recorded(model, inputs or {}, smooth, why)

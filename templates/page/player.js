@@ -15,7 +15,7 @@ const player = (() => {
   const values = makeValues();
   const slider = byId("time");
   const engine = DATA.live ? makeEngine(mechanism, DATA) : null;
-  const clock = { time: replay ? replay.begin : 0, playing: false, stamp: 0, frames: [], mode: replay ? "replay" : "live" };
+  const clock = { time: replay ? replay.begin : 0, playing: false, stamp: 0, frames: [], seen: null, mode: replay ? "replay" : "live" };
   const show = Object.fromEntries(SHOWS.map(([key, , on]) => [key, on]));
   const isLive = () => clock.mode === "live";
   let waiting = false; // for the next picture
@@ -23,6 +23,7 @@ const player = (() => {
   // ---- What is shown: a time, a state, parameters and inputs ----
 
   function current() {
+    if (clock.seen) return clock.seen;
     if (isLive()) return { t: engine.t, y: engine.y, p: engine.p, u: engine.u };
     return { t: clock.time, y: replay.stateAt(clock.time), p: replay.p, u: replay.u };
   }
@@ -103,10 +104,22 @@ const player = (() => {
   function setPlaying(playing) {
     if (playing && !isLive() && clock.time >= replay.end) clock.time = replay.begin;
     const starts = playing && !clock.playing;
+    if (playing) clock.seen = null;
     clock.playing = playing;
     clock.stamp = performance.now();
     byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
     if (starts) requestAnimationFrame(tick);
+  }
+
+  // In a live motion the plots lead back to what was; it goes on from where it is.
+  function seek(time) {
+    if (!isLive()) {
+      goTo(time);
+      return;
+    }
+    setPlaying(false);
+    clock.seen = plotting.rowAt(time);
+    redraw();
   }
 
   function goTo(time) {
@@ -120,6 +133,7 @@ const player = (() => {
     setPlaying(false);
     if (!isLive()) goTo(replay.neighbour(clock.time, direction));
     else if (direction > 0) {
+      clock.seen = null;
       engine.step();
       afterSteps();
     }
@@ -132,6 +146,7 @@ const player = (() => {
       return;
     }
     engine.reset();
+    clock.seen = null;
     say("");
     values.restart();
     stage.clearTraces();
@@ -153,6 +168,7 @@ const player = (() => {
     if (mode === "replay" && !replay) return;
     if (mode === "live" && !DATA.live) return;
     clock.mode = mode;
+    clock.seen = null;
     document.body.dataset.mode = mode;
     for (const name of ["replay", "live"]) byId(`mode-${name}`).setAttribute("aria-pressed", String(mode === name));
     say("");
@@ -223,7 +239,7 @@ const player = (() => {
   // ---- Wiring ----
 
   const overlay = makeOverlay(stage, show);
-  const plotting = makePlotting({ replay, seek: goTo, engine: () => engine, isLive });
+  const plotting = makePlotting({ mechanism, replay, seek });
 
   for (const [key, text, on] of SHOWS) {
     if (key === "shadows" && !DATA.drawing.floor) continue;
@@ -277,7 +293,7 @@ const player = (() => {
   if (engine) {
     engine.onSample = (t, y) => {
       stage.appendTraces([t, y, engine.p, engine.u]);
-      plotting.append(t, y);
+      plotting.append(t, y, engine.p, engine.u);
     };
     panels.showMethods(engine);
   }
@@ -288,7 +304,7 @@ const player = (() => {
   setMode(clock.mode);
   new ResizeObserver(redraw).observe(canvas);
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches && !location.hash.includes("still")) setPlaying(true);
-  return { stage, clock, current, goTo, setPlaying, setMode, panels, engine: () => engine };
+  return { stage, clock, current, goTo, plotting, engine };
 })();
 
 // What tests and curious people may read of the page.
@@ -299,8 +315,8 @@ window.eomgen = Object.freeze({
   get state() { return Array.from(player.current().y); },
   get parameters() { return Array.from(player.current().p); },
   get inputs() { return Array.from(player.current().u); },
-  get error() { return player.engine()?.error ?? null; },
-  get step() { return player.engine() ? { method: player.engine().method, seconds: player.engine().dt, ms: player.engine().cost() } : null; },
+  get error() { return player.engine?.error ?? null; },
+  get step() { return player.engine ? { method: player.engine.method, seconds: player.engine.dt, ms: player.engine.cost() } : null; },
   // World positions of the centres of mass, m, and where they are in the picture, CSS pixels.
   get centers() { return DATA.bodies.map((_, k) => tools.center(player.stage.poses(), k).slice(0, DATA.dimensions)); },
   get screen() { return DATA.bodies.map((_, k) => player.stage.toScreen(tools.center(player.stage.poses(), k))); },
