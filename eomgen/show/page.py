@@ -17,7 +17,7 @@ from eomgen.show.page_code import PageCode
 from eomgen.show.picture_data import geometry_values
 from eomgen.templating import render, templates_folder
 
-MOST_NUMBERS = 24_000
+MOST_NUMBERS = 16_000
 """As many numbers of states as a page holds in double precision, or twice as many in single."""
 MOST_ROWS, ENOUGH_ROWS = 2000, 500
 """Between rows the page interpolates with the slopes of the motion, so that `ENOUGH_ROWS` show a

@@ -172,7 +172,7 @@ const player = (() => {
     document.body.dataset.mode = mode;
     for (const name of ["replay", "live"]) byId(`mode-${name}`).setAttribute("aria-pressed", String(mode === name));
     say("");
-    pointer?.letGo();
+    if (mode === "replay") pointer?.letGo();
     values.restart();
     stage.clearTraces();
     if (mode === "replay") loadReplay();

@@ -10,10 +10,9 @@ const makeStage = (canvas, mechanism) => {
   const [LIGHT, AMBIENT] = [2.1, 1.75];
   const NEAR = 14; // a pointer that misses a body by so many pixels still takes it
   const stage = { view, failed: "" };
-  let renderer = null;
-  try {
-    renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
-  } catch {
+  const context = canvas.getContext("webgl2", { antialias: true, alpha: false });
+  const renderer = context ? new THREE.WebGLRenderer({ canvas, context, antialias: true }) : null;
+  if (!renderer) {
     stage.failed = "This browser offers no WebGL, so the picture cannot be drawn; values, plots and controls work without it.";
   }
   const scene = new THREE.Scene();
@@ -26,7 +25,11 @@ const makeStage = (canvas, mechanism) => {
   // ---- Colours ----
 
   const [paper, ink] = [new THREE.Color("#ffffff"), new THREE.Color("#000000")];
-  const mixed = (strength) => new THREE.Color().lerpColors(paper, ink, strength);
+  // Mixed as a screen does, so that a mixture is as strong on dark paper as on light.
+  const mixed = (strength) => {
+    const [from, to] = [paper, ink].map((color) => color.clone().convertLinearToSRGB());
+    return from.lerp(to, strength).convertSRGBToLinear();
+  };
   const world = makeWorld(scene, mixed);
   const elements = makeElements(scene, mixed);
   const traces = makeTraces(scene, () => paper);

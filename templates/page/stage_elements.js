@@ -245,6 +245,7 @@ const makeElements = (scene, mixed) => {
 
   // ---- What holds the mechanism ----
 
+  const toGround = (element, values) => (element.axis ? vector(element.axis, values) : [0, space ? 0 : -1, space ? -1 : 0]);
   function base(element) {
     if (space) {
       const post = new THREE.Mesh(new THREE.CylinderGeometry(1, 1.3, 0.8, 32), new THREE.MeshLambertMaterial());
@@ -252,9 +253,10 @@ const makeElements = (scene, mixed) => {
       scene.add(post);
       return ({ values }) => {
         const radius = number(element.radius, values);
+        const ground = toGround(element, values);
         post.scale.setScalar(radius);
-        post.rotation.set(Math.PI / 2, 0, 0);
-        post.position.set(...add(vector(element.at, values), [0, 0, -0.4 * radius]));
+        shapes.turnTo(post, scaled(ground, -1));
+        post.position.set(...add(vector(element.at, values), scaled(ground, 0.4 * radius)));
       };
     }
     const hatch = [-1, -0.5, 0, 0.5, 1].flatMap((x) => [x + 0.15, -1.2, 0, x - 0.2, -1.6, 0]);
@@ -262,7 +264,8 @@ const makeElements = (scene, mixed) => {
       { pieces: true, ink: 0.6, width: 1.6, front: false });
     return ({ values }) => {
       const radius = number(element.radius, values);
-      frame(line, vector(element.at, values), [radius, 0, 0], [0, radius, 0], [0, 0, radius]);
+      const up = scaled(toGround(element, values), -radius);
+      frame(line, vector(element.at, values), [up[1], -up[0], 0], up, [0, 0, radius]);
     };
   }
 
