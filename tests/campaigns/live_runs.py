@@ -5,7 +5,7 @@
 For each scene: the greatest difference of a state after 10 s, relative to its size or 1, and the
 time at which it exceeds 1e-9. Chaotic motions amplify the last digit, in which `Math.sin` of V8 and
 `math.sin` may differ. "a last digit" is the same for two runs in Python, of which one starts with
-one state changed by its last digit: no arithmetic but the same could do better.
+its states changed in the last digit: no arithmetic but the same could do better.
 """
 
 import sys
@@ -56,9 +56,11 @@ def compare(name: str) -> str:
     options |= {"unstable": method in ("rk4", "leapfrog"), "form": "velocity", "samples": 10**6}
     # Python keeps each step, and these rows are those that node keeps.
     own = eomgen.simulate(scene, **options).trajectory
-    state = own.states[0]
-    moved = float(np.nextafter(own.y[0, 0], np.inf)) if own.y[0, 0] else 1e-16
-    other = eomgen.simulate(scene, state={state: moved}, **options).trajectory
+    signs = np.random.default_rng(1).choice([-np.inf, np.inf], len(own.states))
+    moved = np.where(own.y[0] == 0, 1e-16, np.nextafter(own.y[0], signs))
+    other = eomgen.simulate(
+        scene, state=dict(zip(own.states, moved.tolist(), strict=True)), **options
+    ).trajectory
     times = np.arange(0, int(SECONDS / dt / found["every"]) + 1) * found["every"] * dt
     mine = np.array(found["rows"], dtype=float)
     end, since = difference(times, mine, own)
