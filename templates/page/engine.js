@@ -13,16 +13,19 @@ const makeEngine = (mechanism, data) => {
   const MOST_EVENTS = 10000; // at one time
   const SHARE = 0.02; // part of the mean cost of a step that the last one has
 
+  const all = [...methods, ...adaptive];
   const engine = {
     t: 0,
     y: new Float64Array(ny),
     p: defaults(data.parameters),
     u: defaults(data.inputs),
-    methods: methods.filter((m) => !m.separable || isSeparable()).map(({ name, about }) => ({ name, about })),
+    methods: all.filter((m) => !m.separable || isSeparable()).map(({ name, about }) => ({ name, about })),
     method: "",
     dt: 0.01,
     events: [],
     error: null,
+    remark: "", // that another method goes on than the one it began with
+    automatic: false, // whether the engine itself has chosen the method
     behind: false, // whether the last advance ran out of time
     grip: null, // what is pulled: {body, at, target, point, force}
     onSample: null,
@@ -110,6 +113,17 @@ const makeEngine = (mechanism, data) => {
     goal = engine.t;
     repeated = 0;
     closed = law ? law.begin(engine.t, engine.y) : [];
+    renew();
+  }
+
+  // The chosen method failed: go on by the adaptive one, if it was not the user who chose.
+  function helped(error) {
+    if (!engine.automatic || engine.method === "DOP853") throw error;
+    engine.remark = `${engine.method} fails at ${Number(engine.t.toPrecision(4))} s, DOP853 goes on`;
+    engine.method = "DOP853";
+    change = all.find((m) => m.name === "DOP853").make(ny);
+    engine.dt = Math.max(engine.dt, 0.005);
+    start = engine.t;
     renew();
   }
 
@@ -203,7 +217,11 @@ const makeEngine = (mechanism, data) => {
 
   function toMark() {
     const end = mark();
-    while (engine.t < end) makeStep();
+    try {
+      while (engine.t < end) makeStep();
+    } catch (error) {
+      helped(error);
+    }
   }
 
   // Advance by so many seconds, in whole steps; stop after `budget` ms, and then do not catch up.
@@ -229,7 +247,7 @@ const makeEngine = (mechanism, data) => {
   };
 
   engine.setMethod = (name, dt = engine.dt) => {
-    const method = methods.find((m) => m.name === name);
+    const method = all.find((m) => m.name === name);
     if (!method || !engine.methods.some((m) => m.name === name)) {
       engine.error = `the method ${name} does not suit this mechanism`;
       return;
@@ -239,6 +257,7 @@ const makeEngine = (mechanism, data) => {
       return;
     }
     engine.error = null;
+    engine.automatic = false;
     engine.method = name;
     engine.dt = dt;
     cost = NaN;
@@ -254,12 +273,26 @@ const makeEngine = (mechanism, data) => {
     guarded(() => {
       engine.t = t;
       engine.y.set(y ?? data.initial ?? mechanism.initialState(engine.p));
-      change = methods.find((m) => m.name === engine.method).make(ny);
+      change = all.find((m) => m.name === engine.method).make(ny);
       law = makeLaw();
       restart();
     });
   };
   engine.cost = () => cost;
+  // Call the derivative for so many ms, so that the browser compiles it; ms of the fastest call.
+  engine.warm = (budget) => {
+    const until = performance.now() + budget;
+    let least = Infinity;
+    guarded(() => {
+      for (let from = performance.now(); from < until; ) {
+        mechanism.derivative(engine.t, engine.y, engine.p, engine.u);
+        const now = performance.now();
+        least = Math.min(least, now - from);
+        from = now;
+      }
+    });
+    return least;
+  };
   engine.energy = () => {
     const of = (name) => mechanism[name](engine.t, engine.y, engine.p, engine.u);
     try {
@@ -363,6 +396,7 @@ const makeEngine = (mechanism, data) => {
   }
   const [method, step] = choice();
   engine.setMethod(data.liveMethod ?? method, data.liveStep ?? step);
+  engine.automatic = !data.liveMethod;
   engine.reset();
   return engine;
 };

@@ -6,7 +6,7 @@
 const methods = (() => {
   const EPS = 2 ** -52;
   const NEWTON = { most: 30, roundoff: 4 * EPS, noise: 1e-10, nothing: 1e-13, small: 1e-9 };
-  const SLOW = 9; // with more iterations than these, the next step takes another Jacobian
+  const SLOW = 10; // with more iterations than these, the next step takes another Jacobian
 
   const explicit = (a, b, c) => (ny) => {
     const slopes = c.map(() => new Float64Array(ny));
@@ -127,6 +127,7 @@ const methods = (() => {
     const iterate = (problem, t, y, h) => {
       changes.fill(0);
       let previous = 0;
+      let done = false;
       for (let count = 1; count <= NEWTON.most; count += 1) {
         for (let i = 0; i < s; i += 1) {
           for (let k = 0; k < ny; k += 1) {
@@ -145,8 +146,10 @@ const methods = (() => {
           if (!(part <= size)) size = part; // nan too
         }
         if (!Number.isFinite(size)) return 0;
-        if (size === 0 || (previous > 0 && solved(y, size, previous))) return count;
-        if (count > 5 && size > 0.9 * previous && size > 1e-6) return 0; // it does not converge
+        // Once more after it has converged: a Jacobian that is not exact leaves an error of the last digit.
+        if (size === 0 || done) return count;
+        done = previous > 0 && solved(y, size, previous);
+        if (!done && count > 5 && size > 0.9 * previous && size > 1e-6) return 0; // it does not converge
         previous = size;
       }
       return 0;

@@ -6,8 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from eomgen.codegen.backends.division import divided
-from eomgen.codegen.interface import Interface
+from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
+from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect, Names, print_block
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
@@ -31,13 +32,11 @@ OWN = {
 """Functions of formulas that JavaScript lacks."""
 DIALECT = Dialect({name: name if name in OWN else f"Math.{name}" for name in FUNCTIONS}, RESERVED)
 
-IN_PAGE = replace(
-    DIALECT, reserved=RESERVED | {"K", "P", "between", "out", "i", "known", "prepare"}
-)
-"""The dialect for functions in a page."""
+IN_PAGE = replace(DIALECT, reserved=RESERVED)
+"""The dialect for functions in a page, in which no name of a scene occurs."""
 MOST = 300
-"""Greatest number of lines of a function in a page: V8 does not optimise functions whose bytecode
-is longer than 60 KB."""
+"""Lines of a part of a function in a page; up to twice as many are one function. V8 does not
+optimise functions whose bytecode is longer than 60 KB; a line takes up to 100 bytes of it."""
 
 
 def files(program: Program, interface: Interface) -> Mapping[str, str]:
@@ -134,18 +133,19 @@ def mechanism(
     the interface. `held` and `impact` take an array of their further inputs last. `contacts` are
     described by tables, one for each, which the object has as `contacts`.
     """
-    kernels, constants = kernels_of(program, interface, IN_PAGE)
+    program, interface = _numbered(ordered(program), interface)
+    kernels, constants = kernels_of(program, interface, IN_PAGE, sharing=True)
     called = {f for kernel in kernels for f in kernel.block.functions} | {*constants.functions}
     names = tuple(dict.fromkeys(name for kernel in kernels for name in kernel.constants))
     place = {name: f"K[{i}]" for i, name in enumerate(names)}
     written = [_divided(kernel, place) for kernel in kernels]
-    given = [(name, f"p[{i}]") for i, name in enumerate(constants.parameters)]
     context: dict[str, Any] = {
         "own_functions": [(name, OWN[name]) for name in OWN if name in called],
         "parameters": len(interface.parameters),
         "between": max(kernel["size"] for kernel in written),
+        "passed": max(len(kernel["passed"]) for kernel in written),
         "constants": names,
-        "given": given,
+        "given": [(name, f"p[{i}]") for i, name in enumerate(constants.parameters)],
         "checked": list(constants.checked),
         "checks": [
             (check.about.replace('"', "'"), source, check.relation)
@@ -163,6 +163,40 @@ def mechanism(
     return render(TEMPLATES, "mechanism.js.jinja", context)
 
 
+def _numbered(program: Program, interface: Interface) -> tuple[Program, Interface]:
+    """The same with short names: y0 for the first state, likewise p0, u0, and x0 for the further
+    inputs; other variables have no names of their own.
+    """
+    extra = dict.fromkeys(name for f in interface.functions for name in f.extra)
+    groups = {
+        "y": [s.name for s in interface.states],
+        "p": [p.name for p in interface.parameters],
+        "u": [i.name for i in interface.inputs],
+        "x": list(extra),
+    }
+    short = {name: f"{letter}{i}" for letter, own in groups.items() for i, name in enumerate(own)}
+    steps = tuple(
+        step._replace(value=short.get(str(step.value), step.value))
+        if step.operation == "input"
+        else step
+        for step in program.steps
+    )
+
+    def renamed(variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+        return tuple(replace(x, name=short[x.name]) for x in variables)
+
+    functions = tuple(
+        replace(f, extra=tuple(short[name] for name in f.extra)) for f in interface.functions
+    )
+    return replace(program, steps=steps, names={}), replace(
+        interface,
+        states=renamed(interface.states),
+        parameters=renamed(interface.parameters),
+        inputs=renamed(interface.inputs),
+        functions=functions,
+    )
+
+
 def in_page(name: str) -> str:
     """The name of an output in JavaScript: `bodyPoses`."""
     first, *others = name.split("_")
@@ -171,22 +205,27 @@ def in_page(name: str) -> str:
 
 def _divided(kernel: Kernel, place: Mapping[str, str]) -> dict[str, Any]:
     """A kernel as values for the template of a page, in parts if it is long."""
-    function, block = kernel.function, kernel.block
+    function, block, base = kernel.function, kernel.block, kernel.base
     given = [
         *((name, place[name]) for name in kernel.constants),
         *_given(kernel.state, "y"),
         *_given(kernel.inputs, "u"),
         *_given(kernel.extra, "extra"),
+        *((name, f"passed[{i}]") for i, name in enumerate(kernel.taken) if name != "_"),
     ]
-    division = divided(block.lines, given, block.results, MOST)
+    # What is passed on is stored beside the results.
+    results = (*block.results, *kernel.passed)
+    division = divided(block.lines, given, results, MOST)
     return {
         "name": in_page(function.name),
         "about": " ".join(function.about.split()),
         "number": not function.shape,
+        "base": in_page(base.function.name) if base else "",
         "parts": division.parts if division else (),
         "given": list(division.given if division else given),
         "lines": [] if division else list(block.lines),
         "results": block.results,
+        "passed": kernel.passed,
         "size": division.size if division else 0,
     }
 
