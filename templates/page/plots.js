@@ -3,14 +3,14 @@
 
 const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {}) => {
   const MOST_SAMPLES = 6000; // of a live run within the time shown
-  const SPANS = [5, 20, 60];
+  const SPANS = [2, 5, 10, 30, 60]; // seconds of a live run that are shown
   const CURVES = 8; // colours; more curves are dashed
   const DASHES = [[], [6, 4], [2, 3]];
   const READING = 100; // ms between changes of the numbers while the picture moves
   const LEAST_PAUSE = 50; // ms between two drawings of a live run
 
   const samples = makeSamples(channels);
-  const state = { live: false, span: SPANS[1], view: null, mark: 0, hover: null };
+  const state = { live: false, span: SPANS[2], view: null, mark: 0, hover: null };
   const due = { data: false, mark: false, frame: 0, drawn: 0, took: 0, read: 0 };
   let plots = [];
   let colors = new Map();
@@ -31,7 +31,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
 
   container.classList.add("plots");
   const bar = container.appendChild(make("div", "plots-bar"));
-  const body = container.appendChild(make("div", "plots"));
+  const body = container.appendChild(make("div", "plots-list"));
   const note = make("span", "plots-note");
   note.setAttribute("role", "status");
   const spanField = make("label", "", "Last");
@@ -82,7 +82,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       if (!(next[1] - next[0] > least)) return;
       state.view = next[0] <= low && next[1] >= high ? null : next;
     } else state.view = null;
-    whole.disabled = !state.view;
+    whole.hidden = !state.view;
     change("data");
   }
   function seek(t) {
@@ -139,8 +139,8 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     plot.curves = plot.root.appendChild(make("ul", "plot-curves"));
     const tools = make("div", "plot-tools");
     tools.append(
-      button("+", "Add or remove curves", () => choose(plot), "small bare"),
-      button("x =", "Choose what lies along the horizontal axis", () => chooseAcross(plot), "small bare"),
+      button("Curves", "Add or remove curves", () => choose(plot), "small bare"),
+      button("x axis", "Choose what lies along the horizontal axis", () => chooseAcross(plot), "small bare"),
       button("PNG", "Save this plot as a picture", () => savePicture(plot), "small bare"),
       button("×", "Remove this plot", () => removePlot(plot), "small bare"),
     );
@@ -216,7 +216,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     plot.box.setAttribute("aria-label", `${names || "No curve"} against ${across}. ` +
       "Left and right move the time, plus and minus zoom, Shift and arrows move the plot, 0 shows all.");
     if (plot.spec.y.length) plot.chart = (plot.spec.x ? charts.phase : charts.time)(place(plot));
-    else plot.foot.textContent = "Choose a curve with +.";
+    else plot.foot.textContent = "Choose what to show with Curves.";
     forget();
     change("data");
   }
@@ -309,7 +309,10 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       const from = performance.now();
       due.data = false;
       due.drawn = now;
-      for (const plot of plots) plot.chart?.refresh();
+      for (const { chart } of plots) {
+        chart?.refresh();
+        chart?.hover(state.hover);
+      }
       due.took = performance.now() - from;
     } else if (due.mark) for (const plot of plots) plot.chart?.mark();
     due.mark = false;
