@@ -14,6 +14,7 @@ import json
 import os
 import pickle
 import platform
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields, replace
 from functools import cache
@@ -31,6 +32,7 @@ from eomgen.templating import PACKAGE, templates_folder
 
 if TYPE_CHECKING:
     from eomgen.codegen.interface import Interface
+    from eomgen.language.formula import Formula
 
 AFTER = (
     *(
@@ -109,6 +111,49 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
         notice = f"the store {directory} held other code for this scene, which was put right"
         return replace(code, notice=notice)
     return code
+
+
+@dataclass(frozen=True)
+class LiveCode:
+    """What a model's page computes with, with the fields of `eomgen.pipeline.Live`."""
+
+    source: str
+    loads: tuple[tuple[str, str], ...]
+    operations: int
+    saved: Mapping[str, int]
+
+
+def live_code(model: Model, geometry: Sequence["Formula"] = ()) -> LiveCode:
+    """The functions of a model's page, from the store, or derived and stored; `geometry` are the
+    formulas of the function of that name.
+
+    A store that cannot be used is no obstacle.
+    """
+    directory = folder()
+    text = f"page of {key_of(model)} with {tuple(geometry)!r}"
+    key = hashlib.sha256(text.encode()).hexdigest()[:32]
+    if directory and (kept := _live_code(Entries(directory).get(key))):
+        return kept
+    # Imported here because the modules that derive equations take long to load.
+    from eomgen.pipeline import live
+
+    new = live(model, geometry)
+    code = LiveCode(new.source, new.loads, new.operations, new.saved)
+    if directory:
+        content = json.dumps([code.source, code.loads, code.operations, dict(code.saved)])
+        Entries(directory).put(key, content.encode())
+    return code
+
+
+def _live_code(content: bytes | None) -> LiveCode | None:
+    """The code of an entry that `live_code` wrote; None for any other bytes."""
+    with suppress(ValueError, TypeError, AttributeError, RecursionError):
+        source, loads, operations, saved = json.loads(content or b"")
+        source.encode()  # fails for lone surrogates
+        pairs = tuple((str(effect), str(body)) for effect, body in loads)
+        counts = {str(name): int(count) for name, count in saved.items()}
+        return LiveCode(source, pairs, int(operations), counts)
+    return None
 
 
 def program_of(model: Model) -> Program:

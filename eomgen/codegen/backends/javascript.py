@@ -1,8 +1,11 @@
 """The JavaScript backend: an ES module of all outputs, and the function that the page animates."""
 
+import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+from eomgen.codegen.backends.division import divided
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.program.printing import Dialect, Names, print_block
@@ -27,6 +30,14 @@ OWN = {
 }
 """Functions of formulas that JavaScript lacks."""
 DIALECT = Dialect({name: name if name in OWN else f"Math.{name}" for name in FUNCTIONS}, RESERVED)
+
+IN_PAGE = replace(
+    DIALECT, reserved=RESERVED | {"K", "P", "between", "out", "i", "known", "prepare"}
+)
+"""The dialect for functions in a page."""
+MOST = 300
+"""Greatest number of lines of a function in a page: V8 does not optimise functions whose bytecode
+is longer than 60 KB."""
 
 
 def files(program: Program, interface: Interface) -> Mapping[str, str]:
@@ -111,6 +122,73 @@ def body_poses(program: Program, interface: Interface) -> str:
         "rows": rows,
     }
     return render(TEMPLATES, "poses.js.jinja", context)
+
+
+def mechanism(
+    program: Program, interface: Interface, contacts: Sequence[Mapping[str, Any]] = ()
+) -> str:
+    """The source of `const mechanism = …` of a page, an object of functions of (t, y, p, u).
+
+    Each returns a Float64Array of the entries of an output in C order, or a number, and may use the
+    same array for its next result. State y, parameters p and inputs u are arrays in the order of
+    the interface. `held` and `impact` take an array of their further inputs last. `contacts` are
+    described by tables, one for each, which the object has as `contacts`.
+    """
+    kernels, constants = kernels_of(program, interface, IN_PAGE)
+    called = {f for kernel in kernels for f in kernel.block.functions} | {*constants.functions}
+    names = tuple(dict.fromkeys(name for kernel in kernels for name in kernel.constants))
+    place = {name: f"K[{i}]" for i, name in enumerate(names)}
+    written = [_divided(kernel, place) for kernel in kernels]
+    given = [(name, f"p[{i}]") for i, name in enumerate(constants.parameters)]
+    context: dict[str, Any] = {
+        "own_functions": [(name, OWN[name]) for name in OWN if name in called],
+        "parameters": len(interface.parameters),
+        "between": max(kernel["size"] for kernel in written),
+        "constants": names,
+        "given": given,
+        "checked": list(constants.checked),
+        "checks": [
+            (check.about.replace('"', "'"), source, check.relation)
+            for check, source in constants.checks
+        ],
+        "fixed": constants.lines,
+        "kernels": written,
+        "missing": [
+            in_page(name)
+            for name in ("gaps", "gap_rates", "impact", "held", "switching_functions")
+            if name not in program.outputs
+        ],
+        "contacts": json.dumps(list(contacts)),
+    }
+    return render(TEMPLATES, "mechanism.js.jinja", context)
+
+
+def in_page(name: str) -> str:
+    """The name of an output in JavaScript: `bodyPoses`."""
+    first, *others = name.split("_")
+    return first + "".join(word.capitalize() for word in others)
+
+
+def _divided(kernel: Kernel, place: Mapping[str, str]) -> dict[str, Any]:
+    """A kernel as values for the template of a page, in parts if it is long."""
+    function, block = kernel.function, kernel.block
+    given = [
+        *((name, place[name]) for name in kernel.constants),
+        *_given(kernel.state, "y"),
+        *_given(kernel.inputs, "u"),
+        *_given(kernel.extra, "extra"),
+    ]
+    division = divided(block.lines, given, block.results, MOST)
+    return {
+        "name": in_page(function.name),
+        "about": " ".join(function.about.split()),
+        "number": not function.shape,
+        "parts": division.parts if division else (),
+        "given": list(division.given if division else given),
+        "lines": [] if division else list(block.lines),
+        "results": block.results,
+        "size": division.size if division else 0,
+    }
 
 
 def _rest(defaults: Sequence[float]) -> str:
