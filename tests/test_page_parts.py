@@ -1,21 +1,23 @@
 """Parts of the page that need no browser, run by node: numbers, channels, samples, tables."""
 
-import json
 import math
 import random
-import subprocess
+from dataclasses import replace
 from pathlib import Path
-from shutil import which
 from typing import Any
 
 import numpy as np
 import pytest
+from live import NODE, run_in_node
 
+from eomgen.api.given import model_of, read
+from eomgen.pipeline import compile_program, python_module
+from eomgen.run.module import load_module
 from eomgen.run.trajectory import COUNTS, Trajectory, save_csv
+from eomgen.show.live import live_table
+from eomgen.store import live_code
 
-PAGE = Path(__file__).parent.parent / "templates" / "page"
-PARTS = ("numbers", "downloads", "plots_channels", "plots_samples", "recording")
-NODE = which("node")
+PARTS = ("numbers.js", "downloads.js", "plots_channels.js", "plots_samples.js", "recording.js")
 pytestmark = pytest.mark.skipif(NODE is None, reason="needs node, which runs JavaScript")
 
 # A mechanism whose results are known and, as generated ones, reused by the next call.
@@ -49,27 +51,9 @@ const channels = makeChannels(data, mechanism);
 """
 
 
-def in_node(script: str, given: Any = None) -> Any:
-    """What the body of a function returns, through JSON, in which nan is null."""
-    source = "\n".join(
-        [
-            '"use strict";',
-            *((PAGE / f"{part}.js").read_text("utf-8") for part in PARTS),
-            "const given = JSON.parse(require('fs').readFileSync(0, 'utf8'));",
-            f"process.stdout.write(JSON.stringify((() => {{\n{script}\n}})()));",
-        ]
-    )
-    # A script longer than an argument may be is no concern here: these parts are small.
-    done = subprocess.run(
-        [str(NODE), "-e", source],
-        input=json.dumps(given),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    return json.loads(done.stdout)
+def in_node(script: str, given: Any = None, source: str = "") -> Any:
+    """What the body of a function returns from these parts of the page."""
+    return run_in_node(source, script, given, seconds=60, scripts=PARTS)
 
 
 TEXTS = [
@@ -229,3 +213,57 @@ def test_a_known_run_is_read_at_any_time() -> None:
     assert values == [0, 0, 1, 5, 7, 9, 9]
     assert before == 2
     assert scale == 9
+
+
+WRENCH = {2: ("fx", "fy", "mz"), 3: ("fx", "fy", "fz", "mx", "my", "mz")}
+TWIST = {2: ("vx", "vy", "wz"), 3: ("vx", "vy", "vz", "wx", "wy", "wz")}
+OUTPUTS = (
+    "kinetic_energy",
+    "potential_energy",
+    "joint_forces",
+    "body_poses",
+    "body_velocities",
+)
+
+
+@pytest.mark.parametrize("name", ["double_pendulum", "furuta_pendulum"])
+def test_channels_are_the_outputs_of_the_module(name: str) -> None:
+    """Errors are relative to the largest value of all channels of an output."""
+    scene = read(name)
+    model = replace(model_of(scene, name), outputs=OUTPUTS)
+    system = compile_program(model, jacobian=False, closed=False).system
+    module = load_module(python_module(system))
+    code = live_code(model_of(scene, name))
+    table = live_table(model_of(scene, name), code, scene.simulation)
+    y = module.initial_state() + np.random.default_rng(3).normal(size=(8, len(module.STATES)))
+    script = """
+    const channels = makeChannels(given.data, mechanism);
+    const samples = makeSamples(channels);
+    const values = (table) => Float64Array.from(table, (x) => x.value);
+    const t = Float64Array.from(given.y, (_, i) => i);
+    const y = Float64Array.from(given.y.flat());
+    samples.set(t, y, values(given.data.parameters), values(given.data.inputs));
+    const keys = channels.list.map((c) => c.key);
+    return Object.fromEntries(samples.columns(keys).map((x, k) => [keys[k], Array.from(x)]));"""
+    found = in_node(script, {"data": table, "y": y.tolist()}, code.source)
+    given = {
+        output: np.array([getattr(module, output)(0.0, row) for row in y]) for output in OUTPUTS
+    }
+    expected = {state: y[:, k] for k, state in enumerate(module.STATES)}
+    expected |= {output: given[output] for output in OUTPUTS[:2]}
+    expected["energy"] = given["kinetic_energy"] + given["potential_energy"]
+    for i, joint in enumerate(table["joints"]):
+        for k, part in enumerate(WRENCH[model.dimensions]):
+            expected[f"joint_forces.{joint}.{part}"] = given["joint_forces"][:, i, k]
+    for i, body in enumerate(table["bodies"]):
+        for k, part in enumerate(TWIST[model.dimensions]):
+            expected[f"body_velocities.{body}.{part}"] = given["body_velocities"][:, i, k]
+        poses = given["body_poses"][:, i]
+        for k, part in enumerate("xyz"[: model.dimensions]):
+            place = poses[:, k, 3] if model.dimensions == 3 else poses[:, k]
+            expected[f"body_poses.{body}.{part}"] = place
+    for key, values in expected.items():
+        size = max(
+            np.abs(v).max() for k, v in expected.items() if k.split(".")[0] == key.split(".")[0]
+        )
+        assert np.abs(np.array(found[key]) - values).max() <= 1e-12 * size, key
