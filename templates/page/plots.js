@@ -11,7 +11,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
 
   const samples = makeSamples(channels);
   const state = { live: false, span: SPANS[2], view: null, mark: 0, hover: null };
-  const due = { data: false, mark: false, frame: 0, drawn: 0, took: 0, read: 0 };
+  const due = { data: false, mark: false, frame: 0, drawn: 0, took: 0, read: 0, timer: 0 };
   let plots = [];
   let colors = new Map();
 
@@ -43,7 +43,11 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     look(null);
   });
   const whole = button("Whole time", "Show the whole time (0, or a double click)", () => look(null));
-  bar.append(button("+ Plot", "Add a plot", () => choose(null)), spanField, whole, note);
+  bar.append(
+    button("+ Plot", "Add a plot", () => choose(null)),
+    button("+ Phase portrait", "Plot a velocity against its position", () => addPlot(portrait())),
+    spanField, whole, note,
+  );
   const picker = makePicker(container, channels);
 
   // ---- Colours of the theme ----
@@ -159,6 +163,13 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     return plot;
   }
 
+  // A position and its velocity which are not shown yet, if there are such.
+  function portrait() {
+    const { pairs } = channels;
+    const [x, y] = pairs.find((pair) => !plots.some(({ spec }) => spec.x === pair[0])) ?? pairs[0] ?? [];
+    return x ? { x, y: [y] } : { x: channels.list[0].key, y: [channels.list[channels.states.length - 1].key] };
+  }
+
   function removePlot(plot) {
     plot.watch.disconnect();
     plot.chart?.destroy();
@@ -254,7 +265,8 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   // ---- Numbers beside the plots ----
 
   function read() {
-    due.read = performance.now();
+    clearTimeout(due.timer);
+    Object.assign(due, { read: performance.now(), timer: 0 });
     const time = state.hover ?? state.mark;
     for (const plot of plots) {
       if (!plot.chart) continue;
@@ -265,6 +277,13 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       const last = plot.spec.x ? `, ${channels.get(plot.spec.x).label} = ${text(keys.length - 1)}` : "";
       plot.foot.textContent = `t = ${numbers.steady(time, "s", 1)}${last}`;
     }
+  }
+
+  // Numbers that change with every picture could not be read.
+  function readSoon() {
+    const wait = due.read + READING - performance.now();
+    if (wait <= 0) read();
+    else if (!due.timer) due.timer = setTimeout(read, wait);
   }
 
   function savePicture(plot) {
@@ -316,7 +335,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       due.took = performance.now() - from;
     } else if (due.mark) for (const plot of plots) plot.chart?.mark();
     due.mark = false;
-    if (performance.now() - due.read >= READING || !state.live) read();
+    readSoon();
     if (due.data) change("data");
   }
 
@@ -353,6 +372,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     // Plots as a list of {x: key or null, y: [keys]}.
     show(specs) {
       for (const plot of [...plots]) removePlot(plot);
+      note.textContent = "";
       specs.forEach(addPlot);
     },
     specs: () => plots.map(({ spec }) => ({ x: spec.x, y: [...spec.y] })),

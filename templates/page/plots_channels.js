@@ -1,5 +1,5 @@
 // `makeChannels` lists what can be plotted. A channel is
-//   key     name as `eomgen plot --of` takes it: theta, joint_forces.hinge.fx
+//   key     its name: theta, joint_forces.hinge.fx, as `eomgen plot --of` takes it, or one like these
 //   label, group, unit   what the reader sees
 //   family  the function of the mechanism whose result it is read from
 //   of      (result) -> value
@@ -141,6 +141,15 @@ const makeChannels = (data, mechanism) => {
   };
   // Joint forces leave out those of held contacts, so that they are not known while one is held.
   const unknownWhileHeld = new Set(["joints"]);
+  // Positions with their velocities: in their order, or by name where there are more positions.
+  function pairsOf() {
+    const of = (kind) => data.states.filter((s) => s.kind === kind).map((s) => s.name);
+    const [positions, velocities] = [of("position"), of("velocity")];
+    if (positions.length === velocities.length) return positions.map((name, k) => [name, velocities[k]]);
+    return positions.filter((name) => velocities.includes(`${name}_dot`)).map((name) => [name, `${name}_dot`]);
+  }
   const byKey = new Map(list.map((channel) => [channel.key, channel]));
-  return { list, families, unknownWhileHeld, get: (key) => byKey.get(key), states: data.states.map((s) => s.name) };
+  return {
+    list, pairs: pairsOf(), families, unknownWhileHeld, get: (key) => byKey.get(key), states: data.states.map((s) => s.name),
+  };
 };

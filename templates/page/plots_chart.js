@@ -33,6 +33,10 @@ const charts = (() => {
     return [low, high];
   }
 
+  // uPlot leaves a gap where there is no value, but joins over nan.
+  const withGaps = (values) =>
+    (values.every(Number.isFinite) ? values : Array.from(values, (value) => (Number.isFinite(value) ? value : null)));
+
   const scaleOf = (place, keys) => Math.min(...keys.map((key) => place.samples.scale(key)));
 
   // An axis; `exponents` receives the power of ten that its marks are in.
@@ -133,7 +137,7 @@ const charts = (() => {
     };
     const chart = {
       refresh() {
-        u.setData([samples.times(), ...samples.columns(spec.y)], true);
+        u.setData([samples.times(), ...samples.columns(spec.y).map(withGaps)], true);
         chart.mark();
       },
       mark() {
