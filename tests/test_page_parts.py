@@ -201,6 +201,36 @@ def test_channels_of_a_live_run_that_slides(dimensions: int) -> None:
     assert 0.9 < found["scale"] < 5
 
 
+def test_forces_of_joints_are_unknown_while_a_contact_is_held() -> None:
+    script = f"""{FAKE}
+    const [t, y] = [Float64Array.of(0, 1, 2, 3, 4, 5, 6), new Float64Array(14).fill(1)];
+    const known = (...held) => {{
+      const samples = makeSamples(channels);
+      samples.set(t, y, [1], [0], ...held);
+      return samples.columns(["joint_forces.hinge"]).flatMap((x) => Array.from(x, Number.isFinite));
+    }};
+    const now = given.events.map((_, i) => channels.heldAfter(given.events.slice(0, i + 1)));
+    const growing = [];
+    for (const event of given.events) growing.push(event), now.push(channels.heldAfter(growing));
+    return [known(channels.heldAt(t, given.events)), known(), now];"""
+    events = [
+        {"t": t, "contact": contact, "kind": kind}
+        for t, contact, kind in (
+            (0.5, "foot", "impact"),
+            (1.0, "foot", "rest"),
+            (1.5, "hand", "rest"),
+            (2.5, "foot", "lift"),
+            (3.5, "hand", "lift"),
+            (5.5, "foot", "rest"),
+        )
+    ]
+    given = {"dimensions": 3, "states": ["q", "w"], "events": events}
+    known, without, now = in_node(script, given)
+    assert known == [True, False, False, False, True, True, False]
+    assert without == [False] * 7
+    assert now == [False, True, True, True, False, True] * 2
+
+
 def test_a_known_run_is_read_at_any_time() -> None:
     script = f"""{FAKE}
     const samples = makeSamples(channels);

@@ -148,8 +148,45 @@ const makeChannels = (data, mechanism) => {
     if (positions.length === velocities.length) return positions.map((name, k) => [name, velocities[k]]);
     return positions.filter((name) => velocities.includes(`${name}_dot`)).map((name) => [name, `${name}_dot`]);
   }
+  // Whether a contact is held at each time, from the events of contacts {t, contact, kind} of a run.
+  function heldAt(times, events) {
+    const since = new Map();
+    const spans = [];
+    for (const { t, contact, kind } of events) {
+      if (kind === "rest") since.set(contact, t);
+      else if (kind === "lift" && since.has(contact)) {
+        spans.push([since.get(contact), t]);
+        since.delete(contact);
+      }
+    }
+    for (const t of since.values()) spans.push([t, Infinity]);
+    return Array.from(times, (t) => spans.some(([from, to]) => from <= t && t <= to));
+  }
+
+  // Whether a contact is held after these events, to which events are only added.
+  let seen = { first: null, count: 0, held: new Set() };
+  function heldAfter(events) {
+    if (seen.first !== events[0] || seen.count > events.length) {
+      seen = { first: events[0], count: 0, held: new Set() }; // another run
+    }
+    for (; seen.count < events.length; seen.count += 1) {
+      const { contact, kind } = events[seen.count];
+      if (kind === "rest") seen.held.add(contact);
+      else if (kind === "lift") seen.held.delete(contact);
+    }
+    return seen.held.size > 0;
+  }
+
   const byKey = new Map(list.map((channel) => [channel.key, channel]));
   return {
-    list, pairs: pairsOf(), families, unknownWhileHeld, get: (key) => byKey.get(key), states: data.states.map((s) => s.name),
+    list,
+    pairs: pairsOf(),
+    states: data.states.map((s) => s.name),
+    get: (key) => byKey.get(key),
+    families,
+    unknownWhileHeld,
+    heldAt,
+    heldAfter,
+    mayHold: Boolean(mechanism?.contacts?.length), // so that it must be said where no contact is held
   };
 };
