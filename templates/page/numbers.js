@@ -17,7 +17,7 @@ const numbers = (() => {
   // A unit as it is printed: m^2 becomes m²; no unit is an empty text.
   function unit(text) {
     if (!text || text === "1" || text === "-") return "";
-    return text.replace(/\^?\*?\*?(?<=[A-Za-z^*])(-?\d+)(?![\d.])/g, (_, n) => raised(n)).replace(/\*/g, " ");
+    return text.replace(/\^?\*?\*?(?<=[A-Za-z^*])(-?\d+)(?![\d.])/g, (_, n) => raised(n)).replace(/[* ]/g, "\u00a0");
   }
 
   function withUnit(text, of) {

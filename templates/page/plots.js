@@ -3,15 +3,15 @@
 
 const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {}) => {
   const MOST_SAMPLES = 6000; // of a live run within the time shown
-  const SPANS = [5, 20, 60];
+  const SPANS = [2, 5, 10, 30, 60]; // seconds of a live run that are shown
   const CURVES = 8; // colours; more curves are dashed
   const DASHES = [[], [6, 4], [2, 3]];
   const READING = 100; // ms between changes of the numbers while the picture moves
   const LEAST_PAUSE = 50; // ms between two drawings of a live run
 
   const samples = makeSamples(channels);
-  const state = { live: false, span: SPANS[1], view: null, mark: 0, hover: null };
-  const due = { data: false, mark: false, frame: 0, drawn: 0, took: 0, read: 0 };
+  const state = { live: false, span: SPANS[2], view: null, mark: 0, hover: null };
+  const due = { data: false, mark: false, frame: 0, drawn: 0, took: 0, read: 0, timer: 0 };
   let plots = [];
   let colors = new Map();
 
@@ -31,7 +31,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
 
   container.classList.add("plots");
   const bar = container.appendChild(make("div", "plots-bar"));
-  const body = container.appendChild(make("div", "plots"));
+  const body = container.appendChild(make("div", "plots-list"));
   const note = make("span", "plots-note");
   note.setAttribute("role", "status");
   const spanField = make("label", "", "Last");
@@ -43,7 +43,11 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     look(null);
   });
   const whole = button("Whole time", "Show the whole time (0, or a double click)", () => look(null));
-  bar.append(button("+ Plot", "Add a plot", () => choose(null)), spanField, whole, note);
+  bar.append(
+    button("+ Plot", "Add a plot", () => choose(null)),
+    button("+ Phase portrait", "Plot a velocity against its position", () => addPlot(portrait())),
+    spanField, whole, note,
+  );
   const picker = makePicker(container, channels);
 
   // ---- Colours of the theme ----
@@ -82,7 +86,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       if (!(next[1] - next[0] > least)) return;
       state.view = next[0] <= low && next[1] >= high ? null : next;
     } else state.view = null;
-    whole.disabled = !state.view;
+    whole.hidden = !state.view;
     change("data");
   }
   function seek(t) {
@@ -139,8 +143,8 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     plot.curves = plot.root.appendChild(make("ul", "plot-curves"));
     const tools = make("div", "plot-tools");
     tools.append(
-      button("+", "Add or remove curves", () => choose(plot), "small bare"),
-      button("x =", "Choose what lies along the horizontal axis", () => chooseAcross(plot), "small bare"),
+      button("Curves", "Add or remove curves", () => choose(plot), "small bare"),
+      button("x axis", "Choose what lies along the horizontal axis", () => chooseAcross(plot), "small bare"),
       button("PNG", "Save this plot as a picture", () => savePicture(plot), "small bare"),
       button("×", "Remove this plot", () => removePlot(plot), "small bare"),
     );
@@ -157,6 +161,13 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     for (const key of y) if (channels.get(key)) toggle(plot, key, false);
     build(plot);
     return plot;
+  }
+
+  // A position and its velocity which are not shown yet, if there are such.
+  function portrait() {
+    const { pairs } = channels;
+    const [x, y] = pairs.find((pair) => !plots.some(({ spec }) => spec.x === pair[0])) ?? pairs[0] ?? [];
+    return x ? { x, y: [y] } : { x: channels.list[0].key, y: [channels.list[channels.states.length - 1].key] };
   }
 
   function removePlot(plot) {
@@ -216,7 +227,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     plot.box.setAttribute("aria-label", `${names || "No curve"} against ${across}. ` +
       "Left and right move the time, plus and minus zoom, Shift and arrows move the plot, 0 shows all.");
     if (plot.spec.y.length) plot.chart = (plot.spec.x ? charts.phase : charts.time)(place(plot));
-    else plot.foot.textContent = "Choose a curve with +.";
+    else plot.foot.textContent = "Choose what to show with Curves.";
     forget();
     change("data");
   }
@@ -254,7 +265,8 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   // ---- Numbers beside the plots ----
 
   function read() {
-    due.read = performance.now();
+    clearTimeout(due.timer);
+    Object.assign(due, { read: performance.now(), timer: 0 });
     const time = state.hover ?? state.mark;
     for (const plot of plots) {
       if (!plot.chart) continue;
@@ -265,6 +277,13 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       const last = plot.spec.x ? `, ${channels.get(plot.spec.x).label} = ${text(keys.length - 1)}` : "";
       plot.foot.textContent = `t = ${numbers.steady(time, "s", 1)}${last}`;
     }
+  }
+
+  // Numbers that change with every picture could not be read.
+  function readSoon() {
+    const wait = due.read + READING - performance.now();
+    if (wait <= 0) read();
+    else if (!due.timer) due.timer = setTimeout(read, wait);
   }
 
   function savePicture(plot) {
@@ -309,11 +328,14 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       const from = performance.now();
       due.data = false;
       due.drawn = now;
-      for (const plot of plots) plot.chart?.refresh();
+      for (const { chart } of plots) {
+        chart?.refresh();
+        chart?.hover(state.hover);
+      }
       due.took = performance.now() - from;
     } else if (due.mark) for (const plot of plots) plot.chart?.mark();
     due.mark = false;
-    if (performance.now() - due.read >= READING || !state.live) read();
+    readSoon();
     if (due.data) change("data");
   }
 
@@ -350,6 +372,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     // Plots as a list of {x: key or null, y: [keys]}.
     show(specs) {
       for (const plot of [...plots]) removePlot(plot);
+      note.textContent = "";
       specs.forEach(addPlot);
     },
     specs: () => plots.map(({ spec }) => ({ x: spec.x, y: [...spec.y] })),

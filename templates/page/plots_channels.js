@@ -1,5 +1,5 @@
 // `makeChannels` lists what can be plotted. A channel is
-//   key     name as `eomgen plot --of` takes it: theta, joint_forces.hinge.fx
+//   key     its name: theta, joint_forces.hinge.fx, as `eomgen plot --of` takes it, or one like these
 //   label, group, unit   what the reader sees
 //   family  the function of the mechanism whose result it is read from
 //   of      (result) -> value
@@ -141,6 +141,52 @@ const makeChannels = (data, mechanism) => {
   };
   // Joint forces leave out those of held contacts, so that they are not known while one is held.
   const unknownWhileHeld = new Set(["joints"]);
+  // Positions with their velocities: in their order, or by name where there are more positions.
+  function pairsOf() {
+    const of = (kind) => data.states.filter((s) => s.kind === kind).map((s) => s.name);
+    const [positions, velocities] = [of("position"), of("velocity")];
+    if (positions.length === velocities.length) return positions.map((name, k) => [name, velocities[k]]);
+    return positions.filter((name) => velocities.includes(`${name}_dot`)).map((name) => [name, `${name}_dot`]);
+  }
+  // Whether a contact is held at each time, from the events of contacts {t, contact, kind} of a run.
+  function heldAt(times, events) {
+    const since = new Map();
+    const spans = [];
+    for (const { t, contact, kind } of events) {
+      if (kind === "rest") since.set(contact, t);
+      else if (kind === "lift" && since.has(contact)) {
+        spans.push([since.get(contact), t]);
+        since.delete(contact);
+      }
+    }
+    for (const t of since.values()) spans.push([t, Infinity]);
+    return Array.from(times, (t) => spans.some(([from, to]) => from <= t && t <= to));
+  }
+
+  // Whether a contact is held after these events, to which events are only added.
+  let seen = { first: null, count: 0, held: new Set() };
+  function heldAfter(events) {
+    if (seen.first !== events[0] || seen.count > events.length) {
+      seen = { first: events[0], count: 0, held: new Set() }; // another run
+    }
+    for (; seen.count < events.length; seen.count += 1) {
+      const { contact, kind } = events[seen.count];
+      if (kind === "rest") seen.held.add(contact);
+      else if (kind === "lift") seen.held.delete(contact);
+    }
+    return seen.held.size > 0;
+  }
+
   const byKey = new Map(list.map((channel) => [channel.key, channel]));
-  return { list, families, unknownWhileHeld, get: (key) => byKey.get(key), states: data.states.map((s) => s.name) };
+  return {
+    list,
+    pairs: pairsOf(),
+    states: data.states.map((s) => s.name),
+    get: (key) => byKey.get(key),
+    families,
+    unknownWhileHeld,
+    heldAt,
+    heldAfter,
+    mayHold: Boolean(mechanism?.contacts?.length), // so that it must be said where no contact is held
+  };
 };

@@ -33,6 +33,10 @@ const charts = (() => {
     return [low, high];
   }
 
+  // uPlot leaves a gap where there is no value, but joins over nan.
+  const withGaps = (values) =>
+    (values.every(Number.isFinite) ? values : Array.from(values, (value) => (Number.isFinite(value) ? value : null)));
+
   const scaleOf = (place, keys) => Math.min(...keys.map((key) => place.samples.scale(key)));
 
   // An axis; `exponents` receives the power of ten that its marks are in.
@@ -133,7 +137,7 @@ const charts = (() => {
     };
     const chart = {
       refresh() {
-        u.setData([samples.times(), ...samples.columns(spec.y)], true);
+        u.setData([samples.times(), ...samples.columns(spec.y).map(withGaps)], true);
         chart.mark();
       },
       mark() {
@@ -246,7 +250,10 @@ const charts = (() => {
     const pixel = (x, y) => [(x - shown.x[0]) * across(), (shown.y[1] - y) * down()];
     const value = (left, top) => [shown.x[0] + left / across(), shown.y[1] - top / down()];
 
+    const current = () => { [xs, ...ys] = samples.columns([spec.x, ...spec.y]); };
+
     function putDots(name, t) {
+      current(); // a live run goes on between two drawings
       dots.forEach((dot, k) => {
         const [left, top] = t === null || !xs.length ? [NaN, NaN]
           : pixel(samples.valueAt(xs, t), samples.valueAt(ys[k], t));
@@ -259,12 +266,15 @@ const charts = (() => {
 
     // The time at which the curves come nearest to a place; of several passes the one next to the mark.
     function nearestTime(left, top) {
+      current();
       const [times, now] = [samples.times(), place.mark()];
       const [kx, ky] = [across(), down()];
       const [x, y] = value(left, top);
       const far = (i, k) => Math.hypot((xs[i] - x) * kx, (ys[k][i] - y) * ky);
       let [least, best] = [Infinity, null];
-      for (let i = 0; i < times.length; i += 1) for (let k = 0; k < ys.length; k += 1) least = Math.min(least, far(i, k));
+      for (let i = 0; i < times.length; i += 1) {
+        for (let k = 0; k < ys.length; k += 1) if (far(i, k) < least) least = far(i, k);
+      }
       for (let i = 0; i < times.length; i += 1) {
         for (let k = 0; k < ys.length; k += 1) {
           if (far(i, k) > least + NEAR) continue;
@@ -276,7 +286,7 @@ const charts = (() => {
 
     const chart = {
       refresh() {
-        [xs, ...ys] = samples.columns([spec.x, ...spec.y]);
+        current();
         shown = zoom ?? whole();
         u.setData([null, ...ys.map((column) => [xs, column])], true);
         chart.mark();

@@ -29,13 +29,14 @@ const makeSamples = (channels, { span = Infinity, spacing = 0, most = 2 ** 23 } 
     sizes.clear();
   };
 
-  // A run that is known whole: t (n), y (n ny). `held` tells for each sample whether a contact is held.
+  // A run that is known whole: t (n), y (n ny). `held` tells for each sample whether a contact is held;
+  // without it one may be wherever there are contacts.
   samples.set = (t, y, p = [], u = [], held = null) => {
     samples.clear();
     width = t.length ? y.length / t.length : 0;
     [times, states, capacity] = [t, y, t.length];
     const values = [false, true].map((known) => ({ p: copy(p), u: copy(u), held: known }));
-    given = Array.from(t, (_, i) => values[held?.[i] ? 1 : 0]);
+    given = Array.from(t, (_, i) => values[(held ? held[i] : channels.mayHold) ? 1 : 0]);
     samples.end = t.length;
     if (t.length) start = rowOf(0);
   };
@@ -66,7 +67,7 @@ const makeSamples = (channels, { span = Infinity, spacing = 0, most = 2 ** 23 } 
   }
 
   // One more sample of a live run; whether it is kept. An earlier time begins a new run.
-  samples.append = (t, y, p = [], u = [], held = false) => {
+  samples.append = (t, y, p = [], u = [], held = channels.mayHold) => {
     if (samples.end > samples.first) {
       const last = times[at(samples.end - 1)];
       if (t < last) samples.clear();

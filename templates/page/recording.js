@@ -4,7 +4,12 @@
 const makeRecorder = (data, channels, { megabytes = 64 } = {}) => {
   const samples = makeSamples(channels, { most: megabytes * 131072 });
   const recorder = { recording: false, samples, onChange: null };
-  const tell = () => recorder.onChange?.(recorder);
+  const TELLING = 200; // ms between calls of onChange while it records
+  let told = 0;
+  function tell() {
+    told = performance.now();
+    recorder.onChange?.(recorder);
+  }
 
   Object.defineProperties(recorder, {
     rows: { get: () => samples.end },
@@ -24,11 +29,12 @@ const makeRecorder = (data, channels, { megabytes = 64 } = {}) => {
   };
 
   // One step. A run that begins again, or a full memory, ends the record.
-  recorder.append = (t, y, p, u, held = false) => {
+  recorder.append = (t, y, p, u, held) => {
     if (!recorder.recording) return;
     const began = samples.end && t < samples.times()[samples.end - 1];
     if (!began) samples.append(t, y, p, u, held);
     if (began || samples.full) recorder.stop();
+    else if (performance.now() - told > TELLING) tell();
   };
 
   const columnName = (key) => (channels.states.includes(key) ? key : key.replaceAll(".", "_"));
