@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.files import write_whole
-from eomgen.scene.look import Shape, number
+from eomgen.scene.look import BARE, Shape, number
 from eomgen.show.formulas import plain_data
 from eomgen.show.motion import Array, Motion, thinned
 from eomgen.show.solid import Indices, solids
@@ -86,6 +86,7 @@ def _in_plane(shape: Shape) -> dict[str, Any]:
     """A shape with its centre, which is the origin if the scene gives none."""
     table: dict[str, Any] = plain_data(shape, number)
     table.pop("orientation_deg", None)
+    table["color"] = table["color"] or BARE
     if "center" in table:
         table["center"] = table["center"] or [0.0, 0.0]
     return table

@@ -7,6 +7,7 @@ rails and stops follow their axes.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,14 +45,14 @@ class Stroke:
 
     weight  width relative to that of an ordinary line
     dashed  whether it shows something that is no thing
-    behind  whether it is behind the bodies
+    layer   behind all bodies, behind them at the last time, or in front of them
     """
 
     points: Array
     weight: float = 1.0
     closed: bool = False
     dashed: bool = False
-    behind: bool = False
+    layer: Literal["back", "middle", "front"] = "front"
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,16 +244,15 @@ def _support(sight: Sight, support: Support) -> Iterator[Stroke]:
     if support.kind == "base":
         top = sight.seen(middle)
         y = r if support.axis is not None and number(support.axis[-1]) > 0 else -r
-        yield Stroke(
-            top + np.array([[0.0, 0.0], [-0.75 * r, y], [0.75 * r, y]]), closed=True, behind=True
-        )
-        yield Stroke(top + np.array([[-1.3 * r, y], [1.3 * r, y]]), 1.3, behind=True)
+        corners = np.array([[0.0, 0.0], [-0.75 * r, y], [0.75 * r, y]])
+        yield Stroke(top + corners, closed=True, layer="middle")
+        yield Stroke(top + np.array([[-1.3 * r, y], [1.3 * r, y]]), 1.3, layer="middle")
         for x in np.linspace(-1.1, 1.3, 7) * r:
-            yield Stroke(top + np.array([[x, y], [x - 0.4 * r, 1.45 * y]]), 0.6, behind=True)
+            yield Stroke(top + np.array([[x, y], [x - 0.4 * r, 1.45 * y]]), 0.6, layer="middle")
     elif support.axis is not None and support.low is not None and support.high is not None:
         along = sight.outward(support.body, np.array(numbers(support.axis)))
         ends = np.outer([number(support.low), number(support.high)], along) + middle
-        yield Stroke(sight.seen(ends), 1.6, behind=True)
+        yield Stroke(sight.seen(ends), 1.6, layer="back")
 
 
 def _ball(sight: Sight, ball: Ball) -> Iterator[Stroke]:
