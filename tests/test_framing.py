@@ -17,6 +17,8 @@ from eomgen.show.picture import Picture, picture_of
 from eomgen.show.view import eye_axes
 
 GENERATED = Path(__file__).parent.parent / "generated"
+POSED = sorted(p.stem for p in GENERATED.glob("*.py") if "def body_poses" in p.read_text("utf-8"))
+"""Built-in scenes with committed modules that give poses."""
 UNTUNED = Path(__file__).parent / "untuned"
 FILLED = 1 / 3
 """Part of the picture's height or width that bodies fill in the course of a motion."""
@@ -69,14 +71,25 @@ def motion(name: str) -> np.ndarray:
     return np.moveaxis(np.asarray(module.body_poses(run.t, run.y)), -1, 0)
 
 
-@pytest.mark.parametrize("name", built_in_names())
+@pytest.mark.parametrize("name", POSED)
 def test_bodies_are_in_the_picture_and_fill_it(name: str) -> None:
+    """Scenes whose modules are committed."""
+    Scene(name).check(motion(name))
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", built_in_names())
+def test_bodies_are_in_the_picture_in_whole_runs(name: str) -> None:
     """Every built-in scene, none of which says where its camera is."""
-    scene = Scene(name)
-    camera = scene.appearance.camera
-    assert camera.center is None and camera.height is None and camera.follow is None
-    if hasattr(eomgen.load(GENERATED / f"{name}.py"), "body_poses"):
-        scene.check(motion(name))
+    scene, run = Scene(name), eomgen.simulate(name)
+    assert scene.check(run.motion.poses) == run.motion.camera
+
+
+def test_no_built_in_scene_needs_a_place_for_its_camera() -> None:
+    """At most a direction in space."""
+    for name in built_in_names():
+        given = eomgen.read(name).camera.model_fields_set
+        assert given <= {"azimuth_deg", "elevation_deg"}, name
 
 
 def flight(scene: Scene, distance: float) -> np.ndarray:
