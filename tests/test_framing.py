@@ -37,7 +37,7 @@ class Scene:
     def view(self, poses: np.ndarray) -> tuple[View, Picture, np.ndarray]:
         """The view of poses, the picture with numbers, and the eye's axes."""
         camera, model = self.appearance.camera, self.model
-        drawn = picture_of(model, self.appearance, spread(poses)).valued(model.value)
+        drawn = picture_of(model, self.appearance, spread(poses)).valued(model.defaults)
         flat = model.dimensions == 2
         eye = np.eye(3) if flat else eye_axes(camera.azimuth_deg, camera.elevation_deg)
         shapes, names = [b.shapes for b in drawn.bodies], [b.name for b in drawn.bodies]

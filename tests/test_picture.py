@@ -74,7 +74,7 @@ def test_links_reach_their_joints_at_any_parameters(name: str) -> None:
     for _ in range(5):
         lengths = {p.name: p.default for p in model.parameters if p.unit == "m" or p.name == "l"}
         values = {name: value * random.uniform(0.3, 3.0) for name, value in lengths.items()}
-        drawn = picture.valued(model.with_parameters(values).value)
+        drawn = picture.valued({**model.defaults, **values})
         poses = module.body_poses(0.0, random.uniform(-2, 2, len(module.STATES)), values)
         for joint in drawn.joints:
             pin = world_points(poses[np.newaxis], joint.child, np.array(numbers(joint.at_child)))
@@ -117,7 +117,7 @@ def moments_of(shape: Any) -> np.ndarray:
 def test_a_solid_has_the_inertia_of_its_body(inertia: list[float]) -> None:
     """If it were filled evenly with the body's mass."""
     model, picture = lone(inertia)
-    found = moments_of(picture.valued(model.value).bodies[0].shapes[0])
+    found = moments_of(picture.valued(model.defaults).bodies[0].shapes[0])
     xx, yy, zz, xy, xz, yz = [*inertia, 0.0, 0.0, 0.0][:6]
     np.testing.assert_allclose(found, [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], atol=1e-12)
 
@@ -158,9 +158,9 @@ SHAPED = 'shapes = [{ type = "box", size = ["2*l", "w"] }, { type = "disc", radi
 def test_formulas_in_shapes_follow_the_parameters() -> None:
     """In figures, and in the page's data through its geometry; definitions work too."""
     text = FREE.format(n=2, inertia=0.7, shapes=SHAPED) + '[definitions]\nw = "l**2"\n'
-    model, picture = picture_in(text)
+    picture = picture_in(text)[1]
     for length in (0.5, 1.5):
-        shapes = picture.valued(model.with_parameters({"l": length}).value).bodies[0].shapes
+        shapes = picture.valued({"l": length}).bodies[0].shapes
         assert isinstance(shapes[0], Box) and numbers(shapes[0].size) == (2 * length, length**2)
         assert isinstance(shapes[1], Disc) and number(shapes[1].radius) == length
     data, geometry = picture_data(picture)
@@ -187,12 +187,7 @@ def test_data_with_its_geometry_is_the_picture(name: str | Path) -> None:
     data, geometry = picture_data(picture)
     values = {p.name: 1.25 * p.default for p in model.parameters}
     found = resolved(json.loads(json.dumps(data)), geometry_values(geometry, values))
-
-    def value(formula: Any) -> float:
-        return geometry_values((formula,), values)[0]
-
-    expected = picture_data(picture.valued(value))[0]
-    assert found == expected
+    assert found == picture_data(picture.valued(values))[0]
 
 
 def test_every_effect_is_drawn() -> None:
@@ -216,7 +211,7 @@ def effects() -> tuple[Any, ...]:
 def with_case(case: Case) -> tuple[Model, Picture]:
     """The model of a case and its picture."""
     model, picture = picture_in(case.text())
-    drawn = picture.valued(model.value)
+    drawn = picture.valued(model.defaults)
     n = model.dimensions
     pose = np.eye(3, 4)[np.newaxis] if n == 3 else np.zeros((1, 3))
     pose = np.repeat(pose, len(model.bodies), axis=0)
@@ -229,7 +224,7 @@ def test_springs_end_where_they_are_held() -> None:
     """The lines of a coil and of a slack rope begin and end at the spring's points."""
     for name, held in (("mass_on_spring", 0.3), ("swing", 0.9)):
         model = eomgen.check(UNTUNED[0].with_name(f"{name}.toml"))
-        drawn = picture_of(model, Appearance()).valued(model.value)
+        drawn = picture_of(model, Appearance()).valued(model.defaults)
         pose = np.array([[0.0, held, 0.0]])
         if model.dimensions == 3:
             pose = np.eye(3, 4)[np.newaxis] + np.array([0, 0, 0, held])

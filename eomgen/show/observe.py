@@ -53,7 +53,7 @@ def observe(
     if works is not None:
         effects, works = works_by_type(model, effects, works)
     picture = with_run(picture_of(model, appearance, spread(poses)), model, poses)
-    drawn = picture.valued(model.value)
+    drawn = picture.valued(model.defaults, float(trajectory.t[-1]))
     shapes = tuple(body.shapes for body in drawn.bodies)
     camera = appearance.camera
     eye = eye_axes(camera.azimuth_deg, camera.elevation_deg)

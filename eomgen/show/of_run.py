@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from eomgen.language.formula import Constant, Formula
 from eomgen.model.model import Model
 from eomgen.scene.look import number, numbers
-from eomgen.show.elements import Attraction, Ball, Element, Field, Link, Support
+from eomgen.show.arrows import field_arrows, region_of, wind_at
+from eomgen.show.elements import Attraction, Ball, Element, Field, Link, Support, Wind
 from eomgen.show.formulas import constant
 from eomgen.show.picture import Picture
 
@@ -19,14 +20,20 @@ BEYOND = 0.35
 
 
 def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
-    """The picture with rails as long as the ways of sliders at the poses of a run, and marks of the
-    ground on the other side of what they hold.
+    """The picture with rails as long as the ways of sliders at the poses of a run, marks of the
+    ground on the other side of what they hold, and arrows of fields where bodies move.
     """
     finite = np.isfinite(poses.reshape(len(poses), -1)).all(axis=1)
     if not finite.any():
         return picture
 
+    region = region_of(places_of(poses[finite]).reshape(-1, model.dimensions))
+
     def ranged(element: Element) -> Element:
+        if isinstance(element, Field):
+            return field_arrows(element, model, *region)
+        if isinstance(element, Wind):
+            return wind_at(element, model, (region[0] + region[1]) / 2)
         if not isinstance(element, Support):
             return element
         if element.kind == "base":
@@ -39,10 +46,15 @@ def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
     return replace(picture, elements=tuple(map(ranged, picture.elements)))
 
 
+def places_of(poses: Array) -> Array:
+    """The positions (n, nb, d) of centres of mass at poses, m."""
+    return poses[..., :2] if poses.ndim == 3 else poses[..., 3]
+
+
 def spread(poses: Array) -> float:
     """The size of the region in which centres of mass move, m; 0 if no pose is finite."""
     finite = np.isfinite(poses.reshape(len(poses), -1)).all(axis=1)
-    places = (poses[..., :2] if poses.ndim == 3 else poses[..., 3])[finite]
+    places = places_of(poses)[finite]
     if not len(places):
         return 0.0
     return float(np.ptp(places.reshape(-1, places.shape[-1]), axis=0).max())

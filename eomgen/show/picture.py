@@ -1,11 +1,12 @@
 """What is drawn of a mechanism: bodies, joints, effects and traces, as formulas of parameters."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eomgen.language.formula import ZERO, Constant, Formula
+from eomgen.language.conditions import value_of
+from eomgen.language.formula import ZERO, Constant
 from eomgen.model.frames import from_centre
 from eomgen.model.model import Body, Model
 from eomgen.scene.appearance import Appearance
@@ -14,7 +15,15 @@ from eomgen.scene.look import Polygon, Rod, Shape
 from eomgen.show.body_points import BodyPoints, points_of, typical_length
 from eomgen.show.colours import body_colours
 from eomgen.show.effect_elements import SYMBOL, elements_of
-from eomgen.show.elements import WORLD_INDEX, Attraction, Element, Field, Support, Vector
+from eomgen.show.elements import (
+    WORLD_INDEX,
+    Attraction,
+    Element,
+    Field,
+    Support,
+    Vector,
+    without_formula,
+)
 from eomgen.show.formulas import constant, valued
 from eomgen.show.invented import invented_shapes, inventor_of
 from eomgen.show.joint_axes import joint_axis
@@ -73,9 +82,14 @@ class Picture:
     traces: tuple[Trace, ...]
     size: float
 
-    def valued(self, evaluate: Callable[[Formula], float]) -> "Picture":
-        """The same with numbers in place of formulas."""
-        return valued(self, evaluate)
+    def valued(self, values: Mapping[str, float], t: float = 0.0) -> "Picture":
+        """The same with numbers for formulas, at these parameters and a time; nan where undefined.
+
+        Formulas of fields and wind, which may depend on the motion, are left out.
+        """
+        known = {**values, "t": t}
+        elements = tuple(without_formula(element) for element in self.elements)
+        return valued(replace(self, elements=elements), lambda formula: value_of(formula, known))
 
 
 def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Picture:
@@ -116,7 +130,7 @@ def _is_landmark(element: Element) -> bool:
 
 def shapes_of(model: Model, appearance: Appearance) -> tuple[tuple[Shape, ...], ...]:
     """The shapes of every body at the model's values of the parameters."""
-    picture = picture_of(model, appearance).valued(model.value)
+    picture = picture_of(model, appearance).valued(model.defaults)
     return tuple(body.shapes for body in picture.bodies)
 
 

@@ -24,6 +24,8 @@ from eomgen.show.elements import (
     Link,
     Pull,
     Support,
+    Vector,
+    Wind,
 )
 from eomgen.show.of_run import world_points
 from eomgen.show.picture import DrawnJoint, Picture
@@ -101,6 +103,10 @@ def _strokes(sight: Sight, element: Element) -> Iterator[Stroke]:
             yield from _ball(sight, element)
         case Field(center=center) if center is not None:
             yield from _center(sight, sight.seen(np.array(numbers(center))))
+        case Field():
+            yield from _arrows(sight, element.points, element.forces)
+        case Wind(velocity=velocity) if velocity is not None:
+            yield from _wind(sight, element.at, velocity)
         case Pull():
             middle = sight.seen(sight.world(element.body, element.at))
             yield Stroke(middle + 0.03 * sight.picture.size * circle(12), closed=True)
@@ -266,6 +272,44 @@ def _ball(sight: Sight, ball: Ball) -> Iterator[Stroke]:
         for spoke in angle + np.arange(3) * np.pi / 3:
             ray = radius * np.array([math.cos(spoke), math.sin(spoke)])
             yield Stroke(np.array([middle - ray, middle + ray]), 0.6)
+
+
+def _arrows(sight: Sight, points: Sequence[Vector], vectors: Sequence[Vector]) -> Iterator[Stroke]:
+    """Vectors at points of a grid; the longest is almost as long as the points are apart."""
+    if len(points) < 2:
+        return
+    places = np.array([numbers(point) for point in points])
+    long = np.array([numbers(vector) for vector in vectors])
+    apart = np.linalg.norm(places[1:] - places[0], axis=1).min()
+    longest = np.linalg.norm(long, axis=1).max()
+    if not (np.isfinite(longest) and longest > 0):
+        return
+    for place, vector in zip(places, long * (0.8 * apart / longest), strict=True):
+        start, end = sight.seen(np.array([place - vector / 2, place + vector / 2]))
+        yield from arrow(start, end, 0.7)
+
+
+def _wind(sight: Sight, at: Vector, velocity: Vector) -> Iterator[Stroke]:
+    """Parallel arrows beside a point."""
+    along = sight.seen(np.array(numbers(velocity)))
+    speed = float(np.linalg.norm(along))
+    if not (np.isfinite(speed) and speed > 0):
+        return
+    along = 0.6 * sight.picture.size * along / speed
+    middle = sight.seen(np.array(numbers(at)))
+    aside = np.array([-along[1], along[0]])
+    for part, shift in ((-0.35, -0.1), (0.0, 0.1), (0.35, -0.1)):
+        start = middle + part * aside + shift * along - along / 2
+        yield from arrow(start, start + along, 1.2)
+
+
+def arrow(start: Array, end: Array, weight: float) -> Iterator[Stroke]:
+    """A line with an open head."""
+    along = end - start
+    aside = np.array([-along[1], along[0]])
+    yield Stroke(np.array([start, end]), weight, layer="back")
+    head = [end - 0.3 * along + 0.15 * aside, end, end - 0.3 * along - 0.15 * aside]
+    yield Stroke(np.array(head), weight, layer="back")
 
 
 def _center(sight: Sight, middle: Array) -> Iterator[Stroke]:
