@@ -21,8 +21,9 @@ from matplotlib.text import Text
 from eomgen import templating
 from eomgen.errors import RunError
 from eomgen.files import is_ours
-from eomgen.scene.look import Box, Disc, Polygon, Rod, numbers
+from eomgen.scene.look import Box, Disc, Polygon, Rod, number, numbers
 from eomgen.show.figure import draw_motion, save_figure
+from eomgen.show.formulas import plain_data
 from eomgen.show.framing import View
 from eomgen.show.motion import Motion, thinned
 from eomgen.show.outlines import outline
@@ -252,7 +253,8 @@ def test_page_holds_the_motion() -> None:
     assert run["camera"]["follow"] == 1 and run["camera"]["height"] == 3.0
     box = {"type": "box", "size": [0.5, 0.2], "center": [0.0, 0.0], "angle": 0.0}
     assert run["shapes"][0] == [{**box, "color": "#4477aa"}]
-    assert run["shapes"][1] == [shape.model_dump(mode="json") for shape in motion.shapes[1]]
+    rod, disc = (plain_data(shape, number) for shape in motion.shapes[1])
+    assert run["shapes"][1] == [{**rod, "color": "#4477aa"}, disc]
     assert run["colors"] == ["#4477aa", "#4477aa"] and run["traced"] == [0, 1]
     assert page.scripts[1].strip() == POSES
     assert "run stopped" not in page.text

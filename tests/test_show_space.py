@@ -21,7 +21,7 @@ from eomgen.errors import SceneError
 from eomgen.program.program import Output, finish
 from eomgen.program.tape import Stage, Tape
 from eomgen.scene.joints.base import Primitive
-from eomgen.scene.look import Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
+from eomgen.scene.look import BARE, Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
 from eomgen.show.figure import draw_motion, save_figure
 from eomgen.show.framing import View
 from eomgen.show.motion import Motion, thinned
@@ -257,7 +257,7 @@ def test_orientation_turns_about_x_then_y_then_z() -> None:
 def test_many_solids_are_coarser_and_alike_ones_shared() -> None:
     one = solids(((SLIDER,),), 3.0, 4000)
     many = solids(((SLIDER, ARM),) * 100, 3.0, 4000)
-    assert len(many.meshes) == 2 and many.bodies[7] == ((0, SLIDER.color), (1, ARM.color))
+    assert len(many.meshes) == 2 and many.bodies[7] == ((0, SLIDER.color), (1, BARE))
     assert len(many.meshes[0].faces) < len(one.meshes[0].faces)
     assert len(cast_of(many).faces) == 100 * sum(len(m.faces) for m in many.meshes)
     assert solids(((), ()), 3.0, 4000) == Solids((), ((), ()))
@@ -281,7 +281,7 @@ def test_the_eye_stands_where_the_camera_says() -> None:
 def picture(shapes: tuple[Shape, ...], azimuth: float, elevation: float) -> Any:
     """Red, green, blue and cover of some shapes of one body, and the frame they lie in."""
     cast = cast_of(Solids(tuple(mesh(s, 0.05) for s in shapes), (tuple(
-        (k, s.color) for k, s in enumerate(shapes)),)))  # fmt: skip
+        (k, s.color or BARE) for k, s in enumerate(shapes)),)))  # fmt: skip
     sight = look(cast, np.eye(3, 4)[np.newaxis], eye_axes(azimuth, elevation))
     frame = frame_around(sight.faces.reshape(-1, 3)[:, :2], 300)
     return rendered(sight, frame), frame
@@ -517,7 +517,7 @@ def test_page_in_space_holds_the_solids() -> None:
     np.testing.assert_array_equal(unpacked(run["y"], "<f8", (31, 2)), motion.y)
     assert run["anchors"] == [[1, 0.0, 0.0, 0.0]] and run["traced"] == [0, 1]
     assert run["camera"]["azimuth"] == -60.0 and run["camera"]["center"] == [0.0, 0.0, 1.0]
-    assert "shapes" not in run and run["solids"] == [[[0, SLIDER.color]], [[1, ARM.color]]]
+    assert "shapes" not in run and run["solids"] == [[[0, SLIDER.color]], [[1, BARE]]]
     for packed, shape in zip(run["meshes"], (SLIDER, ARM), strict=True):
         faces = unpacked(packed["faces"], "<i2", (-1, 4))
         held = Mesh(unpacked(packed["vertices"], "<f4", (-1, 3)).astype(float), faces.astype(int))

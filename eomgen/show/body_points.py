@@ -18,12 +18,20 @@ Vector = tuple[Formula, ...]
 
 @dataclass
 class BodyPoints:
-    """Points of a body from its centre of mass, without repeats: those of joints, and others at
-    which effects act or that have a name.
+    """Points of a body from its centre of mass, without repeats, and its sizes in contacts.
+
+    joints   points of joints
+    carries  whether another body is joined at its centre of mass
+    others   points at which effects act or that have a name
+    spheres  centre and radius of its spheres in contacts
+    boxes    centre, half sizes and rounding of its boxes in contacts
     """
 
     joints: list[Vector] = field(default_factory=list)
     others: list[Vector] = field(default_factory=list)
+    carries: bool = False
+    spheres: list[tuple[Vector, Formula]] = field(default_factory=list)
+    boxes: list[tuple[Vector, Vector, Formula]] = field(default_factory=list)
 
 
 def points_of(model: Model) -> list[BodyPoints]:
@@ -42,6 +50,8 @@ def points_of(model: Model) -> list[BodyPoints]:
         if not isinstance(body.joint, Free):
             add(body.name, body.joint.r_child, "joints")
             add(body.joint.parent, body.joint.r_parent, "joints")
+            if body.parent >= 0 and not length_of(model, body.joint.r_parent):
+                found[body.parent].carries = True
     for point in model.points:
         add(model.bodies[point.body].name, point.at, "others")
     for effect in model.effects:
@@ -51,9 +61,27 @@ def points_of(model: Model) -> list[BodyPoints]:
                 add(effect.body_2, effect.at_2, "others")
             case ExternalForce():
                 add(effect.body, effect.at, "others")
-            case BodyContact(body=str(name), corners=None):
-                add(name, effect.at, "others")
+            case BodyContact():
+                _add_sizes(model, found, index, effect)
+                if effect.body is not None and effect.corners is None:
+                    add(effect.body, effect.at, "others")
     return found
+
+
+def _add_sizes(
+    model: Model, found: list[BodyPoints], index: dict[str, int], contact: BodyContact
+) -> None:
+    """Note the spheres or boxes of the bodies of a contact; points and repeats are left out."""
+    listed = (contact.body,) if contact.body is not None else contact.bodies or ()
+    for name in index if listed == "all" else listed:
+        if name is None or name == contact.other:
+            continue
+        own, radius = found[index[name]], contact.radii.get(name, contact.radius)
+        if contact.corners is not None:
+            if (box := (contact.at, contact.corners, radius)) not in own.boxes:
+                own.boxes.append(box)
+        elif is_drawn(model.value(radius)) and not any(contact.at == at for at, _ in own.spheres):
+            own.spheres.append((contact.at, radius))
 
 
 def length_of(model: Model, vector: Vector) -> float:

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Literal
 
-from eomgen.language.formula import ZERO, Constant, Formula, names_in
+import numpy as np
+
+from eomgen.language.formula import ZERO, Constant, Formula
 from eomgen.model.model import Model, dofs_of
 from eomgen.scalars.exact import direction
 from eomgen.scene.effects import (
@@ -28,6 +30,7 @@ from eomgen.scene.effects import (
 from eomgen.scene.effects.bodies import OnBodies
 from eomgen.scene.effects.dofs import OnCoordinate
 from eomgen.scene.joints.base import WORLD, spatial
+from eomgen.show.arrows import wind_at
 from eomgen.show.elements import (
     WORLD_INDEX,
     AtJoint,
@@ -79,11 +82,6 @@ class _Names:
         """Radius of a symbol at a joint, m."""
         return Constant(SYMBOL * self.size)
 
-    def is_drawn(self, *formulas: Formula) -> bool:
-        """Whether formulas depend on parameters and time only."""
-        known = {"t", *self.model.defaults}
-        return all(name in known for formula in formulas for name in names_in(formula))
-
     def points(self, effect: OnBodies) -> Iterator[tuple[int, Vector]]:
         """The points that an effect acts on."""
         if effect.points is not None:
@@ -120,7 +118,9 @@ def _of_effect(effect: Effect, names: _Names) -> Iterator[Element]:
             yield from _field(effect, names)
         case Drag():
             if any(part != ZERO for part in effect.wind):
-                yield Wind(effect.name, effect.wind if names.is_drawn(*effect.wind) else None)
+                origin = constant(*[0.0] * names.model.dimensions)
+                wind = Wind(effect.name, origin, formula=effect.wind)
+                yield wind_at(wind, names.model, np.zeros(names.model.dimensions))
         case PointGravity():
             pulled = tuple(
                 k
@@ -205,7 +205,7 @@ def _field(field: ForceField, names: _Names) -> Iterator[Element]:
             "obstacle", field.name, WORLD_INDEX, field.center, field.radius, reach=field.reach
         )
     elif field.kind == "formula":
-        yield Field(field.name, field.kind)
+        yield Field(field.name, field.kind, formula=field.force)
     else:
         yield Field(field.name, field.kind, field.center)
 

@@ -5,7 +5,7 @@ the body's centre of mass in body axes, or from the world's origin, m. A body is
 the world; a joint is the index of its child.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from eomgen.language.formula import Formula
@@ -92,9 +92,10 @@ class Plane:
 
 @dataclass(frozen=True)
 class Field:
-    """A force field about a centre, or arrows of a field that a formula gives.
+    """A force field about a centre, or the force that a formula gives on a point at rest.
 
-    `points` and `forces` are the ends of arrows and the forces on a point at rest there, N.
+    `points` are where pictures show it by arrows, m, world axes, and `forces` what it is there, N.
+    `formula` is that of the scene, with the point's position x, y, z and velocity vx, vy, vz.
     """
 
     kind: ClassVar[str] = "field"
@@ -103,15 +104,22 @@ class Field:
     center: Vector | None = None
     points: tuple[Vector, ...] = ()
     forces: tuple[Vector, ...] = ()
+    formula: Vector | None = None
 
 
 @dataclass(frozen=True)
 class Wind:
-    """A fluid's `velocity`, m/s, world axes; None if it is no formula of parameters and time."""
+    """A fluid's velocity, m/s, world axes, which pictures show at the point `at`, m.
+
+    `formula` is that of the scene, as of a field; `velocity` is its value at that point, None if it
+    depends on more than parameters and time.
+    """
 
     kind: ClassVar[str] = "wind"
     effect: str
-    velocity: Vector | None
+    at: Vector
+    velocity: Vector | None = None
+    formula: Vector | None = None
 
 
 @dataclass(frozen=True)
@@ -164,3 +172,8 @@ class Support:
 
 
 Element = Link | AtJoint | Ball | Plane | Field | Wind | Attraction | Pull | Weight | Support
+
+
+def without_formula(element: Element) -> Element:
+    """An element without the formula of a scene, which may depend on the motion."""
+    return replace(element, formula=None) if isinstance(element, Field | Wind) else element

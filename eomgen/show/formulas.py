@@ -1,6 +1,6 @@
 """Quantities in what is drawn: evaluation, and replacement by places in a list of formulas."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
@@ -46,6 +46,16 @@ def plain_data(value: Any, change: Callable[[Formula], Any]) -> Any:
     if names:
         return {name: plain_data(getattr(value, name), change) for name in names}
     return value
+
+
+def with_names(formula: Formula, names: Mapping[str, Formula]) -> Formula:
+    """A formula with formulas in place of some names."""
+    match formula:
+        case Name(name):
+            return names.get(name, formula)
+        case Apply(operation, operands):
+            return Apply(operation, tuple(with_names(part, names) for part in operands))
+    return formula
 
 
 def times(factor: float, formula: Formula) -> Formula:

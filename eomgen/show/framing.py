@@ -21,6 +21,8 @@ SMALL = 0.36
 the whole motion, the camera follows."""
 FEWEST, SOUNDINGS = 60, 300
 """Number of samples at which the bounds of the bodies are found, with many points and with few."""
+ALONE = 1.6
+"""A view that follows a single body is so much larger than one of a mechanism."""
 GAIN = 1.3
 """It follows only if bodies are then larger by this factor."""
 WIDEST = 4.0
@@ -65,14 +67,14 @@ class Bounds:
     high: Array  # (n, 2)
     centres: Array  # (n, nb, 2)
 
-    def view(self, centre: Array | None = None) -> tuple[Array, Array]:
-        """Centre and size of the least rectangle around all bodies at all times; relative to
-        `centre` (n, 2), which is then its middle, if given.
+    def view(self, body: int | None = None, fixed: Array | None = None) -> tuple[Array, Array]:
+        """Centre and size of the least rectangle around all bodies at all times, and the points
+        `fixed` (k, 2); relative to the centre of mass of `body`, if given.
         """
-        if centre is None:
-            low, high = self.low.min(axis=0), self.high.max(axis=0)
-            return (low + high) / 2, high - low
-        low, high = (self.low - centre).min(axis=0), (self.high - centre).max(axis=0)
+        moving = 0.0 if body is None else self.centres[:, body]
+        low, high = (self.low - moving).min(axis=0), (self.high - moving).max(axis=0)
+        if fixed is not None and len(fixed):
+            low, high = np.minimum(low, fixed.min(axis=0)), np.maximum(high, fixed.max(axis=0))
         return (low + high) / 2, high - low
 
     def least_share(self, size: Array) -> float:
@@ -115,12 +117,18 @@ def bounds_of(
 def framed(
     camera: Camera,
     bodies: Sequence[str],
-    parents: Sequence[int],
+    leading: Sequence[int],
     shapes: Sequence[Sequence[Shape]],
     poses: Array,
     eye: Array,
+    fixed: Array,
 ) -> View:
-    """The view of a motion by a camera of a scene; `parents` are the indices of the bodies'."""
+    """The view of a motion by a camera of a scene.
+
+    `leading` are the bodies that a camera may follow: those that translate in the world. `fixed`
+    are points (k, d) of the world that the view of a whole motion shows too, m, world axes: what
+    springs hold to and the like. With any of them the whole motion is shown unless asked otherwise.
+    """
     finite = np.isfinite(poses.reshape(len(poses), -1)).all(axis=1)
     poses = poses[finite]
     dimensions = poses.ndim - 1
@@ -135,7 +143,7 @@ def framed(
     if not len(poses):
         return given
     bounds = bounds_of(shapes, poses, eye)
-    middle, size = bounds.view()
+    middle, size = bounds.view(fixed=fixed if dimensions == 2 else (fixed @ eye.T)[:, :2])
     depth = float((poses[..., 3] @ eye[2]).mean()) if dimensions == 3 else 0.0
     followed = None if camera.follow is None else bodies.index(camera.follow)
     mode = camera.mode
@@ -144,13 +152,14 @@ def framed(
     elif mode is None and (camera.center is not None or camera.height is not None):
         mode = "fixed"
     elif mode is None:
-        followed = _worth_following(bounds, size, parents)
+        followed = None if len(fixed) else _worth_following(bounds, size, leading)
         mode = "fit" if followed is None else "follow"
     if mode == "follow":
         if followed is None:
-            followed = _steadiest(bounds, parents)
-        centre = bounds.centres[:, followed]
-        offset, size = bounds.view(centre)
+            followed = _steadiest(bounds, leading or range(len(bodies)))
+        offset, size = bounds.view(followed)
+        if len(bodies) == 1:
+            size = size * ALONE
         center = camera.center or _world(offset, 0.0, eye, dimensions)
         return _sized(given, camera, mode, center, size, bodies[followed])
     center = camera.center or _world(middle, depth, eye, dimensions)
@@ -184,27 +193,26 @@ def _sized(
     )
 
 
-def _worth_following(bounds: Bounds, size: Array, parents: Sequence[int]) -> int | None:
+def _worth_following(bounds: Bounds, size: Array, leading: Sequence[int]) -> int | None:
     """The body to follow, if the bodies are small in a view of the whole motion and larger in one
     that follows.
     """
     share = bounds.least_share(size)
-    if share >= SMALL:
+    if share >= SMALL or not leading:
         return None
-    body = _steadiest(bounds, parents)
-    _, followed = bounds.view(bounds.centres[:, body])
+    body = _steadiest(bounds, leading)
+    _, followed = bounds.view(body)
     return body if bounds.least_share(followed) > GAIN * share else None
 
 
-def _steadiest(bounds: Bounds, parents: Sequence[int]) -> int:
-    """The body attached to the world around which all bodies need the smallest view."""
-    roots = [k for k, parent in enumerate(parents) if parent < 0]
+def _steadiest(bounds: Bounds, leading: Sequence[int]) -> int:
+    """The body around which all bodies need the smallest view."""
 
     def height(body: int) -> float:
-        _, size = bounds.view(bounds.centres[:, body])
+        _, size = bounds.view(body)
         return max(float(size[1]), float(size[0]) / ASPECT)
 
-    return min(roots, key=height)
+    return min(leading, key=height)
 
 
 def _world(seen: Array, near: float, eye: Array, dimensions: int) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from eomgen.scene.joints.base import spatial
 from eomgen.scene.look import Box, Cylinder, Disc, Rod, Shape, Sphere
 from eomgen.show.body_points import BodyPoints, Vector, gyration, is_drawn, length_of
 from eomgen.show.colours import shade
-from eomgen.show.formulas import constant, scaled, sum_of
+from eomgen.show.formulas import constant, scaled, sum_of, times, total
 from eomgen.show.solid import angles_of, rotation_to
 
 Array = NDArray[np.float64]
@@ -33,12 +33,18 @@ BOB = 0.3
 joint is drawn as a bob at the end of a rod."""
 LONGEST = 1.6
 """The far end of a link is at most so much farther from its centre of mass than the joint is."""
+THICK = 0.5
+"""A body in space is a rod if its second extent is at most this part of its first."""
 STRAIGHT = 0.15
 """A link is straight if its centre of mass is at most this part of its length beside its axis."""
-CARRIAGE = (0.42, 0.26, 0.3)
+CARRIAGE = (0.34, 0.26, 0.3)
 """Size of a carriage along its rail and across, relative to the mechanism's size."""
 ASPECT = 1.7
 """Length to width of a planar body of which only the moment of inertia is known."""
+ALIKE = 1e-6
+"""Principal moments count as equal if they differ by less than this part of the largest."""
+SPECK = (0.02, 0.06)
+"""Least and greatest half extent of a body without joints in a region of size 1."""
 PARTICLE = 0.09
 """Radius of a particle relative to the mechanism's size."""
 
@@ -47,13 +53,15 @@ PARTICLE = 0.09
 class Inventor:
     """What all bodies of a model share.
 
-    size  typical length, m
-    mass  median mass, kg
+    size    typical length, m
+    mass    median mass, kg
+    extent  least and greatest half extent of bodies without joints, m
     """
 
     model: Model
     size: float
     mass: float
+    extent: tuple[float, float] = (0.0, math.inf)
 
     def number(self, body: Body) -> float:
         """How much larger than a median body it is drawn, for its mass."""
@@ -63,10 +71,16 @@ class Inventor:
         return min(WIDEST, max(NARROWEST, float(np.cbrt(mass / self.mass))))
 
 
-def inventor_of(model: Model, size: float) -> Inventor:
-    """The inventor of shapes for a model's bodies."""
+def inventor_of(model: Model, size: float, spread: float) -> Inventor:
+    """The inventor of shapes for a model's bodies.
+
+    `spread` is the size of the region in which bodies move, m, if pictures are to show all of it;
+    else 0.
+    """
     masses = [model.value(body.mass) for body in model.bodies]
-    return Inventor(model, size, median([m for m in masses if m > 0] or [0.0]))
+    mass = median([m for m in masses if m > 0] or [0.0])
+    extent = (SPECK[0] * spread, SPECK[1] * spread) if spread > 0 else (0.0, math.inf)
+    return Inventor(model, size, mass, extent)
 
 
 def invented_shapes(
@@ -75,17 +89,54 @@ def invented_shapes(
     """The shapes of a body: rods to its joints, and a solid where it has an extent of its own."""
     model = inventor.model
     arms = [r for r in points.joints if is_drawn(length_of(model, r))]
-    if isinstance(body.joint, Prismatic | Cylindrical):
+    touching = [*_touching(inventor, body, points, color)]
+    if touching:
+        shapes = [*_rods(inventor, body, arms, color), *touching]
+    elif isinstance(body.joint, Prismatic | Cylindrical):
         shapes = [*_rods(inventor, body, arms, color), *_slider(inventor, body, color)]
     elif not arms:
         shapes = [*_alone(inventor, body, points, color)]
-    elif len(arms) == 1 and len(points.joints) == 1:
+    elif len(arms) == 1 and len(points.joints) == 1 and not _is_thick(model, body, arms[0]):
         shapes = [*_pendulum(inventor, body, arms[0], points.others, color)]
     elif len(arms) == 2 and _is_straight(model, arms):
         shapes = [_rod(inventor, body, arms[0], arms[1], color)]
     else:
-        shapes = [*_rods(inventor, body, arms, color), *_hub(inventor, body, arms, color)]
+        shapes = [*_rods(inventor, body, arms, color), *_hub(inventor, body, points, arms, color)]
     return (*shapes, *_barrel(inventor, body, arms, color))
+
+
+def _touching(inventor: Inventor, body: Body, points: BodyPoints, color: str) -> Iterator[Shape]:
+    """The spheres and boxes with which a body touches others, and a mark that shows rotation."""
+    model = inventor.model
+    dark = shade(color)
+    for at, corners, rounding in points.boxes:
+        size = tuple(times(2.0, total(half, rounding)) for half in corners)
+        yield Box(type="box", size=size, center=at, color=color)
+    for at, radius in points.spheres if not points.boxes else ():
+        if is_drawn(length_of(model, at)):
+            continue  # a foot or the like, at the end of a rod
+        end = (total(at[0], times(0.72, radius)), *at[1:])
+        if model.dimensions == 2:
+            yield Disc(type="disc", radius=radius, center=at, color=color)
+            width = times(0.16, radius)
+            yield Rod(type="rod", start=at, end=end, width=width, color=dark)
+        else:
+            yield Sphere(type="sphere", radius=radius, center=at, color=color)
+            yield Sphere(type="sphere", radius=times(0.4, radius), center=end, color=dark)
+
+
+def _is_thick(model: Model, body: Body, arm: Vector) -> bool:
+    """Whether the inertia of a body in space is that of a cuboid that is no rod."""
+    mass = model.value(body.mass)
+    if model.dimensions == 2 or mass <= 0:
+        return False
+    a, b, c = np.maximum(np.linalg.eigvalsh(_inertia(model, body)), 0.0)
+    longest, second = math.sqrt(max(b + c - a, 0.0)), math.sqrt(max(a + c - b, 0.0))
+    axis = np.array([*map(model.value, arm)]) / length_of(model, arm)
+    along = math.sqrt(max(a + b + c - 2 * float(axis @ _inertia(model, body) @ axis), 0.0))
+    reach = math.sqrt(6 / mass) * longest / 2
+    is_rod = second <= THICK * longest and along > 0.7 * longest
+    return not is_rod and reach > BOB * length_of(model, arm)
 
 
 def _rod(inventor: Inventor, body: Body, start: Vector, end: Vector, color: str) -> Rod:
@@ -144,13 +195,19 @@ def _gyration_across(model: Model, body: Body, along: Array) -> float:
     return math.sqrt(max(moment, 0.0) / mass)
 
 
-def _hub(inventor: Inventor, body: Body, arms: Sequence[Vector], color: str) -> Iterator[Shape]:
+def _hub(
+    inventor: Inventor, body: Body, points: BodyPoints, arms: Sequence[Vector], color: str
+) -> Iterator[Shape]:
     """The middle of a body with several arms, or with one and a joint at its centre of mass."""
     model = inventor.model
     farthest = max(length_of(model, arm) for arm in arms)
     largest = gyration(model, body)
-    if largest > 0.2 * farthest and (len(arms) > 2 or len(arms) == 1):
-        yield from _solid(inventor, body, color, most=1.2 * farthest)
+    if points.carries:
+        yield _ball(model, 0.9 * WIDTH * inventor.number(body) * inventor.size, color)
+    elif is_drawn(largest) and (len(arms) > 2 or _is_thick(model, body, arms[0])):
+        yield from _solid(inventor, body, color, 0.0, farthest)
+    elif largest > 0.2 * farthest and len(arms) == 1:
+        yield from _solid(inventor, body, color, 0.0, 0.3 * farthest)
     else:
         yield _ball(model, 0.9 * WIDTH * inventor.number(body) * inventor.size, color)
 
@@ -159,13 +216,14 @@ def _alone(inventor: Inventor, body: Body, points: BodyPoints, color: str) -> It
     """A body without arms: as large as its inertia says, or a particle."""
     model = inventor.model
     if is_drawn(gyration(model, body)):
-        yield from _solid(inventor, body, color)
+        yield from _solid(inventor, body, color, *inventor.extent)
         zero = constant(*[0.0] * model.dimensions)
         reach = 2 * gyration(model, body)
         far = [r for r in points.others if reach < length_of(model, r) < 20 * reach]
         yield from (_rod(inventor, body, zero, r, shade(color)) for r in far)
     else:
-        yield _ball(model, PARTICLE * inventor.number(body) * inventor.size, color)
+        radius = PARTICLE * inventor.number(body) * inventor.size
+        yield _ball(model, min(max(radius, inventor.extent[0]), inventor.extent[1]), color)
 
 
 def _ball(model: Model, radius: float, color: str) -> Shape:
@@ -174,75 +232,70 @@ def _ball(model: Model, radius: float, color: str) -> Shape:
     return Sphere(type="sphere", radius=Constant(radius), color=color)
 
 
-def _solid(inventor: Inventor, body: Body, color: str, most: float = math.inf) -> Iterator[Shape]:
-    """The simplest uniform solid of the body's mass and inertia, with half extents up to `most`."""
+def _solid(
+    inventor: Inventor, body: Body, color: str, least: float, most: float
+) -> Iterator[Shape]:
+    """The simplest uniform solid of the body's mass and inertia, made smaller or larger if its
+    longest half extent is not from `least` to `most`, m.
+    """
     model, mass = inventor.model, inventor.model.value(body.mass)
     if model.dimensions == 3:
-        yield from _spatial_solid(model, body, color, most)
+        yield from _spatial_solid(model, body, color, least, most)
         return
     moment = model.value(body.moment)
     if isinstance(body.joint, Revolute):
-        radius = min(math.sqrt(2 * moment / mass), most)
+        radius = _within(math.sqrt(2 * moment / mass), least, most)
         yield _ball(model, radius, color)
         # So that its rotation can be seen.
-        spoke = constant(0.72 * radius, 0.0)
-        yield Rod(
-            type="rod",
-            start=constant(0.0, 0.0),
-            end=spoke,
-            width=Constant(0.16 * radius),
-            color=shade(color),
-        )
+        start, end = constant(0.0, 0.0), constant(0.72 * radius, 0.0)
+        thick = Constant(0.16 * radius)
+        yield Rod(type="rod", start=start, end=end, width=thick, color=shade(color))
         return
-    width = min(math.sqrt(12 * moment / mass / (1 + ASPECT**2)), most / ASPECT)
+    width = math.sqrt(12 * moment / mass / (1 + ASPECT**2))
+    width = 2 * _within(ASPECT * width / 2, least, most) / ASPECT
     yield Box(type="box", size=constant(ASPECT * width, width), color=color)
 
 
-def _spatial_solid(model: Model, body: Body, color: str, most: float) -> Iterator[Shape]:
+def _within(length: float, least: float, most: float) -> float:
+    return min(max(length, least), most)
+
+
+def _spatial_solid(
+    model: Model, body: Body, color: str, least: float, most: float
+) -> Iterator[Shape]:
     """A ball, a cylinder or a cuboid, as the principal moments have one value, two or three."""
     mass = model.value(body.mass)
     moments, axes = np.linalg.eigh(_inertia(model, body))
     axes = axes * np.where(np.linalg.det(axes) < 0, -1.0, 1.0)
-    a, b, c = (float(max(x, 0.0)) for x in moments)
-    largest = c or 1.0
-    if c - a < 1e-6 * largest:
-        radius = min(math.sqrt(2.5 * a / mass), most)
-        yield _ball(model, radius, color)
-        yield Sphere(
-            type="sphere",
-            center=constant(0.0, -0.9 * radius, 0.0),
-            radius=Constant(0.2 * radius),
-            color=shade(color),
-        )
-        return
-    for own, other, k in ((a, (b + c) / 2, 0), (c, (a + b) / 2, 2)):
-        two = c - b if k == 0 else b - a
-        if two < 1e-6 * largest:
-            radius = min(math.sqrt(2 * own / mass), most)
-            length = math.sqrt(max(12 * (other - own / 2) / mass, 0.0))
-            half = axes[:, k] * min(max(length, 0.1 * radius) / 2, most)
-            radius = max(radius, 0.04 * length)
-            yield Cylinder(
-                type="cylinder",
-                start=constant(*-half),
-                end=constant(*half),
-                radius=Constant(radius),
-                color=color,
-            )
-            if k == 2:  # flat, as a wheel
-                spot = 0.7 * radius * axes[:, 0]
-                yield Rod(
-                    type="rod",
-                    start=constant(*(spot - 1.02 * half)),
-                    end=constant(*(spot + 1.02 * half)),
-                    width=Constant(0.3 * radius),
-                    color=shade(color),
-                )
-            return
+    a, b, c = np.maximum(moments, 0.0).tolist()
     sums = np.array([b + c - a, a + c - b, a + b - c])
     size = np.sqrt(np.maximum(6 * sums / mass, 0.0))
-    size = np.minimum(np.maximum(size, 0.05 * size.max()), 2 * most)
-    yield Box(type="box", size=constant(*size), orientation_deg=angles_of(axes), color=color)
+    size = np.maximum(size, 0.05 * size.max())
+    scale = _within(size.max() / 2, least, most) / (size.max() / 2)
+    alike = ALIKE * c
+    if c - a < alike:
+        yield from _marked_ball(math.sqrt(2.5 * a / mass) * scale, color)
+    elif c - b < alike or b - a < alike:
+        k = 0 if c - b < alike else 2
+        own, other = (a, c) if k == 0 else (c, a)
+        radius = math.sqrt(2 * own / mass)
+        length = math.sqrt(max(12 * (other - own / 2) / mass, 0.0))
+        radius, length = max(radius, 0.04 * length), max(length, 0.1 * radius)
+        half = axes[:, k] * length / 2 * scale
+        yield _along(constant(0.0, 0.0, 0.0), half, radius * scale, color)
+        if k == 2:  # flat, as a wheel
+            spot = 0.7 * radius * scale * axes[:, 0]
+            yield _along(constant(*spot), 1.02 * half, 0.15 * radius * scale, shade(color))
+    else:
+        turn = angles_of(axes)
+        yield Box(type="box", size=constant(*size * scale), orientation_deg=turn, color=color)
+
+
+def _marked_ball(radius: float, color: str) -> Iterator[Sphere]:
+    """A ball with a spot that shows its rotation."""
+    yield Sphere(type="sphere", radius=Constant(radius), color=color)
+    spot, size = constant(0.0, -0.9 * radius, 0.0), Constant(0.2 * radius)
+    yield Sphere(type="sphere", center=spot, radius=size, color=shade(color))
 
 
 def _inertia(model: Model, body: Body) -> Array:

@@ -15,7 +15,7 @@ from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.framing import framed
 from eomgen.show.motion import Anchor, Motion
-from eomgen.show.of_run import with_run
+from eomgen.show.of_run import fixed_points, leading_bodies, spread, with_run
 from eomgen.show.picture import picture_of
 from eomgen.show.surroundings import balls_of, planes_of
 from eomgen.show.view import eye_axes
@@ -52,12 +52,12 @@ def observe(
     effects, works = trajectory.work_names, trajectory.works
     if works is not None:
         effects, works = works_by_type(model, effects, works)
-    picture = with_run(picture_of(model, appearance), model, poses)
-    drawn = picture.valued(model.value)
+    picture = with_run(picture_of(model, appearance, spread(poses)), model, poses)
+    drawn = picture.valued(model.defaults, float(trajectory.t[-1]))
     shapes = tuple(body.shapes for body in drawn.bodies)
     camera = appearance.camera
     eye = eye_axes(camera.azimuth_deg, camera.elevation_deg)
-    parents = [body.parent for body in model.bodies]
+    leading = leading_bodies(model)
     return Motion(
         name=model.name,
         title=model.title,
@@ -73,7 +73,7 @@ def observe(
         kinetic_energy=kinetic,
         potential_energy=potential,
         joint_drift=drift,
-        camera=framed(camera, module.BODIES, parents, shapes, poses, eye),
+        camera=framed(camera, module.BODIES, leading, shapes, poses, eye, fixed_points(drawn)),
         integrator=trajectory.integrator,
         finished=trajectory.finished,
         message=trajectory.message,

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from eomgen.language.formula import Constant, Formula
 from eomgen.model.model import Model
-from eomgen.show.elements import Element, Support
+from eomgen.scene.look import number, numbers
+from eomgen.show.arrows import field_arrows, region_of, wind_at
+from eomgen.show.elements import Attraction, Ball, Element, Field, Link, Support, Wind
 from eomgen.show.formulas import constant
 from eomgen.show.picture import Picture
 
@@ -18,14 +20,20 @@ BEYOND = 0.35
 
 
 def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
-    """The picture with rails as long as the ways of sliders at the poses of a run, and marks of the
-    ground on the other side of what they hold.
+    """The picture with rails as long as the ways of sliders at the poses of a run, marks of the
+    ground on the other side of what they hold, and arrows of fields where bodies move.
     """
     finite = np.isfinite(poses.reshape(len(poses), -1)).all(axis=1)
     if not finite.any():
         return picture
 
+    region = region_of(places_of(poses[finite]).reshape(-1, model.dimensions))
+
     def ranged(element: Element) -> Element:
+        if isinstance(element, Field):
+            return field_arrows(element, model, *region)
+        if isinstance(element, Wind):
+            return wind_at(element, model, (region[0] + region[1]) / 2)
         if not isinstance(element, Support):
             return element
         if element.kind == "base":
@@ -36,6 +44,47 @@ def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
         return replace(element, low=Constant(low), high=Constant(high))
 
     return replace(picture, elements=tuple(map(ranged, picture.elements)))
+
+
+def places_of(poses: Array) -> Array:
+    """The positions (n, nb, d) of centres of mass at poses, m."""
+    return poses[..., :2] if poses.ndim == 3 else poses[..., 3]
+
+
+def spread(poses: Array) -> float:
+    """The size of the region in which centres of mass move, m; 0 if no pose is finite."""
+    finite = np.isfinite(poses.reshape(len(poses), -1)).all(axis=1)
+    places = places_of(poses)[finite]
+    if not len(places):
+        return 0.0
+    return float(np.ptp(places.reshape(-1, places.shape[-1]), axis=0).max())
+
+
+def leading_bodies(model: Model) -> tuple[int, ...]:
+    """The bodies that translate in the world: a camera may follow them."""
+    kinds = [[p.kind for p in body.joint.primitives(model.dimensions)] for body in model.bodies]
+    pairs = zip(model.bodies, kinds, strict=True)
+    return tuple(k for k, (body, own) in enumerate(pairs) if body.parent < 0 and "prismatic" in own)
+
+
+def fixed_points(drawn: Picture) -> Array:
+    """Points (k, d) of the world, m, at which springs, fields and obstacles are. A pair of opposite
+    corners stands for each ball.
+    """
+    found = []
+    for element in drawn.elements:
+        match element:
+            case Link(start=start, end=end):
+                found += [numbers(a.at) for a in (start, end) if a.body < 0]
+            case Ball(body=-1, at=at, radius=radius):
+                middle, reach = np.array(numbers(at)), number(radius)
+                found += [tuple(middle - reach), tuple(middle + reach)]
+            case Attraction(center=center):
+                found.append(numbers(center))
+            case Field(center=tuple() as center):
+                found.append(numbers(center))
+    dimensions = len(drawn.joints[0].at_parent)
+    return np.array(found, dtype=float).reshape(-1, dimensions)
 
 
 def _ground(picture: Picture, model: Model, poses: Array, base: Support) -> tuple[Formula, ...]:

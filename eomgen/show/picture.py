@@ -1,11 +1,12 @@
 """What is drawn of a mechanism: bodies, joints, effects and traces, as formulas of parameters."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eomgen.language.formula import ZERO, Constant, Formula
+from eomgen.language.conditions import value_of
+from eomgen.language.formula import ZERO, Constant
 from eomgen.model.frames import from_centre
 from eomgen.model.model import Body, Model
 from eomgen.scene.appearance import Appearance
@@ -14,13 +15,25 @@ from eomgen.scene.look import Polygon, Rod, Shape
 from eomgen.show.body_points import BodyPoints, points_of, typical_length
 from eomgen.show.colours import body_colours
 from eomgen.show.effect_elements import SYMBOL, elements_of
-from eomgen.show.elements import WORLD_INDEX, Element, Support, Vector
+from eomgen.show.elements import (
+    WORLD_INDEX,
+    Attraction,
+    Element,
+    Field,
+    Support,
+    Vector,
+    without_formula,
+)
 from eomgen.show.formulas import constant, valued
 from eomgen.show.invented import invented_shapes, inventor_of
 from eomgen.show.joint_axes import joint_axis
 
 MOST_TRACES = 12
 """Greatest number of points whose paths are drawn: more paths would hide everything else."""
+
+SMALLEST = 0.06
+"""The size of a picture of bodies that move around something fixed is at least this part of the
+region in which they move."""
 
 
 @dataclass(frozen=True)
@@ -69,18 +82,30 @@ class Picture:
     traces: tuple[Trace, ...]
     size: float
 
-    def valued(self, evaluate: Callable[[Formula], float]) -> "Picture":
-        """The same with numbers in place of formulas."""
-        return valued(self, evaluate)
+    def valued(self, values: Mapping[str, float], t: float = 0.0) -> "Picture":
+        """The same with numbers for formulas, at these parameters and a time; nan where undefined.
+
+        Formulas of fields and wind, which may depend on the motion, are left out.
+        """
+        known = {**values, "t": t}
+        elements = tuple(without_formula(element) for element in self.elements)
+        return valued(replace(self, elements=elements), lambda formula: value_of(formula, known))
 
 
-def picture_of(model: Model, appearance: Appearance) -> Picture:
+def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Picture:
     """The picture of a model. Shapes are invented for bodies to which the scene gives none, from
-    the model's values of the parameters.
+    the model's values of the parameters, and from the size `spread` of the region, m, in which the
+    bodies move.
     """
     points = points_of(model)
     size = typical_length(model, points)
-    inventor, colours = inventor_of(model, size), body_colours(model)
+    elements = elements_of(model, size)
+    seen_whole = any(_is_landmark(element) for element in elements)
+    inventor = inventor_of(model, size, spread if seen_whole else 0.0)
+    if seen_whole and size < SMALLEST * spread:
+        size = SMALLEST * spread
+        elements = elements_of(model, size)
+    colours = body_colours(model)
     bodies = []
     for body, own, colour in zip(model.bodies, points, colours, strict=True):
         given = appearance.shapes.get(body.name)
@@ -91,14 +116,21 @@ def picture_of(model: Model, appearance: Appearance) -> Picture:
             shapes = invented_shapes(inventor, body, own, colour)
         painted = tuple(s if s.color else s.replaced(color=colour) for s in shapes)
         bodies.append(DrawnBody(body.name, colour, painted))
-    elements = (*_supports(model, size), *elements_of(model, size))
     joints = tuple(_joint(model, k, body) for k, body in enumerate(model.bodies))
+    elements = (*_supports(model, size), *elements)
     return Picture(tuple(bodies), joints, elements, _traces(model, points, bodies), size)
+
+
+def _is_landmark(element: Element) -> bool:
+    """Whether bodies move around something fixed, so that pictures show all of the motion."""
+    if isinstance(element, Field):
+        return element.center is not None
+    return isinstance(element, Attraction) or element.kind == "obstacle"
 
 
 def shapes_of(model: Model, appearance: Appearance) -> tuple[tuple[Shape, ...], ...]:
     """The shapes of every body at the model's values of the parameters."""
-    picture = picture_of(model, appearance).valued(model.value)
+    picture = picture_of(model, appearance).valued(model.defaults)
     return tuple(body.shapes for body in picture.bodies)
 
 

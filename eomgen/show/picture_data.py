@@ -5,7 +5,7 @@ from typing import Any
 
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.scalars.floats import FloatScalars
-from eomgen.show.elements import Ball, Element, Link
+from eomgen.show.elements import Ball, Element, Link, without_formula
 from eomgen.show.formulas import plain_data
 from eomgen.show.picture import Picture
 
@@ -31,7 +31,7 @@ def picture_data(picture: Picture) -> tuple[dict[str, Any], Geometry]:
     tables = {
         "bodies": data(picture.bodies),
         "joints": data(picture.joints),
-        "elements": [_element(element, data(element)) for element in picture.elements],
+        "elements": [_element(e, data(without_formula(e))) for e in picture.elements],
         "traces": data(picture.traces),
         "size": picture.size,
     }
@@ -43,6 +43,7 @@ def _element(element: Element, table: dict[str, Any]) -> dict[str, Any]:
     table = {"kind": element.kind} | table
     if isinstance(element, Link):
         table["from"], table["to"] = table.pop("start"), table.pop("end")
+    table.pop("formula", None)
     if isinstance(element, Ball) and element.axis == ():
         table["axis"] = None
     return table

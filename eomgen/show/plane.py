@@ -16,6 +16,9 @@ from eomgen.show.symbols import Sight, strokes
 SPREAD = 20
 """Size of planes relative to that of the motion, since a wide view shows more than the motion."""
 
+LAYERS = {"back": 2.5, "middle": 1.5 + INSTANTS, "front": 3 + INSTANTS}
+"""Order in which lines are drawn; the bodies at the first time have 3."""
+
 FILL, SURFACE, REACH = 0.08, 0.4, 0.25
 """Strength of the ink of fixed objects: their inside, their surface, the reach of a field."""
 
@@ -45,7 +48,9 @@ def draw_symbols(axes: Axes, motion: Motion, eye: Array) -> None:
     paper = motion.camera.background
     ink = mixed(paper, ink_on(paper), 0.75)
     for stroke in strokes(Sight(motion.drawn, motion.poses[-1], eye)):
-        order = 2.5 if stroke.behind else 3 + INSTANTS
+        order = LAYERS[stroke.layer]
+        if motion.dimensions == 3 and stroke.layer == "middle":
+            order = LAYERS["back"]  # all bodies are one image there
         lines = ":" if stroke.dashed else "-"
         if stroke.closed:
             axes.fill(*stroke.points.T, fc=paper, ec=ink, lw=stroke.weight, zorder=order)

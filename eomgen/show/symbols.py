@@ -7,6 +7,7 @@ rails and stops follow their axes.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ from eomgen.show.elements import (
     Link,
     Pull,
     Support,
+    Vector,
+    Wind,
 )
 from eomgen.show.of_run import world_points
 from eomgen.show.picture import DrawnJoint, Picture
@@ -44,14 +47,14 @@ class Stroke:
 
     weight  width relative to that of an ordinary line
     dashed  whether it shows something that is no thing
-    behind  whether it is behind the bodies
+    layer   behind all bodies, behind them at the last time, or in front of them
     """
 
     points: Array
     weight: float = 1.0
     closed: bool = False
     dashed: bool = False
-    behind: bool = False
+    layer: Literal["back", "middle", "front"] = "front"
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,10 @@ def _strokes(sight: Sight, element: Element) -> Iterator[Stroke]:
             yield from _ball(sight, element)
         case Field(center=center) if center is not None:
             yield from _center(sight, sight.seen(np.array(numbers(center))))
+        case Field():
+            yield from _arrows(sight, element.points, element.forces)
+        case Wind(velocity=velocity) if velocity is not None:
+            yield from _wind(sight, element.at, velocity)
         case Pull():
             middle = sight.seen(sight.world(element.body, element.at))
             yield Stroke(middle + 0.03 * sight.picture.size * circle(12), closed=True)
@@ -243,16 +250,15 @@ def _support(sight: Sight, support: Support) -> Iterator[Stroke]:
     if support.kind == "base":
         top = sight.seen(middle)
         y = r if support.axis is not None and number(support.axis[-1]) > 0 else -r
-        yield Stroke(
-            top + np.array([[0.0, 0.0], [-0.75 * r, y], [0.75 * r, y]]), closed=True, behind=True
-        )
-        yield Stroke(top + np.array([[-1.3 * r, y], [1.3 * r, y]]), 1.3, behind=True)
+        corners = np.array([[0.0, 0.0], [-0.75 * r, y], [0.75 * r, y]])
+        yield Stroke(top + corners, closed=True, layer="middle")
+        yield Stroke(top + np.array([[-1.3 * r, y], [1.3 * r, y]]), 1.3, layer="middle")
         for x in np.linspace(-1.1, 1.3, 7) * r:
-            yield Stroke(top + np.array([[x, y], [x - 0.4 * r, 1.45 * y]]), 0.6, behind=True)
+            yield Stroke(top + np.array([[x, y], [x - 0.4 * r, 1.45 * y]]), 0.6, layer="middle")
     elif support.axis is not None and support.low is not None and support.high is not None:
         along = sight.outward(support.body, np.array(numbers(support.axis)))
         ends = np.outer([number(support.low), number(support.high)], along) + middle
-        yield Stroke(sight.seen(ends), 1.6, behind=True)
+        yield Stroke(sight.seen(ends), 1.6, layer="back")
 
 
 def _ball(sight: Sight, ball: Ball) -> Iterator[Stroke]:
@@ -266,6 +272,44 @@ def _ball(sight: Sight, ball: Ball) -> Iterator[Stroke]:
         for spoke in angle + np.arange(3) * np.pi / 3:
             ray = radius * np.array([math.cos(spoke), math.sin(spoke)])
             yield Stroke(np.array([middle - ray, middle + ray]), 0.6)
+
+
+def _arrows(sight: Sight, points: Sequence[Vector], vectors: Sequence[Vector]) -> Iterator[Stroke]:
+    """Vectors at points of a grid; the longest is almost as long as the points are apart."""
+    if len(points) < 2:
+        return
+    places = np.array([numbers(point) for point in points])
+    long = np.array([numbers(vector) for vector in vectors])
+    apart = np.linalg.norm(places[1:] - places[0], axis=1).min()
+    longest = np.linalg.norm(long, axis=1).max()
+    if not (np.isfinite(longest) and longest > 0):
+        return
+    for place, vector in zip(places, long * (0.8 * apart / longest), strict=True):
+        start, end = sight.seen(np.array([place - vector / 2, place + vector / 2]))
+        yield from arrow(start, end, 0.7)
+
+
+def _wind(sight: Sight, at: Vector, velocity: Vector) -> Iterator[Stroke]:
+    """Parallel arrows beside a point."""
+    along = sight.seen(np.array(numbers(velocity)))
+    speed = float(np.linalg.norm(along))
+    if not (np.isfinite(speed) and speed > 0):
+        return
+    along = 0.6 * sight.picture.size * along / speed
+    middle = sight.seen(np.array(numbers(at)))
+    aside = np.array([-along[1], along[0]])
+    for part, shift in ((-0.35, -0.1), (0.0, 0.1), (0.35, -0.1)):
+        start = middle + part * aside + shift * along - along / 2
+        yield from arrow(start, start + along, 1.2)
+
+
+def arrow(start: Array, end: Array, weight: float) -> Iterator[Stroke]:
+    """A line with an open head."""
+    along = end - start
+    aside = np.array([-along[1], along[0]])
+    yield Stroke(np.array([start, end]), weight, layer="back")
+    head = [end - 0.3 * along + 0.15 * aside, end, end - 0.3 * along - 0.15 * aside]
+    yield Stroke(np.array(head), weight, layer="back")
 
 
 def _center(sight: Sight, middle: Array) -> Iterator[Stroke]:
