@@ -2,7 +2,7 @@
 
 import html
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -300,7 +300,12 @@ class Run:
         from eomgen.show.page_code import page_code
 
         steps = self.trajectory.counts["steps"]
-        return page_code(
+        events = tuple(
+            {"t": event.t, "contact": event.contact, "kind": event.kind}
+            for event in self.trajectory.events
+            if event.kind != "impact"
+        )
+        code = page_code(
             self.model,
             drawing_data(self.motion)[1],
             self.simulation,
@@ -309,6 +314,7 @@ class Run:
             mean_step=float(self.t[-1] - self.t[0]) / steps if steps else None,
             live=live,
         )
+        return replace(code, events=events)
 
     def save(
         self,

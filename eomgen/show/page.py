@@ -45,7 +45,7 @@ def page_data(motion: Motion, code: PageCode) -> dict[str, Any]:
         "keepsEnergy": motion.keeps_energy,
         "live": code.live,
         "drawing": drawing,
-        "run": _run(motion, code.smooth) if own else None,
+        "run": {**_run(motion, code.smooth), "events": list(code.events)} if own else None,
     }
     if not code.live:
         values = {p["name"]: p["value"] for p in table["parameters"]}

@@ -24,6 +24,7 @@ class PageCode:
     table   entries of the page's data that describe its arguments and results
     live    whether a page can integrate it
     smooth  whether its derivative at the given inputs is that of the run
+    events  contacts that came to rest or lifted: t (s), contact, kind
     why     why it is not live, or ""
     """
 
@@ -31,6 +32,7 @@ class PageCode:
     table: Mapping[str, Any]
     live: bool
     smooth: bool = True
+    events: tuple[Mapping[str, Any], ...] = ()
     why: str = ""
 
 

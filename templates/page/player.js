@@ -4,6 +4,7 @@ const player = (() => {
   const { byId, element } = tools;
   const LONGEST = 0.1; // s; a page that was hidden goes on where it was
   const BUDGET = 24; // ms of each picture that steps may take
+  const WARM = 250; // times 8 ms before a live motion
   const SHOWS = [
     ["traces", "Traces", true], ["joints", "Joints", true], ["centres", "Centres of mass", false],
     ["shadows", "Shadows", true], ["forces", "Forces of effects", false], ["torques", "Torques of effects", false],
@@ -15,7 +16,7 @@ const player = (() => {
   const values = makeValues();
   const slider = byId("time");
   const engine = DATA.live ? makeEngine(mechanism, DATA) : null;
-  const clock = { time: replay ? replay.begin : 0, playing: false, stamp: 0, frames: [], seen: null, mode: replay ? "replay" : "live" };
+  const clock = { time: replay ? replay.begin : 0, playing: false, stamp: 0, frames: [], seen: null, remark: "", mode: replay ? "replay" : "live" };
   const show = Object.fromEntries(SHOWS.map(([key, , on]) => [key, on]));
   const isLive = () => clock.mode === "live";
   let waiting = false; // for the next picture
@@ -96,6 +97,12 @@ const player = (() => {
   }
 
   function afterSteps() {
+    if (engine.remark !== clock.remark) {
+      clock.remark = engine.remark;
+      panels.showMethods(engine);
+      byId("remark").textContent = engine.remark;
+      byId("remark").hidden = !engine.remark;
+    }
     if (!engine.error) return;
     say(`The motion stopped at t = ${numbers.text(engine.t, "s")}: ${engine.error}. Reset, or change the step or the method.`);
     setPlaying(false);
@@ -146,6 +153,7 @@ const player = (() => {
       return;
     }
     engine.reset();
+    afterSteps();
     clock.seen = null;
     say("");
     values.restart();
@@ -290,10 +298,19 @@ const player = (() => {
   listenToKeys({ canvas, stage, setPlaying, step, goTo, reset, zoom, redraw, pointer, clock, replay, isLive });
   byId("modes").hidden = !DATA.live || !replay;
   say("");
+  let warmed = 0;
+  // While the run is replayed, the browser compiles the functions for the live motion.
+  const warm = () => {
+    if (isLive() || !window.requestIdleCallback) return;
+    engine.warm(8);
+    warmed += 1;
+    if (warmed < WARM) requestIdleCallback(warm);
+  };
   if (engine) {
+    if (window.requestIdleCallback) requestIdleCallback(warm);
     engine.onSample = (t, y) => {
       stage.appendTraces([t, y, engine.p, engine.u]);
-      plotting.append(t, y, engine.p, engine.u);
+      plotting.append(engine);
     };
     panels.showMethods(engine);
   }

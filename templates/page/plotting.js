@@ -6,6 +6,7 @@ const makePlotting = ({ mechanism, replay, seek }) => {
   const channels = makeChannels(DATA, mechanism);
   const plots = makePlots(byId("plots"), channels, { onSeek: seek, name: DATA.name });
   const recorder = makeRecorder(DATA, channels);
+  if (replay && channels.mayHold) replay.held = channels.heldAt(replay.t, DATA.run.events);
   byId("plots-panel").hidden = false;
   plots.show(plots.first());
   byId("plots-panel").addEventListener("toggle", () => plots.refresh());
@@ -27,11 +28,12 @@ const makePlotting = ({ mechanism, replay, seek }) => {
     // What the plots show from now on.
     source(mode) {
       if (mode === "live") plots.live();
-      else plots.setSource(replay.t, replay.y, replay.p, replay.u);
+      else plots.setSource(replay.t, replay.y, replay.p, replay.u, replay.held ?? undefined);
     },
-    append(t, y, p, u) {
-      plots.append(t, y, p, u);
-      recorder.append(t, y, p, u);
+    append({ t, y, p, u, events }) {
+      const held = channels.heldAfter(events);
+      plots.append(t, y, p, u, held);
+      recorder.append(t, y, p, u, held);
     },
     cursor: (t) => plots.cursor(t),
     restart: () => plots.live(),

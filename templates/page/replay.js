@@ -13,6 +13,7 @@ const makeReplay = (mechanism) => {
   const row = (i) => y.subarray(i * ny, (i + 1) * ny);
   const state = new Float64Array(ny);
   const slopes = [new Float64Array(ny), new Float64Array(ny)];
+  const replay = { t, y, p, u, begin: t[0], end: t[last], rows: t.length, row, stateAt, neighbour, held: null };
 
   // The last row at or before a time, but not the last of all.
   function rowBefore(time) {
@@ -28,6 +29,7 @@ const makeReplay = (mechanism) => {
   // The slopes at both ends of an interval, or null where they are of no use.
   function slopesOf(i) {
     if (!run.smooth || !mechanism.derivative) return null;
+    if (replay.held?.[i] || replay.held?.[i + 1]) return null; // the derivative leaves out what holds it
     try {
       slopes.forEach((slope, k) => slope.set(mechanism.derivative(t[i + k], row(i + k), p, u)));
     } catch {
@@ -68,5 +70,5 @@ const makeReplay = (mechanism) => {
     return t.findLast((other) => other < time) ?? t[0];
   }
 
-  return { t, y, p, u, begin: t[0], end: t[last], rows: t.length, row, stateAt, neighbour };
+  return replay;
 };

@@ -156,9 +156,9 @@ const makeStage = (canvas, mechanism) => {
   // follows a mechanism that would leave the picture.
   stage.draw = (t, y, p, u, show, { pull = null, keep = false } = {}) => {
     now = look([t, y, p, u], show);
-    view.aim(now.poses);
+    if (!pull) view.aim(now.poses); // what the pointer pulls to stays under it
     resize();
-    if (keep && view.follow === null && isGone()) {
+    if (keep && !pull && view.follow === null && isGone()) {
       view.follow = drawing.joints.findIndex(({ parent }) => parent < 0);
       view.aim(now.poses);
     }
