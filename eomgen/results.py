@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from eomgen.program.passes import PassReport
     from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
-    from eomgen.show.page_code import PageCode
+    from eomgen.show.page import PageCode
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
 
@@ -293,8 +293,9 @@ class Run:
         return draw_motion(self.motion)
 
     def page(self, *, live: bool | None = None) -> "PageCode":
-        """The functions of the page of this run, in JavaScript. With `live` None the page is live if
-        it can be; with true, what prevents it is raised as an error.
+        """The functions of the page of this run, in JavaScript.
+
+        With `live` None the page is live if it can be; with true, what prevents it is raised.
         """
         from eomgen.show.drawing_data import drawing_data
         from eomgen.show.page_code import page_code

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.errors import EomgenError, RunError
+from eomgen.errors import EomgenError
 from eomgen.files import check_folder, check_writable, remove_ours, write_pieces, write_whole
 from eomgen.results import Run
 from eomgen.run.trajectory import is_own_table, save_csv, save_npz

@@ -3,6 +3,7 @@
 import base64
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,6 @@ from eomgen.errors import RunError
 from eomgen.files import write_whole
 from eomgen.show.drawing_data import drawing_data
 from eomgen.show.motion import Array, Motion
-from eomgen.show.page_code import PageCode
 from eomgen.show.picture_data import geometry_values
 from eomgen.templating import render, templates_folder
 
@@ -23,6 +23,26 @@ MOST_ROWS, ENOUGH_ROWS = 2000, 500
 """Between rows the page interpolates with the slopes of the motion, so that `ENOUGH_ROWS` show a
 usual run; fewer are in double precision only if they are all that the run has.
 """
+
+
+@dataclass(frozen=True)
+class PageCode:
+    """The mechanism of a page.
+
+    source  JavaScript source of `const mechanism`
+    table   entries of the page's data that describe its arguments and results
+    live    whether a page can integrate it
+    smooth  whether its derivative at the given inputs is that of the run
+    events  contacts that came to rest or lifted: t (s), contact, kind
+    why     why it is not live, or ""
+    """
+
+    source: str
+    table: Mapping[str, Any]
+    live: bool
+    smooth: bool = True
+    events: tuple[Mapping[str, Any], ...] = ()
+    why: str = ""
 
 
 def page_data(motion: Motion, code: PageCode) -> dict[str, Any]:

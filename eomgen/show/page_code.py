@@ -1,8 +1,6 @@
 """What the page of a run computes with: the functions of its mechanism, in JavaScript."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 from eomgen.codegen.backends.javascript import mechanism
 from eomgen.errors import EomgenError
@@ -10,30 +8,11 @@ from eomgen.language.formula import Formula
 from eomgen.model.model import Model
 from eomgen.scene.schema import Simulation
 from eomgen.show.live import live_table
+from eomgen.show.page import PageCode
 from eomgen.store import interfaced_program_of, live_code
 
 LONGEST = 1_500_000
 """A page with longer functions than these characters is live only on request."""
-
-
-@dataclass(frozen=True)
-class PageCode:
-    """The mechanism of a page.
-
-    source  JavaScript source of `const mechanism`
-    table   entries of the page's data that describe its arguments and results
-    live    whether a page can integrate it
-    smooth  whether its derivative at the given inputs is that of the run
-    events  contacts that came to rest or lifted: t (s), contact, kind
-    why     why it is not live, or ""
-    """
-
-    source: str
-    table: Mapping[str, Any]
-    live: bool
-    smooth: bool = True
-    events: tuple[Mapping[str, Any], ...] = ()
-    why: str = ""
 
 
 def page_code(
@@ -50,9 +29,12 @@ def page_code(
 
     A live one has functions for everything that the page can change. Otherwise they are those of
     the generated module. With `live` None it is live unless that fails or would be too large; with
-    true the errors of the derivation are raised. `mean_step` is that of the run, s.
+    true the errors of the derivation are raised, and states of another form are not shown. The
+    `mean_step` is that of the run, s.
     """
     why = ""
+    if live is None and model.form != "velocity":
+        live, why = False, f"the states of its run are those of the form '{model.form}'"
     if live is not False:
         try:
             code = live_code(model, geometry)
@@ -62,9 +44,7 @@ def page_code(
             why = str(error)
         else:
             if live or len(code.source) <= LONGEST:
-                table = live_table(
-                    model, code, simulation, inputs=inputs, mean_step=mean_step
-                )
+                table = live_table(model, code, simulation, inputs=inputs, mean_step=mean_step)
                 return PageCode(code.source, table, live=True, smooth=smooth)
             why = f"its functions would take {len(code.source) / 1e6:.1f} MB"
     return _recorded(model, inputs or {}, smooth, why)

@@ -2,7 +2,8 @@
 
     python tests/campaigns/frames.py PAGE.html … [--seconds 5] [--live]
 
-A page plays meanwhile. It needs the extra `browser`, and Chromium (in CHROMIUM, or /usr/bin/chromium).
+A page plays meanwhile. It needs the extra `browser` and Chromium, which is at CHROMIUM or at
+/usr/bin/chromium.
 """
 
 import argparse
