@@ -52,7 +52,7 @@ await build({
   globalName: "THREE",
   target: "es2020",
   legalComments: "none",
-  banner: { js: "/* three.js 0.187.0, https://threejs.org, MIT License, Copyright (c) 2010-2026 three.js authors */" },
+  banner: { js: "/* three.js 0.187.0, https://threejs.org, MIT License, Copyright © 2010-2026 three.js authors */" },
   plugins: [plainer],
 });
 const text = await readFile("three.min.js", "utf8");
