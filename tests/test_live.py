@@ -17,7 +17,7 @@ from eomgen.pipeline import compile_program, python_module
 from eomgen.run.complementarity import complementary
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scene.built_in import built_in_names
-from eomgen.show.live import live_table
+from eomgen.show.live import live_table, velocity_rows
 from eomgen.store import LiveCode, live_code
 
 pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
@@ -186,6 +186,23 @@ def test_loads_have_the_power_of_their_effects() -> None:
             total += force[:, 0] * (u - w * arm[:, 1]) + force[:, 1] * (v + w * arm[:, 0])
             total += torque * w
         np.testing.assert_allclose(total, powers[:, k], rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("form", ["momentum", "redundant"])
+def test_rows_of_momenta_are_converted(form: Any) -> None:
+    """A run in momenta, converted, has the poses and the energy of that run, but for the error of
+    its constraints, which the redundant form integrates.
+    """
+    run = eomgen.simulate("two_body", form=form, t_end=1.0, samples=11)
+    trajectory, module = run.trajectory, eomgen.load(run.module)
+    rates = module.derivative(trajectory.t, trajectory.y.T).T
+    y = velocity_rows(run.model, trajectory.states, trajectory.y, rates)
+    code = live_code(run.model)
+    table = live_table(run.model, code, read("two_body").simulation)
+    poses = in_page(code, "bodyPoses", trajectory.t, y, table)
+    np.testing.assert_allclose(poses, run.motion.poses.reshape(len(y), -1), atol=1e-9)
+    kinetic = in_page(code, "kineticEnergy", trajectory.t, y, table)[:, 0]
+    np.testing.assert_allclose(kinetic, run.motion.kinetic_energy, rtol=1e-9)
 
 
 def test_geometry_is_evaluated() -> None:
