@@ -129,6 +129,53 @@ def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) 
     assert [(event["kind"], event["contact"]) for event in found["events"]] == kinds
 
 
+STOP = """
+name = "held"
+dimensions = 2
+[[bodies]]
+name = "block"
+mass = 2.0
+inertia_com = 1.0
+[[joints]]
+name = "rail"
+type = "prismatic"
+parent = "world"
+child = "block"
+axis = [1, 0]
+coordinate = "x"
+[initial]
+q = { x = 0.2 }
+[[effects]]
+type = "external_force"
+name = "push"
+body = "block"
+force = ["-8 + 14*sin(t/2)**2", 0]
+[[effects]]
+type = "joint_stop"
+name = "end"
+joint = "rail"
+low = 0.0
+restitution = 0.4
+"""
+
+
+def test_a_stop_holds_and_lets_go() -> None:
+    """It strikes, rests, and is left when the force turns, as in `simulate`."""
+    scene = parse_scene(STOP)
+    model = elaborate(scene)
+    code = live_code(model)
+    table = live_table(model, code, scene.simulation)
+    table |= {"liveMethod": "implicit_midpoint", "liveStep": 0.01, "span": 5.0}
+    found = run_in_node(code.source, ENGINE, {"data": table, "seconds": 5.0})
+    expected = eomgen.simulate(scene, integrator="implicit_midpoint", dt=0.01, t_end=5.0).trajectory
+    assert found["error"] is None
+    np.testing.assert_allclose(found["y"], expected.y[-1], rtol=0, atol=1e-9)
+    events = [(event.kind, event.t, event.speed) for event in expected.events]
+    assert {"impact", "rest", "lift"} == {kind for kind, _, _ in events}
+    assert [e["kind"] for e in found["events"]] == [kind for kind, _, _ in events]
+    np.testing.assert_allclose([e["t"] for e in found["events"]], [t for _, t, _ in events])
+
+
 PUSHED = """
 name = "pushed"
 dimensions = 3
@@ -205,7 +252,9 @@ def test_a_switched_effect_is_left_out() -> None:
     return given.data.effects.map((effect, k) => {
       const off = p.map((x, i) => (i === effect.switch ? 0 : x));
       return given.y[k].map((y) => [
-        ...mechanism.derivative(0, y, off, given.u), mechanism.potentialEnergy(0, y, off, given.u)]);
+        ...mechanism.derivative(0, y, off, given.u),
+        mechanism.potentialEnergy(0, y, off, given.u),
+      ]);
     });
     """
     names = [effect["name"] for effect in table["effects"]]

@@ -92,6 +92,7 @@ def live_table(
         "pointer": {"first": len(model.inputs), "perBody": 3 if model.dimensions == 2 else 6},
         "initial": list(values),
         "size": float(mechanism_size(units, live.defaults, start)),
+        "mass": sum(model.value(body.mass) for body in model.bodies),
         "span": simulation.t_end,
         "restSpeed": simulation.rest_speed,
         "keepsEnergy": keeps_energy(model, given),
