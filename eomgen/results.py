@@ -2,7 +2,7 @@
 
 import html
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Outcome, Trajectory, save_csv, save_npz
+from eomgen.scene.schema import Simulation
 from eomgen.study.diagnosis import joint_limits, locks
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from eomgen.program.passes import PassReport
     from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
+    from eomgen.show.page import PageCode
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
 
@@ -182,6 +184,9 @@ class Run:
     estimate    the estimate of the error by a second run, if asked for
     begun       how it continues an earlier run; "" if it does not
     compiled    whether steps were made, or functions computed, in compiled code
+    simulation  settings of the scene
+    inputs      constant inputs that are not their defaults
+    varying     whether inputs were tables or functions of time
     """
 
     model: Model
@@ -195,6 +200,9 @@ class Run:
     estimate: "Estimate | None" = None
     begun: str = ""
     compiled: bool = False
+    simulation: Simulation = field(default_factory=Simulation)
+    inputs: Mapping[str, float] = field(default_factory=dict)
+    varying: bool = False
 
     @property
     def t(self) -> FloatArray:
@@ -284,11 +292,41 @@ class Run:
 
         return draw_motion(self.motion)
 
+    def page(self, *, live: bool | None = None) -> "PageCode":
+        """The functions of the page of this run, in JavaScript.
+
+        With `live` None the page is live if it can be; with true, what prevents it is raised.
+        """
+        from eomgen.show.drawing_data import drawing_data
+        from eomgen.show.page_code import page_code
+
+        steps = self.trajectory.counts["steps"]
+        events = tuple(
+            {"t": event.t, "contact": event.contact, "kind": event.kind}
+            for event in self.trajectory.events
+            if event.kind != "impact"
+        )
+        code = page_code(
+            self.model,
+            drawing_data(self.motion)[1],
+            self.simulation,
+            inputs=self.inputs,
+            smooth=not self.varying,
+            mean_step=float(self.t[-1] - self.t[0]) / steps if steps else None,
+            live=live,
+        )
+        return replace(code, events=events)
+
     def save(
-        self, folder: str | Path, *, parquet: bool = False, force: bool = False
+        self,
+        folder: str | Path,
+        *,
+        parquet: bool = False,
+        live: bool | None = None,
+        force: bool = False,
     ) -> tuple[Path, ...]:
         """Write module, table, archive and page into a folder, with `parquet` also the table as a
-        Parquet file; return their paths.
+        Parquet file; return their paths. The page is live as `page` says.
 
         Raises `RunError` if a file cannot be written, or exists and this program did not write it.
         """
@@ -301,8 +339,7 @@ class Run:
         # Before the archive: a table is ours if the archive beside it has the same columns.
         save_csv(self.trajectory, table, force=force)
         save_npz(self.trajectory, archive, force=force)
-        parameters = tuple(self.model.defaults.values())
-        save_page(self.motion, self.module.poses, parameters, page, force=force)
+        save_page(self.motion, self.page(live=live), page, force=force)
         if parquet:
             from eomgen.run.parquet import save_parquet
 

@@ -3,7 +3,7 @@
 import json
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from shutil import which
 from typing import Any
@@ -13,15 +13,23 @@ ENGINE = ("methods.js", "adaptive.js", "contacts.js", "engine.js")
 NODE = which("node")
 
 
-def run_in_node(source: str, script: str, given: Mapping[str, Any], seconds: float = 300) -> Any:
-    """What the body `script` of a function returns in node, through JSON.
+def run_in_node(
+    source: str,
+    script: str,
+    given: Any = None,
+    seconds: float = 300,
+    *,
+    scripts: Sequence[str] = ENGINE,
+) -> Any:
+    """What the body `script` of a function returns in node, through JSON, which has null for nan.
 
-    `source` defines `mechanism`; the script may use it, `makeEngine` and `given`.
+    `source` defines `mechanism`; the script may use it, what the `scripts` of the page define, by
+    default `makeEngine`, and `given`.
     """
     parts = [
         '"use strict";',
         source,
-        *((PAGE / name).read_text("utf-8") for name in ENGINE),
+        *((PAGE / name).read_text("utf-8") for name in scripts),
         "const given = JSON.parse(require('fs').readFileSync(0, 'utf8'));",
         f"process.stdout.write(JSON.stringify((() => {{\n{script}\n}})()));",
     ]
