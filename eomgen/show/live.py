@@ -1,12 +1,15 @@
 """What the page of a run knows of its mechanism, as a table for JSON: names, units, values."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
+
+import numpy as np
 
 from eomgen.model.interactive import interactive, switches_of
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
 from eomgen.run.integrators import FixedStep, find_integrator
+from eomgen.run.problem import FloatArray
 from eomgen.run.sizes import mechanism_size
 from eomgen.scene.schema import Simulation
 from eomgen.show.balance import keeps_energy
@@ -89,12 +92,39 @@ def live_table(
         "pointer": {"first": len(model.inputs), "perBody": 3 if model.dimensions == 2 else 6},
         "initial": list(values),
         "size": float(mechanism_size(units, live.defaults, start)),
+        "mass": sum(model.value(body.mass) for body in model.bodies),
         "span": simulation.t_end,
         "restSpeed": simulation.rest_speed,
         "keepsEnergy": keeps_energy(model, given),
         "integrator": _integrator(simulation),
         "meanStep": mean_step,
     }
+
+
+def velocity_rows(
+    model: Model, states: Sequence[str], y: FloatArray, rates: FloatArray
+) -> FloatArray:
+    """The states [q, v] (n, ny) of rows `y` (n, …) of a form of momenta, whose time derivatives are
+    `rates`; the rows themselves if the form is [q, v].
+
+    The coordinates are states or differences of angles of bodies: v is the same of `rates`.
+    """
+    if model.form == "velocity":
+        return y
+    place = {name: i for i, name in enumerate(states)}
+    angles = [
+        place[b.positions[-1].name if b.parent < 0 else f"angle_{b.name}"] for b in model.bodies
+    ]
+
+    def coordinates(rows: FloatArray) -> list[FloatArray]:
+        columns = []
+        for k, body in enumerate(model.bodies):
+            columns += [rows[:, place[c.name]] for c in body.positions[:-1]]
+            above = rows[:, angles[body.parent]] if body.parent >= 0 else 0.0
+            columns.append(rows[:, angles[k]] - above)
+        return columns
+
+    return np.column_stack([*coordinates(y), *coordinates(rates)])
 
 
 def _integrator(simulation: Simulation) -> dict[str, Any]:

@@ -10,6 +10,8 @@ const makeEngine = (mechanism, data) => {
   const defaults = (table) => Float64Array.from(table, (x) => x.value);
   const space = data.dimensions === 3;
   const PULL = 20; // rate at which a pulled point follows the pointer, rad/s
+  const LIFTED = 0.3; // part of the whole mass that a pull moves at least as quickly
+  const STRONG = 30; // acceleration that the strongest pull gives the whole mass at least, m/s²
   const MOST_EVENTS = 10000; // at one time
   const SHARE = 0.02; // part of the mean cost of a step that the last one has
 
@@ -364,10 +366,14 @@ const makeEngine = (mechanism, data) => {
       engine.release();
       const mass = massAt(body, at);
       if (!(mass > 0 && Number.isFinite(mass))) return;
-      const rate = Math.min(PULL, 0.5 / engine.dt);
-      const stiffness = mass * rate * rate;
+      // So strong that what hangs on a light body is lifted, but stable for explicit methods.
+      const moved = Math.max(mass, LIFTED * (data.mass ?? 0));
+      const most = /implicit|gauss/.test(engine.method) ? Infinity : 0.5 * mass / engine.dt;
+      const damping = Math.min(2 * moved * PULL, most);
+      const stiffness = Math.min(moved * PULL ** 2, most * 0.5 / engine.dt);
       const size = data.drawing?.size ?? data.size ?? 1;
-      engine.grip = { body, at: [...at], stiffness, damping: 2 * mass * rate, strongest: stiffness * size };
+      const strongest = Math.max(stiffness * size, STRONG * (data.mass ?? 0));
+      engine.grip = { body, at: [...at], stiffness, damping, strongest };
     }
     engine.grip.target = [...target];
     pullAt(engine.t, engine.y);
