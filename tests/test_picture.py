@@ -16,8 +16,9 @@ from eomgen.model.elaborate import elaborate, expanded
 from eomgen.model.model import Model
 from eomgen.scene.appearance import Appearance, appearance_of
 from eomgen.scene.effects import Effect
-from eomgen.scene.look import Box, Camera, Cylinder, Disc, Rod, Sphere, number, numbers
+from eomgen.scene.look import Box, Camera, Cylinder, Disc, Rod, Shape, Sphere, number, numbers
 from eomgen.scene.reader import built_in_names, parse_scene
+from eomgen.scene.reference import by_type
 from eomgen.scene.schema import Simulation
 from eomgen.show.formulas import plain_data
 from eomgen.show.of_run import world_points
@@ -26,6 +27,7 @@ from eomgen.show.picture_data import geometry_values, picture_data
 from eomgen.show.solid import rotation
 from eomgen.show.symbols import Sight, strokes
 
+DOCS = Path(__file__).parent.parent / "docs"
 UNTUNED = sorted((Path(__file__).parent / "untuned").glob("*.toml"))
 FREE = """\
 name = "lone"
@@ -236,6 +238,17 @@ def test_springs_end_where_they_are_held() -> None:
             assert (np.abs(tips - wanted).max(axis=(1, 2)) < 1e-12).any() or link.kind != "rope"
             for end in wanted:
                 assert (np.abs(tips - end).max(axis=2) < 1e-12).any()
+
+
+def test_each_shape_and_mode_has_a_picture() -> None:
+    """In docs/pictures.md; and so has each kind of element that has lines."""
+    page = (DOCS / "pictures.md").read_text("utf-8")
+    shown = {path.stem for path in (DOCS / "pictures").glob("*.png")}
+    assert all(f"(pictures/{name}.png)" in page for name in shown)
+    modes = get_args(get_args(Camera.model_fields["mode"].annotation)[0])
+    assert {*by_type(Shape), *modes} <= shown
+    kinds = {e.kind for case in CASES for e in with_case(case)[1].elements}
+    assert kinds - {"plane", "torque", "gravity"} <= shown
 
 
 WRONG = [

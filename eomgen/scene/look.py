@@ -99,8 +99,8 @@ class Rod(Table):
     example: ClassVar[str] = """
 [[bodies.shapes]]
 type = "rod"
-start = [-0.4, 0]
-end = [0.4, 0]
+start = ["-l/2", 0]
+end = ["l/2", 0]
 width = 0.06
 """
     type: Literal["rod"]

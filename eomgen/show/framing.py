@@ -160,7 +160,8 @@ def framed(
         offset, size = bounds.view(followed)
         if len(bodies) == 1:
             size = size * ALONE
-        center = camera.center or _world(offset, 0.0, eye, dimensions)
+        offset = offset if camera.height is None else np.zeros(2)
+        center = _world(offset, 0.0, eye, dimensions)
         return _sized(given, camera, mode, center, size, bodies[followed])
     center = camera.center or _world(middle, depth, eye, dimensions)
     if camera.center is not None:

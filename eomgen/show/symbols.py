@@ -315,6 +315,6 @@ def arrow(start: Array, end: Array, weight: float) -> Iterator[Stroke]:
 def _center(sight: Sight, middle: Array) -> Iterator[Stroke]:
     """The centre of a field: a point within rings."""
     size = sight.picture.size
-    yield Stroke(middle + 0.04 * size * circle(24), closed=True, weight=1.4)
-    for radius in (0.1, 0.16):
+    yield Stroke(middle + 0.25 * size * circle(24), closed=True, weight=1.4)
+    for radius in (0.5, 0.75):
         yield Stroke(middle + radius * size * circle(), 0.6, dashed=True)
