@@ -171,6 +171,14 @@ def test_formulas_in_shapes_follow_the_parameters() -> None:
     assert [values[size["of"]] for size in box["size"]] == [3.0, 2.25]
 
 
+def test_shapes_without_a_size_are_left_out() -> None:
+    """Of a run with other parameters; a scene itself may have none."""
+    shapes = 'shapes = [{ type = "disc", radius = "l - 0.2" }, { type = "disc", radius = "1/l" }]'
+    picture = lone(0.7, 2, shapes)[1]
+    counts = [len(picture.valued({"l": x}).bodies[0].shapes) for x in (0.5, 0.1, 0.2, 0.0)]
+    assert counts == [2, 1, 1, 0]
+
+
 def resolved(data: Any, values: list[float]) -> Any:
     """Data with the values of the geometry in place of references."""
     if isinstance(data, dict):
