@@ -65,7 +65,7 @@ def ends(picture: Picture, body: int) -> Iterator[np.ndarray]:
             yield from (np.array(numbers(end)) for end in (shape.start, shape.end))
 
 
-@pytest.mark.parametrize("name", ["triple_pendulum", "finger", "robot_arm"])
+@pytest.mark.parametrize("name", ["triple_pendulum", "finger", "robot_arm", "car", "puppet"])
 def test_links_reach_their_joints_at_any_parameters(name: str) -> None:
     """The generated module says where bodies are; their rods meet there, whatever the lengths."""
     text = UNTUNED[0].with_name(f"{name}.toml").read_text("utf-8")

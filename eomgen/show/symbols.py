@@ -207,7 +207,7 @@ def _at_joint(sight: Sight, element: AtJoint) -> Iterator[Stroke]:
             head = np.array([[-1.0, 0.1], [0.0, 0.0], [0.1, -1.0]]) * back
             yield Stroke(center + tip + head, 1.3)
             if element.kind == "servo":
-                yield Stroke(center + 0.3 * r * circle(16), closed=True)
+                yield Stroke(center + 0.15 * r * circle(16), closed=True)
         case "brake":
             for side in (-1.0, 1.0):
                 arc = circle(12, -0.25 * np.pi, 0.25 * np.pi) * side
