@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 ASPECT = 4 / 3
 """Width to height of the picture for which a camera is chosen."""
-MARGIN = 1.12
+MARGIN = 1.1
 """The view is so much larger than what it must contain."""
 SMALL = 0.36
 """If at some time the bodies fill less than this part of the height and of the width of a view of

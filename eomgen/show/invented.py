@@ -38,7 +38,7 @@ THICK = 0.5
 """A body in space is a rod if its second extent is at most this part of its first."""
 STRAIGHT = 0.15
 """A link is straight if its centre of mass is at most this part of its length beside its axis."""
-CARRIAGE = (0.34, 0.26, 0.3)
+CARRIAGE = (0.5, 0.36, 0.4)
 """Size of a carriage along its rail and across, relative to the mechanism's size."""
 ASPECT = 1.7
 """Length to width of a planar body of which only the moment of inertia is known."""

@@ -125,6 +125,8 @@ def _link(sight: Sight, link: Link) -> Iterator[Stroke]:
     length, radius = float(np.linalg.norm(end - start)), number(link.radius)
     if link.kind == "rope":
         yield Stroke(_rope(sight, link, start, end), 1.1)
+        for place in (start, end):
+            yield Stroke(place + 0.22 * radius * circle(16), closed=True)
         return
     if length < 1e-9 * radius:
         return
