@@ -41,7 +41,7 @@ const player = (() => {
       const grip = isLive() && engine.grip;
       const pull = grip && grip.point ? [grip.point, grip.target] : null;
       stage.draw(state.t, state.y, state.p, state.u, show, { pull, keep: isLive() });
-      values.show({ ...state, energy: energyOf(state), playing: clock.playing, stepCost: isLive() ? engine.cost() : NaN });
+      values.show({ ...state, energy: energyOf(state), playing: clock.playing, stepCost: isLive() ? engine.cost() : NaN, single: !isLive() && DATA.run.single });
       overlay.draw(state.t);
       plotting.cursor(state.t);
       if (!isLive()) {
