@@ -130,7 +130,6 @@ class Module:
 
     name         name of the scene
     source       source code
-    poses        JavaScript source of `bodyPoses` for the page; "" without the output `body_poses`
     explanation  a line for each route, with its operations and which was chosen
     notices      notices for the user
     reports      steps and operations of the program after each optimisation pass
@@ -143,7 +142,6 @@ class Module:
 
     name: str
     source: str
-    poses: str
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
     reports: "tuple[PassReport, ...]" = ()

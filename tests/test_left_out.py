@@ -13,7 +13,7 @@ from engine import DERIVATIVES, along, apart, engine, exact
 from spatial_trees import PLANE, SPACE, random_spatial_tree
 
 from eomgen.cli import main
-from eomgen.codegen.backends.javascript import body_poses
+from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.interface import interface_of
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
@@ -340,11 +340,11 @@ def test_poses_of_every_function_in_javascript() -> None:
     e = engine(text)
     y, times = np.array([0.4, -1.0]), [0.0, 0.4, 1.1, 1.3, 1.9, 2.7]
     p = list(e.module.PARAMETERS.values())
-    call = f"bodyPoses({json.dumps(y.tolist())}, {json.dumps(p)}, t)"
-    script = f"{body_poses(e.system.program, interface_of(e.system))}\n"
-    script += f"console.log(JSON.stringify({json.dumps(times)}.map((t) => {call})));"
+    call = f"mechanism.bodyPoses(t, {json.dumps(y.tolist())}, {json.dumps(p)}, [])"
+    script = f"{mechanism(e.system.program, interface_of(e.system))}\n"
+    script += f"console.log(JSON.stringify({json.dumps(times)}.map((t) => [...{call}])));"
     answer = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
-    expected = [e.module.body_poses(t, y) for t in times]
+    expected = [e.module.body_poses(t, y).ravel() for t in times]
     assert apart(json.loads(answer.stdout), expected) < 1e-14
 
 
