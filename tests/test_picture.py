@@ -296,7 +296,10 @@ WRONG = [
     ('{ type = "disc", radius = "l +" }', "bodies[0].shapes[0].radius: 'l +' is not a formula"),
     ('{ type = "box", size = ["l", 0.0] }', "bodies[0].shapes[0].size[1]: 0 is not positive"),
     ('{ type = "box", size = ["1/(l - 0.5)", 1] }', "bodies[0].shapes[0].size[0]: its value is "),
-    ('{ type = "disc", radius = 1, color = "red" }', "bodies[0].shapes[0].color: 'red' is no col"),
+    (
+        '{ type = "disc", radius = 1, color = "red" }',
+        "bodies[0].shapes[0].color: 'red' is not a colour",
+    ),
 ]
 CAMERAS = [
     ('mode = "fit"\nheight = 3.0', "camera.height: mode 'fit' finds"),
