@@ -107,7 +107,7 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     if trouble:
         return replace(code, notice=f"the store {directory} is not used: {trouble}")
     if kept and kept.module != code.module:
-        notice = f"the store {directory} held other code for this scene, which was put right"
+        notice = f"the store {directory} held other code for this scene, which was replaced"
         return replace(code, notice=notice)
     return code
 

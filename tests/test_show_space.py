@@ -384,7 +384,7 @@ def test_a_hundred_bodies_make_a_figure(tmp_path: Path) -> None:
     np.testing.assert_allclose(shown[:100, 0], motion.places[0, :, 0])
     np.testing.assert_allclose(shown[200:, -1], motion.places[-1, :, 2])
     names = [text.get_text() for text in lengths.get_yticklabels()]
-    assert (names[0], names[-1]) == (r"$\mathrm{link}_{1,x}$", r"$\mathrm{link}_{100,z}$")
+    assert (names[0], names[-1]) == ("link 1 x", "link 100 z")
     gaps = panel(figure, "Gap in the joints")
     assert [text.get_text() for text in gaps.get_legend().texts] == ["largest of 100", "median"]
     np.testing.assert_array_equal(gaps.get_lines()[0].get_ydata(), motion.joint_drift.max(axis=1))
