@@ -313,7 +313,18 @@ class Run:
             mean_step=float(self.t[-1] - self.t[0]) / steps if steps else None,
             live=live,
         )
+        if code.live and self.model.form != "velocity":
+            code = replace(code, y=self._velocity_rows())
         return replace(code, events=events)
+
+    def _velocity_rows(self) -> FloatArray:
+        """The rows of a run in momenta as [q, v]."""
+        from eomgen.run.module import load_module
+        from eomgen.show.live import velocity_rows
+
+        module = load_module(self.module.reference or self.module.source)
+        rates = module.derivative(self.t, self.y.T, self.model.defaults, self.inputs or None).T
+        return velocity_rows(self.model, self.states, self.y, rates)
 
     def save(
         self,

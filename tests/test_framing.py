@@ -129,6 +129,7 @@ def test_a_scene_may_say_what_its_camera_does() -> None:
     scene = Scene(path, Camera(follow="ball", height=5.0, background="#102030"))
     view = scene.view(flight(scene, 30.0))[0]
     assert (view.mode, view.height, view.themed) == ("follow", 5.0, False)
+    assert view.center == (0.0, 0.0)
     # The picture around a given centre is as large as the motion needs.
     scene = Scene(path, Camera(center=(3.0, 1.0)))
     assert scene.check(flight(scene, 8.0)).center == (3.0, 1.0)

@@ -230,18 +230,26 @@ def test_a_page_is_small_and_ours(run: Run, tmp_path: Path) -> None:
 
 
 def test_a_page_that_only_replays(run: Run) -> None:
-    """`--no-live`, and states of other forms, which the live functions do not take."""
+    """`--no-live`, also of a run whose states the live functions do not take."""
     code = run.page(live=False)
     page = Page(render_page(run.motion, code))
     assert not page.data["live"] and page.data["effects"] == []
     np.testing.assert_array_equal(unpacked(page.data["run"])[1], run.y)
     assert "geometry" in page.data and "pull it" not in page.text
     momenta = eomgen.simulate("two_body", form="momentum", t_end=0.5, samples=11)
-    data = page_data(momenta.motion, momenta.page())
-    assert not data["live"]
+    data = page_data(momenta.motion, momenta.page(live=False))
     np.testing.assert_array_equal(unpacked(data["run"])[1], momenta.y)
-    data = page_data(momenta.motion, momenta.page(live=True))
-    assert data["live"] and data["run"] is None
+
+
+def test_a_page_of_momenta_is_live() -> None:
+    """It shows the run in the states that its functions take."""
+    runs = [
+        eomgen.simulate("two_body", form=form, t_end=0.5, samples=11)
+        for form in ("momentum", "velocity")
+    ]
+    data = page_data(runs[0].motion, runs[0].page())
+    assert data["live"] and [s["name"] for s in data["states"]] == list(runs[1].states)
+    np.testing.assert_allclose(unpacked(data["run"])[1], runs[1].y, atol=1e-8)
 
 
 # ---- Parts of the page in node ----

@@ -235,14 +235,22 @@ def test_a_known_run_is_read_at_any_time() -> None:
     script = f"""{FAKE}
     const samples = makeSamples(channels);
     const t = Float64Array.of(0, 1, 1, 3);
-    samples.set(t, Float64Array.of(0, 0, 2, 0, 5, 0, 9, 0), [1], [0]);
+    const y = Float64Array.of(0, 0, 2, 0, 5, 0, 9, 0);
+    samples.set(t, y, [1], [0], null, true);
+    samples.columns(["energy_change"]);
+    const tiny = (of) => numbers.text(1e-7, "J", of.scale("energy_change"));
+    const texts = [tiny(samples)];
+    samples.set(t, y, [1], [0]);
+    samples.columns(["energy_change"]);
+    texts.push(tiny(samples));
     const [q] = samples.columns(["q"]);
     const values = [-1, 0, 0.5, 1, 2, 3, 9].map((time) => samples.valueAt(q, time));
-    return [values, samples.before(1), samples.scale("q")];"""
-    values, before, scale = in_node(script, {"dimensions": 2, "states": ["q", "w"]})
+    return [values, samples.before(1), samples.scale("q"), texts];"""
+    values, before, scale, texts = in_node(script, {"dimensions": 2, "states": ["q", "w"]})
     assert values == [0, 0, 1, 5, 7, 9, 9]
     assert before == 2
     assert scale == 9
+    assert texts == ["0\u00a0J", "1.000×10⁻⁷\u00a0J"]  # what was rounded to 24 bits is less precise
 
 
 WRENCH = {2: ("fx", "fy", "mz"), 3: ("fx", "fy", "fz", "mx", "my", "mz")}

@@ -16,8 +16,9 @@ from eomgen.model.elaborate import elaborate, expanded
 from eomgen.model.model import Model
 from eomgen.scene.appearance import Appearance, appearance_of
 from eomgen.scene.effects import Effect
-from eomgen.scene.look import Box, Camera, Cylinder, Disc, Rod, Sphere, number, numbers
+from eomgen.scene.look import Box, Camera, Cylinder, Disc, Rod, Shape, Sphere, number, numbers
 from eomgen.scene.reader import built_in_names, parse_scene
+from eomgen.scene.reference import by_type
 from eomgen.scene.schema import Simulation
 from eomgen.show.formulas import plain_data
 from eomgen.show.of_run import world_points
@@ -26,6 +27,7 @@ from eomgen.show.picture_data import geometry_values, picture_data
 from eomgen.show.solid import rotation
 from eomgen.show.symbols import Sight, strokes
 
+DOCS = Path(__file__).parent.parent / "docs"
 UNTUNED = sorted((Path(__file__).parent / "untuned").glob("*.toml"))
 FREE = """\
 name = "lone"
@@ -63,7 +65,7 @@ def ends(picture: Picture, body: int) -> Iterator[np.ndarray]:
             yield from (np.array(numbers(end)) for end in (shape.start, shape.end))
 
 
-@pytest.mark.parametrize("name", ["triple_pendulum", "finger", "robot_arm"])
+@pytest.mark.parametrize("name", ["triple_pendulum", "finger", "robot_arm", "car", "puppet"])
 def test_links_reach_their_joints_at_any_parameters(name: str) -> None:
     """The generated module says where bodies are; their rods meet there, whatever the lengths."""
     text = UNTUNED[0].with_name(f"{name}.toml").read_text("utf-8")
@@ -169,6 +171,14 @@ def test_formulas_in_shapes_follow_the_parameters() -> None:
     assert [values[size["of"]] for size in box["size"]] == [3.0, 2.25]
 
 
+def test_shapes_without_a_size_are_left_out() -> None:
+    """Of a run with other parameters; a scene itself may have none."""
+    shapes = 'shapes = [{ type = "disc", radius = "l - 0.2" }, { type = "disc", radius = "1/l" }]'
+    picture = lone(0.7, 2, shapes)[1]
+    counts = [len(picture.valued({"l": x}).bodies[0].shapes) for x in (0.5, 0.1, 0.2, 0.0)]
+    assert counts == [2, 1, 1, 0]
+
+
 def resolved(data: Any, values: list[float]) -> Any:
     """Data with the values of the geometry in place of references."""
     if isinstance(data, dict):
@@ -236,6 +246,17 @@ def test_springs_end_where_they_are_held() -> None:
             assert (np.abs(tips - wanted).max(axis=(1, 2)) < 1e-12).any() or link.kind != "rope"
             for end in wanted:
                 assert (np.abs(tips - end).max(axis=2) < 1e-12).any()
+
+
+def test_each_shape_and_mode_has_a_picture() -> None:
+    """In docs/pictures.md; and so has each kind of element that has lines."""
+    page = (DOCS / "pictures.md").read_text("utf-8")
+    shown = {path.stem for path in (DOCS / "pictures").glob("*.png")}
+    assert all(f"(pictures/{name}.png)" in page for name in shown)
+    modes = get_args(get_args(Camera.model_fields["mode"].annotation)[0])
+    assert {*by_type(Shape), *modes} <= shown
+    kinds = {e.kind for case in CASES for e in with_case(case)[1].elements}
+    assert kinds - {"plane", "torque", "gravity"} <= shown
 
 
 WRONG = [

@@ -1,5 +1,6 @@
 """The appearance of a scene: shapes on bodies, and the camera. No equation depends on it."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
@@ -99,8 +100,8 @@ class Rod(Table):
     example: ClassVar[str] = """
 [[bodies.shapes]]
 type = "rod"
-start = [-0.4, 0]
-end = [0.4, 0]
+start = ["-l/2", 0]
+end = ["l/2", 0]
 width = 0.06
 """
     type: Literal["rod"]
@@ -321,6 +322,16 @@ def _check_components(vector: tuple[Any, ...] | None, dimensions: int, location:
         raise SceneError(
             f"{location}: {shown} has {len(vector)} components; in {where} give {dimensions}"
         )
+
+
+def is_drawable(shape: Shape) -> bool:
+    """Whether the numbers of a shape, which other parameters than the scene's may give, are finite
+    and its lengths positive.
+    """
+    return all(
+        math.isfinite(number(part)) and (bound != "positive" or number(part) > 0)
+        for _, bound, part in _quantities(shape)
+    )
 
 
 def number(formula: Formula) -> float:

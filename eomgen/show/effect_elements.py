@@ -49,7 +49,7 @@ from eomgen.show.elements import (
 from eomgen.show.formulas import constant, sum_of, times
 from eomgen.show.joint_axes import zero_direction
 
-COIL, SYMBOL = 0.06, 0.11
+COIL, SYMBOL = 0.06, 0.14
 """Radius of a coil, and of what is drawn at a joint, relative to the mechanism's size."""
 MOST_CORNERS = 400
 """More corners of boxes in contact than these are not drawn."""

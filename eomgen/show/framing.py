@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 ASPECT = 4 / 3
 """Width to height of the picture for which a camera is chosen."""
-MARGIN = 1.12
+MARGIN = 1.1
 """The view is so much larger than what it must contain."""
 SMALL = 0.36
 """If at some time the bodies fill less than this part of the height and of the width of a view of
@@ -25,6 +25,9 @@ ALONE = 1.6
 """A view that follows a single body is so much larger than one of a mechanism."""
 GAIN = 1.3
 """It follows only if bodies are then larger by this factor."""
+FAR = 6.0
+"""What bodies hold to is shown if its distance from them is at most this multiple of the size of
+the region in which they are."""
 WIDEST = 4.0
 """Greatest width to height of what a camera shows."""
 MOST_POINTS = 2_000_000
@@ -143,7 +146,8 @@ def framed(
     if not len(poses):
         return given
     bounds = bounds_of(shapes, poses, eye)
-    middle, size = bounds.view(fixed=fixed if dimensions == 2 else (fixed @ eye.T)[:, :2])
+    fixed = _near(bounds, fixed if dimensions == 2 else (fixed @ eye.T)[:, :2])
+    middle, size = bounds.view(fixed=fixed)
     depth = float((poses[..., 3] @ eye[2]).mean()) if dimensions == 3 else 0.0
     followed = None if camera.follow is None else bodies.index(camera.follow)
     mode = camera.mode
@@ -160,7 +164,8 @@ def framed(
         offset, size = bounds.view(followed)
         if len(bodies) == 1:
             size = size * ALONE
-        center = camera.center or _world(offset, 0.0, eye, dimensions)
+        offset = offset if camera.height is None else np.zeros(2)
+        center = _world(offset, 0.0, eye, dimensions)
         return _sized(given, camera, mode, center, size, bodies[followed])
     center = camera.center or _world(middle, depth, eye, dimensions)
     if camera.center is not None:
@@ -168,6 +173,16 @@ def framed(
         seen = np.array(camera.center) if dimensions == 2 else (eye @ camera.center)[:2]
         size = size + 2 * np.abs(middle - seen)
     return _sized(given, camera, mode, center, size, None)
+
+
+def _near(bounds: Bounds, points: Array) -> Array:
+    """Those of some points (k, 2) that are not so far away that bodies would be tiny beside them,
+    or infinitely far.
+    """
+    middle, size = bounds.view()
+    with np.errstate(invalid="ignore"):
+        near = np.abs(points - middle).max(axis=1) <= FAR * size.max()
+    return np.asarray(points[near])
 
 
 def _sized(

@@ -16,10 +16,11 @@ from eomgen.language.formula import Constant
 from eomgen.model.model import Body, Model
 from eomgen.scene.joints import Cylindrical, Free, Prismatic, Revolute
 from eomgen.scene.joints.base import spatial
-from eomgen.scene.look import Box, Cylinder, Disc, Rod, Shape, Sphere
+from eomgen.scene.look import Box, Cylinder, Disc, Polygon, Rod, Shape, Sphere
 from eomgen.show.body_points import BodyPoints, Vector, gyration, is_drawn, length_of
 from eomgen.show.colours import shade
 from eomgen.show.formulas import constant, scaled, sum_of, times, total
+from eomgen.show.outlines import hull
 from eomgen.show.solid import angles_of, rotation_to
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ THICK = 0.5
 """A body in space is a rod if its second extent is at most this part of its first."""
 STRAIGHT = 0.15
 """A link is straight if its centre of mass is at most this part of its length beside its axis."""
-CARRIAGE = (0.34, 0.26, 0.3)
+CARRIAGE = (0.5, 0.36, 0.4)
 """Size of a carriage along its rail and across, relative to the mechanism's size."""
 ASPECT = 1.7
 """Length to width of a planar body of which only the moment of inertia is known."""
@@ -89,9 +90,9 @@ def invented_shapes(
     """The shapes of a body: rods to its joints, and a solid where it has an extent of its own."""
     model = inventor.model
     arms = [r for r in points.joints if is_drawn(length_of(model, r))]
-    touching = [*_touching(inventor, body, points, color)]
+    touching = [] if arms else [*_touching(inventor, body, points, color)]
     if touching:
-        shapes = [*_rods(inventor, body, arms, color), *touching]
+        shapes = touching
     elif isinstance(body.joint, Prismatic | Cylindrical):
         shapes = [*_rods(inventor, body, arms, color), *_slider(inventor, body, color)]
     elif not arms:
@@ -100,6 +101,8 @@ def invented_shapes(
         shapes = [*_pendulum(inventor, body, arms[0], points.others, color)]
     elif len(arms) == 2 and _is_straight(model, arms):
         shapes = [_rod(inventor, body, arms[0], arms[1], color)]
+    elif len(arms) > 1 and model.dimensions == 2:
+        shapes = [*_plate(inventor, body, arms, color)]
     else:
         shapes = [*_rods(inventor, body, arms, color), *_hub(inventor, body, points, arms, color)]
     return (*shapes, *_barrel(inventor, body, arms, color))
@@ -153,6 +156,18 @@ def _rods(inventor: Inventor, body: Body, arms: Sequence[Vector], color: str) ->
         return
     zero = constant(*[0.0] * inventor.model.dimensions)
     yield from (_rod(inventor, body, zero, arm, color) for arm in arms)
+
+
+def _plate(inventor: Inventor, body: Body, arms: Sequence[Vector], color: str) -> Iterator[Shape]:
+    """A planar body with its joints and its centre of mass at the corners or within."""
+    value = inventor.model.value
+    points = [constant(0.0, 0.0), *arms]
+    places = np.array([[*map(value, point)] for point in points])
+    corners = [points[k] for k in hull(places)]
+    pairs = zip(corners, [*corners[1:], corners[0]], strict=True)
+    yield from (_rod(inventor, body, a, b, color) for a, b in pairs)
+    if len(corners) > 2:
+        yield Polygon(type="polygon", points=tuple(corners), color=color)
 
 
 def _pendulum(

@@ -57,3 +57,26 @@ def turned(points: Array, angle: float) -> Array:
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = points[..., 0], points[..., 1]
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+
+
+def hull(points: Array) -> list[int]:
+    """The corners of the convex hull of points (n, 2), as indices, counter-clockwise.
+
+    A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions", Information
+    Processing Letters 9 (1979) 216-219.
+    """
+    order = sorted(range(len(points)), key=lambda k: tuple(points[k]))
+    halves = []
+    for way in (order, order[::-1]):
+        half: list[int] = []
+        for k in way:
+            while len(half) > 1 and _turn(points[half[-2]], points[half[-1]], points[k]) <= 0:
+                half.pop()
+            half.append(k)
+        halves += half[:-1]
+    return halves
+
+
+def _turn(a: Array, b: Array, c: Array) -> float:
+    """Twice the area of the triangle a, b, c: > 0 if it is counter-clockwise."""
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

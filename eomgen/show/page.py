@@ -34,6 +34,7 @@ class PageCode:
     live    whether a page can integrate it
     smooth  whether its derivative at the given inputs is that of the run
     events  contacts that came to rest or lifted: t (s), contact, kind
+    y       rows of the run in the table's states, (n, ny); None if the run has these states
     why     why it is not live, or ""
     """
 
@@ -42,6 +43,7 @@ class PageCode:
     live: bool
     smooth: bool = True
     events: tuple[Mapping[str, Any], ...] = ()
+    y: Array | None = None
     why: str = ""
 
 
@@ -54,6 +56,8 @@ def page_data(motion: Motion, code: PageCode) -> dict[str, Any]:
     table = dict(code.table)
     names = [state["name"] for state in table["states"]]
     own = list(motion.states) == names
+    y = motion.y if code.y is None else code.y
+    run = _run(motion, y, code.smooth)
     data: dict[str, Any] = {
         **table,
         "name": motion.name,
@@ -65,14 +69,13 @@ def page_data(motion: Motion, code: PageCode) -> dict[str, Any]:
         "keepsEnergy": motion.keeps_energy,
         "live": code.live,
         "drawing": drawing,
-        "run": {**_run(motion, code.smooth), "events": list(code.events)} if own else None,
+        "run": run | {"events": list(code.events)},
     }
     if not code.live:
         values = {p["name"]: p["value"] for p in table["parameters"]}
         data["geometry"] = geometry_values(geometry, values)
-    elif own:
-        finite = np.flatnonzero(np.isfinite(motion.y).all(axis=1))
-        data["initial"] = motion.y[finite[0]].tolist() if len(finite) else table["initial"]
+    else:
+        data["initial"] = y[np.flatnonzero(np.isfinite(y).all(axis=1))[0]].tolist()
     return data
 
 
@@ -86,7 +89,7 @@ def render_page(motion: Motion, code: PageCode) -> str:
     three = templates_folder() / "page" / "vendor" / "three" / "three.min.js"
     context: Mapping[str, object] = {
         "heading": motion.heading,
-        "summary": _summary(motion, data["run"]),
+        "summary": _summary(motion, data["run"]["rows"]),
         "stopped": motion.stopped,
         "space": motion.dimensions == 3,
         "live": code.live,
@@ -102,25 +105,23 @@ def save_page(motion: Motion, code: PageCode, path: Path, force: bool = False) -
     write_whole(path, render_page(motion, code), force=force)
 
 
-def _summary(motion: Motion, run: Mapping[str, Any] | None) -> str:
-    kept = run["rows"] if run else len(motion.t)
+def _summary(motion: Motion, kept: int) -> str:
     return motion.summary + (f", {kept} of them here" if kept < len(motion.t) else "")
 
 
-def _run(motion: Motion, smooth: bool) -> dict[str, Any]:
+def _run(motion: Motion, y: Array, smooth: bool) -> dict[str, Any]:
     """The finite rows of a run, fewer if there are many."""
-    finite = np.flatnonzero(np.isfinite(motion.y).all(axis=1) & np.isfinite(motion.t))
+    finite = np.flatnonzero(np.isfinite(y).all(axis=1) & np.isfinite(motion.t))
     if not len(finite):
         raise RunError(f"{motion.name}: the run holds no finite sample, nothing can be shown")
-    width = max(1, motion.y.shape[1])
+    width = max(1, y.shape[1])
     fits = min(MOST_ROWS, MOST_NUMBERS // width)
     single = fits < min(ENOUGH_ROWS, len(finite))
     rows = _kept(motion.t[finite], min(MOST_ROWS, 2 * fits) if single else fits)
-    y = motion.y[finite[rows]]
     return {
         "rows": len(rows),
         "t": _packed(motion.t[finite[rows]], "<f8"),
-        "y": _packed(y, "<f4" if single else "<f8"),
+        "y": _packed(y[finite[rows]], "<f4" if single else "<f8"),
         "single": single,
         "smooth": smooth,
     }

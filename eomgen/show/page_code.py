@@ -29,12 +29,9 @@ def page_code(
 
     A live one has functions for everything that the page can change. Otherwise they are those of
     the generated module. With `live` None it is live unless that fails or would be too large; with
-    true the errors of the derivation are raised, and states of another form are not shown. The
-    `mean_step` is that of the run, s.
+    true the errors of the derivation are raised. `mean_step` is that of the run, s.
     """
     why = ""
-    if live is None and model.form != "velocity":
-        live, why = False, f"the states of its run are those of the form '{model.form}'"
     if live is not False:
         try:
             code = live_code(model, geometry)

@@ -11,7 +11,7 @@ from eomgen.model.frames import from_centre
 from eomgen.model.model import Body, Model
 from eomgen.scene.appearance import Appearance
 from eomgen.scene.joints import Free
-from eomgen.scene.look import Polygon, Rod, Shape
+from eomgen.scene.look import Polygon, Rod, Shape, is_drawable
 from eomgen.show.body_points import BodyPoints, points_of, typical_length
 from eomgen.show.colours import body_colours
 from eomgen.show.effect_elements import SYMBOL, elements_of
@@ -85,11 +85,14 @@ class Picture:
     def valued(self, values: Mapping[str, float], t: float = 0.0) -> "Picture":
         """The same with numbers for formulas, at these parameters and a time; nan where undefined.
 
-        Formulas of fields and wind, which may depend on the motion, are left out.
+        Shapes that have no size then are left out, and so are the formulas of fields and wind,
+        which may depend on the motion.
         """
         known = {**values, "t": t}
         elements = tuple(without_formula(element) for element in self.elements)
-        return valued(replace(self, elements=elements), lambda formula: value_of(formula, known))
+        found = valued(replace(self, elements=elements), lambda part: value_of(part, known))
+        drawn = (replace(b, shapes=tuple(filter(is_drawable, b.shapes))) for b in found.bodies)
+        return replace(found, bodies=tuple(drawn))
 
 
 def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Picture:

@@ -17,7 +17,7 @@ SPREAD = 20
 """Size of planes relative to that of the motion, since a wide view shows more than the motion."""
 
 LAYERS = {"back": 2.5, "middle": 1.5 + INSTANTS, "front": 3 + INSTANTS}
-"""Order in which lines are drawn; the bodies at the first time have 3."""
+"""Order in which lines are drawn; the bodies at the last time have 2 + INSTANTS."""
 
 FILL, SURFACE, REACH = 0.08, 0.4, 0.25
 """Strength of the ink of fixed objects: their inside, their surface, the reach of a field."""
@@ -29,8 +29,9 @@ def draw_plane(axes: Axes, motion: Motion) -> None:
     axes.grid(color=mixed(paper, ink_on(paper), 0.1))
     for path, colour in paths(motion):
         axes.plot(*path.T, color=colour, linewidth=0.8, alpha=0.5, zorder=2)
-    for order, (row, strength) in enumerate(instants(motion)):
-        draw_pose(axes, motion, motion.poses[row], strength, zorder=3 + order)
+    rows = instants(motion)
+    for order, (row, strength) in enumerate(rows, 3 + INSTANTS - len(rows)):
+        draw_pose(axes, motion, motion.poses[row], strength, zorder=order)
     draw_symbols(axes, motion, np.eye(3))
     for ball in motion.balls:
         draw_ball(axes, ball, np.array(ball.center), motion.camera)

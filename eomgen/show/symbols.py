@@ -125,6 +125,8 @@ def _link(sight: Sight, link: Link) -> Iterator[Stroke]:
     length, radius = float(np.linalg.norm(end - start)), number(link.radius)
     if link.kind == "rope":
         yield Stroke(_rope(sight, link, start, end), 1.1)
+        for place in (start, end):
+            yield Stroke(place + 0.22 * radius * circle(16), closed=True)
         return
     if length < 1e-9 * radius:
         return
@@ -207,7 +209,7 @@ def _at_joint(sight: Sight, element: AtJoint) -> Iterator[Stroke]:
             head = np.array([[-1.0, 0.1], [0.0, 0.0], [0.1, -1.0]]) * back
             yield Stroke(center + tip + head, 1.3)
             if element.kind == "servo":
-                yield Stroke(center + 0.3 * r * circle(16), closed=True)
+                yield Stroke(center + 0.15 * r * circle(16), closed=True)
         case "brake":
             for side in (-1.0, 1.0):
                 arc = circle(12, -0.25 * np.pi, 0.25 * np.pi) * side
@@ -315,6 +317,6 @@ def arrow(start: Array, end: Array, weight: float) -> Iterator[Stroke]:
 def _center(sight: Sight, middle: Array) -> Iterator[Stroke]:
     """The centre of a field: a point within rings."""
     size = sight.picture.size
-    yield Stroke(middle + 0.04 * size * circle(24), closed=True, weight=1.4)
-    for radius in (0.1, 0.16):
+    yield Stroke(middle + 0.25 * size * circle(24), closed=True, weight=1.4)
+    for radius in (0.5, 0.75):
         yield Stroke(middle + radius * size * circle(), 0.6, dashed=True)

@@ -3,7 +3,7 @@
 const player = (() => {
   const { byId, element } = tools;
   const LONGEST = 0.1; // s; a page that was hidden goes on where it was
-  const BUDGET = 24; // ms of each picture that steps may take
+  const [BUDGET, SHARE] = [24, 0.5]; // ms of each picture that steps may take, or a part of it
   const WARM = 250; // times 8 ms before a live motion
   const SHOWS = [
     ["traces", "Traces", true], ["joints", "Joints", true], ["centres", "Centres of mass", false],
@@ -41,7 +41,7 @@ const player = (() => {
       const grip = isLive() && engine.grip;
       const pull = grip && grip.point ? [grip.point, grip.target] : null;
       stage.draw(state.t, state.y, state.p, state.u, show, { pull, keep: isLive() });
-      values.show({ ...state, energy: energyOf(state), playing: clock.playing, stepCost: isLive() ? engine.cost() : NaN });
+      values.show({ ...state, energy: energyOf(state), playing: clock.playing, stepCost: isLive() ? engine.cost() : NaN, single: !isLive() && DATA.run.single });
       overlay.draw(state.t);
       plotting.cursor(state.t);
       if (!isLive()) {
@@ -72,9 +72,10 @@ const player = (() => {
 
   function tick(now) {
     if (!clock.playing) return;
-    const passed = Math.min(Math.max((now - clock.stamp) / 1000, 0), LONGEST) * Number(byId("speed").value);
+    const before = clock.stamp;
+    const passed = Math.min(Math.max((now - before) / 1000, 0), LONGEST) * Number(byId("speed").value);
     clock.stamp = now;
-    if (isLive()) advance(passed);
+    if (isLive()) advance(passed, Math.max(BUDGET, SHARE * (now - before)));
     else {
       clock.time += passed;
       if (clock.time >= replay.end) {
@@ -90,8 +91,8 @@ const player = (() => {
     if (clock.playing) requestAnimationFrame(tick);
   }
 
-  function advance(seconds) {
-    engine.advance(seconds, BUDGET);
+  function advance(seconds, budget) {
+    engine.advance(seconds, Math.min(budget, 1000 * LONGEST));
     byId("behind").hidden = !engine.behind;
     afterSteps();
   }

@@ -342,10 +342,10 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   const api = {
     samples,
     // A run that is known whole; see `samples.set`.
-    setSource(t, y, p, u, held) {
+    setSource(t, y, p, u, held, single) {
       state.live = false;
       setMemory();
-      samples.set(t, y, p, u, held);
+      samples.set(t, y, p, u, held, single);
       api.showLive();
     },
     // A live run, whose samples come by `append`.

@@ -90,6 +90,7 @@ const charts = (() => {
     const units = [...new Set(spec.y.map((key) => place.channel(key).unit))];
     const scaleName = (key) => `y${units.indexOf(place.channel(key).unit)}`;
     const exponents = {};
+    let chart = null;
     const keysOf = (name) => spec.y.filter((key) => scaleName(key) === name);
     const scales = { x: { time: false, range: () => place.view() } };
     units.forEach((_, i) => {
@@ -120,8 +121,11 @@ const charts = (() => {
           .map((name) => [name, () => null])),
       },
       hooks: {
-        draw: [(self) => units.forEach((unit, i) =>
-          corner(self, place, numbers.axisUnit(unit, exponents[`y${i}`] ?? 0), i > 0))],
+        draw: [
+          (self) => units.forEach((unit, i) =>
+            corner(self, place, numbers.axisUnit(unit, exponents[`y${i}`] ?? 0), i > 0)),
+          () => chart?.mark(), // the size of the plot may be another one
+        ],
       },
     }, [[], ...spec.y.map(() => [])], box);
     const mark = child(u.over, "plot-mark");
@@ -135,7 +139,7 @@ const charts = (() => {
       const [low, high] = place.view();
       return high > low ? (u.over.clientWidth * (t - low)) / (high - low) : 0;
     };
-    const chart = {
+    chart = {
       refresh() {
         u.setData([samples.times(), ...samples.columns(spec.y).map(withGaps)], true);
         chart.mark();
@@ -150,7 +154,6 @@ const charts = (() => {
       },
       resize() {
         u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT.time });
-        chart.mark();
       },
       canvas: () => u.ctx.canvas,
       destroy: () => u.destroy(),
@@ -186,6 +189,7 @@ const charts = (() => {
   function phase(place) {
     const { samples, spec, box } = place;
     const exponents = {};
+    let chart = null;
     let [xs, ys] = [[], []];
     let zoom = null; // {x: [low, high], y: [low, high]}
     const scaleX = () => samples.scale(spec.x);
@@ -239,8 +243,11 @@ const charts = (() => {
       }))],
       cursor: { show: false },
       hooks: {
-        draw: [(self) => corner(self, place,
-          [spec.y.length === 1 ? nameOf(spec.y[0]) : "", numbers.axisUnit(unit, exponents.y0 ?? 0)].filter(Boolean).join(", "), false)],
+        draw: [
+          (self) => corner(self, place,
+            [spec.y.length === 1 ? nameOf(spec.y[0]) : "", numbers.axisUnit(unit, exponents.y0 ?? 0)].filter(Boolean).join(", "), false),
+          () => chart?.mark(),
+        ],
       },
     }, [null, ...spec.y.map(() => [[], []])], box);
     const dots = spec.y.map((key) => ({ key, mark: child(u.over, "plot-dot"), hover: child(u.over, "plot-dot plot-dot-hover") }));
@@ -284,7 +291,7 @@ const charts = (() => {
       return best === null ? null : times[best];
     }
 
-    const chart = {
+    chart = {
       refresh() {
         current();
         shown = zoom ?? whole();
@@ -295,7 +302,6 @@ const charts = (() => {
       hover: (t) => putDots("hover", t),
       resize() {
         u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT.phase });
-        chart.mark();
       },
       canvas: () => u.ctx.canvas,
       destroy: () => u.destroy(),

@@ -11,7 +11,10 @@ const makeSamples = (channels, { span = Infinity, spacing = 0, most = 2 ** 23 } 
   let offset = 0; // number of the sample at index 0 of the arrays
   let width = 0;
   let [times, states] = [new Float64Array(0), new Float64Array(0)];
-  let [given, start] = [[], null];
+  // How much coarser than the rounding of doubles values are, and changes, which are small differences
+  // that are asked for because they are small.
+  const [DOUBLE, SINGLE] = [{ value: 1, change: 1e-3 }, { value: 1e5, change: 1e6 }];
+  let [given, start, precision] = [[], null, DOUBLE];
   const columns = new Map();
   const sizes = new Map(); // greatest absolute values, by family and unit
 
@@ -24,15 +27,16 @@ const makeSamples = (channels, { span = Infinity, spacing = 0, most = 2 ** 23 } 
     Object.assign(samples, { first: 0, end: 0, full: false });
     [capacity, offset, width] = [0, 0, 0];
     [times, states] = [new Float64Array(0), new Float64Array(0)];
-    [given, start] = [[], null];
+    [given, start, precision] = [[], null, DOUBLE];
     columns.clear();
     sizes.clear();
   };
 
   // A run that is known whole: t (n), y (n ny). `held` tells for each sample whether a contact is held;
-  // without it one may be wherever there are contacts.
-  samples.set = (t, y, p = [], u = [], held = null) => {
+  // without it one may be wherever there are contacts. `single`: y was rounded to 24 bits.
+  samples.set = (t, y, p = [], u = [], held = null, single = false) => {
     samples.clear();
+    precision = single ? SINGLE : DOUBLE;
     width = t.length ? y.length / t.length : 0;
     [times, states, capacity] = [t, y, t.length];
     const values = [false, true].map((known) => ({ p: copy(p), u: copy(u), held: known }));
@@ -148,11 +152,12 @@ const makeSamples = (channels, { span = Infinity, spacing = 0, most = 2 ** 23 } 
   };
   samples.times = () => times.subarray(at(samples.first), at(samples.end));
 
-  // A typical size of a channel: the greatest value so far of all that is of its kind.
+  // The size of a channel beside which `numbers` sees what is rounding: the greatest value so far of
+  // all that is of its kind, more where values are less precise.
   samples.scale = (key) => {
     const channel = channels.get(key);
     const size = sizes.get(sizeKey(channel)) ?? 0;
-    return channel.change ? 1e-3 * size : size; // a change is asked for where it is small
+    return size * (channel.change ? precision.change : precision.value);
   };
 
   // Forget columns of channels that are no longer shown.

@@ -28,7 +28,7 @@ const makePlotting = ({ mechanism, replay, seek }) => {
     // What the plots show from now on.
     source(mode) {
       if (mode === "live") plots.live();
-      else plots.setSource(replay.t, replay.y, replay.p, replay.u, replay.held ?? undefined);
+      else plots.setSource(replay.t, replay.y, replay.p, replay.u, replay.held ?? undefined, DATA.run.single);
     },
     append({ t, y, p, u, events }) {
       const held = channels.heldAfter(events);

@@ -128,7 +128,7 @@ const makeArrows = (scene, mechanism) => {
   return {
     calibrate,
     // What the legend says: name, unit, colour, the value of a bar, and the bar's length in pixels.
-    legend: (show) => Object.entries(KINDS).filter(([kind]) => show[kind])
+    legend: (show) => Object.entries(KINDS).filter(([kind]) => show[kind] && values[kind] > 0)
       .map(([kind, about]) => ({ kind, ...about, value: barOf(kind), pixels: BAR })),
     draw(now, show) {
       for (const kind of Object.keys(KINDS)) {

@@ -8,6 +8,7 @@ const makeElements = (scene, mixed) => {
   const LAYER = { behind: -20, front: 40 };
   const INK = 0.75;
   const SAG = 16; // pieces of a slack rope
+  const ARROW = 26; // pixels of a field's longest arrow
   const painted = []; // lines with the strength of their ink
 
   function stroke(points, { ink = INK, width = 2, pieces = false, front = true } = {}) {
@@ -219,21 +220,22 @@ const makeElements = (scene, mixed) => {
   }
   function field(element) {
     const line = stroke(null, { pieces: true, ink: 0.3, width: 1.4, front: false });
-    const steps = [-2, -1, 0, 1, 2].map((k) => 0.6 * k * size);
-    return ({ values }) => {
+    return ({ values, pixel }) => {
       const points = [];
+      const longest = ARROW * pixel;
+      const steps = [-2, -1, 0, 1, 2].map((k) => k * Math.max(0.6 * size, 1.6 * longest));
       if (element.points?.length) {
         const ends = element.points.map((point) => vector(point, values));
         const forces = element.forces.map((force) => vector(force, values));
         const largest = Math.max(...forces.map((force) => Math.hypot(...force))) || 1;
-        ends.forEach((from, k) => points.push(...arrowPieces(from, add(from, scaled(forces[k], (0.4 * size) / largest)))));
+        ends.forEach((from, k) => points.push(...arrowPieces(from, add(from, scaled(forces[k], longest / largest)))));
       } else if (element.center && FORMS[element.form]) {
         const middle = vector(element.center, values);
         for (const x of steps) {
           for (const y of steps) {
             const r = Math.hypot(x, y);
             if (!r) continue;
-            const [dx, dy] = FORMS[element.form](x / r, y / r).map((part) => 0.13 * size * part);
+            const [dx, dy] = FORMS[element.form](x / r, y / r).map((part) => 0.5 * longest * part);
             points.push(...arrowPieces(add(middle, [x - dx, y - dy, 0]), add(middle, [x + dx, y + dy, 0])));
           }
         }

@@ -26,7 +26,7 @@ const makeValues = () => {
       start = null;
       scale = 0;
     },
-    show({ t, y, energy, playing, stepCost }) {
+    show({ t, y, energy, playing, stepCost, single }) {
       const now = performance.now();
       if (playing && states.length > MANY && now - written < PAUSE) return;
       written = now;
@@ -41,7 +41,8 @@ const makeValues = () => {
       [kinetic, potential, total].forEach((value, k) => {
         energies[k].textContent = numbers.text(value, "", scale);
       });
-      drift.textContent = numbers.text(total - start, "", scale);
+      // States that are stored in single precision give rounding, which is no drift.
+      drift.textContent = numbers.text(total - start, "", single ? 1e6 * scale : 1e-3 * scale);
       if (cost) cost.textContent = Number.isFinite(stepCost) ? numbers.text(stepCost) : "–";
     },
   };

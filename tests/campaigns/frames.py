@@ -29,10 +29,12 @@ def main() -> None:
     parser.add_argument("pages", nargs="+", type=Path)
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--live", action="store_true", help="integrate in the page")
+    parser.add_argument("--no-gl", action="store_true", help="for pages that draw without WebGL")
     given = parser.parse_args()
+    flags = ["--no-sandbox", "--disable-gpu"] if given.no_gl else FLAGS
     chromium = os.environ.get("CHROMIUM", "/usr/bin/chromium")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=chromium, args=flags)
         for path in given.pages:
             page = browser.new_page(viewport={"width": 1280, "height": 800})
             page.goto(path.resolve().as_uri())
