@@ -10,6 +10,14 @@ const player = (() => {
     ["shadows", "Shadows", true], ["forces", "Forces of effects", false], ["torques", "Torques of effects", false],
     ["velocities", "Velocities", false], ["reactions", "Joint forces", false],
   ];
+  // What this mechanism has nothing of is not offered.
+  const offered = {
+    shadows: Boolean(DATA.drawing.floor),
+    forces: DATA.loads.length > 0,
+    torques: DATA.loads.length > 0,
+    velocities: Boolean(mechanism.bodyVelocities),
+    reactions: Boolean(mechanism.jointForces),
+  };
   const canvas = byId("stage");
   const stage = makeStage(canvas, mechanism);
   const replay = makeReplay(mechanism);
@@ -265,7 +273,7 @@ const player = (() => {
   const plotting = makePlotting({ mechanism, replay, seek });
 
   for (const [key, text, on] of SHOWS) {
-    if (key === "shadows" && !DATA.drawing.floor) continue;
+    if (offered[key] === false) continue;
     const box = element("input", { type: "checkbox", id: `show-${key}`, checked: on });
     box.addEventListener("change", () => {
       show[key] = box.checked;
