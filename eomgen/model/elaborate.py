@@ -87,6 +87,11 @@ def elaborate(scene: Scene) -> Model:
     )
 
 
+def expanded(scene: Scene) -> Scene:
+    """The scene with its definitions expanded. Raises `SceneError` as `with_definitions` does."""
+    return with_definitions(scene, _moving(scene))
+
+
 def outputs_for(
     wanted: Literal["all"] | Sequence[str],
     location: str,
