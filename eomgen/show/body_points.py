@@ -6,6 +6,7 @@ from statistics import median
 
 from eomgen.language.formula import Formula
 from eomgen.model.model import Body, Model
+from eomgen.scene.constraints import Distance
 from eomgen.scene.effects import BodyContact, ExternalForce, Spring
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
@@ -52,6 +53,13 @@ def points_of(model: Model) -> list[BodyPoints]:
             add(body.joint.parent, body.joint.r_parent, "joints")
             if body.parent >= 0 and not length_of(model, body.joint.r_parent):
                 found[body.parent].carries = True
+    for loop in model.loops:
+        add(loop.joint.child, loop.joint.r_child, "joints")
+        add(loop.joint.parent, loop.joint.r_parent, "joints")
+    for constraint in model.constraints:
+        if isinstance(constraint, Distance):
+            add(constraint.body_1, constraint.at_1, "others")
+            add(constraint.body_2, constraint.at_2, "others")
     for point in model.points:
         add(model.bodies[point.body].name, point.at, "others")
     for effect in model.effects:

@@ -77,7 +77,7 @@ def live_table(
             for i in live.inputs
         ],
         "bodies": [body.name for body in live.bodies],
-        "joints": [body.joint.name for body in live.holding],
+        "joints": list(live.force_joints),
         "effects": [
             {
                 "name": e.name,

@@ -128,6 +128,6 @@ def _recorded(run: Ran, why: str) -> PageCode:
         "effects": [],
         "loads": [],
         "operations": 0,
-        "joints": [body.joint.name for body in run.model.holding],
+        "joints": list(run.model.force_joints),
     }
     return PageCode(mechanism(program, interface), table, live=False, why=why)

@@ -1,6 +1,6 @@
 """What is drawn of a mechanism: bodies, joints, effects and traces, as formulas of parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,9 @@ from eomgen.language.formula import ZERO, Constant
 from eomgen.model.frames import from_centre
 from eomgen.model.model import Body, Model
 from eomgen.scene.appearance import Appearance
+from eomgen.scene.constraints import Distance
 from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import WORLD
 from eomgen.scene.look import Polygon, Rod, Shape, is_drawable
 from eomgen.show.body_points import BodyPoints, points_of, typical_length
 from eomgen.show.colours import body_colours
@@ -18,9 +20,11 @@ from eomgen.show.connections import hidden_rods
 from eomgen.show.effect_elements import SYMBOL, elements_of
 from eomgen.show.elements import (
     WORLD_INDEX,
+    Attachment,
     Attraction,
     Element,
     Field,
+    Link,
     Support,
     Vector,
     without_formula,
@@ -121,8 +125,8 @@ def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Pic
             shapes = invented_shapes(inventor, body, own, colour)
         painted = tuple(s if s.color else s.replaced(color=colour) for s in shapes)
         bodies.append(DrawnBody(body.name, colour, painted))
-    joints = tuple(_joint(model, k, body) for k, body in enumerate(model.bodies))
-    elements = (*_supports(model, size), *elements)
+    joints = tuple(_joint(model, k, body) for k, body in _holders(model))
+    elements = (*_supports(model, size), *_rods(model, size), *elements)
     return Picture(tuple(bodies), joints, elements, _traces(model, points, bodies), size)
 
 
@@ -150,6 +154,31 @@ def shape_from_centre(shape: Shape, com: Vector) -> Shape:
     return shape.replaced(**fields) if fields else shape
 
 
+def _holders(model: Model) -> list[tuple[int, Body]]:
+    """Each joint as a body that it holds, with the body's index: those of the tree, then loops."""
+    index = {WORLD: WORLD_INDEX, **{body.name: k for k, body in enumerate(model.bodies)}}
+    loops = [
+        (index[loop.joint.child], loop.joint) for loop in model.loops if loop.joint.child != WORLD
+    ]
+    return [
+        *enumerate(model.bodies),
+        *(
+            (k, replace(model.bodies[k], joint=joint, parent=index[joint.parent]))
+            for k, joint in loops
+        ),
+    ]
+
+
+def _rods(model: Model, size: float) -> Iterator[Link]:
+    """A line for each massless rod."""
+    index = {WORLD: WORLD_INDEX, **{body.name: k for k, body in enumerate(model.bodies)}}
+    for rod in model.constraints:
+        if isinstance(rod, Distance):
+            ends = ((rod.body_1, rod.at_1), (rod.body_2, rod.at_2))
+            one, other = (Attachment(index[body], at) for body, at in ends)
+            yield Link("rope", rod.name, one, other, rod.length, Constant(SYMBOL * size))
+
+
 def _joint(model: Model, k: int, body: Body) -> DrawnJoint:
     joint, zero = body.joint, (ZERO,) * model.dimensions
     if isinstance(joint, Free):
@@ -168,7 +197,7 @@ def _joint(model: Model, k: int, body: Body) -> DrawnJoint:
 def _supports(model: Model, size: float) -> list[Support]:
     """A mark where the world holds a joint, and a rail for each slider."""
     found = []
-    for k, body in enumerate(model.bodies):
+    for k, (_, body) in enumerate(_holders(model)):
         joint = body.joint
         if isinstance(joint, Free) or joint.type == "planar":
             continue

@@ -38,6 +38,7 @@ OF_PAGE = (
     *("initial_state", "derivative", "kinetic_energy", "potential_energy", "joint_forces"),
     *("body_poses", "body_velocities", "loads", "geometry", "switching_functions"),
     *("gaps", "gap_rates", "impact", "held"),
+    *("constraint_residuals", "project_position", "project_velocity", "constraint_margins"),
 )
 """The outputs that a page uses."""
 MOST = 300
