@@ -124,6 +124,12 @@ def assembled(model: Model) -> Model:
         raise SceneError(_open(mechanism, start, free))
     dropped = _dependent(mechanism, q)
     model = replace(model, initial_q=tuple(q.tolist()), dropped=dropped)
+    if not model.rows:
+        raise SceneError(
+            f"joints: {', '.join(c.name for c in model.constraints)} "
+            f"restrict{'s' * (len(model.constraints) == 1)} nothing that the other joints do not "
+            "restrict already; leave it out"
+        )
     if len(model.rows) >= len(model.velocities):
         raise SceneError(
             f"joints: the loops hold everything: {len(model.rows)} independent constraints on "
