@@ -1,11 +1,13 @@
 """Linkages whose loops block directions twice, in plain numbers; nothing here imports eomgen."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
-from spatial_loops import Closed, closed, loop_joint
-from spatial_newton_euler import poses
-from spatial_trees import ORIGIN, SPACE, Loop, SpatialTree, TreeBody, TreeJoint, Vector, Z
+from spatial_loops import Closed, Ends, closed, loop_joint
+from spatial_newton_euler import at_rest
+from spatial_trees import ORIGIN, SPACE, SpatialTree, TreeBody, TreeJoint, Vector, Z
 
 GRAVITY = 9.81
 
@@ -29,18 +31,14 @@ def hinged(lengths: list[float], twists: list[float], angles: list[float], tilt:
         bodies.append(TreeBody(f"b{k}", float(np.round(rng.uniform(0.5, 2), 2)), moments, joint))
     tree = SpatialTree("linkage", SPACE, tuple(bodies), GRAVITY, -1, None, (), {})
     q, last = np.array(angles), len(bodies) - 1
-    _, axes = poses(tree, q)[last]
+    there = at_rest(tree, q)
     twist = Rotation.from_euler("x", twists[-2], degrees=True)
-    direction = axes @ twist.apply(Z)
-    x, y, z = direction.tolist()
-    end = np.array([lengths[-2] / 2, 0.0, 0.0])
-    nothing = np.zeros(3), Rotation.identity()
-    joint = loop_joint(
-        tree, q, 0, "revolute", last, -1, ((x, y, z),), end, nothing[1], nothing[0]
+    x, y, z = (there[last].axes @ twist.apply(Z)).tolist()
+    ends = Ends(last, -1, np.array([lengths[-2] / 2, 0.0, 0.0]))
+    closing = loop_joint(
+        tree, there, "revolute", ((x, y, z),), ends, Rotation.identity(), np.zeros(3)
     )
-    tree = SpatialTree(
-        "linkage", SPACE, tree.bodies, GRAVITY, -1, None, (), {}, (Loop(joint, -1),)
-    )
+    tree = replace(tree, loops=(closing,))
     return closed(tree, written(tree), q, rng.uniform(-2.0, 2.0, len(q)))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from spatial_newton_euler import loop_rows, poses, velocities_of
+from spatial_newton_euler import STILL, BodyMotion, at_rest, loop_rows, mass_matrix, velocities_of
 from spatial_trees import (
     PLANE,
     SPACE,
@@ -28,6 +28,12 @@ LOOP_KINDS: dict[int, tuple[str, ...]] = {
     PLANE: ("revolute", "revolute", "prismatic", "weld"),
     SPACE: ("ball", "revolute", "prismatic", "cylindrical", "universal", "planar", "weld"),
 }
+BLOCKED = {
+    PLANE: {"revolute": 2, "prismatic": 2, "weld": 3},
+    SPACE: {"ball": 3, "revolute": 5, "prismatic": 5, "cylindrical": 4, "universal": 4, "planar": 3,
+            "weld": 6},
+}  # fmt: skip
+"""How many directions each kind blocks."""
 TRIES = 60
 """Loops that are drawn before a tree is given up."""
 LEAST = 1e-3
@@ -38,7 +44,8 @@ LEAST = 1e-3
 class Closed:
     """A mechanism with loops at a state that closes them; `text` is its scene.
 
-    `condition` is that of the rows of its loops: the greatest singular value over the least.
+    `condition` is that of the mass matrix M or of J M⁻¹ Jᵀ, the greater, with a diagonal of 1; J are
+    the rows of the loops.
     """
 
     tree: SpatialTree
@@ -55,32 +62,43 @@ def random_loops(seed: int, dimensions: int, most: int, loops: int) -> Closed:
     rng = np.random.default_rng([seed, dimensions, most, loops])
     while True:
         tree, text = random_spatial_tree(int(rng.integers(2**31)), dimensions, most)
-        if len(tree.bodies) < 2:
+        freedoms = len(tree.velocities)
+        if len(tree.bodies) < 2 or freedoms <= loops * min(BLOCKED[dimensions].values()):
             continue
         q, v = random_state(tree, rng)
-        velocities = velocities_of(tree, q)
+        bodies, velocities = at_rest(tree, q), velocities_of(tree, q)
+        rows = np.zeros((0, freedoms))
         for _ in range(TRIES):
             if len(tree.loops) == loops:
-                break
-            other = replace(tree, loops=(*tree.loops, _drawn(rng, tree, q)))
-            rows = loop_rows(other, q, velocities)
-            if len(rows) < rows.shape[1] and _condition(rows) < 1 / LEAST:
-                tree = other
-        if len(tree.loops) == loops:
-            return closed(tree, text, q, v)
+                return closed(tree, text, q, v)
+            loop = _drawn(rng, tree, bodies, freedoms - 1 - len(rows))
+            if loop is None:
+                continue
+            more = loop_rows(replace(tree, loops=(loop,)), bodies, velocities)
+            if _condition(np.vstack([rows, more])) < 1 / LEAST:
+                tree, rows = replace(tree, loops=(*tree.loops, loop)), np.vstack([rows, more])
 
 
 def closed(tree: SpatialTree, text: str, q: np.ndarray, v: np.ndarray) -> Closed:
     """A tree at a state that closes its loops, with the velocities that keep them closed; `text` is
     its scene without them.
     """
-    rows = loop_rows(tree, q, velocities_of(tree, q))
+    velocities = velocities_of(tree, q)
+    rows = loop_rows(tree, at_rest(tree, q), velocities)
     v = v - np.linalg.pinv(rows, rcond=1e-9) @ (rows @ v)
     start = [f"{name} = {float(x)!r}" for name, x in zip(tree.coordinates, q, strict=True)]
     speeds = [f"{name} = {float(x)!r}" for name, x in zip(tree.velocities, v, strict=True)]
     initial = f"[initial]\nq = {{ {', '.join(start)} }}\nv = {{ {', '.join(speeds)} }}\n"
     tables = [text, *(written(tree, loop) for loop in tree.loops), initial]
-    return Closed(tree, "\n".join(tables), q, v, _condition(rows))
+    mass = mass_matrix(tree, q, velocities)
+    loops = rows @ np.linalg.solve(mass, rows.T)
+    return Closed(tree, "\n".join(tables), q, v, max(_scaled(mass), _scaled(loops)))
+
+
+def _scaled(matrix: np.ndarray) -> float:
+    """The condition of a symmetric matrix whose diagonal is made 1."""
+    sizes = np.sqrt(np.abs(np.diag(matrix)))
+    return float(np.linalg.cond(matrix / np.outer(sizes, sizes)))
 
 
 def _condition(rows: np.ndarray) -> float:
@@ -91,12 +109,16 @@ def _condition(rows: np.ndarray) -> float:
     return float(np.linalg.cond(rows / sizes[:, np.newaxis]))
 
 
-def _drawn(rng: np.random.Generator, tree: SpatialTree, q: np.ndarray) -> Loop:
-    """A loop joint that is closed at q."""
+def _drawn(
+    rng: np.random.Generator, tree: SpatialTree, bodies: list[BodyMotion], most: int
+) -> Loop | None:
+    """A loop joint that is closed where the bodies are; None if it blocks more than `most`."""
     n, space = len(tree.bodies), tree.dimensions == SPACE
     parent, child = (int(k) for k in rng.choice(np.arange(-1, n), 2, replace=False))
     kinds = LOOP_KINDS[tree.dimensions]
     kind = kinds[int(rng.integers(len(kinds)))]
+    if BLOCKED[tree.dimensions][kind] > most:
+        return None
     axes: Vectors = (Z,)
     if kind == "prismatic" or (space and kind in ("revolute", "cylindrical")):
         axes = (direction(rng, tree.dimensions),)
@@ -126,39 +148,44 @@ def _drawn(rng: np.random.Generator, tree: SpatialTree, q: np.ndarray) -> Loop:
         slide = rng.uniform(-0.5, 0.5) * np.array(axes[0])
     elif kind == "planar":
         slide[:2] = rng.uniform(-0.5, 0.5, 2)
-    return Loop(loop_joint(tree, q, len(tree.loops), kind, parent, child, axes, at, turn, slide),
-                child)  # fmt: skip
+    ends = Ends(parent, child, at)
+    return loop_joint(tree, bodies, kind, axes, ends, turn, slide)
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """The bodies of a loop joint by their indices, -1 for the world, and its place on the parent."""
+
+    parent: int
+    child: int
+    at: np.ndarray
 
 
 def loop_joint(
     tree: SpatialTree,
-    q: np.ndarray,
-    number: int,
+    bodies: list[BodyMotion],
     kind: str,
-    parent: int,
-    child: int,
     axes: Vectors,
-    at: np.ndarray,
+    ends: Ends,
     turn: Rotation,
     slide: np.ndarray,
-) -> TreeJoint:
-    """The joint that is closed at q, where its own coordinates turn and move the child by `turn`
-    and `slide`, in its axes.
+) -> Loop:
+    """The joint that is closed where the bodies are and where its own coordinates turn and move the
+    child by `turn` and `slide`, in its axes.
     """
-    bodies = [*poses(tree, q), (np.zeros(3), np.eye(3))]  # the last is the world
-    (place, base), (centre, own) = bodies[parent], bodies[child]
-    frame = Rotation.from_matrix(base.T @ own) * turn.inv()
+    base, child = ([*bodies, STILL][k] for k in (ends.parent, ends.child))
+    frame = Rotation.from_matrix(base.axes.T @ child.axes) * turn.inv()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # where two of the angles are one, either does
         degrees = frame.as_euler("xyz", degrees=True)
-    point = place + base @ (at + frame.apply(slide))
-    r_child = own.T @ (point - centre)
+    point = base.place + base.axes @ (ends.at + frame.apply(slide))
+    r_child = child.axes.T @ (point - child.place)
     if tree.dimensions == PLANE:
         degrees[:2] = 0.0
-    orientation, r_parent, r_child = (_vector(x) for x in (degrees, at, r_child))
-    return TreeJoint(
-        f"loop{number}", kind, parent, r_parent, r_child, orientation, axes, 0.0, (), ()
-    )
+    orientation, r_parent, r_child = (_vector(x) for x in (degrees, ends.at, r_child))
+    name = f"loop{len(tree.loops)}"
+    where = (r_parent, r_child, orientation, axes)
+    return Loop(TreeJoint(name, kind, ends.parent, *where, 0.0, (), ()), ends.child)
 
 
 def written(tree: SpatialTree, loop: Loop) -> str:

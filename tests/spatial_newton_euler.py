@@ -62,7 +62,7 @@ class SpatialMotion:
 
 
 @dataclass
-class _Body:
+class BodyMotion:
     """Where a body is and how it moves, in world axes; `angle` has a meaning in the plane alone."""
 
     place: np.ndarray
@@ -72,7 +72,7 @@ class _Body:
     angle: float = 0.0
 
 
-STILL = _Body(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+STILL = BodyMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 """The world."""
 
 
@@ -180,7 +180,7 @@ def _pairs(tree: SpatialTree, q: np.ndarray, v: np.ndarray) -> list["_Pair"]:
     return pairs
 
 
-def _closing(tree: SpatialTree, moving: list[_Body]) -> list["_Closing"]:
+def _closing(tree: SpatialTree, moving: list[BodyMotion]) -> list["_Closing"]:
     """The joints that close loops."""
     bodies = [*moving, STILL]  # the last is the world
     return [
@@ -200,26 +200,33 @@ def _touched(child: int, parent: int) -> tuple[list[int], list[int]]:
     )
 
 
-def poses(tree: SpatialTree, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Place and axes of each body."""
-    pairs = _pairs(tree, q, np.zeros(len(tree.velocities)))
-    return [(pair.child.place, pair.child.axes) for pair in pairs]
+def at_rest(tree: SpatialTree, q: np.ndarray) -> list[BodyMotion]:
+    """The bodies at coordinates q."""
+    return [pair.child for pair in _pairs(tree, q, np.zeros(len(tree.velocities)))]
 
 
 def velocities_of(tree: SpatialTree, q: np.ndarray) -> np.ndarray:
-    """The velocities of all bodies, linear and angular, (6 nb, nv), for each velocity of the tree.
-    """
+    """The velocities of all bodies, linear and angular, (6 nb, nv), for each velocity of the tree."""
     found = [[pair.child for pair in _pairs(tree, q, v)] for v in np.eye(len(tree.velocities))]
     return np.array([[x for b in bodies for x in (*b.velocity, *b.spin)] for bodies in found]).T
 
 
-def loop_rows(tree: SpatialTree, q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+def mass_matrix(tree: SpatialTree, q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+    """Twice the kinetic energy by the velocities of the tree, (nv, nv); see `velocities_of`."""
+    found = np.diag([body.joint.armature for body in tree.bodies for _ in body.joint.velocities])
+    for k, (body, there) in enumerate(zip(tree.bodies, at_rest(tree, q), strict=True)):
+        linear, angular = velocities[6 * k : 6 * k + 3], velocities[6 * k + 3 : 6 * k + 6]
+        inertia = there.axes @ body.inertia_matrix @ there.axes.T
+        found = found + body.mass * linear.T @ linear + angular.T @ inertia @ angular
+    return np.asarray(found)
+
+
+def loop_rows(tree: SpatialTree, bodies: list[BodyMotion], velocities: np.ndarray) -> np.ndarray:
     """The rates of the directions that the loops block, for each velocity of the tree; `velocities`
-    are those of its bodies.
+    are those of its bodies, see `velocities_of`.
     """
     found = [np.zeros((0, velocities.shape[1]))]
-    moving = [pair.child for pair in _pairs(tree, q, np.zeros(len(tree.velocities)))]
-    for loop, pair in zip(tree.loops, _closing(tree, moving), strict=True):
+    for loop, pair in zip(tree.loops, _closing(tree, bodies), strict=True):
         places, used = _touched(loop.child, loop.joint.parent)
         found.append(pair.blocked()[0][:, used] @ velocities[places])
     return np.vstack(found)
@@ -229,7 +236,7 @@ class _Pair:
     """A joint with its two bodies: how the child moves, and what is blocked."""
 
     def __init__(
-        self, tree: SpatialTree, joint: TreeJoint, base: _Body, q: np.ndarray, v: np.ndarray
+        self, tree: SpatialTree, joint: TreeJoint, base: BodyMotion, q: np.ndarray, v: np.ndarray
     ) -> None:
         self.joint, self.base, self.q, self.v = joint, base, q, v
         plane = tree.dimensions == PLANE
@@ -269,7 +276,7 @@ class _Pair:
         place = base.place + self.arm_parent + slide - self.arm_child
         velocity = base.velocity + _cross(base.spin, self.arm_parent) + self.gap_rate
         velocity = velocity - _cross(self.spin, self.arm_child)
-        self.child = _Body(place, axes, velocity, self.spin, base.angle + about_z + angle)
+        self.child = BodyMotion(place, axes, velocity, self.spin, base.angle + about_z + angle)
 
     def along(self, n: np.ndarray) -> tuple[np.ndarray, float]:
         """Second time derivative of n · gap, n fixed in the parent: a row and what it lacks."""
@@ -349,7 +356,9 @@ class _Pair:
 class _Closing(_Pair):
     """A joint between two bodies whose motions are known."""
 
-    def __init__(self, tree: SpatialTree, joint: TreeJoint, base: _Body, child: _Body) -> None:
+    def __init__(
+        self, tree: SpatialTree, joint: TreeJoint, base: BodyMotion, child: BodyMotion
+    ) -> None:
         self.joint, self.base, self.child, self.spin = joint, base, child, child.spin
         self.plane = tree.dimensions == PLANE
         self.flat = joint.kind == "planar"

@@ -4,24 +4,24 @@ in space, over all joint types; and four-bars and slider-cranks with their close
 `campaigns/loops.py` tries 300 random ones.
 """
 
-from itertools import product
-
 import linkages
 import numpy as np
+import planar_linkages
 import pytest
-from campaign import some
 from engine import apart, engine
 from loop_routes import apart_by_route, model_of, solved
 from spatial_loops import Closed, random_loops
 from spatial_trees import PLANE, SPACE
 
 from eomgen.outputs import OUTPUTS
+from eomgen.run.integrate import integrate
+from eomgen.run.module import as_problem
 
 CASES = [(PLANE, 5, 0), (PLANE, 7, 1), (PLANE, 8, 3), (SPACE, 5, 1), (SPACE, 6, 2), (SPACE, 6, 3)]
 """Dimensions, most bodies, seed."""
 CLOSE, WELL = 1e-10, 1e-12
-CONDITION = 30.0
-"""Of the rows of the loops, below which a mechanism is well-conditioned."""
+CONDITION = 100.0
+"""That of a mechanism, see `Closed`, below which it is well-conditioned."""
 
 
 def drawn(dimensions: int, most: int, seed: int) -> Closed:
@@ -43,14 +43,16 @@ def test_every_route_is_the_solver(dimensions: int, most: int, seed: int) -> Non
     assert_as_solved(drawn(dimensions, most, seed), seed)
 
 
-LEFT = ("jacobian", *(name for name in OUTPUTS if name != "joint_forces"))
+def left_out(*kept: str) -> tuple[str, ...]:
+    """All outputs but some."""
+    return ("jacobian", *(name for name in OUTPUTS if name not in kept))
 
 
 @pytest.mark.parametrize(("dimensions", "route"), [(PLANE, "independent"), (SPACE, "aba")])
 def test_a_module_is_the_solver(dimensions: int, route: str) -> None:
     """As generated code: accelerations, wrenches, residuals, and projections that change nothing."""
     case = drawn(dimensions, 4, 2)
-    module = engine(case.text, route, leave_out=LEFT).module
+    module = engine(case.text, route, leave_out=left_out("joint_forces")).module
     u, motion = solved(case, 0)
     y = np.empty(len(module.STATES))
     y[case.tree.places(module.STATES)] = np.concatenate((case.q, case.v))
@@ -101,3 +103,54 @@ def test_the_solver_notices_faults() -> None:
     model = model_of(Closed(case.tree, other, case.q, case.v, case.condition))
     found = apart_by_route(case, model, u, motion)
     assert min(max(off) for off in found.values()) > 1e-9
+
+
+FORMULAS = {
+    "slider_crank": (planar_linkages.slider_crank, "theta bend x"),
+    "four_bar": (planar_linkages.four_bar, "theta bend gamma"),
+}
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_closed_formulas(name: str) -> None:
+    """Positions, velocities and accelerations around the whole circle, and the branch kept along a
+    run: those of the closed formulas and of the reduced equation of motion.
+    """
+    formulas, words = FORMULAS[name]
+    text = getattr(planar_linkages, f"{name}_scene")(1.5, 3.0)
+    module = engine(text, "independent", leave_out=left_out()).module
+    own = [module.STATES.index(word) for word in words.split()]
+    expected, start = formulas(1.5, 3.0), module.initial_state()
+    assert apart(start[:3][own], expected.q) < WELL  # assembled from the angle alone
+    assert apart(start[3:][own], 3.0 * expected.by_angle) < WELL
+    rng = np.random.default_rng(0)
+    for angle in np.linspace(-3.0, 3.0, 31).tolist():
+        rate = float(rng.uniform(-5.0, 5.0))
+        expected, y = formulas(angle, rate), np.zeros(6)
+        y[own] = expected.q + [0.0, *rng.uniform(-0.01, 0.01, 2)]
+        for _ in range(6):
+            y[:3] = module.project_position(0.0, y)
+        assert apart(y[own], expected.q) < WELL
+        y[3 + own[0]] = rate
+        y[3:] = module.project_velocity(0.0, y)
+        assert apart(y[3:][own], rate * expected.by_angle) < WELL
+        rates = module.derivative(0.0, y)
+        assert apart(rates[:3], y[3:]) == 0.0
+        assert apart(rates[3:][own], expected.accelerations(rate)) < WELL
+    run = integrate(as_problem(module), "rk4", 1.0, dt=2e-3)
+    assert run.finished
+    ends = [formulas(float(y[own[0]]), 0.0).q for y in run.y[::50]]
+    # Angles may have gone around.
+    apart_by = (run.y[::50, own] - ends + np.pi) % (2 * np.pi) - np.pi
+    assert np.abs(apart_by).max() < WELL
+
+
+def test_peaucellier_draws_a_straight_line() -> None:
+    """`campaigns/loops.py` runs it for 1e5 steps."""
+    text = planar_linkages.peaucellier_scene()
+    module = engine(text, "aba", leave_out=left_out("point_positions")).module
+    run = integrate(as_problem(module), "rk4", 0.2, dt=1e-3)
+    x, y = module.point_positions(0.0, run.y.T)[0]
+    assert run.finished
+    assert np.ptp(y) > 0.05
+    assert np.abs(x - planar_linkages.LINE).max() < 1e-12 * np.ptp(y)

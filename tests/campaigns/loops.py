@@ -43,6 +43,8 @@ def random(count: int) -> int:
         kinds.update(f"{loop.joint.kind}_{dimensions}" for loop in case.tree.loops)
         conditions.append(case.condition)
         for route, off in apart_by_route(case, model, u, motion).items():
+            if "LJ" in __import__("os").environ:
+                print("DATA", seed, route, *off, case.condition, flush=True)
             at = 2 * (not well)
             worst[route][at : at + 2] = np.maximum(worst[route][at : at + 2], off)
             if max(off) > (WELL if well else CLOSE) or model.notices:
