@@ -1,6 +1,7 @@
 """Linkages whose loops block directions twice, in plain numbers; nothing here imports eomgen."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -99,7 +100,7 @@ def bricard(angle: float = 2.0) -> Closed:
 
     grid = np.linspace(-np.pi, np.pi, 200)
     found = []
-    for low, high in zip(grid, grid[1:], strict=False):
+    for low, high in pairwise(grid):
         if gap(low) * gap(high) < 0:
             found.append(brentq(gap, low, high, xtol=1e-15))
     for other in found:

@@ -34,6 +34,10 @@ BLOCKED = {
             "weld": 6},
 }  # fmt: skip
 """How many directions each kind blocks."""
+WORST = 1e5
+"""A mechanism of a greater condition is drawn again: its data's last places decide on more than the
+tenth digit.
+"""
 TRIES = 60
 """Loops that are drawn before a tree is given up."""
 LEAST = 1e-3
@@ -44,8 +48,8 @@ LEAST = 1e-3
 class Closed:
     """A mechanism with loops at a state that closes them; `text` is its scene.
 
-    `condition` is that of the mass matrix M or of J M⁻¹ Jᵀ, the greater, with a diagonal of 1; J are
-    the rows of the loops.
+    `condition` is that of the mass matrix M or of J M⁻¹ Jᵀ, the greater, with a diagonal of 1; J is
+    of the rows of the loops.
     """
 
     tree: SpatialTree
@@ -70,7 +74,10 @@ def random_loops(seed: int, dimensions: int, most: int, loops: int) -> Closed:
         rows = np.zeros((0, freedoms))
         for _ in range(TRIES):
             if len(tree.loops) == loops:
-                return closed(tree, text, q, v)
+                case = closed(tree, text, q, v)
+                if case.condition > WORST:
+                    break
+                return case
             loop = _drawn(rng, tree, bodies, freedoms - 1 - len(rows))
             if loop is None:
                 continue
@@ -136,7 +143,9 @@ def _drawn(
         case "cylindrical":
             turn = Rotation.from_rotvec(angle[0] * np.array(axes[0]))
         case "universal":
-            one, two = (Rotation.from_rotvec(a * np.array(x)) for a, x in zip(angle, axes))
+            one, two = (
+                Rotation.from_rotvec(a * np.array(x)) for a, x in zip(angle, axes, strict=True)
+            )
             turn = one * two
         case "ball":
             turn = Rotation.from_quat(rng.normal(size=4))
@@ -154,7 +163,7 @@ def _drawn(
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """The bodies of a loop joint by their indices, -1 for the world, and its place on the parent."""
+    """The bodies of a loop joint by index, -1 for the world, and its place on the parent."""
 
     parent: int
     child: int

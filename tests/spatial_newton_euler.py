@@ -33,8 +33,9 @@ class SpatialMotion:
     then angular, world axes; `momentum` (3,) | (6,) about the world's origin, of the bodies alone;
     `centre_of_mass`, `point_positions`, `point_velocities` with 2 | 3 components.
 
-    `joint_forces` (nj, 3) | (nj, 6), one for each of the tree's `joints`, loops too: force and moment of the
-    whole wrench that the joint puts on its parent, at the joint's point on the child, world axes.
+    `joint_forces` (nj, 3) | (nj, 6), one for each of the tree's `joints`, loops too: force and
+    moment of the whole wrench that the joint puts on its parent, at the joint's point on the child,
+    world axes.
     It is what the child and all it carries need to move as they do, turned round: reactions of
     blocked directions, the motor's torque and the rotor's inertia torque (-armature q̈ on the child)
     included. Along a free direction the wrench on the child is hence torque - armature q̈.
@@ -206,7 +207,7 @@ def at_rest(tree: SpatialTree, q: np.ndarray) -> list[BodyMotion]:
 
 
 def velocities_of(tree: SpatialTree, q: np.ndarray) -> np.ndarray:
-    """The velocities of all bodies, linear and angular, (6 nb, nv), for each velocity of the tree."""
+    """Velocities of all bodies, linear and angular, (6 nb, nv), for each velocity of the tree."""
     found = [[pair.child for pair in _pairs(tree, q, v)] for v in np.eye(len(tree.velocities))]
     return np.array([[x for b in bodies for x in (*b.velocity, *b.spin)] for bodies in found]).T
 

@@ -13,9 +13,13 @@ from loop_routes import apart_by_route, model_of, solved
 from spatial_loops import Closed, random_loops
 from spatial_trees import PLANE, SPACE
 
+from eomgen.dynamics.assembly import assembled
+from eomgen.errors import SceneError
+from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
+from eomgen.scene.reader import parse_scene
 
 CASES = [(PLANE, 5, 0), (PLANE, 7, 1), (PLANE, 8, 3), (SPACE, 5, 1), (SPACE, 6, 2), (SPACE, 6, 3)]
 """Dimensions, most bodies, seed."""
@@ -50,7 +54,7 @@ def left_out(*kept: str) -> tuple[str, ...]:
 
 @pytest.mark.parametrize(("dimensions", "route"), [(PLANE, "independent"), (SPACE, "aba")])
 def test_a_module_is_the_solver(dimensions: int, route: str) -> None:
-    """As generated code: accelerations, wrenches, residuals, and projections that change nothing."""
+    """As code: accelerations, wrenches, residuals, and projections that change nothing."""
     case = drawn(dimensions, 4, 2)
     module = engine(case.text, route, leave_out=left_out("joint_forces")).module
     u, motion = solved(case, 0)
@@ -127,7 +131,7 @@ def test_closed_formulas(name: str) -> None:
     for angle in np.linspace(-3.0, 3.0, 31).tolist():
         rate = float(rng.uniform(-5.0, 5.0))
         expected, y = formulas(angle, rate), np.zeros(6)
-        y[own] = expected.q + [0.0, *rng.uniform(-0.01, 0.01, 2)]
+        y[own] = expected.q + np.array([0.0, *rng.uniform(-0.01, 0.01, 2)])
         for _ in range(6):
             y[:3] = module.project_position(0.0, y)
         assert apart(y[own], expected.q) < WELL
@@ -154,3 +158,123 @@ def test_peaucellier_draws_a_straight_line() -> None:
     assert run.finished
     assert np.ptp(y) > 0.05
     assert np.abs(x - planar_linkages.LINE).max() < 1e-12 * np.ptp(y)
+
+
+# Bad input.
+
+
+def bars(*more: str, ground: float = 0.75, closing: str = "loop = true", start: str = "") -> str:
+    """A four-bar, with more tables."""
+    pin = planar_linkages.pin
+    tables = [planar_linkages.head("bad")]
+    tables += [planar_linkages.body(name, 1.0, 0.1) for name in ("crank", "coupler", "rocker")]
+    close = pin("close", "coupler", (0.4, 0), "rocker", (0.275, 0), loop=True)
+    tables += [
+        pin("theta", "world", (0, 0), "crank", (-0.125, 0)),
+        pin("bend", "crank", (0.125, 0), "coupler", (-0.4, 0)),
+        pin("gamma", "world", (ground, 0), "rocker", (-0.275, 0)),
+        close.replace("loop = true", closing),
+    ]
+    return "\n".join([*tables, *more, f"[initial]\n{start}"])
+
+
+def another(parent: str, at: tuple[float, float], child: str, own: tuple[float, float]) -> str:
+    """One more loop joint."""
+    return planar_linkages.pin("more", parent, at, child, own, loop=True)
+
+
+def constraint(kind: str, *lines: str) -> str:
+    """A constraint as TOML."""
+    return "\n".join(["[[constraints]]", f'type = "{kind}"', 'name = "rule"', *lines, ""])
+
+
+BAD = {
+    "it cannot close": (bars(ground=3.0), "pin_close_x stays open by 2.5 m; change lengths"),
+    "nor where it is held": (
+        bars(ground=1.9, start="q = { theta = 3.14 }"),
+        "cannot be met with theta as given: pin_close_x stays open by 0.806 m",
+    ),
+    "it holds everything": (
+        bars(another("world", (0.25, 0), "crank", (0.125, 0))),
+        "the loops hold everything: 3 independent constraints on 3 velocities",
+    ),
+    "two more hold everything": (
+        bars(constraint("equation", 'position = "theta - 1"')),
+        "the loops hold everything: 3 independent constraints on 3 velocities",
+    ),
+    "it restricts nothing": (
+        planar_linkages.head("bad")
+        + planar_linkages.body("crank", 1.0, 0.1)
+        + planar_linkages.pin("theta", "world", (0, 0), "crank", (-0.125, 0))
+        + another("world", (0, 0), "crank", (-0.125, 0)),
+        "pin_more restricts nothing that the other joints do not restrict already; leave it out",
+    ),
+    "velocities contradict it": (
+        bars(start="q = { theta = 1.0 }\nv = { theta_dot = 1.0, gamma_dot = 5.0 }"),
+        "initial.v: the velocities given contradict the constraints; give fewer of them",
+    ),
+    "it does not say that it is a loop": (
+        bars(closing=""),
+        "'rocker' is the child of joints[2] too; in a tree each body has one joint to its parent; "
+        "give one of the two loop = true",
+    ),
+    "a body is held to itself": (
+        bars(another("crank", (0, 0), "crank", (0, 0))),
+        "joints[4].child: 'crank' is also the parent; a loop joint holds two bodies together",
+    ),
+    "a joint holds nothing": (
+        bars(another("world", (0, 0), "crank", (0, 0)).replace("revolute", "planar")),
+        "a 'planar' joint holds nothing here, so it closes no loop; leave the joint out",
+    ),
+    "it has a coordinate": (
+        bars(closing='loop = true\ncoordinate = "x"'),
+        "joints[3].coordinate: a joint with loop = true has no coordinates, so this has no effect",
+    ),
+    "it has a rotor": (
+        bars(closing="loop = true\nmotor_inertia = 0.1"),
+        "joints[3].motor_inertia: a joint with loop = true has no coordinates",
+    ),
+    "a key is wrong": (
+        bars(closing="loops = true"),
+        "joints[3].loops: unknown key (did you mean 'loop'?)",
+    ),
+    "a rod is too long": (
+        bars(constraint("distance", 'body_1 = "world"', 'body_2 = "crank"', "length = 5.0")),
+        "rule stays open by 4.88 m",
+    ),
+    "a coordinate is unknown": (
+        bars(constraint("coupling", 'coordinate = "thet"', 'equals = "gamma"')),
+        "constraints[0].coordinate: no coordinate is named 'thet' (did you mean 'theta'?)",
+    ),
+    "a formula of positions has a velocity": (
+        bars(constraint("equation", 'position = "theta - gamma_dot"')),
+        "constraints[0].position: 'gamma_dot' is no coordinate",
+    ),
+    "a formula is not linear in velocities": (
+        bars(constraint("equation", 'velocity = "theta_dot**2 - 1"')),
+        "rule is not linear in the velocities",
+    ),
+    "a formula is never met": (
+        bars(constraint("equation", 'position = "1"')),
+        "rule stays open by 1 rad",
+    ),
+    "a name is taken": (
+        bars(constraint("equation", 'position = "theta"').replace("rule", "pin_close")),
+        "constraints[0].name: 'pin_close' is also the name of joints[3]; give each its own",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_gets_one_clear_line(name: str) -> None:
+    text, message = BAD[name]
+    with pytest.raises(SceneError) as caught:
+        assembled(elaborate(parse_scene(text)))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_loop_joint_that_is_there_twice_is_dropped_and_named() -> None:
+    twice = another("coupler", (0.4, 0), "rocker", (0.275, 0))
+    model = assembled(elaborate(parse_scene(bars(twice))))
+    assert model.dropped == ("pin_more_x", "pin_more_y")

@@ -112,6 +112,7 @@ def assembled(model: Model) -> Model:
         return model
     mechanism = Closure.of(model)
     start = np.array(model.initial_q)
+    _check_linear(mechanism, start)
     free = _free(model)
     q = _closed(mechanism, start, free)
     notices = list[str]()
@@ -144,6 +145,18 @@ def assembled(model: Model) -> Model:
     v, more = _speeds(mechanism, q)
     pivots = _pivots(mechanism.jacobian(q), _free(model))
     return replace(model, initial_v=v, pivots=pivots, notices=(*model.notices, *notices, *more))
+
+
+def _check_linear(mechanism: Closure, q: Array) -> None:
+    """Raise `SceneError` for a row that is not linear in the velocities."""
+    rng, model = random.Random(5), mechanism.model
+    slopes = []
+    for _ in range(2):
+        d = mechanism.dynamics(q, [rng.uniform(0.5, 2.0) for _ in model.velocities])
+        slopes.append(constraints.jacobian_of(d, constraints.rows_of(d)))
+    for (name, _), row, other in zip(model.rows, *slopes, strict=True):
+        if not np.allclose(row, other, rtol=1e-9, atol=0.0, equal_nan=True):
+            raise SceneError(f"constraints: {name} is not linear in the velocities; write it so")
 
 
 def _size(model: Model) -> float:

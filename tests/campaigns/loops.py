@@ -43,8 +43,6 @@ def random(count: int) -> int:
         kinds.update(f"{loop.joint.kind}_{dimensions}" for loop in case.tree.loops)
         conditions.append(case.condition)
         for route, off in apart_by_route(case, model, u, motion).items():
-            if "LJ" in __import__("os").environ:
-                print("DATA", seed, route, *off, case.condition, flush=True)
             at = 2 * (not well)
             worst[route][at : at + 2] = np.maximum(worst[route][at : at + 2], off)
             if max(off) > (WELL if well else CLOSE) or model.notices:
@@ -54,8 +52,9 @@ def random(count: int) -> int:
                       f"{case.condition:.0f} {notices}", flush=True)  # fmt: skip
         if (seed + 1) % 50 == 0:
             print(f"to {seed + 1}: {time.process_time() - start:.0f} s", flush=True)
-    print(f"{count} mechanisms, {sum(c < CONDITION for c in conditions)} well-conditioned, largest "
-          f"condition {max(conditions):.0f}; loop joints {dict(sorted(kinds.items()))}")  # fmt: skip
+    well = sum(condition < CONDITION for condition in conditions)
+    print(f"{count} mechanisms, {well} well-conditioned, largest condition {max(conditions):.1e}")
+    print(f"loop joints: {dict(sorted(kinds.items()))}")
     for route, off in worst.items():
         numbers = " ".join(f"{x:.1e}" for x in off)
         print(f"{route:<12} v̇, wrenches; of the others v̇, wrenches: {numbers}")
