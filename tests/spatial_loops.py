@@ -6,6 +6,7 @@ closed there. The velocities are the nearest to random ones that keep it so.
 """
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,10 +60,13 @@ class Closed:
     condition: float
 
 
-def random_loops(seed: int, dimensions: int, most: int, loops: int) -> Closed:
-    """A mechanism of up to `most` bodies with so many loops, of every joint type, whose rows are
-    independent and leave it a freedom.
+def random_loops(
+    seed: int, dimensions: int, most: int, loops: int, kinds: Sequence[str] = ()
+) -> Closed:
+    """A mechanism of up to `most` bodies with so many loops, of every joint type or of some
+    `kinds`, whose rows are independent and leave it a freedom.
     """
+    kinds = kinds or LOOP_KINDS[dimensions]
     rng = np.random.default_rng([seed, dimensions, most, loops])
     while True:
         tree, text = random_spatial_tree(int(rng.integers(2**31)), dimensions, most)
@@ -78,9 +82,10 @@ def random_loops(seed: int, dimensions: int, most: int, loops: int) -> Closed:
                 if case.condition > WORST:
                     break
                 return case
-            loop = _drawn(rng, tree, bodies, freedoms - 1 - len(rows))
-            if loop is None:
+            kind = kinds[int(rng.integers(len(kinds)))]
+            if len(rows) + BLOCKED[dimensions][kind] >= freedoms:
                 continue
+            loop = _drawn(rng, tree, bodies, kind)
             more = loop_rows(replace(tree, loops=(loop,)), bodies, velocities)
             if _condition(np.vstack([rows, more])) < 1 / LEAST:
                 tree, rows = replace(tree, loops=(*tree.loops, loop)), np.vstack([rows, more])
@@ -117,15 +122,11 @@ def _condition(rows: np.ndarray) -> float:
 
 
 def _drawn(
-    rng: np.random.Generator, tree: SpatialTree, bodies: list[BodyMotion], most: int
-) -> Loop | None:
-    """A loop joint that is closed where the bodies are; None if it blocks more than `most`."""
+    rng: np.random.Generator, tree: SpatialTree, bodies: list[BodyMotion], kind: str
+) -> Loop:
+    """A loop joint that is closed where the bodies are."""
     n, space = len(tree.bodies), tree.dimensions == SPACE
     parent, child = (int(k) for k in rng.choice(np.arange(-1, n), 2, replace=False))
-    kinds = LOOP_KINDS[tree.dimensions]
-    kind = kinds[int(rng.integers(len(kinds)))]
-    if BLOCKED[tree.dimensions][kind] > most:
-        return None
     axes: Vectors = (Z,)
     if kind == "prismatic" or (space and kind in ("revolute", "cylindrical")):
         axes = (direction(rng, tree.dimensions),)

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 STEPS = 60
 """Most steps of Newton's method from one start."""
+PATIENCE = 12
+"""Steps that must reduce the sum of the residuals' squares by 30 %, or no position is near."""
 CLOSED = 1e-12
 """A residual relative to the mechanism's size that is rounding."""
 STARTS = (0.0, *(0.1,) * 6, *(0.5,) * 10, *(2.0,) * 30)
@@ -208,9 +210,13 @@ def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array 
 def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | None:
     """The end of Newton's method with damped least-squares steps; None if it does not converge."""
     g = mechanism.residuals(q)
-    damping, last = 0.0, math.inf
-    for _ in range(STEPS):
+    damping, last, before = 0.0, math.inf, math.inf
+    for step_number in range(STEPS):
         size = float(np.abs(g).max())
+        if step_number % PATIENCE == 0:
+            if size > CLOSED and float(g @ g) > 0.7 * before:
+                return None
+            before = float(g @ g)
         if size <= CLOSED and size >= 0.5 * last:
             return q
         last = size
