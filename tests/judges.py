@@ -204,6 +204,18 @@ def _pinocchio_model(tree: SpatialTree) -> Any:
     return model, model.createData(), held
 
 
+def _depth_first(tree: SpatialTree) -> bool:
+    """Whether each body hangs on the one before it, or on one that carries that."""
+    path: list[int] = []
+    for k, body in enumerate(tree.bodies):
+        while path and path[-1] != body.joint.parent:
+            path.pop()
+        if not path and body.joint.parent >= 0:
+            return False
+        path.append(k)
+    return True
+
+
 def _pinocchio_loops(tree: SpatialTree) -> Any:
     """The loops, if they are all balls or welds, or hinges of the plane."""
     import pinocchio as pin
@@ -259,6 +271,8 @@ def pinocchio_accelerations(
         force = data.oMi[at].rotation.T @ tree.push_force(u)
         forces[at] = pin.Force(force, np.cross(frame.act(np.array(place)), force))
     if tree.loops:
+        if not _depth_first(tree):
+            raise Unsuitable("its Cholesky factors take subtrees to be numbered without gaps")
         pin.computeJointJacobians(model, data, q)
         tau = tree.torques(u)
         for at, force in enumerate(forces):

@@ -62,6 +62,28 @@ def measured(count: int, left: set[str]) -> dict[str, float]:
     return found
 
 
+def drawn(found: dict[int, dict[str, float]]) -> Figure:
+    """The costs of chains by their four-bars."""
+    with style():
+        figure = Figure(figsize=(9, 2.8), layout="constrained")
+        left_axes, right_axes = figure.subplots(1, 2)
+        for k, name in enumerate(NAMES):
+            axes = left_axes if name in NAMES[: len(ROUTES)] else right_axes
+            shown = {count: values[name] for count, values in found.items() if name in values}
+            label = name.removeprefix("operations, ").removesuffix(", s")
+            axes.loglog(list(shown), list(shown.values()), "o-", color=PALETTE[k], markersize=3,
+                        label=label)  # fmt: skip
+        first = found[1][NAMES[0]]
+        left_axes.loglog(list(found), [first * n for n in found], ":", color=PALETTE[len(NAMES)],
+                         label="linear")  # fmt: skip
+        left_axes.set_title("operations of a derivative")
+        right_axes.set_title("time, s")
+        for axes in (left_axes, right_axes):
+            axes.set_xlabel("four-bars")
+            axes.legend()
+    return figure
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
@@ -85,24 +107,7 @@ def main() -> None:
             for n in NAMES
         ]
         row(f"{a} to {b}", *powers)
-    with style():
-        figure = Figure(figsize=(9, 2.8), layout="constrained")
-        left_axes, right_axes = figure.subplots(1, 2)
-        for k, name in enumerate(NAMES):
-            axes = left_axes if name in NAMES[: len(ROUTES)] else right_axes
-            shown = {count: values[name] for count, values in found.items() if name in values}
-            label = name.removeprefix("operations, ").removesuffix(", s")
-            axes.loglog(list(shown), list(shown.values()), "o-", color=PALETTE[k], markersize=3,
-                        label=label)  # fmt: skip
-        first = found[1][NAMES[0]]
-        left_axes.loglog(list(found), [first * n for n in found], ":", color=PALETTE[len(NAMES)],
-                         label="linear")  # fmt: skip
-        left_axes.set_title("operations of a derivative")
-        right_axes.set_title("time, s")
-        for axes in (left_axes, right_axes):
-            axes.set_xlabel("four-bars")
-            axes.legend()
-    write_figure(figure, given.o, force=True)
+    write_figure(drawn(found), given.o, force=True)
     print(f"wrote {given.o}")
 
 

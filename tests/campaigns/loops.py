@@ -65,12 +65,16 @@ def random(count: int) -> int:
 
 def pinocchio(count: int) -> int:
     """How many mechanisms in space that balls and welds close are not as Pinocchio has them."""
-    failed, worst = 0, 0.0
+    failed, tried, worst = 0, 0, 0.0
     for seed in range(count):
         loops = 1 + seed % 3
         case = random_loops(seed, 3, 4 + loops + seed % 3, loops, ("ball", "weld"))
         model, (u, motion) = model_of(case), solved(case, seed)
-        other = judges.pinocchio_accelerations(case.tree, case.q, case.v, u)
+        try:
+            other = judges.pinocchio_accelerations(case.tree, case.q, case.v, u)
+        except judges.Unsuitable:
+            continue
+        tried += 1
         off = apart(other, motion.accelerations)
         ours = apart_by_route(case, model, u, replace(motion, accelerations=other))
         off = max(off, *(accelerations for accelerations, _ in ours.values()))
@@ -78,7 +82,7 @@ def pinocchio(count: int) -> int:
         if off > CLOSE:
             failed += 1
             print(f"{seed}: off by {off:.1e}; condition {case.condition:.0f}", flush=True)
-    print(f"{count} mechanisms; the worst is off by {worst:.1e}")
+    print(f"{tried} mechanisms; the worst is off by {worst:.1e}")
     return failed
 
 
