@@ -208,4 +208,8 @@ def peaucellier_scene(angle: float = 0.5, rate: float = 0.0) -> str:
     point = f'[[points]]\nname = "pen"\nbody = "left_out"\nat = [{SIDE / 2}, 0]\n'
     start = ", ".join(f"{name} = {float(x)!r}" for name, x in q.items())
     initial = f"[initial]\nq = {{ {start} }}\n"
-    return "\n".join([*tables, *joints, point, initial])
+    spring = (
+        '[[effects]]\ntype = "joint_spring"\nname = "spring"\njoint = "pin_theta"\n'
+        "stiffness = 100.0\n"
+    )
+    return "\n".join([*tables, *joints, spring, point, initial])
