@@ -3,7 +3,6 @@
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes
 from eomgen.dynamics import constraints
-from eomgen.dynamics.loads import scaled
 from eomgen.program.tape import Node
 from eomgen.scene.effects.base import Load
 
@@ -31,13 +30,4 @@ def constraint_forces(record: Recording) -> list[Node]:
 
 def constraint_loads(record: Recording) -> list[list[Load]]:
     """The loads on bodies of each constraint of the model, under the effects."""
-    found: list[list[Load]] = []
-    forces = dict(
-        zip((name for name, _ in record.model.rows), constraint_forces(record), strict=True)
-    )
-    for constraint in record.model.constraints:
-        names = (name for name, _ in constraint.row_names(record.model.dimensions))
-        rows = zip(names, constraint.rows(record.dynamics), strict=True)
-        loads = (x for name, row in rows if name in forces for x in scaled(row.loads, forces[name]))
-        found.append([x for x in loads if isinstance(x, Load)])
-    return found
+    return constraints.loads_of(record.dynamics, constraint_forces(record))

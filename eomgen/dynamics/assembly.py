@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 STEPS = 60
 """Most steps of Newton's method from one start."""
+PATIENCE = 12
+"""Steps that must reduce the sum of the residuals' squares by 30 %, or no position is near."""
 CLOSED = 1e-12
 """A residual relative to the mechanism's size that is rounding."""
 STARTS = (0.0, *(0.1,) * 6, *(0.5,) * 10, *(2.0,) * 30)
@@ -119,6 +121,7 @@ def assembled(model: Model) -> Model:
         return model
     mechanism = Closure.of(model)
     start = np.array(model.initial_q)
+    _check_linear(mechanism, start)
     free = _free(model)
     q = _closed(mechanism, start, free)
     notices = list[str]()
@@ -131,6 +134,12 @@ def assembled(model: Model) -> Model:
         raise SceneError(_open(mechanism, start, free))
     dropped = _dependent(mechanism, q)
     model = replace(model, initial_q=tuple(q.tolist()), dropped=dropped)
+    if not model.rows:
+        raise SceneError(
+            f"joints: {', '.join(c.name for c in model.constraints)} "
+            f"restrict{'s' * (len(model.constraints) == 1)} nothing that the other joints do not "
+            "restrict already; leave it out"
+        )
     if len(model.rows) >= len(model.velocities):
         raise SceneError(
             f"joints: the loops hold everything: {len(model.rows)} independent constraints on "
@@ -145,6 +154,18 @@ def assembled(model: Model) -> Model:
     v, more = _speeds(mechanism, q)
     pivots = _pivots(mechanism.jacobian(q), _free(model))
     return replace(model, initial_v=v, pivots=pivots, notices=(*model.notices, *notices, *more))
+
+
+def _check_linear(mechanism: Closure, q: Array) -> None:
+    """Raise `SceneError` for a row that is not linear in the velocities."""
+    rng, model = random.Random(5), mechanism.model
+    slopes = []
+    for _ in range(2):
+        d = mechanism.dynamics(q, [rng.uniform(0.5, 2.0) for _ in model.velocities])
+        slopes.append(jacobian_of(d))
+    for (name, _), row, other in zip(model.rows, *slopes, strict=True):
+        if not np.allclose(row, other, rtol=1e-9, atol=0.0, equal_nan=True):
+            raise SceneError(f"constraints: {name} is not linear in the velocities; write it so")
 
 
 def _size(model: Model) -> float:
@@ -196,9 +217,13 @@ def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array 
 def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | None:
     """The end of Newton's method with damped least-squares steps; None if it does not converge."""
     g = mechanism.residuals(q)
-    damping, last = 0.0, math.inf
-    for _ in range(STEPS):
+    damping, last, before = 0.0, math.inf, math.inf
+    for step_number in range(STEPS):
         size = float(np.abs(g).max())
+        if step_number % PATIENCE == 0:
+            if size > CLOSED and float(g @ g) > 0.7 * before:
+                return None
+            before = float(g @ g)
         if size <= CLOSED and size >= 0.5 * last:
             return q
         last = size

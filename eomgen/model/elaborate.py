@@ -274,7 +274,8 @@ def _loops(
         loops.append(closing(joint_from_centres(joint, centres), location, scene.dimensions))
         found += [bindings, Bindings(conditions=kept)]
     others, of_others = constraints_in_force(scene, bodies, scope)
-    check_names([(c.name, "constraints") for c in (*loops, *others)])
+    joints = [(joint.name, location) for joint, location in closing_joints(scene)]
+    check_names([*joints, *((c.name, f"constraints[{i}]") for i, c in enumerate(others))])
     return (*loops, *others), joined([*found, of_others])
 
 
