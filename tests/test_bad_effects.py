@@ -63,6 +63,9 @@ TABLES: dict[str, dict[str, str]] = {
     "spring": {"body_1": '"boom"', "body_2": '"trolley"', "stiffness": "1", "damping": "1",
                "rest_length": "1", "at_1": "{v}", "at_2": "{v}"},
     "spring law": {"body_1": '"boom"', "body_2": '"world"', "law": "1"},
+    "pairwise": {"bodies": '"all"', "gravitation": "1", "softening": "1"},
+    "pairwise springs": {"bodies": '"all"', "stiffness": "1", "damping": "1", "rest_length": "1"},
+    "pairwise law": {"bodies": '"all"', "law": "1"},
     "joint_spring": {"joint": '"hinge"', "stiffness": "1", "damping": "1", "rest": "1"},
     "joint_spring law": {"joint": '"hinge"', "law": "1"},
     "joint_friction": {"joint": '"rail"', "viscous": "1", "coulomb": "1", "speed": "1"},
@@ -88,8 +91,8 @@ OF_ANY_SIGN = set(
     "contact.at contact.offset contact.other_at contact.restitution controller.torques drag.at "
     "drag.wind driven.coordinate external_force.at external_force.force external_torque.torque "
     "field.at field.center field.force gravity.g joint_spring.law joint_spring.rest "
-    "joint_stop.high joint_stop.low joint_stop.restitution motor.torque pd.target pd.target_rate "
-    "pid.target pid.target_rate point_gravity.at spring.at_1 spring.at_2 spring.law "
+    "joint_stop.high joint_stop.low joint_stop.restitution motor.torque pairwise.law pd.target "
+    "pd.target_rate pid.target pid.target_rate point_gravity.at spring.at_1 spring.at_2 spring.law "
     "spring.rest_length".split()
 )
 """Forces, places, laws and targets; a restitution has two bounds, and tests of its own. All else,

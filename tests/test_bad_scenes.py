@@ -550,7 +550,8 @@ MISTAKES_IN_SPACE = [
      "bodies[1].inertia_com: body 'hand' has moments 2, 2, 1.5 and products -1.2, 0, 0; so one "
      "of its principal moments is negative, or larger than the other two together: make the "
      "products smaller, or change xx, yy or zz"),
-    (INERTIA, "", "bodies[1].inertia_com: missing; every such table needs it"),
+    (INERTIA, "", "bodies[1].inertia_com: missing; a body needs it unless it is on a joint of type "
+     "'particle'"),
     # Directions.
     (AXIS, "axis = [0, 0, 0]",
      "joints[0].axis: has no length; give a direction, for example [1.0, 0.0, 0.0]"),

@@ -459,13 +459,14 @@ PARTS = {
         [("revolute", TILTED), ("revolute", Y_AXIS)],
     ),
     "planar": ("", [("prismatic", X_AXIS), ("prismatic", Y_AXIS), ("revolute", Z_AXIS)]),
+    "particle": ("", [("prismatic", a) for a in (X_AXIS, Y_AXIS, Z_AXIS)]),
     "free": ("", [*(("prismatic", a) for a in (X_AXIS, Y_AXIS, Z_AXIS)), ("ball", "")]),
 }
 
 
 @pytest.mark.parametrize("kind", PARTS)
 def test_a_joint_is_its_parts(route: str, kind: str) -> None:
-    """Cylindrical, universal, planar and free move as their parts on massless bodies do."""
+    """Joints of several coordinates move as their parts on massless bodies do."""
     line, parts = PARTS[kind]
     first = ("r_parent = [0.2, 0.1, -0.3]", "orientation_deg = [10, 20, 30]")
     last = (at("r_child", R),)
@@ -499,6 +500,7 @@ NAMES = {
     (2, "revolute"): (("j_angle",), ("j_angle_dot",)),
     (2, "prismatic"): (("j_slide",), ("j_slide_dot",)),
     (2, "planar"): (("j_x", "j_y", "j_angle"), ("j_x_dot", "j_y_dot", "j_angle_dot")),
+    (2, "particle"): (("b_x", "b_y"), ("b_x_dot", "b_y_dot")),
     (2, "free"): (("b_x", "b_y", "b_angle"), ("b_x_dot", "b_y_dot", "b_angle_dot")),
     (3, "weld"): ((), ()),
     (3, "revolute"): (("j_angle",), ("j_angle_dot",)),
@@ -506,6 +508,7 @@ NAMES = {
     (3, "cylindrical"): (("j_slide", "j_angle"), ("j_slide_dot", "j_angle_dot")),
     (3, "universal"): (("j_angle_1", "j_angle_2"), ("j_angle_1_dot", "j_angle_2_dot")),
     (3, "planar"): (("j_x", "j_y", "j_angle"), ("j_x_dot", "j_y_dot", "j_angle_dot")),
+    (3, "particle"): (("b_x", "b_y", "b_z"), ("b_x_dot", "b_y_dot", "b_z_dot")),
     (3, "ball"): (("j_qw", "j_qx", "j_qy", "j_qz"), ("j_wx", "j_wy", "j_wz")),
     (3, "free"): (
         ("b_x", "b_y", "b_z", "b_qw", "b_qx", "b_qy", "b_qz"),
@@ -561,7 +564,16 @@ def test_orientation_turns_about_x_then_y_then_z() -> None:
     places = [E, E @ E]
     first = np.array([0.1, 0.2, 0.3]) - E @ R
     second = first + E @ [0.1, 0.2, 0.3] - E @ E @ R
-    for kind in ("weld", "revolute", "prismatic", "cylindrical", "universal", "planar", "ball"):
+    for kind in (
+        "weld",
+        "revolute",
+        "prismatic",
+        "cylindrical",
+        "universal",
+        "planar",
+        "particle",
+        "ball",
+    ):
         axis = X_AXIS if kind == "prismatic" else ""
         text = scene(
             body("a"),

@@ -87,6 +87,14 @@ class Closure:
         scaled: Array = matrix * self.lengths / self._units[:, np.newaxis]
         return scaled
 
+    def holding(self, q: Array) -> Array:
+        """J (nc, nv) in sizes, 0 in the rows that restrict velocities alone: what positions can be
+        closed by. A wheel is put on the ground without rolling there.
+        """
+        rows = constraints.rows_of(self.dynamics(q))
+        held = np.array([[row.residual is not None] for row in rows], dtype=bool)
+        return np.where(held.reshape(len(rows), 1), self.jacobian(q), 0.0)
+
     def moved(self, q: Array, step: Array) -> Array:
         """q after a step (nv,) of the velocities' directions, in sizes; quaternions stay unit."""
         rates = constraints.position_rates(self.dynamics(q), (step * self.lengths).tolist())
@@ -227,7 +235,7 @@ def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | Non
         if size <= CLOSED and size >= 0.5 * last:
             return q
         last = size
-        matrix = np.where(free, mechanism.jacobian(q), 0.0)
+        matrix = np.where(free, mechanism.holding(q), 0.0)
         normal = matrix @ matrix.T + damping * np.eye(len(g))
         step = -matrix.T @ np.linalg.lstsq(normal, g, rcond=1e-14)[0]
         length = float(np.abs(step).max())
@@ -248,7 +256,7 @@ def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     """What cannot close, and by how much at least."""
     q, g = start, mechanism.residuals(start)
     for _ in range(200):
-        matrix = np.where(free, mechanism.jacobian(q), 0.0)
+        matrix = np.where(free, mechanism.holding(q), 0.0)
         step = -matrix.T @ np.linalg.solve(matrix @ matrix.T + 1e-3 * np.eye(len(g)), g)
         there = mechanism.moved(q, step * min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300)))
         after = mechanism.residuals(there)

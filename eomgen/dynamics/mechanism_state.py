@@ -167,6 +167,23 @@ class MechanismState:
             self.value(formula, **rates),
         )
 
+    def gradient(
+        self, formula: Formula, names: Mapping[str, Scalar]
+    ) -> tuple[Scalar, Vector, Scalar]:
+        """A formula of `names`, t and parameters with its derivatives by the names and by t."""
+        duals, one = Duals(self.scalars), self.scalars.number(1.0)
+        values = {**self.values.parameters, **names, "t": self.values.time}
+        used = set(names_in(formula))
+        still = {name: duals.still(values[name]) for name in used}
+
+        def slope(name: str) -> Scalar:
+            if name not in used:
+                return self.scalars.number(0.0)
+            along = {**still, name: Dual(values[name], one)}
+            return evaluate(formula, along, duals).rate
+
+        return evaluate(formula, values, self.scalars), tuple(map(slope, names)), slope("t")
+
     def input(self, name: str) -> Scalar:
         """An input."""
         return self.values.inputs[name]

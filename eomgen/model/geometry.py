@@ -8,7 +8,7 @@ from eomgen.language.conditions import ROUNDING
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components
 from eomgen.scalars.exact import sine_between
-from eomgen.scene.joints import Free, Joint
+from eomgen.scene.joints import Free, Joint, Particle
 from eomgen.scene.joints.base import Geared
 from eomgen.scene.schema import BodyTable
 
@@ -41,6 +41,10 @@ def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
     if not three_angles and dimensions == 3 and joint.orientation_deg != 0.0:
         raise SceneError(
             f"{location}.orientation_deg: is one angle; space takes 3, about x, y and z"
+        )
+    if isinstance(joint, Particle) and len(joint.coordinates or "xyz"[:dimensions]) != dimensions:
+        raise SceneError(
+            f"{location}.coordinates: has {len(joint.coordinates or ())} names; give {dimensions}"
         )
     axis = getattr(joint, "axis", None)
     if axis is not None:

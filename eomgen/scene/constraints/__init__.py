@@ -10,9 +10,14 @@ from pydantic import Field
 from eomgen.scene.constraints.base import Constraint, ConstraintTable, Row
 from eomgen.scene.constraints.distance import Distance
 from eomgen.scene.constraints.formula import Coupling, Equation
+from eomgen.scene.constraints.knife_edge import KnifeEdge
 from eomgen.scene.constraints.loop import LoopJoint, closing
+from eomgen.scene.constraints.point_on import PointOn
+from eomgen.scene.constraints.rolling import Rolling
 
-AnyConstraint = Annotated[Coupling | Distance | Equation, Field(discriminator="type")]
+AnyConstraint = Annotated[
+    Coupling | Distance | Equation | KnifeEdge | PointOn | Rolling, Field(discriminator="type")
+]
 """Any constraint of a scene; its `type` selects the class."""
 
 __all__ = [
@@ -22,7 +27,10 @@ __all__ = [
     "Coupling",
     "Distance",
     "Equation",
+    "KnifeEdge",
     "LoopJoint",
+    "PointOn",
+    "Rolling",
     "Row",
     "closing",
 ]

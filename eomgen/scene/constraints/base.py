@@ -1,11 +1,11 @@
 """The interface of constraints: scalar equations of the motion, each kept by a multiplier."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from eomgen.language.formula import Formula
-from eomgen.scene.effects.base import EffectTable, JointLoad, Load, Mechanism, Scalar
+from eomgen.scene.effects.base import EffectTable, JointLoad, Load, Mechanism, Scalar, Vector
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,13 @@ class Linkage(Mechanism, Protocol):
 
     def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
         """A formula with its derivatives by coordinates or by velocities."""
+
+    def gradient(
+        self, formula: Formula, names: Mapping[str, Scalar]
+    ) -> tuple[Scalar, Vector, Scalar]:
+        """A formula of `names`, t and parameters: its value, and its derivatives by each of the
+        names, in order, and by t.
+        """
 
 
 class Constraint(Protocol):

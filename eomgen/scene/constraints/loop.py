@@ -13,6 +13,7 @@ from eomgen.scene.joints import (
     Cylindrical,
     Free,
     Joint,
+    Particle,
     Planar,
     Prismatic,
     Revolute,
@@ -21,7 +22,7 @@ from eomgen.scene.joints import (
 )
 from eomgen.scene.joints.base import spatial
 
-Closing = Ball | Cylindrical | Planar | Prismatic | Revolute | Universal | Weld
+Closing = Ball | Cylindrical | Particle | Planar | Prismatic | Revolute | Universal | Weld
 Direction = tuple[exact.Real, ...]
 X, Y, Z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -52,11 +53,13 @@ class LoopJoint:
             words = ["across"]
         elif isinstance(joint, Prismatic | Cylindrical):
             words = ["across"] if dimensions == 2 else ["across_1", "across_2"]
+        elif isinstance(joint, Particle):
+            words = []
         else:
             words = list("xyz"[:dimensions])
         if dimensions == 2:
             count = 0 if isinstance(joint, Revolute) else 1
-        elif isinstance(joint, Weld | Prismatic):
+        elif isinstance(joint, Weld | Prismatic | Particle):
             count = 3
         elif not isinstance(joint, Ball):
             count = 1 if isinstance(joint, Universal) else 2
@@ -102,6 +105,8 @@ class LoopJoint:
         all.
         """
         joint = self.joint
+        if isinstance(joint, Particle):
+            return []
         if isinstance(joint, Planar):
             return [self._on_parent(mechanism, Z)]
         if isinstance(joint, Prismatic | Cylindrical):

@@ -17,6 +17,7 @@ from eomgen.scene.effects.joint_friction import JointFriction
 from eomgen.scene.effects.joint_spring import JointSpring
 from eomgen.scene.effects.joint_stop import JointStop
 from eomgen.scene.effects.motor import Motor
+from eomgen.scene.effects.pairwise import Pairwise
 from eomgen.scene.effects.pd import Pd
 from eomgen.scene.effects.pid import Pid
 from eomgen.scene.effects.spring import Spring
@@ -34,6 +35,7 @@ Effect = Annotated[
     | JointSpring
     | JointStop
     | Motor
+    | Pairwise
     | Pd
     | Pid
     | PointGravity
@@ -56,6 +58,7 @@ __all__ = [
     "JointSpring",
     "JointStop",
     "Motor",
+    "Pairwise",
     "Pd",
     "Pid",
     "PointGravity",

@@ -86,12 +86,12 @@ rest_length = 0.5
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """Equal and opposite forces on the two bodies."""
-        line = _line(self, mechanism)
+        line = line_of(self, mechanism)
         pull = self._pull(mechanism, line)
         yield Load(self.body_1, pull, line.at_1, "applied")
         yield Load(self.body_2, negative(pull), line.at_2, "applied")
 
-    def _pull(self, mechanism: Mechanism, line: "_Line") -> tuple[Scalar, ...]:
+    def _pull(self, mechanism: Mechanism, line: "Line") -> tuple[Scalar, ...]:
         """The force on point 1, world axes."""
         damping, stretch, rate = mechanism.value(self.damping), line.stretch, line.rate
         if self.law is not None:
@@ -122,7 +122,7 @@ rest_length = 0.5
         half, nothing = mechanism.number(0.5), mechanism.number(0.0)
         if self.law is not None:
             return nothing
-        line = _line(self, mechanism)
+        line = line_of(self, mechanism)
         if self.rest_length == ZERO:  # a rope is then never slack
             return half * mechanism.value(self.stiffness) * line.square
         # The second term is 0 unless |d| < ε; there its derivative is that of the smoothed force.
@@ -136,7 +136,7 @@ rest_length = 0.5
 
 
 @dataclass(frozen=True)
-class _Line:
+class Line:
     """The line between the ends of a spring; vectors in world axes, m and m/s."""
 
     at_1: Components
@@ -164,7 +164,8 @@ class _Line:
         return tuple(along * x + across * y for x, y in zip(self.d, self.d_dot, strict=True))
 
 
-def _line(spring: Spring, mechanism: Mechanism) -> _Line:
+def line_of(spring: Spring, mechanism: Mechanism) -> Line:
+    """The line of a spring at a state."""
     at_1 = tuple(mechanism.value(part) for part in spring.at_1)
     at_2 = tuple(mechanism.value(part) for part in spring.at_2)
     d = sub(mechanism.position(spring.body_2, at_2), mechanism.position(spring.body_1, at_1))
@@ -174,7 +175,7 @@ def _line(spring: Spring, mechanism: Mechanism) -> _Line:
     larger = mechanism.call("max", square, nearest_square(mechanism))
     (length,) = mechanism.called("l", mechanism.call("sqrt", larger))
     (stretch,) = mechanism.called("s", length - mechanism.value(spring.rest_length))
-    return _Line(at_1, at_2, d, d_dot, square, larger, length, stretch)
+    return Line(at_1, at_2, d, d_dot, square, larger, length, stretch)
 
 
 def check_law(table: EffectTable, law: Formula | None, location: str) -> None:

@@ -7,6 +7,7 @@ from pydantic import Field
 from eomgen.scene.joints.ball import Ball
 from eomgen.scene.joints.cylindrical import Cylindrical
 from eomgen.scene.joints.free import Free
+from eomgen.scene.joints.particle import Particle
 from eomgen.scene.joints.planar import Planar
 from eomgen.scene.joints.prismatic import Prismatic
 from eomgen.scene.joints.revolute import Revolute
@@ -14,7 +15,7 @@ from eomgen.scene.joints.universal import Universal
 from eomgen.scene.joints.weld import Weld
 
 Joint = Annotated[
-    Ball | Cylindrical | Free | Planar | Prismatic | Revolute | Universal | Weld,
+    Ball | Cylindrical | Free | Particle | Planar | Prismatic | Revolute | Universal | Weld,
     Field(discriminator="type"),
 ]
 """Any joint of a scene; its `type` selects the class."""
@@ -24,6 +25,7 @@ __all__ = [
     "Cylindrical",
     "Free",
     "Joint",
+    "Particle",
     "Planar",
     "Prismatic",
     "Revolute",
