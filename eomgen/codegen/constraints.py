@@ -12,6 +12,7 @@ def constraint_outputs(record: Recording) -> OutputNodes:
     """What a run needs to keep the constraints."""
     d = record.dynamics
     held = d.constrained(record.route)
+    jacobian = constraints.jacobian_of(d, constraints.rows_of(d))
     nodes = {
         "constraint_residuals": constraints.residuals(d),
         "constraint_rates": constraints.rates(d),
@@ -19,7 +20,9 @@ def constraint_outputs(record: Recording) -> OutputNodes:
         "project_velocity": held.velocity(),
         "constraint_margins": held.margins(),
     }
-    return {name: ((len(part),), part) for name, part in nodes.items()}
+    vectors: OutputNodes = {name: ((len(part),), part) for name, part in nodes.items()}
+    entries = [entry for row in jacobian for entry in row]
+    return {**vectors, "constraint_jacobian": ((len(jacobian), d.nv), entries)}
 
 
 def constraint_forces(record: Recording) -> list[Node]:

@@ -13,10 +13,10 @@ from eomgen.linear.linearise import (
     input_jacobian,
     input_values,
     rate_unit,
-    tangents,
 )
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
+from eomgen.run.tangents import tangents
 
 MOST_STEPS = 60
 """Greatest number of steps to the nearest equilibrium; a near one takes few."""

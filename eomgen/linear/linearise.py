@@ -13,6 +13,7 @@ from eomgen.files import write_whole
 from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
+from eomgen.run.tangents import tangents
 
 FORMAT = "linearisation 1"
 BOUND = 1e100
@@ -195,26 +196,6 @@ def input_values(module: GeneratedModule, u: Any) -> FloatArray:
     if values.shape != (len(module.INPUTS),):
         raise RunError(f"inputs: have shape {values.shape}, not ({len(module.INPUTS)},)")
     return values
-
-
-def tangents(
-    y: FloatArray, quaternions: tuple[tuple[int, int, int, int], ...], plain: float = 1.0
-) -> FloatArray:
-    """T (ny, n) of δy = T δx: `plain` for each scalar state, q (0, δr)/2 for each quaternion."""
-    firsts = {indices[0]: indices for indices in quaternions}
-    rest = {i for indices in quaternions for i in indices}
-    result = np.zeros((len(y), len(y) - len(quaternions)))
-    column = 0
-    for i in range(len(y)):
-        if i in firsts:
-            a, b, c, d = (0.5 * y[list(firsts[i])]).tolist()
-            block = [[-b, -c, -d], [a, -d, c], [d, a, -b], [-c, b, a]]
-            result[list(firsts[i]), column : column + 3] = block
-            column += 3
-        elif i not in rest:
-            result[i, column] = plain
-            column += 1
-    return result
 
 
 def _deviations(

@@ -126,6 +126,17 @@ class Compilable:
         if switching is not None and switching.of_state is not None:
             of_state = self.function("switching_functions", switching.of_state)
             switching = replace(switching, of_state=of_state)
+        projection = problem.projection
+        if projection is not None:
+            projection = replace(
+                projection,
+                residuals=self.function("constraint_residuals", projection.residuals),
+                jacobian=self.function("constraint_jacobian", projection.jacobian),
+                rates=self.function("constraint_rates", projection.rates),
+                position=self.function("project_position", projection.position),
+                velocity=self.function("project_velocity", projection.velocity),
+                margins=self.function("constraint_margins", projection.margins),
+            )
         jacobian = problem.jacobian
         if hasattr(self.module, "jacobian"):
             jacobian = self.function("jacobian", jacobian)
@@ -135,6 +146,7 @@ class Compilable:
             jacobian=jacobian,
             contacts=contacts,
             switching=switching,
+            projection=projection,
         )
 
     def function(
