@@ -126,7 +126,7 @@ class Projection:
             moved = basis.T @ moved / np.sum(basis**2, axis=0)[:, np.newaxis]
         matrix = np.vstack((jacobian @ moved, jacobian @ ways[nq : nq + nv]))
         off = np.concatenate((self.residuals(t, y) / self.sizes, self.rates(t, y) / self.sizes))
-        return np.linalg.solve(matrix, off)
+        return np.asarray(np.linalg.solve(matrix, off), dtype=np.float64)
 
     def _scaled(self, t: float, y: FloatArray) -> FloatArray:
         return self.jacobian(t, y) / self.sizes[:, None]

@@ -42,6 +42,9 @@ def _arms(model: Model) -> dict[str, list[tuple[float, ...]]]:
         if not isinstance(body.joint, Free):
             add(body.name, body.joint.r_child)
             add(body.joint.parent, body.joint.r_parent)
+    for loop in model.loops:
+        add(loop.joint.child, loop.joint.r_child)
+        add(loop.joint.parent, loop.joint.r_parent)
     return arms
 
 
