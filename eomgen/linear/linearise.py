@@ -2,7 +2,7 @@
 
 import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.files import write_whole
+from eomgen.linear.manifold import Manifold, manifold
 from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
@@ -34,6 +35,8 @@ class Linearisation:
     y (ny,), u (nu,)     the state and the constant inputs, SI units
     rates (ny,)          ẏ there, zero at an equilibrium
     quaternions          indices into the deviations of each unit quaternion among them
+    manifold             of the deviations, three for a quaternion, that keep the constraints; None
+                         without constraints
     """
 
     A: FloatArray
@@ -44,6 +47,7 @@ class Linearisation:
     u: FloatArray
     rates: FloatArray
     quaternions: tuple[tuple[int, int, int, int], ...]
+    manifold: Manifold | None = None
 
     def reduced(self) -> "Linearisation":
         """The same system with as many states as twice the degrees of freedom.
@@ -52,7 +56,18 @@ class Linearisation:
         named `<prefix>_rx`, …: q + δq = q (1, δr/2). With δy = T δx the system is
         ẋ = T⁺ (A T - Ṫ) x + T⁺ B u, where Ṫ follows the motion and is zero at rest. Without
         quaternions nothing changes.
+
+        With constraints only the independent deviations are left; the others follow from them.
         """
+        if self.manifold:
+            free = replace(self, manifold=None).reduced()
+            T, kept = self.manifold
+            return replace(
+                free,
+                A=(free.A @ T)[kept],
+                B=free.B[kept],
+                state_names=tuple(free.state_names[i] for i in kept),
+            )
         if not self.quaternions:
             return self
         basis = tangents(self.y, self.quaternions)
@@ -122,6 +137,7 @@ def linearise(
         u=inputs,
         rates=rates,
         quaternions=module.QUATERNIONS,
+        manifold=manifold(module, y, p, inputs) if getattr(module, "CONSTRAINTS", ()) else None,
     )
 
 
