@@ -26,6 +26,10 @@ SINGULAR, NEAR = 1e-9, 0.05
 """A margin that counts as 0; and one below which the least margin is searched between steps."""
 SEARCH = 60
 """Evaluations of that search."""
+REMEDY = (
+    "take another start, lengths that do not line up, or another route than independent if this is a "
+    "dead point"
+)
 CLOSE = 1e-9
 """The largest residual that is left where Newton's method ends, in sizes."""
 
@@ -184,17 +188,23 @@ def watched(
     there.
     """
     start, margin, before, last = t, _least(projection, t, y), float("inf"), None
-    for advance in advances:
-        here = _least(projection, advance.t, advance.y)
-        if advance.t > start:
-            if margin < before and margin < here and margin < NEAR and last is not None:
-                _search(projection, last, advance)
-            before, margin, last = margin, here, (start, advance)
-            start = advance.t
-        else:  # a strike
-            before, margin, last = float("inf"), here, None
-        _check(projection, advance.t, advance.y)
-        yield advance
+    try:
+        for advance in advances:
+            here = _least(projection, advance.t, advance.y)
+            if advance.t > start:
+                if margin < before and margin < here and margin < NEAR and last is not None:
+                    _search(projection, last, advance)
+                before, margin, last = margin, here, (start, advance)
+                start = advance.t
+            else:  # a strike
+                before, margin, last = float("inf"), here, None
+            _check(projection, advance.t, advance.y)
+            yield advance
+    except StepFailure as failure:
+        if margin < NEAR and "singular at" not in failure.reason:
+            reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
+            raise StepFailure(reason, REMEDY) from None
+        raise
 
 
 def _search(projection: Projection, last: tuple[float, Part], advance: Part) -> None:
@@ -230,7 +240,7 @@ def _check(projection: Projection, t: float, y: FloatArray) -> None:
         raise StepFailure(
             f"the mechanism is singular at t = {t:.6g} s: constraint {projection.names[worst]} "
             "follows from the others there, as at a dead point or a change point",
-            "take another start, or lengths that do not line up",
+            REMEDY,
         )
 
 
