@@ -345,6 +345,7 @@ def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]
     rate = rate / np.array([mechanism.size if unit == "N" else 1.0 for _, unit in model.rows])
     for free in (~held, np.ones(len(held), dtype=bool)):
         change = -np.linalg.lstsq(np.where(free, matrix, 0.0), rate, rcond=1e-10)[0]
+        change = np.where(free, change, 0.0)
         left = float(np.abs(matrix @ change + rate).max())
         if left <= 1e-9 * max(1.0, float(np.abs(rate).max())):
             moved = float(np.abs(change[held]).max(initial=0.0))
