@@ -3,6 +3,7 @@
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes
 from eomgen.dynamics import constraints
+from eomgen.dynamics.clusters import jacobian_of
 from eomgen.dynamics.loads import scaled
 from eomgen.program.tape import Node
 from eomgen.scene.effects.base import Load
@@ -12,7 +13,7 @@ def constraint_outputs(record: Recording) -> OutputNodes:
     """What a run needs to keep the constraints."""
     d = record.dynamics
     held = d.constrained(record.route)
-    jacobian = constraints.jacobian_of(d, constraints.rows_of(d))
+    jacobian = jacobian_of(d)
     nodes = {
         "constraint_residuals": constraints.residuals(d),
         "constraint_rates": constraints.rates(d),

@@ -27,8 +27,8 @@ SINGULAR, NEAR = 1e-9, 0.05
 SEARCH = 60
 """Evaluations of that search."""
 REMEDY = (
-    "take another start, lengths that do not line up, or another route than independent if this is a "
-    "dead point"
+    "take another start, lengths that do not line up, or --route aba at a dead point of the "
+    "coordinates that were taken as independent"
 )
 CLOSE = 1e-9
 """The largest residual that is left where Newton's method ends, in sizes."""
