@@ -24,7 +24,8 @@ from eomgen.run.integrators.tableau import ButcherTableau
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import Projection
 
-MAX_ITERATIONS = 20
+MAX_ITERATIONS, MAX_PROJECTED = 20, 60
+"""Most iterations, and those of a step with symmetric projection, which converge linearly."""
 REMEDY = "take a smaller --dt or an adaptive method (--integrator Radau)"
 
 ROUNDOFF = 4 * float(np.finfo(np.float64).eps)
@@ -147,7 +148,7 @@ class _Newton:
         normals, end = projection.normals(self._end, y), y
         beyond, changes = normals, np.zeros(self.shape)
         multipliers, previous = np.zeros(normals.shape[1]), 0.0
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(MAX_PROJECTED):
             start = y + normals @ multipliers
             update = self.update(start, changes)
             changes += update
@@ -162,7 +163,7 @@ class _Newton:
             if size == 0 or (previous and _is_solved(y, changes, updates, size, previous)):
                 return np.asarray(step + (normals + beyond) @ more + beyond @ (multipliers - more))
             previous = size
-        raise _unsolved()
+        raise _unsolved(MAX_PROJECTED)
 
     def _carried(self, normals: FloatArray) -> FloatArray:
         """Changes (ny, k) of the start at the end of the step, about: by the implicit midpoint rule
@@ -181,8 +182,8 @@ def _finite(update: FloatArray) -> float:
     return size
 
 
-def _unsolved() -> StepFailure:
-    return StepFailure(f"Newton did not converge in {MAX_ITERATIONS} iterations", REMEDY)
+def _unsolved(most: int = MAX_ITERATIONS) -> StepFailure:
+    return StepFailure(f"Newton did not converge in {most} iterations", REMEDY)
 
 
 def _is_solved(
