@@ -1,6 +1,7 @@
 """Runs of mechanisms with loops: no drift, energy, given starts, impacts, singular positions."""
 
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from eomgen.api.given import check
 from eomgen.cli import main
 from eomgen.dynamics.assembly import closed_start
 from eomgen.errors import RunError, SceneError
+from eomgen.run.projection import jacobian_of
 
 A, B, C, D = 0.3, 0.8, 0.6, 0.7
 """Lengths of a crank-rocker: crank, coupler, rocker and ground, m."""
@@ -77,6 +79,16 @@ def test_c_and_python_agree() -> None:
     assert runs[1].compiled
     assert np.array_equal(runs[0].y, runs[1].y)
     assert runs[0].trajectory.violations == runs[1].trajectory.violations
+
+
+def test_matrix_of_large_mechanisms() -> None:
+    """Where a module has no `constraint_jacobian`, it is computed from the rates."""
+    module: Any = eomgen.load(eomgen.generate(four_bar()))
+    y = module.initial_state()
+    rates = SimpleNamespace(**{n: x for n, x in vars(module).items() if n != "constraint_jacobian"})
+    np.testing.assert_allclose(
+        jacobian_of(rates)(0.0, y), module.constraint_jacobian(0.0, y), atol=1e-15
+    )
 
 
 @pytest.mark.parametrize("route", ["independent", "aba"])

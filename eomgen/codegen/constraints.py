@@ -8,12 +8,14 @@ from eomgen.dynamics.loads import scaled
 from eomgen.program.tape import Node
 from eomgen.scene.effects.base import Load
 
+LARGEST_JACOBIAN = 2000
+"""A larger matrix of constraints is not written out: runs compute it from the rates."""
+
 
 def constraint_outputs(record: Recording) -> OutputNodes:
     """What a run needs to keep the constraints."""
     d = record.dynamics
     held = d.constrained(record.route)
-    jacobian = jacobian_of(d)
     nodes = {
         "constraint_residuals": constraints.residuals(d),
         "constraint_rates": constraints.rates(d),
@@ -21,9 +23,11 @@ def constraint_outputs(record: Recording) -> OutputNodes:
         "project_velocity": held.velocity(),
         "constraint_margins": held.margins(),
     }
-    vectors: OutputNodes = {name: ((len(part),), part) for name, part in nodes.items()}
-    entries = [entry for row in jacobian for entry in row]
-    return {**vectors, "constraint_jacobian": ((len(jacobian), d.nv), entries)}
+    found: OutputNodes = {name: ((len(part),), part) for name, part in nodes.items()}
+    shape = len(record.model.rows), d.nv
+    if shape[0] * shape[1] <= LARGEST_JACOBIAN:
+        found["constraint_jacobian"] = (shape, [x for row in jacobian_of(d) for x in row])
+    return found
 
 
 def constraint_forces(record: Recording) -> list[Node]:

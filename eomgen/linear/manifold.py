@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from eomgen.errors import RunError
 from eomgen.run.problem import FloatArray
+from eomgen.run.projection import jacobian_of
 from eomgen.run.tangents import tangents
 
 NEWTON, MET = 30, 1e-14
@@ -31,7 +32,7 @@ def directions(module: Any, y: FloatArray, p: Any, u: Any, free: NDArray[np.intp
     """The projection (nf, nf) of the `free` displacements, three for a quaternion, onto those that
     keep the constraints.
     """
-    jacobian = module.constraint_jacobian(0.0, y, p, u)[:, free]
+    jacobian = jacobian_of(module)(0.0, y, p, u)[:, free]
     return np.asarray(np.eye(len(free)) - np.linalg.pinv(jacobian, rcond=LEAST) @ jacobian)
 
 
@@ -44,7 +45,7 @@ def returned(module: Any, y: FloatArray, p: Any, u: Any, free: NDArray[np.intp])
         off = module.constraint_residuals(0.0, y, p, u)
         if np.abs(off).max() <= MET:
             return y
-        jacobian = module.constraint_jacobian(0.0, y, p, u)
+        jacobian = jacobian_of(module)(0.0, y, p, u)
         step = np.zeros(jacobian.shape[1])
         step[free] = -np.linalg.lstsq(jacobian[:, free], off, rcond=LEAST)[0]
         y = y.copy()
@@ -64,7 +65,7 @@ def manifold(module: Any, y: FloatArray, p: Any, u: Any) -> Manifold:
 
     Raises `RunError` in a singular position.
     """
-    jacobian = module.constraint_jacobian(0.0, y, p, u)
+    jacobian = jacobian_of(module)(0.0, y, p, u)
     nv, nx = jacobian.shape[1], len(y) - len(module.POSITIONS) - jacobian.shape[1]
     dependent = _pivots(jacobian)
     independent = [j for j in range(nv) if j not in dependent]

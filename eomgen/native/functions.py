@@ -128,10 +128,12 @@ class Compilable:
             switching = replace(switching, of_state=of_state)
         projection = problem.projection
         if projection is not None:
+            if hasattr(self.module, "constraint_jacobian"):
+                matrix = self.function("constraint_jacobian", projection.jacobian)
+                projection = replace(projection, jacobian=matrix)
             projection = replace(
                 projection,
                 residuals=self.function("constraint_residuals", projection.residuals),
-                jacobian=self.function("constraint_jacobian", projection.jacobian),
                 rates=self.function("constraint_rates", projection.rates),
                 position=self.function("project_position", projection.position),
                 velocity=self.function("project_velocity", projection.velocity),

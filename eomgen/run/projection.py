@@ -8,7 +8,7 @@ error of the constraints adds up.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,6 +140,24 @@ class Projection:
         return float(np.abs(residuals / self.sizes).max())
 
 
+def jacobian_of(module: Any) -> Callable[..., FloatArray]:
+    """The derivatives (nc, nv) of a module's constraint rates by the velocities, as a function of
+    time, state, parameters and inputs.
+    """
+    if hasattr(module, "constraint_jacobian"):
+        return cast(Callable[..., FloatArray], module.constraint_jacobian)
+
+    def by_columns(t: float, y: FloatArray, p: Any = None, u: Any = None) -> FloatArray:
+        nq, nc = len(module.POSITIONS), len(module.CONSTRAINTS)
+        nv = len(module.project_velocity(t, y, p, u))
+        columns = np.repeat(y[:, np.newaxis], nv + 1, axis=1)
+        columns[nq : nq + nv] = np.eye(nv, nv + 1)
+        rates = module.constraint_rates(t, columns, p, u).reshape(nc, nv + 1)
+        return np.asarray(rates[:, :nv] - rates[:, nv:])
+
+    return by_columns
+
+
 def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Projection | None:
     """The projection of a module of this size, m; None if it has no constraints."""
     names = getattr(module, "CONSTRAINTS", None)
@@ -150,7 +168,7 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
         np.array([size if module.UNITS[name] == "N" else 1.0 for name in names]),
         residuals=lambda t, y: module.constraint_residuals(t, y, parameters, inputs),
         rates=lambda t, y: module.constraint_rates(t, y, parameters, inputs),
-        jacobian=lambda t, y: module.constraint_jacobian(t, y, parameters, inputs),
+        jacobian=lambda t, y: jacobian_of(module)(t, y, parameters, inputs),
         position=lambda t, y: module.project_position(t, y, parameters, inputs),
         velocity=lambda t, y: module.project_velocity(t, y, parameters, inputs),
         margins=lambda t, y: module.constraint_margins(t, y, parameters, inputs),
