@@ -21,6 +21,17 @@ from eomgen.native.module import Kernels, outputs_of, usual_constants
 from eomgen.program.program import Program
 from eomgen.run.problem import FloatArray, Problem
 
+PROJECTION = {
+    "residuals": "constraint_residuals",
+    "rates": "constraint_rates",
+    "jacobian": "constraint_jacobian",
+    "position": "project_position",
+    "velocity": "project_velocity",
+    "margins": "constraint_margins",
+    "inertia": "mass_matrix",
+    "kinetic_slopes": "kinetic_slopes",
+}
+"""The functions of a module by the fields of its `Projection`."""
 Value = Callable[..., FloatArray]
 """A function of time, state and further arguments, such as the derivative."""
 Look = Callable[[float], ctypes.CDLL | None]
@@ -128,17 +139,12 @@ class Compilable:
             switching = replace(switching, of_state=of_state)
         projection = problem.projection
         if projection is not None:
-            if hasattr(self.module, "constraint_jacobian"):
-                matrix = self.function("constraint_jacobian", projection.jacobian)
-                projection = replace(projection, jacobian=matrix)
-            projection = replace(
-                projection,
-                residuals=self.function("constraint_residuals", projection.residuals),
-                rates=self.function("constraint_rates", projection.rates),
-                position=self.function("project_position", projection.position),
-                velocity=self.function("project_velocity", projection.velocity),
-                margins=self.function("constraint_margins", projection.margins),
-            )
+            made: dict[str, Any] = {
+                field: self.function(name, getattr(projection, field))
+                for field, name in PROJECTION.items()
+                if hasattr(self.module, name)
+            }
+            projection = replace(projection, **made)
         jacobian = problem.jacobian
         if hasattr(self.module, "jacobian"):
             jacobian = self.function("jacobian", jacobian)

@@ -123,7 +123,7 @@ def integrate(
     if isinstance(method, FixedStep):
         # Evaluations to check stability do not count. They need a Jacobian with all digits, which
         # doubles do not give where the derivative is repaired.
-        checked = None if unstable or not method.explicit or repairs else problem
+        checked = None if unstable or repairs or not method.steps_explicitly(problem) else problem
         plain = not (monitor or powers or problem.contacts)
         compiled = compiled_steps(problem) if plain else None
         begin, settings = equal_steps(

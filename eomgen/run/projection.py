@@ -50,6 +50,15 @@ class Violations:
         np.maximum(self.after, np.abs(after), out=self.after)
 
 
+Value = Callable[[float, FloatArray], FloatArray]
+"""A function of time and state."""
+
+
+def without(t: float, y: FloatArray) -> FloatArray:
+    """A `Value` that a module lacks."""
+    raise AssertionError("the module lacks this function")
+
+
 @dataclass(frozen=True, eq=False)
 class Projection:
     """The constraints of a module.
@@ -65,19 +74,24 @@ class Projection:
                 singular position
     quaternions indices of the components of each unit quaternion among the coordinates
     violations  to which each projection is added, if given
+    inertia, kinetic_slopes
+                (t, y) -> the mass matrix (nv, nv), and the derivatives (nq,) of the kinetic energy
+                by the coordinates; `without` if the module has none
     """
 
     names: tuple[str, ...]
     sizes: FloatArray
-    residuals: Callable[[float, FloatArray], FloatArray]
-    rates: Callable[[float, FloatArray], FloatArray]
-    jacobian: Callable[[float, FloatArray], FloatArray]
-    position: Callable[[float, FloatArray], FloatArray]
-    velocity: Callable[[float, FloatArray], FloatArray]
-    margins: Callable[[float, FloatArray], FloatArray]
+    residuals: Value
+    rates: Value
+    jacobian: Value
+    position: Value
+    velocity: Value
+    margins: Value
     coordinates: int
     quaternions: Sequence[tuple[int, int, int, int]] = ()
     violations: Violations | None = None
+    inertia: Value = without
+    kinetic_slopes: Value = without
 
     def onto(self, t: float, y: FloatArray, unit: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """The state on the constraints; `unit` normalises quaternions.
@@ -163,17 +177,24 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
     names = getattr(module, "CONSTRAINTS", None)
     if not names:
         return None
+
+    def of(name: str) -> Value:
+        function = getattr(module, name, None)
+        return (lambda t, y: function(t, y, parameters, inputs)) if function else without
+
     return Projection(
         tuple(names),
         np.array([size if module.UNITS[name] == "N" else 1.0 for name in names]),
-        residuals=lambda t, y: module.constraint_residuals(t, y, parameters, inputs),
-        rates=lambda t, y: module.constraint_rates(t, y, parameters, inputs),
+        residuals=of("constraint_residuals"),
+        rates=of("constraint_rates"),
         jacobian=lambda t, y: jacobian_of(module)(t, y, parameters, inputs),
-        position=lambda t, y: module.project_position(t, y, parameters, inputs),
-        velocity=lambda t, y: module.project_velocity(t, y, parameters, inputs),
-        margins=lambda t, y: module.constraint_margins(t, y, parameters, inputs),
+        position=of("project_position"),
+        velocity=of("project_velocity"),
+        margins=of("constraint_margins"),
         coordinates=len(module.POSITIONS),
         quaternions=module.QUATERNIONS,
+        inertia=of("mass_matrix"),
+        kinetic_slopes=of("kinetic_slopes"),
     )
 
 
