@@ -119,15 +119,15 @@ def test_rattle_keeps_energy_where_symmetry_does_not() -> None:
     bands = []
     for dt in (0.01, 0.005):
         settings: dict[str, Any] = {"integrator": "leapfrog", "dt": dt, "backend": "numpy"}
-        run = eomgen.simulate(four_bar(initial=swings), t_end=700 * dt, **settings)
-        assert run.finished and run["theta"][-1] > 10.0
+        run = eomgen.simulate(four_bar(initial=swings), t_end=400 * dt, **settings)
+        assert run.finished and run["theta"][-1] > 6.0
         first, last = np.array_split(run.energy - run.energy[0], 2)
         bands.append(np.ptp(first))
         assert np.ptp(last) < 1.1 * np.ptp(first) and last.max() < first.max() + 0.1 * bands[-1]
         assert gap({name: run[name] for name in run.states}).max() < 1e-13
     assert 3.5 < bands[0] / bands[1] < 4.7
     rubs = '[[effects]]\ntype = "joint_friction"\nname = "rub"\njoint = "A"\nviscous = 0.1\n'
-    with pytest.raises(RunError, match="depends on velocities.*gauss_4"):
+    with pytest.raises(RunError, match=r"depends on velocities.*gauss_4"):
         eomgen.simulate(four_bar(effects=rubs), t_end=0.1, **settings)
 
 
