@@ -130,6 +130,13 @@ def _parser(
     )
     check = command("check", commands.check, "validate a scene and print its parts")
     check.add_argument("--long", action="store_true", help="do not shorten long lists")
+    check.add_argument(
+        "--assemble", action="store_true", help="print how the start of a mechanism with loops fits"
+    )
+    check.add_argument(
+        "--picture", metavar="FILE", type=path, help="draw the start (png, pdf, svg)"
+    )
+    add_force(check)
     _form(check)
     derive = command("derive", commands.derive, "print the derivation, step by step")
     derive.add_argument(

@@ -39,6 +39,7 @@ FLOORS = (
     "native",
     "precision",
     "linear",
+    "study.closing",
     "study.diagnosis",
     "study.timing",
     "study.accuracy",

@@ -3,8 +3,12 @@
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes
 from eomgen.dynamics import constraints
+from eomgen.dynamics.clusters import jacobian_of
 from eomgen.program.tape import Node
 from eomgen.scene.effects.base import Load
+
+LARGEST_JACOBIAN = 2000
+"""A larger matrix of constraints is not written out: runs compute it from the rates."""
 
 
 def constraint_outputs(record: Recording) -> OutputNodes:
@@ -18,7 +22,11 @@ def constraint_outputs(record: Recording) -> OutputNodes:
         "project_velocity": held.velocity(),
         "constraint_margins": held.margins(),
     }
-    return {name: ((len(part),), part) for name, part in nodes.items()}
+    found: OutputNodes = {name: ((len(part),), part) for name, part in nodes.items()}
+    shape = len(record.model.rows), d.nv
+    if shape[0] * shape[1] <= LARGEST_JACOBIAN:
+        found["constraint_jacobian"] = (shape, [x for row in jacobian_of(d) for x in row])
+    return found
 
 
 def constraint_forces(record: Recording) -> list[Node]:

@@ -9,7 +9,7 @@ motion: a linkage such as Bennett's moves only because its rows depend on each o
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,6 +72,13 @@ class Closure:
         found = np.array(constraints.residuals(self.dynamics(q)))
         return np.asarray(found / self._units)
 
+    def met(self, q: Array, v: Sequence[float]) -> bool:
+        """Whether a state meets the constraints, except for rounding."""
+        rates = np.array(constraints.rates(self.dynamics(q, v))) / self._units
+        speed = max(1.0, float(np.abs(np.array(v) / self.lengths).max(initial=0.0)))
+        near = np.abs(self.residuals(q)).max(initial=0.0) <= CLOSED
+        return bool(near and np.abs(rates).max(initial=0.0) <= CLOSED * speed)
+
     def both(self, q: Array) -> tuple[Array, Array]:
         """`residuals` and `jacobian`."""
         d = self.dynamics(q)
@@ -128,18 +135,8 @@ def assembled(model: Model) -> Model:
     if not model.constraints:
         return model
     mechanism = Closure.of(model)
-    start = np.array(model.initial_q)
-    _check_linear(mechanism, start)
-    free = _free(model)
-    q = _closed(mechanism, start, free)
-    notices = list[str]()
-    if q is None and not free.all():
-        q = _closed(mechanism, start, np.ones(len(free), dtype=bool))
-        if q is None or not _complete(model):
-            raise SceneError(_open(mechanism, start, free))
-        notices += _changes(model, start, q)
-    if q is None:
-        raise SceneError(_open(mechanism, start, free))
+    _check_linear(mechanism, np.array(model.initial_q))
+    q, notices = _position(mechanism)
     dropped = _dependent(mechanism, q)
     model = replace(model, initial_q=tuple(q.tolist()), dropped=dropped)
     if not model.rows:
@@ -176,6 +173,48 @@ def _check_linear(mechanism: Closure, q: Array) -> None:
             raise SceneError(f"constraints: {name} is not linear in the velocities; write it so")
 
 
+def closed_start(
+    model: Model, q: Sequence[float], v: Sequence[float], given: Collection[str] = ()
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[str, ...]]:
+    """The start q, v of an assembled model at its parameters, as near as it can be, and notices.
+
+    Coordinates and velocities that are `given` are kept; without given coordinates those that the
+    scene gives, and without given velocities likewise. Raises `SceneError` if that cannot be.
+    """
+    positions, velocities = (
+        [c.name for c in each] for each in (model.coordinates, model.velocities)
+    )
+    held = [
+        name
+        for names in (positions, velocities)
+        for name in names
+        if name in (given if set(given) & set(names) else model.held)
+    ]
+    model = replace(model, initial_q=tuple(q), initial_v=tuple(v), held=tuple(held))
+    mechanism = Closure.of(model)
+    if mechanism.met(np.array(q), v):
+        return model.initial_q, model.initial_v, ()
+    found, notices = _position(mechanism)
+    speeds, more = _speeds(mechanism, found)
+    return tuple(found.tolist()), speeds, (*notices, *more)
+
+
+def _position(mechanism: Closure) -> tuple[Array, list[str]]:
+    """The closed position nearest to a model's initial one, with notices; what it holds is kept,
+    unless it holds all. Raises `SceneError` if there is none.
+    """
+    model = mechanism.model
+    start, free = np.array(model.initial_q), _free(model)
+    q = _closed(mechanism, start, free)
+    if q is None and not free.any():  # they may be rounded
+        q = _closed(mechanism, start, ~free)
+        if q is not None:
+            return q, _changes(model, start, q)
+    if q is None:
+        raise SceneError(_open(mechanism, start, free))
+    return q, []
+
+
 def _size(model: Model) -> float:
     """A typical length of the mechanism, m."""
     joints = [*(body.joint for body in model.bodies), *(loop.joint for loop in model.loops)]
@@ -200,11 +239,6 @@ def _free(model: Model) -> NDArray[np.bool_]:
         if held & set(names[index.body.plain :]):
             found[list(index.spin)] = False
     return found
-
-
-def _complete(model: Model) -> bool:
-    """Whether the scene gives every coordinate, so that its values may be rounded."""
-    return not _free(model).any()
 
 
 def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array | None:
@@ -267,7 +301,7 @@ def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     worst = int(np.abs(g).argmax())
     name, unit = model.rows[worst]
     gap = abs(float(g[worst])) * (mechanism.size if unit == "N" else 1.0)
-    held = ", ".join(model.held)
+    held = ", ".join(c.name for c in model.coordinates if c.name in model.held)
     given = f" with {held} as given" if held else ""
     return (
         f"initial.q: the constraints cannot be met{given}: {name} stays open by "
@@ -365,6 +399,7 @@ def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]
     rate = rate / np.array([mechanism.size if unit == "N" else 1.0 for _, unit in model.rows])
     for free in (~held, np.ones(len(held), dtype=bool)):
         change = -np.linalg.lstsq(np.where(free, matrix, 0.0), rate, rcond=1e-10)[0]
+        change = np.where(free, change, 0.0)
         left = float(np.abs(matrix @ change + rate).max())
         if left <= 1e-9 * max(1.0, float(np.abs(rate).max())):
             moved = float(np.abs(change[held]).max(initial=0.0))

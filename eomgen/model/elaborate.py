@@ -63,6 +63,10 @@ def elaborate(scene: Scene) -> Model:
             "scene: every coordinate is driven or locked, so there is no motion to find; "
             "leave one free"
         )
+    if scene.initial.guess and not constraints:
+        raise SceneError(
+            "initial.guess: is for mechanisms with loops, and this scene has none; give initial.q"
+        )
     start = initial_state(scene.initial, bodies, prescribed)
     lengths = (line for link in links for line in axis_notices(link.joint, link.joint_location))
     model = Model(

@@ -194,6 +194,11 @@ v = { elbow_angle_dot = -2.0 }
     v: tuple[Number, ...] | ByName = Field(
         default={}, union_mode="left_to_right", description="velocities"
     )
+    guess: ByName = Field(
+        default={},
+        description="with loops, where the search begins for coordinates that are not given: it "
+        "chooses the branch",
+    )
 
 
 class Simulation(Table):
