@@ -2,12 +2,14 @@
 
 import random
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from eomgen.dynamics.assembly import Array, Closure, newton
 from eomgen.model.model import Model
+from eomgen.scene.effects import Driven
 
 STEP = 0.12
 """The distance of positions, rad, or in sizes of the mechanism."""
@@ -17,9 +19,15 @@ SAFE = 0.02
 """The least pivot, relative to its row, with which dependent velocities may be solved for."""
 
 
-@lru_cache(maxsize=8)
 def closed_positions(model: Model) -> tuple[Array, ...]:
     """Closed positions (nq,): walks along the freedoms, ahead, back and in seeded directions."""
+    # Only drives have a say in them; other effects may hold tables, which cannot be keys.
+    drives = tuple(effect for effect in model.effects if isinstance(effect, Driven))
+    return _closed_positions(replace(model, effects=drives, outputs=(), route="auto"))
+
+
+@lru_cache(maxsize=8)
+def _closed_positions(model: Model) -> tuple[Array, ...]:
     return tuple(q for walk in range(WALKS) for q in _walk(model, walk))
 
 
