@@ -25,6 +25,7 @@ from eomgen.dynamics.composite import (
     mass_entries,
     solved,
 )
+from eomgen.dynamics.embedding import Embedded
 from eomgen.dynamics.kinematics import TreeKinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.loads import power_of
@@ -234,17 +235,29 @@ class Dynamics(MechanismState):
     def constrained(self, route: str) -> RangeSpace | NullSpace:
         """The constraints, solved with the recursion of a route."""
         if route not in self._constrained:
-            recursion = ROUTES[route].recursion
-            self._constrained[route] = (
-                NullSpace(self, self.mass_entries, self._right, self._fall)
-                if ROUTES[route].loops
-                else RangeSpace(
-                    self,
-                    getattr(self, f"{recursion}_forward"),
-                    getattr(self, f"{recursion}_response"),
-                )
-            )
+            self._constrained[route] = self._solver(ROUTES[route].recursion)
         return self._constrained[route]
+
+    def _solver(self, recursion: str) -> RangeSpace | NullSpace:
+        if recursion == "independent":
+            return NullSpace(self, self.mass_entries, self._right, self._fall)
+        if recursion == "embedded":
+            return Embedded(
+                self,
+                self._generalised_forces,
+                lambda: self._bias_wrenches(self.kinematics),
+                self._beyond_effects,
+                self._fall,
+            )
+        forward, response = (
+            getattr(self, f"{recursion}_{name}") for name in ("forward", "response")
+        )
+        return RangeSpace(self, forward, response)
+
+    def _beyond_effects(self, vd: Sequence[Scalar]) -> list[Scalar]:
+        """The generalised forces besides the effects that v̇ takes: M v̇ + V + G - F."""
+        pairs = zip(self.inverse(vd), self.applied_force, strict=True)
+        return [needed - applied for needed, applied in pairs]
 
     @cached_property
     def _constrained(self) -> dict[str, RangeSpace | NullSpace]:

@@ -12,18 +12,17 @@ where the dependent velocities do not follow from the independent ones, as at a 
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
+from eomgen.dynamics.clusters import jacobian_of
 from eomgen.dynamics.composite import Entries
 from eomgen.dynamics.constraints import (
     Square,
     accelerations_at_rest,
     factored,
     inner,
-    jacobian_of,
     position_rates,
     rates,
     relative,
     residuals,
-    rows_of,
     triangular,
 )
 from eomgen.dynamics.mechanism_state import MechanismState
@@ -54,8 +53,12 @@ class NullSpace:
     @cached_property
     def _jacobian(self) -> list[list[Scalar]]:
         """J with its rows in the order of elimination."""
-        rows = jacobian_of(self._d, rows_of(self._d))
-        return [rows[i] for i in self._order]
+        return [self._rows[i] for i in self._order]
+
+    @cached_property
+    def _rows(self) -> list[list[Scalar]]:
+        """J."""
+        return jacobian_of(self._d)
 
     @cached_property
     def _factors(self) -> Square:
@@ -64,7 +67,7 @@ class NullSpace:
         names = [self._d.model.rows[i][0] for i in self._order]
         return triangular(square, names, self._scalars)
 
-    def _dependents(self, along: Sequence[Scalar]) -> list[Scalar]:
+    def dependents(self, along: Sequence[Scalar]) -> list[Scalar]:
         """Velocities (nv,) with J v = -`along`, where independent ones are 0."""
         found = [self._zero] * self._d.nv
         ordered = [-along[i] for i in self._order]
@@ -89,10 +92,8 @@ class NullSpace:
     def _bend(self) -> list[Scalar]:
         """γ (nv,) without `fall`."""
         rest = accelerations_at_rest(self._d)
-        J = jacobian_of(self._d, rows_of(self._d))
-        return self._dependents(
-            [b + inner(row, self._fall, self._scalars) for row, b in zip(J, rest, strict=True)]
-        )
+        pairs = zip(self._rows, rest, strict=True)
+        return self.dependents([b + inner(row, self._fall, self._scalars) for row, b in pairs])
 
     def _times_mass(self, v: Sequence[Scalar]) -> list[Scalar]:
         """M v."""
@@ -134,14 +135,14 @@ class NullSpace:
         needed = self._times_mass(self._accelerations(right))
         over = [needed[j] - right[j] for j in self._dependent]
         found = self._factors.solved_transposed(over)
-        return [x for _, x in sorted(zip(self._order, found, strict=True), key=_first)]
+        return [x for _, x in sorted(zip(self._order, found, strict=True), key=first_of)]
 
     def margins(self) -> list[Scalar]:
         """The square of each pivot relative to the rows of J of its kind: 0 where its velocity does
         not follow from the others.
         """
-        pairs = sorted(zip(self._order, self._factors.pivots, strict=True), key=_first)
-        rows = sorted(zip(self._order, self._jacobian, strict=True), key=_first)
+        pairs = sorted(zip(self._order, self._factors.pivots, strict=True), key=first_of)
+        rows = sorted(zip(self._order, self._jacobian, strict=True), key=first_of)
         squares = [inner(row, row, self._scalars) for _, row in rows]
         return relative(self._d, [pivot * pivot for _, pivot in pairs], squares)
 
@@ -151,15 +152,16 @@ class NullSpace:
 
     def position(self) -> list[Scalar]:
         """q after one Newton step towards g = 0; independent coordinates keep their values."""
-        change = self._dependents(residuals(self._d))
+        change = self.dependents(residuals(self._d))
         pairs = zip(self._d.values.q, position_rates(self._d, change), strict=True)
         return [x + dx for x, dx in pairs]
 
     def velocity(self) -> list[Scalar]:
         """v with ġ = 0; independent velocities keep their values."""
-        change = self._dependents(rates(self._d))
+        change = self.dependents(rates(self._d))
         return [v + dv for v, dv in zip(self._d.values.v, change, strict=True)]
 
 
-def _first(pair: tuple[int, Scalar]) -> int:
+def first_of(pair: tuple[int, Scalar]) -> int:
+    """The index of a pair."""
     return pair[0]
