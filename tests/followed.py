@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.dynamics.closed_positions import closed_positions
+from eomgen.dynamics.assembly import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.exposition.constraints import DerivedConstraint
 from eomgen.exposition.derivation import used_bodies
@@ -39,7 +39,9 @@ def instant(model: Model, seed: int = 0, shake: float = 0.3, *, closed: bool = F
     inputs = {i.name: float(rng.normal()) for i in model.inputs}
     states = {x.name: float(rng.normal()) for x in model.states}
     if closed:
-        q = closed_positions(model)[4 + seed]
+        found = newton(Closure.of(model), q, np.ones(len(v), dtype=bool))
+        assert found is not None
+        q = found
     values = Values(model.defaults, inputs, q.tolist(), v.tolist(), states, 0.4)
     solver = Dynamics(model, values, FloatScalars())
     if closed:

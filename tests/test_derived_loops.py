@@ -1,6 +1,7 @@
 """Derivations of mechanisms with constraints, followed in numbers beside module and solver."""
 
 import re
+from dataclasses import replace
 from functools import cache
 from typing import Any
 from xml.etree import ElementTree
@@ -13,6 +14,7 @@ from followed import Instant, follow_recursion, instant
 import eomgen
 from eomgen.dynamics import constraints as solved
 from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.clusters import jacobian_of
 from eomgen.exposition.constraints import DerivedConstraint, derived_constraints
 from eomgen.exposition.derivation import exposition_of
 from eomgen.exposition.evaluate import Numbers, array, define, number
@@ -123,7 +125,7 @@ def model_of(scene: str) -> Model:
 
 def followed(model: Model, seed: int = 0) -> tuple[Instant, tuple[DerivedConstraint, ...]]:
     """A closed state with all that the steps on constraints define."""
-    at, found = instant(model, seed, closed=True), derived_constraints(model)
+    at, found = instant(model, seed, 0.05, closed=True), derived_constraints(model)
     needed = dict.fromkeys(body for c in found for body in c.bodies)
     define(poses(model, frames_of(model), needed)[0], at.known)
     for c in found:
@@ -139,7 +141,7 @@ def assert_close(ours: Any, theirs: Any) -> None:
     assert float(np.abs(ours - theirs).max(initial=0.0)) < ROUNDING * size
 
 
-@pytest.mark.parametrize("scene", [*SCENES, *some(("universal", "planar", "prismatic"), LOOPS)])
+@pytest.mark.parametrize("scene", [*SCENES, *some(("prismatic",), LOOPS)])
 def test_equations_of_constraints_and_their_solution(scene: str) -> None:
     """g, ġ, J, β and the elimination; then v̇ by the steps of the tree with these multipliers."""
     model = model_of(scene)
@@ -153,14 +155,16 @@ def test_equations_of_constraints_and_their_solution(scene: str) -> None:
     assert_close([number(row.speed, at.known) for row in rows], solved.rates(d))
     J = np.array([[number(dict(row.slopes).get(name, 0 * row.speed), at.known) for name in names]
                   for row in rows])  # fmt: skip
-    assert_close(J, solved.jacobian_of(d, solved.rows_of(d)))
+    assert_close(J, jacobian_of(d))
     beta = np.array([number(row.bend, at.known) for row in rows])
     assert_close(beta, solved.accelerations_at_rest(d))
     want = d.forward("ldl")(None)
     force = d.constrained("ldl").multipliers()
-    rates, multipliers = eliminated(model, found, at, J, beta)
-    assert_close(rates, want)
-    assert_close(multipliers, force)
+    for route in ("independent", "ldl"):
+        named = replace(model, route=route)
+        rates, multipliers = eliminated(named, found, at, J, beta)
+        assert_close(rates, want)
+        assert_close(multipliers, force)
     known = dict(at.known)
     known |= {f"lambda_{name}": x for (name, _), x in zip(model.rows, force, strict=True)}
     assert_close(follow_recursion(model, known, found)[0], want)
@@ -178,9 +182,12 @@ def eliminated(
         order = [*dependent, *(j for j in order if j not in dependent)]
         m = len(dependent)
         known |= {"J_d": J[:, dependent], "J_i": J[:, order[m:]]}
-    known |= {"M": np.array(d.mass_matrix)[np.ix_(order, order)], "J": J}
+    mass = np.zeros((n, n))
+    for (i, j), x in d.mass_entries.items():
+        mass[i, j] = mass[j, i] = x
+    known |= {"M": mass[np.ix_(order, order)], "J": J}
     known |= {"beta": beta.reshape(-1, 1), "V": np.zeros((n, 1))}
-    known["G"] = np.array(d.bias_force)[order].reshape(-1, 1)
+    known["G"] = np.array(d.bias())[order].reshape(-1, 1)
     known["F_0"] = np.array(d.applied_force)[order].reshape(-1, 1)
     last = [*solution_steps(model, found, recursive=False)][-1]
     for line in last.equations:
@@ -199,7 +206,7 @@ def test_matrices_with_multipliers_against_the_module(scene: str) -> None:
     matrices = found.exposition.matrices
     assert matrices is not None
     for seed in range(3):
-        at = instant(model, seed, closed=True)
+        at = instant(model, seed, 0.05, closed=True)
         y = np.array([at.known[state] for state in module.STATES])
         want = module.derivative(0.4, y)[-len(model.velocities) :]
         force = module.constraint_forces(0.4, y)

@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from eomgen.derivation.projected.symbols import rate, real
+from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
 from eomgen.exposition.effects import AnyLoad, DerivedEffect, StandIn, named_loads
@@ -170,8 +170,10 @@ def _row(name: str, row: Row, motion: "_Motion") -> DerivedRow:
     speed = power(motion.model, row.loads) + drift
     whole = motion.over_velocities(speed)
     slopes, bend = [], motion.rate(drift)
-    for v, a in motion.velocities.items():
-        slope = sp.diff(whole, v)
+    still = dict.fromkeys(motion.velocities, sp.S.Zero)
+    there = whole.xreplace(still)
+    for v, a in motion.velocities.items():  # the speed is linear in the velocities
+        slope = whole.xreplace({**still, v: sp.S.One}) - there
         if slope == 0:
             continue
         bend += v * motion.rate(slope)
@@ -244,6 +246,24 @@ class _Motion:
     def rate(self, expression: Expr) -> Expr:
         """The time derivative of what depends on poses and time."""
         return rate(expression, self.rates)
+
+
+def rate(e: Expr, rates: Mapping[Expr, Expr]) -> Expr:
+    """The time derivative of an expression in one pass; symbols without a rate are constant."""
+    if not rates.keys() & e.free_symbols:
+        return sp.S.Zero
+    if e.is_Symbol:
+        return rates[e]
+    if e.is_Add:
+        return sp.Add(*(rate(x, rates) for x in e.args))
+    if e.is_Mul:
+        factors = list(e.args)
+        terms = [(i, rate(x, rates)) for i, x in enumerate(factors)]
+        products = (sp.Mul(*factors[:i], x, *factors[i + 1 :]) for i, x in terms if x != 0)
+        return sp.Add(*products)
+    return sp.Add(
+        *(sp.diff(e, s) * rates[s] for s in sorted(e.free_symbols, key=str) if s in rates)
+    )
 
 
 def _coordinate_rates(model: Model) -> Iterator[tuple[Expr, Expr]]:

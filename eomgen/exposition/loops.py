@@ -131,10 +131,12 @@ def solution_steps(
 
 
 def by_independent_velocities(model: Model) -> bool:
-    """Whether the elimination that is shown is that of the route for independent velocities."""
-    if model.route != "auto":
-        return ROUTES[model.route].loops
-    return safely_dependent(model)
+    """Whether the elimination that is shown is that by independent velocities; loop by loop it is
+    that of the route `embedded`.
+    """
+    if model.route == "auto":
+        return safely_dependent(model)
+    return ROUTES[model.route].loops
 
 
 def _entry(row: DerivedRow, velocity: str) -> Expr:
