@@ -94,10 +94,10 @@ def derived_constraints(model: Model) -> tuple[DerivedConstraint, ...]:
         bodies = tuple(dict.fromkeys(b for b in (*notes.bodies, *touched) if b != WORLD))
         motion, moving = _Motion.of(model, frames, bodies).with_points(notes.definitions)
         derived = tuple(_row(name, row, motion) for name, row in kept)
-        moving = needed_by([row.bend for row in derived], moving)
+        speeds = needed_by([row.bend for row in derived], moving)
         force = _force(model, constraint, kept, bodies)
         points = tuple(notes.definitions)
-        found.append(DerivedConstraint(constraint, points, moving, bodies, derived, force))
+        found.append(DerivedConstraint(constraint, points, speeds, bodies, derived, force))
     return tuple(found)
 
 
