@@ -8,7 +8,7 @@ J is the matrix of the constraints' rates by the velocities: ġ = J v + drift an
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.dynamics.loads import power_of
+from eomgen.dynamics.loads import generalised, power_of, scaled
 from eomgen.dynamics.mechanism_state import MechanismState, Values
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar, Scalars
@@ -36,6 +36,12 @@ def rates(d: MechanismState) -> list[Scalar]:
         rate = power_of(d, row.loads)
         found.append(rate if row.drift is None else rate + row.drift)
     return found
+
+
+def held(d: MechanismState, multipliers: Sequence[Scalar]) -> list[Scalar]:
+    """Jᵀ λ: the generalised forces of the constraints, with the rows of driven velocities."""
+    pairs = zip(rows_of(d), multipliers, strict=True)
+    return generalised(d, [x for row, force in pairs for x in scaled(row.loads, force)])
 
 
 def accelerations_at_rest(d: MechanismState) -> list[Scalar]:

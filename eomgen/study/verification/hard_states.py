@@ -48,6 +48,10 @@ class State:
         return f"{self.kind} {self.number}"
 
 
+FAR = 0.01
+"""The least margin of states with constraints: nearer to a singular position digits are lost by any
+elimination.
+"""
 CLOSED = ("fast", "still", "random")
 """Kinds for mechanisms with constraints, at positions that meet these."""
 
@@ -75,7 +79,7 @@ def closed_states(
     model: Model, module: GeneratedModule, count: int, seed: int, t_end: float
 ) -> list[State]:
     """`count` states of each kind of `CLOSED` that meet the constraints of a model, at positions
-    along its motion.
+    along its motion, without those near singular positions.
     """
     problem, found, nq = as_problem(module), [], len(module.POSITIONS)
     positions = closed_positions(model) or (np.array(model.initial_q),)
@@ -87,9 +91,11 @@ def closed_states(
             u = {name: float(rng.uniform(-1.0, 1.0)) for name in module.INPUTS}
             y = _made(kind, module, len(model.velocities), y, rng)
             try:
-                found.append(State(kind, number, t, problem.projected(t, y), u))
+                y = problem.projected(t, y)
             except StepFailure:
                 continue  # too far from where the constraints are met at this time
+            if problem.projection is None or problem.projection.margins(t, y).min() >= FAR:
+                found.append(State(kind, number, t, y, u))
     return found
 
 

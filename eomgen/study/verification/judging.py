@@ -48,8 +48,9 @@ class Judged:
     errors     by route, the error of its v̇ (nv,), nan where it is not finite
     data       change of v̇ (nv,) by one ulp in the data
     agreed     digits to which articulated bodies and virtual work agree, in 60 digits
-    condition  2-norm condition number of the mass matrix scaled to a diagonal of ones
-    pivot      smallest pivot of that matrix, eliminated from the last row up as in LᵀDL
+    condition  2-norm condition number of the mass matrix scaled to a diagonal of ones, or that of
+               J M⁻¹ Jᵀ of the constraints, if it is greater
+    pivot      smallest pivot of these matrices, eliminated from the last row up as in LᵀDL
     residuals  the errors of M v̇ + h - F - Jᵀ λ at the v̇ of each route
     losses     errors of everything else that the module computes
     """
@@ -110,7 +111,7 @@ def judged(
             errors,
             doubles(data),
             agreed,
-            *_condition(free.mass_matrix),
+            *_conditions(free),
             residuals,
             losses,
         )
@@ -312,6 +313,16 @@ def ulps(error: Array, scale: Array) -> float:
         if x
     ]
     return float(np.max(parts, initial=0.0))  # Python's own max could lose a nan
+
+
+def _conditions(free: FreeBodies) -> tuple[float, float]:
+    """The greater condition number, and the smaller of the smallest pivots, of M and J M⁻¹ Jᵀ."""
+    found = [_condition(free.mass_matrix)]
+    if free.model.rows:
+        J = free.constraint_jacobian[:, : free.nv]
+        found.append(_condition(J @ solved(free.mass_matrix, J.T)))
+    conditions, pivots = zip(*found, strict=True)
+    return max(conditions), min(pivots)
 
 
 def _condition(matrix: Array) -> tuple[float, float]:

@@ -90,11 +90,10 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
         if not why_no_energy_law(model):
             change = (ahead.kinetic_energy - behind.kinetic_energy) / step
             powers, sizes = free.powers
-            held, held_sizes = (push[:nv] for push in free.constraint_push)
-            # Where the constraints are met but for rounding, this power is rounding.
-            power = np.sum(powers, initial=mpfr(0)) + held @ free.rates[:nv]
+            held, held_sizes = free.constraint_push
+            power = np.sum(powers, initial=mpfr(0)) + held @ free.rates
             needed = abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes
-            needed = needed + held_sizes
+            needed = needed + held_sizes[:nv]
             # At both ends of the difference, bodies that are at rest here move.
             scale = (abs(free.rates[:nv]) + step * abs(vd)) @ needed
             scale += np.sum(sizes, initial=mpfr(0))
