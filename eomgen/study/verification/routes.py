@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass, replace
 
-from eomgen.codegen.choice import why_not_compared
+from eomgen.codegen.choice import why_not_compared, why_not_loops
 from eomgen.codegen.system import System
-from eomgen.dynamics.closed_positions import safely_dependent
+from eomgen.dynamics.closed_positions import with_safe_pivots
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.routes import ROUTES, routes_for
+from eomgen.routes import routes_for
 from eomgen.run.module import GeneratedModule, load_module
 
 
@@ -28,8 +28,8 @@ def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
         if route == but:
             continue
         words = why_not_compared(model, route)
-        if ROUTES[route].loops and not safely_dependent(model):
-            words = "the velocities that it solves for do not follow from others everywhere"
+        if model.constraints and not words:
+            words = why_not_loops(with_safe_pivots(model), route)
         try:
             if not words:
                 made[route] = loaded(
