@@ -11,6 +11,7 @@ import math
 import random
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from numpy.typing import NDArray
 from eomgen.dynamics import constraints
 from eomgen.dynamics.clusters import jacobian_of
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.frames import Linkage
+from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -65,7 +68,12 @@ class Closure:
         states = {x.name: x.initial for x in model.states}
         speeds = [0.0] * len(model.velocities) if v is None else list(v)
         values = Values(model.defaults, inputs, q.tolist(), speeds, states, 0.0)
-        return Dynamics(model, values, FloatScalars())
+        return Dynamics(model, values, FloatScalars(), linkage=self._linkage)
+
+    @cached_property
+    def _linkage(self) -> Linkage:
+        """Frames and mounts, the same at all coordinates."""
+        return make_linkage(self.model, self.model.defaults, FloatScalars())
 
     def residuals(self, q: Array) -> Array:
         """g of each row, (nc,)."""

@@ -39,6 +39,12 @@ def rates(d: MechanismState) -> list[Scalar]:
     return found
 
 
+def held(d: MechanismState, multipliers: Sequence[Scalar]) -> list[Scalar]:
+    """Jᵀ λ: the generalised forces of the constraints, with the rows of driven velocities."""
+    pairs = zip(rows_of(d), multipliers, strict=True)
+    return generalised(d, [x for row, force in pairs for x in scaled(row.loads, force)])
+
+
 def accelerations_at_rest(d: MechanismState) -> list[Scalar]:
     """β: the second derivative of each g at v̇ = 0, by dual numbers along q̇ and t."""
     model, values, scalars = d.model, d.values, d.scalars
