@@ -8,7 +8,7 @@ J is the matrix of the constraints' rates by the velocities: ġ = J v + drift an
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.dynamics.loads import power_of, scaled
+from eomgen.dynamics.loads import generalised, power_of, scaled
 from eomgen.dynamics.mechanism_state import MechanismState, Values
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar, Scalars

@@ -20,7 +20,7 @@ from eomgen.dynamics.vectors import Vec, in_space, times, zeros
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import JointIndex, Model, dofs_of
-from eomgen.model.partials import partials_of
+from eomgen.model.partials import gradient_of, partials_of
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.constraints.base import Partials
@@ -148,18 +148,8 @@ class MechanismState:
         self, formula: Formula, names: Mapping[str, Scalar]
     ) -> tuple[Scalar, Vector, Scalar]:
         """A formula of `names`, t and parameters with its derivatives by the names and by t."""
-        duals, one = Duals(self.scalars), self.scalars.number(1.0)
-        values = {**self.values.parameters, **names, "t": self.values.time}
-        used = set(names_in(formula))
-        still = {name: duals.still(values[name]) for name in used}
-
-        def slope(name: str) -> Scalar:
-            if name not in used:
-                return self.scalars.number(0.0)
-            along = {**still, name: Dual(values[name], one)}
-            return evaluate(formula, along, duals).rate
-
-        return evaluate(formula, values, self.scalars), tuple(map(slope, names)), slope("t")
+        given = {**self.values.parameters, "t": self.values.time}
+        return gradient_of(formula, names, given, self.scalars)
 
     def input(self, name: str) -> Scalar:
         """An input."""

@@ -37,3 +37,25 @@ def partials_of(
         slope("t") if "t" in used else zero,
         evaluate(formula, {**names, **rates}, scalars),
     )
+
+
+def gradient_of(
+    formula: Formula,
+    names: Mapping[str, Scalar],
+    given: Mapping[str, Scalar],
+    scalars: Scalars,
+) -> tuple[Scalar, tuple[Scalar, ...], Scalar]:
+    """A formula of `names` and of what is `given`, t and parameters, with its derivatives by each
+    of the names and by t.
+    """
+    duals, one = Duals(scalars), scalars.number(1.0)
+    values, used = {**given, **names}, set(names_in(formula))
+    still = {name: duals.still(values[name]) for name in used}
+
+    def slope(name: str) -> Scalar:
+        if name not in used:
+            return scalars.number(0.0)
+        along = {**still, name: Dual(values[name], one)}
+        return evaluate(formula, along, duals).rate
+
+    return evaluate(formula, values, scalars), tuple(map(slope, names)), slope("t")

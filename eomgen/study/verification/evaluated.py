@@ -189,6 +189,21 @@ class EvaluatedModel:
         by_time = slope("t") if "t" in used else mpfr(0)
         return Partials(self.value(formula), tuple(slopes), by_time, self.value(formula, **still))
 
+    def gradient(
+        self, formula: Formula, names: Mapping[str, Extended]
+    ) -> tuple[Extended, tuple[Extended, ...], Extended]:
+        """A formula of `names`, t and parameters with its derivatives, by central differences."""
+        values = {**self._parameters, "t": self._time, **names}
+
+        def slope(name: str) -> Extended:
+            ahead, behind = (
+                evaluate(formula, {**values, name: values[name] + h}, self.scalars)
+                for h in (_BESIDE, -_BESIDE)
+            )
+            return (ahead - behind) / (2 * _BESIDE)
+
+        return evaluate(formula, values, self.scalars), tuple(map(slope, names)), slope("t")
+
     @cached_property
     def _names(self) -> dict[str, Extended]:
         model = self.model
