@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
+    from eomgen.api.exhibiting import gallery
     from eomgen.api.generating import generate, load
     from eomgen.api.given import check, read
     from eomgen.api.linearising import linearise
@@ -38,6 +39,7 @@ __all__ = [
     "derive",
     "effects",
     "ensemble",
+    "gallery",
     "generate",
     "grid",
     "horizon",
@@ -53,6 +55,7 @@ _PLACES = {
     **dict.fromkeys(("check", "read"), "api.given"),
     **dict.fromkeys(("generate", "load"), "api.generating"),
     "derive": "api.deriving",
+    "gallery": "api.exhibiting",
     "linearise": "api.linearising",
     "simulate": "api.simulating",
     **dict.fromkeys(("Ensemble", "ensemble", "grid", "sampled"), "api.sweeping"),

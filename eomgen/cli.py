@@ -10,7 +10,7 @@ from pathlib import Path
 
 from eomgen import commands
 from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
-from eomgen.options import add_folder, add_force, add_simulation, add_values
+from eomgen.options import add_folder, add_force, add_gallery, add_simulation, add_values
 from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
 from eomgen.text import one_line
@@ -138,6 +138,10 @@ def _parser(
         ("view", commands.view, "integrate, and open the animated page"),
     ):
         add_simulation(_code(_form(command(name, run, about))))
+    about = (
+        "write a folder of live pages, and one that shows them all with a picture and a sentence"
+    )
+    add_gallery(command("gallery", commands.gallery, about, None))
     about = "run a scene many times, with other parameters, initial states or inputs"
     _sweep(_route(_form(command("sweep", commands.sweep, about))))
     about = "compare the module with an independent solver and 60 digits"

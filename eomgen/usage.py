@@ -20,6 +20,7 @@ EXAMPLES = {
     "generate": "eomgen generate two_body pendulum -o modules",
     "simulate": "eomgen simulate cart_pole --set l=0.4 --state theta=0.3 --input push=3*sin(t)",
     "view": "eomgen view double_pendulum",
+    "gallery": "eomgen gallery -o course --scene pendulum two_body",
     "sweep": "eomgen sweep cart_pole --vary m_pole=0.1:0.5:20 --of theta",
     "verify": "eomgen verify two_body --states 20",
     "accuracy": "eomgen accuracy pendulum --quick",

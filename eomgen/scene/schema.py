@@ -220,6 +220,7 @@ class Scene(Table):
 
     name: ModuleName
     title: Text = Field(default="", description="one line of text")
+    about: Text = Field(default="", description="a sentence on what it shows, for the gallery")
     outputs: Annotated[Literal["all"] | tuple[Output, ...], BeforeValidator(_all)] = Field(
         default=(),
         union_mode="left_to_right",
