@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from eomgen.api.generating import generate, load
     from eomgen.api.given import check, read
     from eomgen.api.linearising import linearise
+    from eomgen.api.reopening import load_run
     from eomgen.api.simulating import simulate
     from eomgen.api.sweeping import Ensemble, ensemble, grid, sampled
     from eomgen.api.verifying import horizon, verify
@@ -45,6 +46,7 @@ __all__ = [
     "horizon",
     "linearise",
     "load",
+    "load_run",
     "read",
     "sampled",
     "simulate",
@@ -57,6 +59,7 @@ _PLACES = {
     "derive": "api.deriving",
     "gallery": "api.exhibiting",
     "linearise": "api.linearising",
+    "load_run": "api.reopening",
     "simulate": "api.simulating",
     **dict.fromkeys(("Ensemble", "ensemble", "grid", "sampled"), "api.sweeping"),
     **dict.fromkeys(("horizon", "verify"), "api.verifying"),

@@ -10,7 +10,16 @@ from pathlib import Path
 
 from eomgen import commands
 from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
-from eomgen.options import add_folder, add_force, add_gallery, add_simulation, add_values
+from eomgen.options import (
+    add_film,
+    add_folder,
+    add_force,
+    add_gallery,
+    add_inputs,
+    add_parameters,
+    add_plot,
+    add_simulation,
+)
 from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
 from eomgen.text import one_line
@@ -24,7 +33,7 @@ DERIVED = "what was derived is kept for the next call"
 KEPT = {
     "accuracy": "the runs made so far are in the table, and the same command continues",
     **dict.fromkeys(("derive", "verify", "effects", "linearise"), DERIVED),
-    **dict.fromkeys(("simulate", "view"), DERIVED),
+    **dict.fromkeys(("simulate", "view", "plot", "film"), DERIVED),
 }
 """What an interrupt leaves, for commands that do not say so themselves."""
 
@@ -86,7 +95,7 @@ def _parser(
         description="Equations of motion from a scene: derived, solved once, written as code.",
         epilog="SCENE is a file or the name of a built-in scene (eomgen list).",
     )
-    parser.add_argument("--version", action=Version, help="print the version and end")
+    parser.add_argument("--version", action=Version, help="print the version and exit")
     sub = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def command(
@@ -98,6 +107,9 @@ def _parser(
             found.append((name, added))
         if scenes == "scene":
             added.add_argument("scene", metavar="SCENE", help="file or built-in name")
+        elif scenes == "run":
+            text = "file that simulate wrote, .npz or .csv; or a scene, which is simulated first"
+            added.add_argument("scene", metavar="RUN", help=text)
         elif scenes == "scenes":
             added.add_argument("scenes", metavar="SCENE", nargs="*", help="file or built-in name")
         return added
@@ -122,7 +134,9 @@ def _parser(
     _form(check)
     derive = command("derive", commands.derive, "print the derivation, step by step")
     derive.add_argument(
-        "--format", choices=("text", "latex", "html"), default="text", help="what is written"
+        "--format",
+        choices=("text", "latex", "html"),
+        help="what is written (by the ending of FILE, .html or .tex; else text)",
     )
     derive.add_argument(
         "--form",
@@ -138,6 +152,10 @@ def _parser(
         ("view", commands.view, "integrate, and open the animated page"),
     ):
         add_simulation(_code(_form(command(name, run, about))))
+    about = "draw a figure of a run for a paper: PNG, SVG or PDF"
+    add_plot(command("plot", commands.plot, about, "run"))
+    about = "make a film of a run: GIF, or MP4 with ffmpeg"
+    add_film(command("film", commands.film, about, "run"))
     about = (
         "write a folder of live pages, and one that shows them all with a picture and a sentence"
     )
@@ -161,6 +179,7 @@ def _parser(
         default=10.0,
         help="length of the motions that are compared, s",
     )
+    add_inputs(costing)
     add_folder(costing)
     add_force(costing)
     _linearisation(
@@ -182,10 +201,12 @@ def _generation(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="all built-in scenes")
     parser.add_argument(
-        "--check", action="store_true", help="report which are stale, write nothing"
+        "--check", action="store_true", help="report which modules are stale; write nothing"
     )
     parser.add_argument(
-        "--explain", action="store_true", help="say why its route was chosen, and what each line is"
+        "--explain",
+        action="store_true",
+        help="say why the route was chosen, and what each line computes",
     )
     parser.add_argument("--report", action="store_true", help="say what each pass saved")
     add_force(parser)
@@ -236,8 +257,9 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=…",
         action="append",
         default=[],
-        help="a parameter, state or input: LOW:HIGH:COUNT, LOW:HIGH:COUNT:log or A,B,…; with "
-        "--sample uniform:LOW:HIGH, loguniform:LOW:HIGH or normal:MEAN:DEVIATION",
+        help="a parameter, state or input, or NAME_deg, an angle in degrees: LOW:HIGH:COUNT, "
+        "LOW:HIGH:COUNT:log or A,B,…; with --sample uniform:LOW:HIGH, loguniform:LOW:HIGH or "
+        "normal:MEAN:DEVIATION",
     )
     parser.add_argument("--sample", metavar="N", type=int, help="draw N members, instead of a grid")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of the sample")
@@ -255,7 +277,11 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument(
-        "--samples", metavar="N", type=int, default=2, help="rows to keep; 2 are the ends"
+        "--samples",
+        metavar="N",
+        type=int,
+        default=2,
+        help="rows to keep; 2 keeps only the first and the last",
     )
     parser.add_argument(
         "--backend",
@@ -263,11 +289,14 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="auto: compute in compiled C code if that pays; numpy: never; c: always",
     )
-    parser.add_argument("--workers", metavar="N", type=int, help="processes (one a core)")
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="number of processes (one per core)"
+    )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", default="", help="run on the workers of a Dask scheduler"
     )
-    add_values(parser)
+    add_parameters(parser)
+    add_inputs(parser)
     add_folder(parser)
     add_force(parser)
 
@@ -282,8 +311,9 @@ def _accuracy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--time", metavar="S", type=float, default=300.0, help="start no run after this, s"
     )
-    parser.add_argument("--fresh", action="store_true", help="use no runs of an earlier call")
-    add_values(parser)
+    parser.add_argument("--fresh", action="store_true", help="do not use runs of earlier calls")
+    add_parameters(parser)
+    add_inputs(parser)
     half = parser.add_mutually_exclusive_group()
     half.add_argument("--arithmetic", action="store_true", help="only rounding errors, no runs")
     half.add_argument("--no-arithmetic", action="store_true", help="only runs, no rounding errors")
@@ -327,6 +357,7 @@ def _verification(parser: argparse.ArgumentParser) -> None:
         const=Path("generated"),
         help="write the report beside the module, in DIR (generated)",
     )
+    add_inputs(parser)
     add_force(parser)
 
 
@@ -349,16 +380,17 @@ def _linearisation(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="a coordinate that keeps its value while an equilibrium is searched",
+        help="a coordinate that keeps its value while an equilibrium is searched for",
     )
     parser.add_argument(
         "--trim",
         metavar="INPUT",
         action="append",
         default=[],
-        help="an input whose value is searched as well",
+        help="an input whose value is searched for as well",
     )
-    add_values(parser)
+    add_parameters(parser)
+    add_inputs(parser, constant=True)
     _route(parser)
     parser.add_argument(
         "-o", "--output", metavar="FILE", type=path, help="write A and B to FILE.npz or FILE.csv"

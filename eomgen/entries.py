@@ -50,7 +50,7 @@ class Entries:
         if stat.S_ISLNK(about.st_mode):
             return "it is a symbolic link; name the folder itself in EOMGEN_CACHE"
         if not stat.S_ISDIR(about.st_mode):
-            return "it is no folder; name one in EOMGEN_CACHE"
+            return "it is not a folder; name one in EOMGEN_CACHE"
         if not _is_own(about):
             return "it belongs to another user; name a folder of your own in EOMGEN_CACHE"
         if not _is_private(about):

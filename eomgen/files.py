@@ -31,8 +31,12 @@ SIGNATURES = (
     b"eomgen.npy",  # archives: their first member
     b"Software\0eomgen",  # PNG
     b"<dc:title>eomgen</dc:title>",  # SVG: who made it
+    b"% eomgen figure\n",  # PDF
+    b"!\xfe\x06eomgen\0",  # GIF: a comment
 )
 """Every file that this program writes has one of these in its first `SIGNED_WITHIN` bytes."""
+SIGNED_AT_END = b"eomgen film"
+"""What films have there instead, in their last bytes: the comment of an MP4 comes last."""
 SIGNED_WITHIN = 2048
 PIECE = 2**20
 """Bytes that are read in one call."""
@@ -86,8 +90,8 @@ def _check_plain(about: os.stat_result, shown: str, error: type[EomgenError]) ->
         return
     kinds = {stat.S_IFIFO: "a pipe", stat.S_IFDIR: "a folder", stat.S_IFSOCK: "a socket"}
     raise error(
-        f"{shown}: is {kinds.get(kind, 'a device')}, no plain file; "
-        "save what it holds to a file and name that"
+        f"{shown}: is {kinds.get(kind, 'a device')}, not a plain file; "
+        "save its content to a file and name that file"
     )
 
 
@@ -99,11 +103,11 @@ def check_writable(path: Path, *, force: bool = False) -> None:
         if not path.exists():
             return
         if not path.is_file():
-            raise RunError(f"{path}: is no plain file; choose another name")
+            raise RunError(f"{path}: is not a plain file; choose another name")
         if force:
             return
         with path.open("rb") as file:
-            ours = is_ours(file.read(SIGNED_WITHIN))
+            ours = is_ours(file.read(SIGNED_WITHIN)) or _ends_as_ours(file)
     except OSError as error:
         raise RunError(f"{path}: cannot be used: {error.strerror}") from None
     if not ours:
@@ -113,12 +117,19 @@ def check_writable(path: Path, *, force: bool = False) -> None:
         )
 
 
+def _ends_as_ours(file: BinaryIO) -> bool:
+    """Whether a file ends like a film of this program."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - SIGNED_WITHIN))
+    return SIGNED_AT_END in file.read(SIGNED_WITHIN)
+
+
 def check_folder(path: Path) -> None:
     """Create a folder for output. Raises `RunError` if it cannot be created or written to."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise RunError(f"{path}: cannot be made a folder: {error.strerror}") from None
+        raise RunError(f"{path}: the folder cannot be created: {error.strerror}") from None
     if not os.access(path, os.W_OK | os.X_OK):
         raise RunError(f"{path}: cannot be written to; choose another folder with -o")
 

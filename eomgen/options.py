@@ -21,17 +21,29 @@ def add_folder(parser: argparse.ArgumentParser, default: Path = Path("out")) -> 
         metavar="DIR",
         type=path,
         default=default,
-        help="folder of what is written",
+        help="output folder",
     )
 
 
-def add_values(parser: argparse.ArgumentParser) -> None:
-    """Values of parameters and inputs."""
+def add_parameters(parser: argparse.ArgumentParser) -> None:
+    """Values of parameters."""
     parser.add_argument(
         "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
     )
+
+
+def add_inputs(parser: argparse.ArgumentParser, *, constant: bool = False) -> None:
+    """Inputs, or constant ones alone."""
+    varying = (
+        "an input: a number or a formula of t, 'push=3*sin(t)'; or FILE.csv with columns t and "
+        "names, between whose times inputs are linear"
+    )
     parser.add_argument(
-        "--input", metavar="NAME=X", action="append", default=[], help="constant value of an input"
+        "--input",
+        metavar="NAME=X",
+        action="append",
+        default=[],
+        help="constant value of an input" if constant else varying,
     )
 
 
@@ -105,7 +117,7 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
         choices=("stop", "repair"),
         nargs="?",
         const="stop",
-        help="check rounding at each step; stop (without a word) or repair where digits are lost",
+        help="check rounding at each step; where digits are lost, stop (the default) or repair",
     )
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument(
@@ -126,8 +138,8 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         "--save",
         metavar="A,B,…",
         default="",
-        help="what results hold beside states: energy, points, poses, works, inputs, or outputs by "
-        "name, joint_forces for example",
+        help="what to save beside the states: energy, points, poses, works, inputs, or outputs by "
+        "name, for example joint_forces",
     )
     parser.add_argument(
         "--parquet", action="store_true", help="also write the table as a Parquet file"
@@ -142,9 +154,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_start(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter"
-    )
+    add_parameters(parser)
     parser.add_argument(
         "--state",
         metavar="NAME=X",
@@ -152,11 +162,72 @@ def _add_start(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="value of a state at the start; NAME_deg in degrees (the scene's initial state)",
     )
+    add_inputs(parser)
+
+
+def add_plot(parser: argparse.ArgumentParser) -> None:
+    """The options of `plot`."""
     parser.add_argument(
-        "--input",
-        metavar="NAME=X",
-        action="append",
-        default=[],
-        help="an input: a number or a formula of t, 'push=3*sin(t)'; or FILE.csv with columns t "
-        "and names, between whose times inputs are linear",
+        "--of",
+        metavar="A,B,…",
+        default="",
+        help="states, energy, outputs as joint_forces, components as joint_forces.NAME.fx, against "
+        "time (all coordinates)",
     )
+    parser.add_argument("--phase", metavar="A,B", default="", help="B against A")
+    parser.add_argument(
+        "--poincare",
+        metavar="A,B",
+        default="",
+        help="B against A where the motion passes --at; of A alone each value against the last",
+    )
+    parser.add_argument(
+        "--at", metavar="X=Y", default="", help="condition of t, states and parameters: 'phi = 0'"
+    )
+    parser.add_argument(
+        "--direction",
+        choices=("rising", "falling", "both"),
+        default="rising",
+        help="how X passes Y",
+    )
+    parser.add_argument("--strobe", action="store_true", help="the mechanism at several times")
+    parser.add_argument("--times", metavar="T,T,…", default="", help="times of --strobe, s")
+    parser.add_argument("--count", metavar="N", type=int, default=8, help="poses of --strobe")
+    parser.add_argument(
+        "--size",
+        metavar="SIZE",
+        default="double",
+        help="single or double column of a paper (85 or 174 mm), or mm: 120 or 120x80",
+    )
+    _add_picture(parser, "figure, .png, .svg or .pdf (out/NAME_plot.png)")
+
+
+def add_film(parser: argparse.ArgumentParser) -> None:
+    """The options of `film`."""
+    parser.add_argument("--fps", metavar="N", type=float, default=25.0, help="frames of a second")
+    parser.add_argument(
+        "--speed", metavar="X", type=float, default=1.0, help="0.5 shows the motion half as fast"
+    )
+    parser.add_argument(
+        "--from", metavar="T", type=float, dest="start", help="time of the first frame, s"
+    )
+    parser.add_argument("--to", metavar="T", type=float, dest="end", help="time of the last, s")
+    parser.add_argument(
+        "--size", metavar="WxH", default="", help="pixels, 640x480 for example (as it needs them)"
+    )
+    _add_picture(parser, "film, .gif or .mp4 (out/NAME.gif)")
+
+
+def _add_picture(parser: argparse.ArgumentParser, what: str) -> None:
+    """Where a picture is written, and how a scene is simulated for it."""
+    parser.add_argument(
+        "--t-end", metavar="S", type=float, help="end time, if a scene is simulated"
+    )
+    parser.add_argument(
+        "--samples", metavar="N", type=int, help="rows to keep, then (1001, 20001 for --poincare)"
+    )
+    parser.add_argument(
+        "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter, then"
+    )
+    parser.add_argument("-o", "--output", metavar="FILE", type=path, help=what)
+    add_force(parser)

@@ -46,10 +46,12 @@ def _force(about: str, *, contacts: bool = False) -> OutputSpec:
 
 OUTPUTS: Mapping[str, OutputSpec] = {
     "forward_dynamics": _force(
-        "Accelerations (nv,) under generalised forces `tau` beside the effects.", contacts=True
+        "Accelerations (nv,) under generalised forces `tau` in addition to the effects.",
+        contacts=True,
     ),
     "inverse_dynamics": _force(
-        "Generalised forces (nv,) that give accelerations `vd` beside the effects.", contacts=True
+        "Generalised forces (nv,) that, in addition to the effects, give accelerations `vd`.",
+        contacts=True,
     ),
     "mass_matrix": OutputSpec(
         ("nv", "nv"),
@@ -68,8 +70,8 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "effect_powers": OutputSpec(("effects",), "Power of each of `EFFECT_NAMES` on the motion, W."),
     "momentum": OutputSpec(
         (3,),
-        "Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s).",
-        ((6,), "Momentum x, y, z (kg m/s), angular about the world's origin (kg m^2/s)."),
+        "Linear momentum x, y (kg m/s), angular momentum about the world's origin (kg m^2/s).",
+        ((6,), "Momentum x, y, z (kg m/s), angular momentum about the world's origin (kg m^2/s)."),
     ),
     "centre_of_mass": OutputSpec(
         ("dimensions",), "World position of the centre of mass of all bodies, m."
@@ -110,26 +112,28 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     ),
     "point_jacobians": OutputSpec(
         ("points", "dimensions", "nv"),
-        "J of each of `POINTS`: its world velocity is J v.",
+        "Jacobian J of each of `POINTS`, whose world velocity is J v.",
         needs="points",
         forms=False,
     ),
     "input_jacobian": OutputSpec(
         ("ny", "inputs"),
-        "Exact Jacobian of `derivative` by the inputs.",
+        "Exact Jacobian of `derivative` with respect to the inputs.",
         needs="inputs",
         by="inputs",
     ),
     "parameter_jacobian": OutputSpec(
         ("ny", "parameters"),
-        "Exact Jacobian of `derivative` by the parameters.",
+        "Exact Jacobian of `derivative` with respect to the parameters.",
         needs="parameters",
         by="parameters",
     ),
 }
 """All outputs, in the order in which a module has them."""
 
-JACOBIAN = OutputSpec(("ny", "ny"), "Exact Jacobian of `derivative` by the state.", by="state")
+JACOBIAN = OutputSpec(
+    ("ny", "ny"), "Exact Jacobian of `derivative` with respect to the state.", by="state"
+)
 """The Jacobian, which every module has."""
 DERIVATIVES = ("jacobian", *(name for name, spec in OUTPUTS.items() if spec.by))
 """Names of the matrices of derivatives."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.codegen.backends import python
-from eomgen.codegen.backends.javascript import body_poses, mechanism
+from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.choice import Candidate, Choice, choose
 from eomgen.codegen.derive import record
 from eomgen.codegen.interface import Interface, interface_of
@@ -27,13 +27,11 @@ from eomgen.scene.schema import Scene
 
 @dataclass(frozen=True)
 class Generated:
-    """What a model is compiled to: a Python module, the page's `bodyPoses`, the program of both
-    with its interface, what passes saved, why its route was taken, and what the report must say of
-    it.
+    """What a model is compiled to: a Python module, its program with the interface, what passes
+    saved, why its route was taken, and what the report must say of it.
     """
 
     module: str
-    poses: str
     program: Program
     interface: Interface
     reports: tuple[PassReport, ...]
@@ -95,11 +93,10 @@ def compile_program(model: Model, *, jacobian: bool = True, closed: bool = True)
 
 
 def render(compiled: Compiled) -> Generated:
-    """The NumPy module of a program, with its page function and reports."""
+    """The NumPy module of a program, with its reports."""
     program, interface = compiled.system.program, interface_of(compiled.system)
     return Generated(
         python.module(program, interface),
-        body_poses(program, interface),
         program,
         interface,
         compiled.system.reports,

@@ -1,13 +1,14 @@
 """Results of the public functions, which can be pickled and displayed in a notebook."""
 
 import html
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from eomgen.errors import SceneError
 from eomgen.files import check_writable, write_whole
+from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import FloatArray
@@ -23,11 +24,21 @@ if TYPE_CHECKING:
     from eomgen.derivation.symbols import Expr
     from eomgen.exposition.derivation import Exposition
     from eomgen.program.passes import PassReport
+    from eomgen.run.progress import Progress
     from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
     from eomgen.show.page import PageCode
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
+    from eomgen.study.between import Direction
+
+
+NUMBERS = (
+    "m = eomgen.load(eomgen.generate(scene, outputs=['mass_matrix', 'velocity_force', "
+    "'gravity_force', 'applied_force'])); y = m.initial_state(); m.mass_matrix(0.0, y), "
+    "m.velocity_force(0.0, y), m.gravity_force(0.0, y), m.applied_force(0.0, y)"
+)
+"""How to compute M, V, G and F of a `scene` where they are not written out."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +46,8 @@ class Derivation:
     """Equations of motion M v̇ + V + G = F as SymPy expressions, and the steps of their derivation.
 
     `matrices` has the equations and the symbols of coordinates `q`, velocities `v` and
-    accelerations `a`. A mechanism that is told as an algorithm has none: see `steps`.
+    accelerations `a`. A mechanism whose steps are those of an algorithm has none; the functions
+    `mass_matrix`, `velocity_force`, `gravity_force`, `applied_force` of its module give numbers.
     """
 
     model: Model
@@ -56,8 +68,8 @@ class Derivation:
         """The equations as matrices. Raises `SceneError` if they are too long to be written out."""
         if self.exposition.matrices is None:
             raise SceneError(
-                f"derive: M, V, G and F of {self.name} are too long to be written out; its steps "
-                "tell the algorithm, and the generated module computes them"
+                f"derive: M, V, G and F of {self.name} are too long to be written out as "
+                f"expressions; a module computes their numbers: `{NUMBERS}`"
             )
         return self.exposition.matrices
 
@@ -130,7 +142,6 @@ class Module:
 
     name         name of the scene
     source       source code
-    poses        JavaScript source of `bodyPoses` for the page; "" without the output `body_poses`
     explanation  a line for each route, with its operations and which was chosen
     notices      notices for the user
     reports      steps and operations of the program after each optimisation pass
@@ -143,7 +154,6 @@ class Module:
 
     name: str
     source: str
-    poses: str
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
     reports: "tuple[PassReport, ...]" = ()
@@ -268,6 +278,7 @@ class Run:
 
     def __getitem__(self, state: str) -> FloatArray:
         """One state over time, (n,). Raises `KeyError` for an unknown name."""
+        state = identifier(state)
         if state not in self.states:
             raise KeyError(f"no state '{state}'; known: {', '.join(self.states)}")
         return self.y[:, self.states.index(state)]
@@ -293,40 +304,78 @@ class Run:
         return draw_motion(self.motion)
 
     def page(self, *, live: bool | None = None) -> "PageCode":
-        """The functions of the page of this run, in JavaScript.
-
-        With `live` None the page is live if it can be; with true, what prevents it is raised.
-        """
-        from eomgen.show.drawing_data import drawing_data
+        """The functions of the page of this run, in JavaScript: `show.page_code.page_code`."""
         from eomgen.show.page_code import page_code
 
-        steps = self.trajectory.counts["steps"]
-        events = tuple(
-            {"t": event.t, "contact": event.contact, "kind": event.kind}
-            for event in self.trajectory.events
-            if event.kind != "impact"
-        )
-        code = page_code(
-            self.model,
-            drawing_data(self.motion)[1],
-            self.simulation,
-            inputs=self.inputs,
-            smooth=not self.varying,
-            mean_step=float(self.t[-1] - self.t[0]) / steps if steps else None,
-            live=live,
-        )
-        if code.live and self.model.form != "velocity":
-            code = replace(code, y=self._velocity_rows())
-        return replace(code, events=events)
+        return page_code(self, live=live)
 
-    def _velocity_rows(self) -> FloatArray:
-        """The rows of a run in momenta as [q, v]."""
-        from eomgen.run.module import load_module
-        from eomgen.show.live import velocity_rows
+    def plot(
+        self,
+        of: str | Sequence[str] = (),
+        *,
+        phase: str | Sequence[str] = (),
+        poincare: str | Sequence[str] = (),
+        at: str = "",
+        direction: "Direction" = "rising",
+        strobe: int | Sequence[float] = 0,
+        size: str = "double",
+    ) -> "Figure":
+        """A figure for a paper, as Matplotlib's `Figure`.
 
-        module = load_module(self.module.reference or self.module.source)
-        rates = module.derivative(self.t, self.y.T, self.model.defaults, self.inputs or None).T
-        return velocity_rows(self.model, self.states, self.y, rates)
+        of        quantities against time: states, "energy", outputs and their components, as
+                  "joint_forces.hinge.fx"; names, or a text of names with commas, here and below
+        phase     two quantities, one against the other
+        poincare  two quantities where the motion passes `at`, one against the other; or one, each
+                  value against the one before
+        at        a condition on t, states and parameters, as "phi = 0"
+        direction in which it is passed: "rising", "falling" or "both"
+        strobe    the mechanism at these times, s, in one picture, or at so many equal times
+        size      "single" or "double" for one column or two, or mm, as "120" or "120x80"
+
+        Without any of them all coordinates are drawn. Raises `RunError` for an unknown name.
+        """
+        from eomgen.show.plotting import Wanted, names_of, plotted
+
+        wanted = Wanted(
+            names_of(of),
+            names_of(phase),
+            names_of(poincare),
+            at,
+            direction,
+            strobe if isinstance(strobe, int) else tuple(strobe),
+            size,
+        )
+        return plotted(self.trajectory, self.motion, wanted).figure
+
+    def film(
+        self,
+        path: str | Path,
+        *,
+        fps: float = 25.0,
+        speed: float = 1.0,
+        start: float | None = None,
+        end: float | None = None,
+        size: str = "",
+        force: bool = False,
+        progress: "Progress | None" = None,
+    ) -> Path:
+        """Write a film, .gif or, where the program ffmpeg is, .mp4; return its path.
+
+        fps         frames of a second
+        speed       of the film relative to the motion: 0.5 shows it half as fast
+        start, end  times of the run between which it is shown, s; None: all
+        size        in pixels, as "640x480"; "": as the motion needs it
+        progress    called with the fraction done
+
+        Raises `RunError` for another suffix, without ffmpeg, or if the file exists and this program
+        did not write it.
+        """
+        from eomgen.show.plotting import filmed
+
+        times = (start, end)
+        return filmed(
+            self.trajectory, self.motion, Path(path), fps, speed, times, size, force, progress
+        ).path
 
     def save(
         self,

@@ -77,7 +77,6 @@ class Code:
     """
 
     module: str
-    poses: str
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
@@ -99,7 +98,7 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     from eomgen.pipeline import generate
 
     new = generate(model)
-    code = Code(new.module, new.poses, new.reports, new.explanation, new.notices, derived=True)
+    code = Code(new.module, new.reports, new.explanation, new.notices, derived=True)
     if directory is None:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
     entries = Entries(directory)
@@ -107,8 +106,8 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     trouble = trouble or _keep_program(entries, key, new.program, new.interface)
     if trouble:
         return replace(code, notice=f"the store {directory} is not used: {trouble}")
-    if kept and (kept.module, kept.poses) != (code.module, code.poses):
-        notice = f"the store {directory} held other code for this scene, which was put right"
+    if kept and kept.module != code.module:
+        notice = f"the store {directory} held other code for this scene, which was replaced"
         return replace(code, notice=notice)
     return code
 
@@ -205,15 +204,15 @@ def _program_key(key: str) -> str:
 def _content(code: Code) -> bytes:
     """The bytes of an entry for code."""
     reports = [astuple(report) for report in code.reports]
-    return json.dumps([code.module, code.poses, reports, code.explanation, code.notices]).encode()
+    return json.dumps([code.module, reports, code.explanation, code.notices]).encode()
 
 
 def _code(content: bytes | None) -> Code | None:
     """The code of an entry that `_content` wrote; None for any other bytes."""
     try:
-        module, poses, reports, explanation, notices = json.loads(content or b"")
+        module, reports, explanation, notices = json.loads(content or b"")
         passes = tuple(PassReport(*report) for report in reports)
-        texts = [module, poses, *explanation, *notices, *(report.name for report in passes)]
+        texts = [module, *explanation, *notices, *(report.name for report in passes)]
         "".join(texts).encode()  # fails for lone surrogates
     except (ValueError, TypeError, RecursionError):
         return None
@@ -221,7 +220,7 @@ def _code(content: bytes | None) -> Code | None:
     lists = all(type(part) is list for part in (reports, explanation, notices))
     if not (lists and all(type(n) is int for n in counts)):
         return None
-    return Code(module, poses, passes, tuple(explanation), tuple(notices), derived=False)
+    return Code(module, passes, tuple(explanation), tuple(notices), derived=False)
 
 
 def key_of(model: Model) -> str:

@@ -20,20 +20,20 @@ Parameters p, with the scene's values:
     l_A = 0.6                 m       centre of mass of A to the joint
     l_B = 0.5                 m       joint to the centre of mass of B
     g = 9.81                  m/s^2   gravitational acceleration
-    ground_radius = 0.08      m       radius of ground
-    ground_restitution = 0.8          coefficient of restitution, 0 to 1, which law 'impact' needs of ground
-    ground_friction = 0.5             coefficient of friction of ground
-    ground_slip_speed = 0.01  m/s     speed within which friction is smoothed of ground
+    ground_radius = 0.08      m       ground: radius
+    ground_restitution = 0.8          ground: coefficient of restitution, 0 to 1 (needed by law 'impact')
+    ground_friction = 0.5             ground: coefficient of friction
+    ground_slip_speed = 0.01  m/s     ground: speed within which friction is smoothed
 
 Effects: gravity, contact.
 
-Contacts that strike, each with the unit of its gap and its effect:
+Rigid contacts, each with the unit of its gap and its effect:
     ground_end_A  m  ground
     ground_elbow  m  ground
     ground_end_B  m  ground
 
 One call of `derivative` takes 87 operations: 14 add, 18 sub, 41 mul, 9 div, 1 neg, 2 sin, 2 cos; 3
-more on parameters alone are done once.
+more depend on parameters alone and are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
@@ -172,11 +172,11 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, g
 
 @lru_cache(maxsize=64)
 def _constants(key):
-    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+    """The constants of each kernel, and `reach`, computed once for each set of parameters.
 
-    `reach` is how large states and results may be without a thought of overflow. It is 0 if
-    parameters or constants are so large or small that a product may be lost; not for the constants
-    near 1e-200 that weigh what must never count.
+    Sets are compared by their bytes: 0.0 is not -0.0. States and results of a size up to `reach`
+    need no check for overflow. `reach` is 0 if parameters or constants are so large or small that a
+    product may be lost. Constants near 1e-200, the weights of what must never count, are exempt.
     """
     values = np.frombuffer(key) if key else np.empty(0)
     try:
@@ -188,7 +188,7 @@ def _constants(key):
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
-            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+            _fixed(*values)  # with NumPy's numbers, which report what is lost on the way
     except ArithmeticError as error:
         made = "the mass matrix is singular"
         sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
@@ -634,7 +634,7 @@ _LARGEST = 1e+100
 
 
 def _numbers(values, what):
-    """`values` converted exactly to an array of floats; else an error is raised."""
+    """`values` converted exactly to an array of floats; an error is raised if that is impossible."""
     if values.__class__ is _ARRAY and values.dtype is _FLOAT:
         return values
     if np.ma.is_masked(values):
@@ -741,15 +741,15 @@ def _trouble(name, state, error=None):
         if not isfinite(value):
             return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
     if isinstance(error, ZeroDivisionError):
-        why = "its mass matrix is singular, or a formula infinite"
+        why = "the mass matrix is singular, or a formula is infinite"
         return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
     if isinstance(error, ValueError):
         return ValueError(f"{name}: a formula has no value at this state ({error})")
     size, label = max((abs(value), label) for value, label in zip(state, STATES))
     kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
     return kind(
-        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
-        f" of size {size:g}; choose other units"
+        f"{name}: numbers are too large or too small for floats at this state; the largest in it, {label!r},"
+        f" has the size {size:g}; choose other units"
     )
 
 
@@ -768,10 +768,10 @@ def _strict(reach):
 
 
 def _alone(call, y, name, reach, closely=False):
-    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+    """What `call` computes from a state, a list of numbers. If that is nothing, an error says why.
 
     Beyond `reach`, or where asked to look `closely`, it is computed again with NumPy's numbers, which
-    tell of any overflow on the way.
+    report any overflow on the way.
     """
     state = y.tolist()
     try:
@@ -787,10 +787,10 @@ def _alone(call, y, name, reach, closely=False):
 
 
 def _together(call, result, given, reach):
-    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+    """Fill a result of many states, one row for each value; a column without a value is nan.
 
-    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns. A block
-    of columns at a time, for the memory of intermediate values.
+    `call` computes the values from what is `given`: numbers, and arrays whose last axis is columns. It is
+    called for a block of columns at a time, which limits the memory of intermediate values.
     """
     columns = result.shape[-1]
     block = max(64, min(2048, 2**18 * columns // max(1, result.size)))
@@ -851,10 +851,10 @@ def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
 
 
 def initial_state(p=None):
-    """The scene's initial state, (8,); momenta follow the parameters."""
+    """The scene's initial state, (8,); momenta depend on the parameters."""
     values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
     if not all(map(isfinite, values)):
-        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+        raise FloatingPointError("initial_state: numbers are too large for floats; choose other units")
     return _from(values, _FLOAT, 8)
 
 
@@ -876,7 +876,7 @@ def derivative(t, y, p=None, u=None):
 
 
 def jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the state."""
+    """Exact Jacobian of `derivative` with respect to the state."""
     return _evaluate(_jacobian, "jacobian", (8, 8), ('cos', 'sin'), y, p, u)
 
 
@@ -892,7 +892,7 @@ def gap_rates(t, y, p=None, u=None):
 
 def impact(t, y, contact, bounce=1.0, p=None, u=None):
     """The state after contact number `contact` of `CONTACTS` has struck: its normal velocity is
-    -bounce * restitution times that before, and friction keeps within its cone.
+    -bounce * restitution times that before, and friction stays within its cone.
 
     A. Chatterjee, A. Ruina, J. Appl. Mech. 65 (1998) 939-951. `bounce` 0 is perfectly plastic.
     """

@@ -16,8 +16,8 @@ Parameters p, with the scene's values:
     g = 9.81   m/s^2  gravitational acceleration
 
 Effects: gravity.
-One call of `derivative` takes 27 operations: 6 add, 2 sub, 14 mul, 1 div, 1 sin, 3 cos; 24 more on
-parameters alone are done once.
+One call of `derivative` takes 27 operations: 6 add, 2 sub, 14 mul, 1 div, 1 sin, 3 cos; 24 more
+depend on parameters alone and are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
@@ -208,11 +208,11 @@ def _fixed(m_1, m_2, l_1, l_2, g):
 
 @lru_cache(maxsize=64)
 def _constants(key):
-    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+    """The constants of each kernel, and `reach`, computed once for each set of parameters.
 
-    `reach` is how large states and results may be without a thought of overflow. It is 0 if
-    parameters or constants are so large or small that a product may be lost; not for the constants
-    near 1e-200 that weigh what must never count.
+    Sets are compared by their bytes: 0.0 is not -0.0. States and results of a size up to `reach`
+    need no check for overflow. `reach` is 0 if parameters or constants are so large or small that a
+    product may be lost. Constants near 1e-200, the weights of what must never count, are exempt.
     """
     values = np.frombuffer(key) if key else np.empty(0)
     try:
@@ -224,7 +224,7 @@ def _constants(key):
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
-            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+            _fixed(*values)  # with NumPy's numbers, which report what is lost on the way
     except ArithmeticError as error:
         made = "the mass matrix is singular"
         sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
@@ -624,7 +624,7 @@ _LARGEST = 1e+100
 
 
 def _numbers(values, what):
-    """`values` converted exactly to an array of floats; else an error is raised."""
+    """`values` converted exactly to an array of floats; an error is raised if that is impossible."""
     if values.__class__ is _ARRAY and values.dtype is _FLOAT:
         return values
     if np.ma.is_masked(values):
@@ -729,15 +729,15 @@ def _trouble(name, state, error=None):
         if not isfinite(value):
             return ValueError(f"{name}: state {label!r} is {value}, not a finite number")
     if isinstance(error, ZeroDivisionError):
-        why = "its mass matrix is singular, or a formula infinite"
+        why = "the mass matrix is singular, or a formula is infinite"
         return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
     if isinstance(error, ValueError):
         return ValueError(f"{name}: a formula has no value at this state ({error})")
     size, label = max((abs(value), label) for value, label in zip(state, STATES))
     kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
     return kind(
-        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
-        f" of size {size:g}; choose other units"
+        f"{name}: numbers are too large or too small for floats at this state; the largest in it, {label!r},"
+        f" has the size {size:g}; choose other units"
     )
 
 
@@ -756,10 +756,10 @@ def _strict(reach):
 
 
 def _alone(call, y, name, reach, closely=False):
-    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+    """What `call` computes from a state, a list of numbers. If that is nothing, an error says why.
 
     Beyond `reach`, or where asked to look `closely`, it is computed again with NumPy's numbers, which
-    tell of any overflow on the way.
+    report any overflow on the way.
     """
     state = y.tolist()
     try:
@@ -775,10 +775,10 @@ def _alone(call, y, name, reach, closely=False):
 
 
 def _together(call, result, given, reach):
-    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+    """Fill a result of many states, one row for each value; a column without a value is nan.
 
-    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns. A block
-    of columns at a time, for the memory of intermediate values.
+    `call` computes the values from what is `given`: numbers, and arrays whose last axis is columns. It is
+    called for a block of columns at a time, which limits the memory of intermediate values.
     """
     columns = result.shape[-1]
     block = max(64, min(2048, 2**18 * columns // max(1, result.size)))
@@ -839,10 +839,10 @@ def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
 
 
 def initial_state(p=None):
-    """The scene's initial state, (4,); momenta follow the parameters."""
+    """The scene's initial state, (4,); momenta depend on the parameters."""
     values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
     if not all(map(isfinite, values)):
-        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+        raise FloatingPointError("initial_state: numbers are too large for floats; choose other units")
     return _from(values, _FLOAT, 4)
 
 
@@ -863,12 +863,12 @@ def derivative(t, y, p=None, u=None):
 
 
 def jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the state."""
+    """Exact Jacobian of `derivative` with respect to the state."""
     return _evaluate(_jacobian, "jacobian", (4, 4), ('sin', 'cos'), y, p, u)
 
 
 def parameter_jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the parameters."""
+    """Exact Jacobian of `derivative` with respect to the parameters."""
     return _evaluate(_parameter_jacobian, "parameter_jacobian", (4, 5), ('sin', 'cos'), y, p, u)
 
 
@@ -881,14 +881,14 @@ def _joined(q, v):
 
 
 def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
-    """Accelerations (nv,) under generalised forces `tau` beside the effects."""
+    """Accelerations (nv,) under generalised forces `tau` in addition to the effects."""
     y = _joined(q, v)
     extra = _beside(_NO_FORCE if tau is None else tau, "tau", 2, y.shape[1:])
     return _evaluate(_forward_dynamics, "forward_dynamics", (2,), ('sin', 'cos'), y, p, u, extra)
 
 
 def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
-    """Generalised forces (nv,) that give accelerations `vd` beside the effects."""
+    """Generalised forces (nv,) that, in addition to the effects, give accelerations `vd`."""
     y = _joined(q, v)
     extra = _beside(vd, "vd", 2, y.shape[1:])
     return _evaluate(_inverse_dynamics, "inverse_dynamics", (2,), ('sin', 'cos'), y, p, u, extra)
@@ -935,7 +935,7 @@ def effect_powers(t, y, p=None, u=None):
 
 
 def momentum(t, y, p=None, u=None):
-    """Linear momentum x, y (kg m/s), angular about the world's origin (kg m^2/s)."""
+    """Linear momentum x, y (kg m/s), angular momentum about the world's origin (kg m^2/s)."""
     return _evaluate(_momentum, "momentum", (3,), ('cos', 'sin'), y, p, u)
 
 

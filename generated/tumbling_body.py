@@ -22,11 +22,11 @@ Parameters p, with the scene's values:
     I_1 = 0.000125               kg m^2  smallest principal moment, about x
     I_2 = 0.0003333333333333334  kg m^2  middle principal moment, about y
     I_3 = 0.0004583333333333333  kg m^2  largest principal moment, about z
-    stem_at_y = 0.0833           m       point from the centre of mass of stem, y
+    stem_at_y = 0.0833           m       stem: point from the centre of mass, y
 
 Effects: none.
-One call of `derivative` takes 30 operations: 5 add, 3 sub, 21 mul, 1 neg; 9 more on parameters
-alone are done once.
+One call of `derivative` takes 30 operations: 5 add, 3 sub, 21 mul, 1 neg; 9 more depend on
+parameters alone and are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
 None (INPUTS), a mapping by name, or an array in the order of INPUTS. Many states at once are the
@@ -186,11 +186,11 @@ def _fixed(m, I_1, I_2, I_3, stem_at_y):
 
 @lru_cache(maxsize=64)
 def _constants(key):
-    """The same, once for each set of parameters, which is told by its bytes: 0.0 is not -0.0.
+    """The constants of each kernel, and `reach`, computed once for each set of parameters.
 
-    `reach` is how large states and results may be without a thought of overflow. It is 0 if
-    parameters or constants are so large or small that a product may be lost; not for the constants
-    near 1e-200 that weigh what must never count.
+    Sets are compared by their bytes: 0.0 is not -0.0. States and results of a size up to `reach`
+    need no check for overflow. `reach` is 0 if parameters or constants are so large or small that a
+    product may be lost. Constants near 1e-200, the weights of what must never count, are exempt.
     """
     values = np.frombuffer(key) if key else np.empty(0)
     try:
@@ -202,7 +202,7 @@ def _constants(key):
     try:
         made = _fixed(*values.tolist())
         with np.errstate(over="raise", under="raise", invalid="raise"):
-            _fixed(*values)  # with NumPy's numbers, which tell of what is lost on the way
+            _fixed(*values)  # with NumPy's numbers, which report what is lost on the way
     except ArithmeticError as error:
         made = "the mass matrix is singular"
         sizes = sorted((abs(value), name) for name, value in zip(PARAMETERS, values) if value)
@@ -940,7 +940,7 @@ _LARGEST = 1e+100
 
 
 def _numbers(values, what):
-    """`values` converted exactly to an array of floats; else an error is raised."""
+    """`values` converted exactly to an array of floats; an error is raised if that is impossible."""
     if values.__class__ is _ARRAY and values.dtype is _FLOAT:
         return values
     if np.ma.is_masked(values):
@@ -1046,17 +1046,17 @@ def _trouble(name, state, error=None):
         length = hypot(*(state[i] for i in indices))
         if not 1e-150 < length < 1e150:
             label = STATES[indices[0]]
-            return ValueError(f"{name}: the quaternion from {label!r} on has length {length:g}; scale it to 1")
+            return ValueError(f"{name}: the quaternion that starts at {label!r} has length {length:g}; scale it to 1")
     if isinstance(error, ZeroDivisionError):
-        why = "its mass matrix is singular, or a formula infinite"
+        why = "the mass matrix is singular, or a formula is infinite"
         return ZeroDivisionError(f"{name}: division by zero at this state: {why}")
     if isinstance(error, ValueError):
         return ValueError(f"{name}: a formula has no value at this state ({error})")
     size, label = max((abs(value), label) for value, label in zip(state, STATES))
     kind = OverflowError if isinstance(error, OverflowError) else FloatingPointError
     return kind(
-        f"{name}: numbers too large or too small for floats at this state, whose largest is {label!r}"
-        f" of size {size:g}; choose other units"
+        f"{name}: numbers are too large or too small for floats at this state; the largest in it, {label!r},"
+        f" has the size {size:g}; choose other units"
     )
 
 
@@ -1075,10 +1075,10 @@ def _strict(reach):
 
 
 def _alone(call, y, name, reach, closely=False):
-    """What `call` computes of a state, a list of numbers; or an error that says why there is none.
+    """What `call` computes from a state, a list of numbers. If that is nothing, an error says why.
 
     Beyond `reach`, or where asked to look `closely`, it is computed again with NumPy's numbers, which
-    tell of any overflow on the way.
+    report any overflow on the way.
     """
     state = y.tolist()
     try:
@@ -1094,10 +1094,10 @@ def _alone(call, y, name, reach, closely=False):
 
 
 def _together(call, result, given, reach):
-    """Fill a result of many states, a row a value; a column of it that has no value is nan.
+    """Fill a result of many states, one row for each value; a column without a value is nan.
 
-    `call` computes the values of what is `given`: numbers, and arrays whose last axis is columns. A block
-    of columns at a time, for the memory of intermediate values.
+    `call` computes the values from what is `given`: numbers, and arrays whose last axis is columns. It is
+    called for a block of columns at a time, which limits the memory of intermediate values.
     """
     columns = result.shape[-1]
     block = max(64, min(2048, 2**18 * columns // max(1, result.size)))
@@ -1158,10 +1158,10 @@ def _evaluate(kernel, name, shape, functions, y, p, u, extra=()):
 
 
 def initial_state(p=None):
-    """The scene's initial state, (13,); momenta follow the parameters."""
+    """The scene's initial state, (13,); momenta depend on the parameters."""
     values = _initial_state((), (_DEFAULT if p is None else _parameters(p))["initial_state"])
     if not all(map(isfinite, values)):
-        raise FloatingPointError("initial_state: numbers too large for floats; choose other units")
+        raise FloatingPointError("initial_state: numbers are too large for floats; choose other units")
     return _from(values, _FLOAT, 13)
 
 
@@ -1183,12 +1183,12 @@ def derivative(t, y, p=None, u=None):
 
 
 def jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the state."""
+    """Exact Jacobian of `derivative` with respect to the state."""
     return _evaluate(_jacobian, "jacobian", (13, 13), (), y, p, u)
 
 
 def parameter_jacobian(t, y, p=None, u=None):
-    """Exact Jacobian of `derivative` by the parameters."""
+    """Exact Jacobian of `derivative` with respect to the parameters."""
     return _evaluate(_parameter_jacobian, "parameter_jacobian", (13, 5), (), y, p, u)
 
 
@@ -1201,14 +1201,14 @@ def _joined(q, v):
 
 
 def forward_dynamics(q, v, tau=None, t=0.0, p=None, u=None):
-    """Accelerations (nv,) under generalised forces `tau` beside the effects."""
+    """Accelerations (nv,) under generalised forces `tau` in addition to the effects."""
     y = _joined(q, v)
     extra = _beside(_NO_FORCE if tau is None else tau, "tau", 6, y.shape[1:])
     return _evaluate(_forward_dynamics, "forward_dynamics", (6,), (), y, p, u, extra)
 
 
 def inverse_dynamics(q, v, vd, t=0.0, p=None, u=None):
-    """Generalised forces (nv,) that give accelerations `vd` beside the effects."""
+    """Generalised forces (nv,) that, in addition to the effects, give accelerations `vd`."""
     y = _joined(q, v)
     extra = _beside(vd, "vd", 6, y.shape[1:])
     return _evaluate(_inverse_dynamics, "inverse_dynamics", (6,), (), y, p, u, extra)
@@ -1255,7 +1255,7 @@ def effect_powers(t, y, p=None, u=None):
 
 
 def momentum(t, y, p=None, u=None):
-    """Momentum x, y, z (kg m/s), angular about the world's origin (kg m^2/s)."""
+    """Momentum x, y, z (kg m/s), angular momentum about the world's origin (kg m^2/s)."""
     return _evaluate(_momentum, "momentum", (6,), (), y, p, u)
 
 
@@ -1290,5 +1290,5 @@ def point_velocities(t, y, p=None, u=None):
 
 
 def point_jacobians(t, y, p=None, u=None):
-    """J of each of `POINTS`: its world velocity is J v."""
+    """Jacobian J of each of `POINTS`, whose world velocity is J v."""
     return _evaluate(_point_jacobians, "point_jacobians", (1, 3, 6), (), y, p, u)

@@ -9,8 +9,8 @@ FULL = "FULL" in os.environ
 
 
 def is_kept(index: int, every: int) -> bool:
-    """Whether a case is one of every so many that are tried. Not at equal distances, or of two
-    routes that take turns only one would be tried: by the sum of the digits of its index.
+    """Whether a case is among the one in `every` that are tried, by the sum of the digits of its
+    index. Equal distances would try only one of two routes that take turns.
     """
     total, rest = 0, index
     while rest:
@@ -20,7 +20,7 @@ def is_kept(index: int, every: int) -> bool:
 
 
 def thinned(cases: Iterable[T], every: int) -> list[T]:
-    """One of every so many cases; in a full run all of them."""
+    """One in `every` of the cases; in a full run all of them."""
     return [case for i, case in enumerate(cases) if FULL or is_kept(i, every)]
 
 

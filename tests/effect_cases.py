@@ -138,7 +138,7 @@ class Case:
         return BASES[self.base].format(outputs=outputs)
 
     def text(self, outputs: str = "") -> str:
-        """The scene that has it, told before anything else it is made of."""
+        """The scene with the effect, written before everything else in it."""
         first, bodies, rest = self.without(outputs).partition("[[bodies]]")
         return f"{first}[[effects]]\n{self.table}\n{bodies}{rest}"
 

@@ -1,4 +1,4 @@
-"""What a derivation tells, followed in numbers, beside the numeric solver."""
+"""What a derivation states, followed in numbers, beside the numeric solver."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -45,23 +45,23 @@ def instant(model: Model, seed: int = 0, shake: float = 0.3) -> Instant:
     return Instant(solver, known)
 
 
-def follow_effects(model: Model, told: Sequence[DerivedEffect], known: Numbers) -> None:
+def follow_effects(model: Model, effects: Sequence[DerivedEffect], known: Numbers) -> None:
     """Poses, and what each effect says."""
-    needed = dict.fromkeys(body for t in told for body in used_bodies(t))
+    needed = dict.fromkeys(body for t in effects for body in used_bodies(t))
     define(poses(model, frames_of(model), needed)[0], known)
     for body in needed if model.dimensions == 3 else ():
         entries = [[known[f"W_{body},{i}{j}"] for j in "xyz"] for i in "xyz"]
         known[f"W_{body}"] = np.array(entries)
-    for t in told:
+    for t in effects:
         define(t.definitions, known)
         define(t.rates, known)
 
 
 def follow_recursion(model: Model, known: Numbers) -> tuple[list[float], list[float]]:
     """v̇ and F by the steps of the algorithm, in the order of v."""
-    told, frames = derived_effects(model), frames_of(model)
-    follow_effects(model, told, known)
-    for step in recursive_steps(model, frames, told):
+    effects, frames = derived_effects(model), frames_of(model)
+    follow_effects(model, effects, known)
+    for step in recursive_steps(model, frames, effects):
         follow(step.equations, known)
     rates: dict[str, float] = {}
     forces: dict[str, float] = {}

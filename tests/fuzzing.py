@@ -1,7 +1,7 @@
 """Scenes with something wrong in them, any number of them, and what must not come of any.
 
 A scene comes from a built-in one by a few changes: letters, lines, keys, values, formulas, from
-another scene or out of a list of what has broken readers before. Its number tells all of it.
+another scene or out of a list of what has broken readers before. Its number determines all of it.
 """
 
 import random
@@ -23,7 +23,7 @@ from eomgen.text import LONGEST_LINE
 LONGEST = 3000
 """Letters of the scenes that are changed: long ones take long."""
 HANGS = 10.0
-"""After so many seconds of its own processor time a reader hangs; a busy machine is no hang."""
+"""After this many seconds of its own processor time a reader hangs; a busy machine is no hang."""
 VALUES = (
     *("0", "-1", "1e308", "-1e308", "nan", "inf", "-inf", "1e-320", "-0.0", "1_0", "0x1F", "true"),
     *("2026-01-01", "07:32:00", '""', "[]", "{}", "[[]]", "[1, 2, 3]", "[nan, 0]", '["m"]'),

@@ -2,7 +2,7 @@
 
 A scene's file comes from a built-in scene by changes of its tree (types, keys, numbers, nesting),
 of its text (`fuzzing`) or of its bytes; an archive comes from one that a run wrote, by changes of
-its bytes or of its members. A file's number tells all of it.
+its bytes or of its members. A file's number determines all of it.
 """
 
 import io
@@ -277,8 +277,8 @@ def _reported(command: list[str]) -> tuple[int, str]:
         code = main(command)
     for stream in (out, err):
         stream.seek(0)
-    told, said = out.read(), err.read()
-    for line in (told + "\n" + said).split("\n"):
+    output, said = out.read(), err.read()
+    for line in (output + "\n" + said).split("\n"):
         if not line.isprintable():
             raise Failure(f"a terminal would obey {line[:200]!r}")
     lines = said.splitlines()

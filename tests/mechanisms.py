@@ -1,4 +1,5 @@
-"""Scenes for tests, told twice: as eomgen reads them, and as plain numbers for `newton_euler`."""
+"""Scenes for tests, written twice: as eomgen reads them, and as plain numbers for
+`newton_euler`."""
 
 import itertools
 import types
@@ -26,7 +27,7 @@ SEEDS = some((4, 9, 15, 18, 27, 36), (4, 9, 15, 18, 20, 22, 27, 34, 36, 37, 38, 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene:
-    """A scene in plain numbers, told without eomgen.
+    """A scene in plain numbers, written without eomgen.
 
     `numbers` turns parameter values and inputs, by name, into a mechanism. `bodies`, `pins` (the
     joint of each body that has one) and `coordinates` are names in the mechanism's order, `angles`
@@ -91,7 +92,7 @@ class Scene:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Compiled(Engine):
-    """A scene after every stage of eomgen, told in plain numbers too."""
+    """A scene after every stage of eomgen, in plain numbers too."""
 
     scene: Scene
     equations: Equations
@@ -123,7 +124,7 @@ def load(source: str) -> types.ModuleType:
     return module
 
 
-# The scenes that come with eomgen, told by hand.
+# The scenes that come with eomgen, written by hand.
 
 
 def _two_body(p: Mapping[str, float], u: Mapping[str, float]) -> Mechanism:

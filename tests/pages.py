@@ -20,13 +20,14 @@ COMMANDS = """\
 
 SCENE is a file or the name of a built-in scene (`eomgen list`). Exit codes: 0 done, 1 the scene or
 the run is at fault, with one line on standard error that says what to do, 2 wrong usage, 130
-interrupted. `eomgen COMMAND --help` prints what stands here.
+interrupted. `eomgen COMMAND --help` prints the same text. A default is given in brackets.
 """
 
 FUNCTIONS = """\
 # Functions of the Python API
 
-What `help(eomgen.simulate)` prints, for each function. [api.md](api.md) has examples.
+The text that `help` prints for each function, as in `help(eomgen.simulate)`. [api.md](api.md) has
+examples.
 """
 
 

@@ -72,8 +72,8 @@ def _scaled(seed: int, dimensions: int, decades: Sequence[float]) -> str:
 
 
 def _no_needle(entries: Sequence[float]) -> tuple[Constant, ...]:
-    """Moments of inertia of one body within six decades: in turned axes doubles hold a body that is
-    thinner no better than its axes, of which half a unit in the last place tells all.
+    """Moments of inertia of one body within six decades: in rotated axes doubles do not resolve a
+    thinner body, whose smallest moment is below half a unit in the last place of the entries.
     """
     moments, products = entries[:3], entries[3:]
     if len(moments) == 3 and min(moments) > 0:
@@ -103,7 +103,8 @@ def dynamics(model: Model, p: Any, q: Any, v: Any, u: Any, scalars: Any) -> Dyna
 
 
 def taken(model: Model) -> Compiled:
-    """The steps of the route that `auto` takes, `closed` left out, and what it tells of its digits.
+    """The steps of the route that `auto` takes, `closed` left out, and what it reports of its
+    digits.
 
     Raises `SceneError` where it refuses the scene.
     """

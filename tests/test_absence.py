@@ -153,7 +153,7 @@ def literals(annotation: Any) -> list[str]:
 def test_every_effect_has_its_cases(effect: Any) -> None:
     """In the plane and in space, with every key that it has, and every word that one may be."""
     (kind,) = get_args(effect.model_fields["type"].annotation)
-    told = {
+    cases = {
         base: [
             parse_scene(case.text()).effects[0]
             for case in CASES
@@ -161,9 +161,9 @@ def test_every_effect_has_its_cases(effect: Any) -> None:
         ]
         for base in ("plane", "space")
     }
-    for base, tables in told.items():
+    for base, tables in cases.items():
         assert tables, f"{kind} has no case in {base}: add one to tests/effect_cases.py"
-    tables = [*told["plane"], *told["space"]]
+    tables = [*cases["plane"], *cases["space"]]
     for field, info in effect.model_fields.items():
         given = [getattr(table, field) for table in tables if field in table.model_fields_set]
         assert given, f"{kind}.{field} has no case: add one to tests/effect_cases.py"

@@ -36,9 +36,9 @@ BOUND, TIMES = 1e-10, 1e3
 """Of v̇ relative to its largest component, or that of ω v; and of what half a unit in the last place
 of all numbers changes it by."""
 NUDGES = 3
-WELL = ("right", "told", "refused", "singular")
-"""What may come of a case: 'told' where it is as far off as is said of its digits; a state where
-the mass matrix is singular has no accelerations.
+WELL = ("right", "reported", "refused", "singular")
+"""What may come of a case: 'reported' where it is as far off as is said of its digits; a state
+where the mass matrix is singular has no accelerations.
 """
 
 
@@ -76,7 +76,7 @@ def tried(given: Case, *, closed: bool = False, **more: object) -> str:
         return "right" if error <= BOUND else f"off by {error:.1e}, where all is 0"
     error, allowed = error / size, BOUND + TIMES * max(map(off, near)) / size
     if made.choice.digits is not None and allowed < error <= allowed + 10.0**-made.choice.digits:
-        return "told"
+        return "reported"
     return "right" if error <= allowed else f"off by {error:.1e}, allowed {allowed:.1e}"
 
 
@@ -106,7 +106,7 @@ def test_not_silent_again(number: int) -> None:
 
 def test_digits_reported_are_those_of_accelerations() -> None:
     """Two slides 9e-15 from each other: 5e-7 off, over a thousand times what half a unit in the
-    last place of the data does. It was told 8 digits.
+    last place of the data does. Eight digits were reported for it.
     """
     assert tried(case(13863)) == "refused"
 
@@ -139,7 +139,7 @@ TILTS = {
     "axis of length 3": ("axis = [0, 4.2e-17, 3]", STRAIGHT, np.degrees(1.4e-17)),
     "gravity": ("axis = [0, 0, 1]", ASKEW, np.degrees(5e-10)),
 }
-"""Pins on an axis that stands off the vertical by so many degrees."""
+"""Pins on an axis that stands off the vertical by this many degrees."""
 
 
 def modules(text: str, *routes: str) -> dict[str, GeneratedModule]:
@@ -330,8 +330,8 @@ r_child = [-1, 0]
 
 
 def test_what_digits_are_right_is_reported() -> None:
-    """A moment of inertia of 1e-14 beside masses on arms: run, and told what it costs; one of 1e-6:
-    run, and nothing said.
+    """A moment of inertia of 1e-14 beside masses on arms: run, with a report of what it costs; one
+    of 1e-6: run, and nothing said.
     """
     few = compile_program(elaborate(parse_scene(UNEVEN.replace("MOMENT", "1e-14"))), jacobian=False)
     assert few.choice.digits is not None and FEWEST <= few.choice.digits < ENOUGH

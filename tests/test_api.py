@@ -60,7 +60,7 @@ def test_a_scene_in_every_way(tmp_path: Path) -> None:
         ({**DROP, "name": 7}, "scene: name: 7 is not a text; give one"),
         ({**DROP, "points": np.zeros(2)}, "scene: points[0]: 0.0 is not a table; give one"),
         (7, "a scene cannot be read from int; give a path, a name, a text, a mapping or a Scene"),
-        ("pendulam", "pendulam: no such file, nor a built-in scene (did you mean 'pendulum'?)"),
+        ("pendulam", "pendulam: no such file or built-in scene (did you mean 'pendulum'?)"),
     ],
 )
 def test_a_mistake_is_a_line(source: Any, said: str) -> None:
@@ -164,7 +164,7 @@ def test_a_run_is_that_of_the_command(tmp_path: Path) -> None:
 
 
 def test_a_run_is_followed_and_stopped() -> None:
-    """Told every step; what it is told is a copy; a true result ends the run there."""
+    """It is called at every step, with a copy; a true result ends the run there."""
     seen: list[float] = []
 
     def follow(t: float, y: np.ndarray) -> bool:
@@ -207,7 +207,7 @@ def test_a_run_by_its_error() -> None:
     run = eomgen.simulate("pendulum", t_end=2.0, accuracy=1e-6)
     assert run.error < 1e-6 and not run.warnings
     (said,) = eomgen.simulate("pendulum", t_end=2.0, accuracy=1e-17).warnings
-    assert said.startswith("accuracy: not reached, the estimate is ")
+    assert said.startswith("accuracy: not reached; the error estimate is ")
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_a_run_by_its_error() -> None:
         ({"inputs": {"push": 1.0}}, "inputs: no input 'push'; known: none"),
         ({"integrator": "rk5"}, "rk5"),
         ({"integrator": "rk4", "rtol": 1e-3}, "rtol, atol: rk4 takes equal steps; give dt instead"),
-        ({"accuracy": 1e-3, "budget": 1.0}, "a run has one aim"),
+        ({"accuracy": 1e-3, "budget": 1.0}, "a run has only one aim"),
         ({"accuracy": 1e-3, "dt": 1.0}, "accuracy, dt: accuracy chooses dt itself; leave one out"),
         ({"t_end": -1.0}, "t_end"),
     ],
@@ -275,7 +275,7 @@ def test_a_run_goes_on_from_another_or_its_archive(tmp_path: Path) -> None:
     assert whole.begun == "" and whole.imbalance is not None and whole.imbalance.lost < 1e-6
     with pytest.raises(eomgen.RunError, match="resume: continues with a given method"):
         eomgen.simulate("pendulum", resume=half, accuracy=1e-3)
-    with pytest.raises(eomgen.RunError, match="guard: 'watch' is none of stop, repair"):
+    with pytest.raises(eomgen.RunError, match="guard: 'watch' is not one of stop, repair"):
         eomgen.simulate("pendulum", guard="watch")  # type: ignore[arg-type]
 
 

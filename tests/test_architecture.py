@@ -161,7 +161,7 @@ def test_tables_of_the_reference_are_whole() -> None:
 
 
 def test_built_in_scenes_fit_the_json_schema() -> None:
-    """What editors are told agrees with what the reader takes."""
+    """The schema for editors agrees with what the reader takes."""
     import json
 
     import jsonschema

@@ -243,7 +243,7 @@ def test_names_and_vectors(kind: str) -> None:
         assert refusal(crane(kind, **{field: "3"})) == f"{place}: 3 is not a text; give one"
         assert refusal(crane(kind, **{field: '"my boom"'})) == (
             f"{place}: 'my boom' is not an identifier; use letters a-z, digits, _ and -, "
-            "a letter first"
+            "starting with a letter"
         )
         if member.model_fields[field].default == "world":
             elaborate(parse_scene(crane(kind, **{field: None})))
@@ -291,7 +291,7 @@ def test_joints(kind: str) -> None:
     )
     if several:
         assert refusal(crane(kind, joints='["rail"]')) == (
-            "effects[0].joint: is given beside 'joints'; give one of joint, joints"
+            "effects[0].joint: is given in addition to 'joints'; give one of joint, joints"
         )
         assert refusal(crane(kind, joint=None, joints='["rail", "rail"]')) == (
             "effects[0].joints[1]: 'rail' is listed twice; leave one out"
@@ -339,12 +339,12 @@ CLASHES = [
      "effects[1]: 'stiff' would be the name of an input and of a parameter (parameters.stiff); "
      "rename one of them"),
     ('[[effects]]\ntype = "external_force"\nname = "effect"\nbody = "boom"\nforce = "input"\n',
-     "effects[1].name: 'effect' is the name of effects[0] too; give each its own"),
+     "effects[1].name: 'effect' is also the name of effects[0]; give each its own"),
     ('[[effects]]\ntype = "motor"\nname = "effect_stiffness"\njoint = "rail"\ntorque = "input"\n',
      "effects[1]: 'effect_stiffness' would be the name of an input and of a parameter "
      "(effects[0].stiffness); rename one of them"),
     ('[[effects]]\ntype = "gravity"\ng = 1\n[[effects]]\ntype = "gravity"\nname = "g2"\ng = 1\n',
-     "effects[2].type: a second 'gravity'; give one"),
+     "effects[2].type: a second 'gravity'; give only one"),
     ('[[effects]]\ntype = "pid"\nname = "hold"\njoint = "rail"\ntarget = 0\nstiffness = 1\n'
      'integral_gain = 1\n[[effects]]\ntype = "motor"\nname = "hold_integral"\njoint = "rail"\n'
      'torque = "input"\n',

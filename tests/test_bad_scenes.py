@@ -84,7 +84,10 @@ SINGULAR = (
 
 # What is replaced, by what (or None: appended), and the message without the file's name.
 MISTAKES = [
-    ("name = \"swing\"", "name = swing", "is not TOML: Invalid value (at line 1, column 8)"),
+    ("name = \"swing\"", "name = swing", "is not TOML: Invalid value (at line 1, column 8); "
+     "a text stands in quotes"),
+    ("[[bodies]]", "[bodies]", "is not TOML: Cannot overwrite a value (at line 8, column 9); "
+     "a key stands once in a table; lists of tables have double brackets, [[effects]]"),
     ("mass = 0.5", "mas = 0.5", "bodies[1].mas: unknown key (did you mean 'mass'?)"),
     ("[initial]", "[inital]", "inital: unknown key (did you mean 'initial'?)"),
     ("mass = 0.5", "", "bodies[1].mass: missing; every such table needs it"),
@@ -172,18 +175,18 @@ MISTAKES = [
     (
         'name = "hand"',
         'name = "arm"',
-        "bodies[1].name: 'arm' is the name of bodies[0] too; give each its own",
+        "bodies[1].name: 'arm' is also the name of bodies[0]; give each its own",
     ),
     (
         'name = "wrist"',
         'name = "shoulder"',
-        "joints[1].name: 'shoulder' is the name of joints[0] too; give each its own",
+        "joints[1].name: 'shoulder' is also the name of joints[0]; give each its own",
     ),
     (
         'name = "hand"',
         'name = "my hand"',
         "bodies[1].name: 'my hand' is not an identifier; "
-        "use letters a-z, digits, _ and -, a letter first",
+        "use letters a-z, digits, _ and -, starting with a letter",
     ),
     (
         'name = "hand"',
@@ -252,7 +255,7 @@ MISTAKES = [
     (
         None,
         '[[effects]]\ntype = "gravity"\nname = "g2"\ng = 1.0\n',
-        "effects[1].type: a second 'gravity'; give one",
+        "effects[1].type: a second 'gravity'; give only one",
     ),
     (
         None,
@@ -282,7 +285,7 @@ MISTAKES = [
     ('name = "swing"', 'name = "swing"\ntitle = "a\\u001b[31mb"',
      "title: 'a\\x1b[31mb' has a character at 2 that cannot be printed; remove it"),
     ("q = [0.1, 0.2]", "q = { wrist_angle = 0.1, wrist_angle_deg = 3.0 }",
-     "initial.q.wrist_angle_deg: wrist_angle is given too; give one of them"),
+     "initial.q.wrist_angle_deg: wrist_angle is also given; give only one of them"),
     ('m = { value = 1.0, unit = "kg"', 'm = { value = 1.0, unti = "kg"',
      "parameters.m.unti: unknown key (did you mean 'unit'?)"),
     ("r_child = [-0.1, 0]", "r_child = 3", "joints[1].r_child: 3 is not a list; give one"),
@@ -300,10 +303,16 @@ MISTAKES = [
     ("inertia_com = 0.02", 'inertia_com = "m*"',
      "bodies[1].inertia_com: 'm*' is not a formula at column 3; write for example '2*m_A' or "
      "'l_A/2'"),
+    ("inertia_com = 0.02", 'inertia_com = "0.02 kg m^2"',
+     "bodies[1].inertia_com: '0.02 kg m^2' has '^' at column 10, which is not allowed; write ** "
+     "for a power"),
+    ("inertia_com = 0.02", 'inertia_com = "200 g"',
+     "bodies[1].inertia_com: '200 g' is not a formula at column 5; write the number alone, in SI "
+     "units, or * to multiply"),
     ("inertia_com = 0.02", 'inertia_com = "I"',
      "bodies[1].inertia_com: unknown parameter 'I'; give it a value in [parameters]"),
     ("inertia_com = 0.02", "inertia_com = [0.02]",
-     "bodies[1].inertia_com: has 1 entry; give one number in the plane, in space [xx, yy, zz] "
+     "bodies[1].inertia_com: has 1 entry; give one number in the plane; in space [xx, yy, zz], "
      "or those and xy, xz, yz"),
     ("inertia_com = 0.02", "inertia_com = [0.02, 0.02, 0.02]",
      "bodies[1].inertia_com: body 'hand' has 3 entries; the plane takes one number"),
@@ -327,7 +336,7 @@ MISTAKES = [
      "joints[1].axis: has no length; give a direction, for example [1.0, 0.0]"),
     (WRIST, SLIDE, "joints[1].axis: missing; every such table needs it"),
     *((WRIST, f'name = "wrist"\ntype = "{kind}"',
-       f"joints[1].type: a '{kind}' joint is one of space; give dimensions = 3")
+       f"joints[1].type: a '{kind}' joint exists only in space; give dimensions = 3")
       for kind in ("ball", "cylindrical", "universal")),
     (WRIST, WRIST + "\naxis = [0, 0, 1]",
      "joints[1].axis: in the plane a pin turns about z; leave it out"),
@@ -350,7 +359,7 @@ MISTAKES = [
     (WRIST, WRIST + "\ngear_ratio = 50",
      "joints[1].gear_ratio: does nothing without a motor_inertia; give one"),
     (WRIST, WRIST + "\nmotor_inertia = 1e-5\ngear_ratio = 0",
-     "joints[1].gear_ratio: is 0, so that no rotor turns; give another"),
+     "joints[1].gear_ratio: is 0, so the rotor would not turn; give another"),
     (WRIST, WRIST + "\nmotor_inertia = -1e-5",
      "joints[1].motor_inertia: -1e-05 is negative; give a number >= 0 in kg m^2"),
     (WRIST, 'name = "wrist"\ntype = "weld"\nmotor_inertia = 1e-5',
@@ -378,10 +387,10 @@ MISTAKES = [
         ('"many"', "'many' is not a whole number; give one"),
     )),
     (None, CHAIN.replace("count = 3", "count = 999"),
-     "chains: make 1001 bodies in all; the most is 1000"),
+     "chains: make 1001 bodies in all; at most 1000 are allowed"),
     (None, "".join(CHAIN.replace("count = 3", "count = 1000").replace("links", f"links{i}")
                    for i in range(1000)),
-     "chains: make 1000002 bodies in all; the most is 1000"),
+     "chains: make 1000002 bodies in all; at most 1000 are allowed"),
     *((None, CHAIN.replace(f"{field} = [0.1, 0]", f"{field} = [0.1, 0, 0]"),
        f"chains[0].{field}: has 3 components; the plane takes 2")
       for field in ("start", "r_parent", "r_child")),
@@ -394,19 +403,19 @@ MISTAKES = [
     (None, CHAIN.replace("links", "l" * 93),
      f"chains[0].name: makes the name '{'l' * 93}_joint_3', which is longer than 100 characters; "
      "choose a shorter name"),
-    (None, CHAIN + CHAIN, "chains[1].name: 'links_1' is the name of chains[0] too; "
+    (None, CHAIN + CHAIN, "chains[1].name: 'links_1' is also the name of chains[0]; "
      "give each its own"),
     (None, BODY.format("links_2") + JOINT.format("extra", "world", "links_2") + CHAIN,
-     "chains[0].name: 'links_2' is the name of bodies[2] too; give each its own"),
+     "chains[0].name: 'links_2' is also the name of bodies[2]; give each its own"),
     (None, BODY.format("extra") + JOINT.format("links_joint_2", "world", "extra") + CHAIN,
-     "chains[0].name: 'links_joint_2' is the name of joints[2] too; give each its own"),
+     "chains[0].name: 'links_joint_2' is also the name of joints[2]; give each its own"),
     # Points and outputs.
     (None, '[[points]]\nname = "tip"\nbody = "amr"\n',
      "points[0].body: no body is named 'amr' (did you mean 'arm'?)"),
     (None, 2 * '[[points]]\nname = "tip"\nbody = "arm"\n',
-     "points[1].name: 'tip' is the name of points[0] too; give each its own"),
+     "points[1].name: 'tip' is also the name of points[0]; give each its own"),
     *(('name = "swing"', f'name = "swing"\noutputs = ["momentum", "{name}"]',
-       f"outputs[1]: '{name}' is about {what}, and there are none")
+       f"outputs[1]: '{name}' needs {what}, and there are none")
       for name, what in (("point_positions", "points"), ("point_velocities", "points"),
                          ("point_jacobians", "points"), ("input_jacobian", "inputs"))),
     ('name = "swing"', 'name = "swing"\noutputs = ["momentun"]',
@@ -492,7 +501,7 @@ INERTIA = "inertia_com = [0.02, 0.03, 0.04, 0.001, 0, 0]"
 AXIS = "axis = [0, 1, 0]"
 BALL = 'name = "wrist"\ntype = "ball"'
 UNIVERSAL = 'name = "wrist"\ntype = "universal"\naxes = '
-WHAT_INERTIA = "give one number in the plane, in space [xx, yy, zz] or those and xy, xz, yz"
+WHAT_INERTIA = "give one number in the plane; in space [xx, yy, zz], or those and xy, xz, yz"
 LINKS = """\
 name = "robot"
 dimensions = 3
@@ -553,12 +562,12 @@ MISTAKES_IN_SPACE = [
     (AXIS, "axis = [0, inf, 0]",
      "joints[0].axis[1]: inf is not a finite number; give one that is"),
     (BALL, UNIVERSAL + "[[1, 0, 0], [-2, 0, 1e-15]]",
-     "joints[1].axes: are parallel; give two that cross, or a revolute"),
+     "joints[1].axes: are parallel; give two that cross, or a revolute joint"),
     (BALL, UNIVERSAL + "[[1, 0, 0], [0, 0, 0]]",
      "joints[1].axes[1]: has no length; give a direction, for example [1.0, 0.0, 0.0]"),
     (BALL, UNIVERSAL + "[[1, 0, 0]]", "joints[1].axes[1]: missing; the list is too short"),
     (BALL, UNIVERSAL + "[1, 0]",
-     "joints[1].axes: has entries that are no lists; give a list of lists"),
+     "joints[1].axes: has entries that are not lists; give a list of lists"),
     (BALL, UNIVERSAL + "[[1, 0, 0], [0, 1]]",
      "joints[1].axes[1]: has 2 components; space takes 3"),
     (BALL, BALL + "\norientation_deg = 90",
@@ -599,9 +608,11 @@ MISTAKES_IN_SPACE = [
      "joints[1].parent: unknown value 'arm'; known: world"),
     # States at the start.
     ("[0.1, 1.0, 0.0, 0.0, 0.0]", "[0.1, 0, 0, 0, 0]",
-     "initial.q: the quaternion from wrist_qw on has no length; give 1, 0, 0, 0 for no turn"),
+     "initial.q: the quaternion that starts at wrist_qw has no length; give 1, 0, 0, 0 for "
+     "no rotation"),
     ("[0.1, 1.0, 0.0, 0.0, 0.0]", "{ wrist_qw = 0 }",
-     "initial.q: the quaternion from wrist_qw on has no length; give 1, 0, 0, 0 for no turn"),
+     "initial.q: the quaternion that starts at wrist_qw has no length; give 1, 0, 0, 0 for "
+     "no rotation"),
     ("[0.1, 1.0, 0.0, 0.0, 0.0]", "[0.1]",
      "initial.q: has 1 numbers for 5 coordinates; give one each for shoulder_angle, wrist_qw, "
      "wrist_qx, wrist_qy, wrist_qz"),
@@ -687,9 +698,9 @@ NOTICES = [
     (SPACE, AXIS, "axis = [1e-200, 1e-200, 0]",
      "joints[0].axis: has length 1.41421e-200; taken as a direction of length 1"),
     (SPACE, "[0.1, 1.0, 0.0, 0.0, 0.0]", "[0.1, 0.0, 2.0, 0.0, 0.0]",
-     "initial.q: the quaternion from wrist_qw on has length 2; scaled to 1"),
+     "initial.q: the quaternion that starts at wrist_qw has length 2; scaled to 1"),
     (SPACE, "[0.1, 1.0, 0.0, 0.0, 0.0]", "{ wrist_qx = 0.5 }",
-     "initial.q: the quaternion from wrist_qw on has length 0.5; scaled to 1"),
+     "initial.q: the quaternion that starts at wrist_qw has length 0.5; scaled to 1"),
     (SPACE, SPACE, LINKS + "axis = [1, 1, 0]",
      "chains[0].axis: has length 1.41421; taken as a direction of length 1"),
 ]  # fmt: skip
@@ -791,13 +802,16 @@ def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: 
     """A path that leads nowhere, a folder, a file that is no text."""
     assert main(["check", "two_boddy"]) == 1
     assert capsys.readouterr().err == (
-        "eomgen: two_boddy: no such file, nor a built-in scene (did you mean 'two_body'?)\n"
+        "eomgen: two_boddy: no such file or built-in scene (did you mean 'two_body'?)\n"
     )
     assert main(["check", str(tmp_path)]) == 1
     assert capsys.readouterr().err == (
         f"eomgen: {tmp_path}: is a folder; give a scene file in it\n"
     )
     (tmp_path / "picture.toml").write_bytes(b"\x89PNG\xff")
+    for mistake in ("picture", "pictures.toml"):
+        assert main(["check", str(tmp_path / mistake)]) == 1
+        assert "picture.toml'?)" in capsys.readouterr().err
     assert main(["check", str(tmp_path / "picture.toml")]) == 1
     assert capsys.readouterr().err == "eomgen: picture.toml: is not UTF-8 text (byte 0)\n"
 
@@ -847,7 +861,7 @@ def test_an_unwritable_output(scene: Path, capsys: pytest.CaptureFixture[str]) -
     blocked = scene / "out"
     assert main(["simulate", str(scene), "-o", str(blocked)]) == 1
     assert capsys.readouterr().err == (
-        f"eomgen: {blocked}: cannot be made a folder: Not a directory\n"
+        f"eomgen: {blocked}: the folder cannot be created: Not a directory\n"
     )
     theirs = scene.parent / "swing.csv"
     theirs.write_text("t,x\n0,1\n")
@@ -885,7 +899,7 @@ def test_two_scenes_of_one_name(scene: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_a_refusal_stops_no_other_scene(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Each refusal is told, the other modules are written, and the exit code is 1."""
+    """Each refusal is reported, the other modules are written, and the exit code is 1."""
     scene.write_text(GOOD)
     bad = scene.parent / "bad.toml"
     bad.write_text(GOOD.replace("mass = 0.5", "mass = -1"))
@@ -905,7 +919,7 @@ def test_a_refusal_stops_no_other_scene(scene: Path, capsys: pytest.CaptureFixtu
     blocked = scene / "out"
     assert main(["generate", str(scene), "pendulum", "-o", str(blocked)]) == 1
     assert capsys.readouterr().err == (
-        f"eomgen: {blocked}: cannot be made a folder: Not a directory\n"
+        f"eomgen: {blocked}: the folder cannot be created: Not a directory\n"
     )
 
 

@@ -47,8 +47,8 @@ def test_kinetic_energy_grows_by_the_power_of_effects(case: Case) -> None:
         gained = growth(made, "kinetic_energy", y, t, u=u)
         energy = made.exactly("kinetic_energy", exact(y), u, t=t)
         assert apart(gained, np.sum(powers), powers, energy) < EXACT
-        told = made.module.effect_powers(t, y, u=u)
-        assert apart(told, powers, energy) < 1e-11
+        reported = made.module.effect_powers(t, y, u=u)
+        assert apart(reported, powers, energy) < 1e-11
         moved = max(moved, float(np.max(np.abs(powers), initial=0)))
     idle = any(words in case.table for words in IDLE)
     assert moved < EXACT if idle else moved > 1e-3

@@ -85,7 +85,7 @@ def spin_after(inertia: Sequence[float], spin: Sequence[float], t_end: float) ->
 
 def test_near_a_separatrix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Rotation about the middle axis turns what rounding does to a constant, 1/3 here, into 1e-8:
-    no run of that module is better than that, and two of them do not tell.
+    no run of that module is better than that, and two of them do not show it.
     """
     scene = tmp_path / "nut.toml"
     scene.write_text(text("separatrix_1"))
@@ -152,7 +152,7 @@ def test_rows_a_period_apart() -> None:
 def test_what_is_said_of_rows_before_the_end(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The target is one of the last state; what is known of all rows is told beside it."""
+    """The target is one of the last state; what is known of all rows is reported beside it."""
     scene = tmp_path / "crank.toml"
     scene.write_text(text("crank"))
     assert main(["simulate", str(scene), "--accuracy", "1e-6", "-o", str(tmp_path)]) == 0

@@ -221,7 +221,8 @@ def test_beyond_the_floor_of_adaptive_methods(target: float) -> None:
 
 def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lorenz's over 50 s grows an error by 1e19: no run in doubles is right, and once DOP853 as
-    tight as it goes is wrong, no other method is asked; gauss_6 for so long that it tells, no more.
+    tight as it goes is wrong, no other method is asked; gauss_6 only for so long that its error
+    shows.
     """
 
     def derivative(t: float, y: FloatArray) -> FloatArray:
@@ -246,7 +247,7 @@ def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_steps_that_something_else_keeps_short() -> None:
-    """Two runs of the same steps tell nothing of their error."""
+    """Two runs of the same steps show nothing of their error."""
     case = case_of("pendulum")
     case = replace(case, kept={**case.kept, "max_step": 0.01})
     true = truth(replace(case, kept={**case.kept, "max_step": None}))
@@ -355,8 +356,8 @@ def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert main(["simulate", "pendulum", "--accuracy", "1e-16", "-o", str(tmp_path)]) == 1
     said = capsys.readouterr()
     assert re.fullmatch(
-        r"eomgen: --accuracy 1e-16: not reached, the best run's estimate is \S+: a double resolves "
-        r"theta only to \S+ of its range of motion; take a shorter --t-end\n",
+        r"eomgen: --accuracy 1e-16: not reached; the best run's error estimate is \S+: a double "
+        r"resolves theta only to \S+ of its range of motion; take a shorter --t-end\n",
         said.err,
     )
     assert (tmp_path / "pendulum.npz").exists()
@@ -369,7 +370,7 @@ def test_a_wrong_run_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], integrator: str
 ) -> None:
     """At SciPy's default tolerances every method reports success on the light cart-pole and is
-    wrong (published errors 2.29, 0.086, 2.21, 3.85, 0.134): energy alone tells, and a second run.
+    wrong (published errors 2.29, 0.086, 2.21, 3.85, 0.134): only energy shows it, and a second run.
     """
     scene = tmp_path / "spiky.toml"
     scene.write_text(SPIKY)
@@ -404,7 +405,7 @@ def test_no_false_alarm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         ("--accuracy 1e-6 --rtol 1e-6", "--accuracy chooses rtol itself; leave one out"),
         ("--accuracy 1e-6 --dt 0.1", "--accuracy chooses dt itself; leave one out"),
         ("--budget 2s --atol 1e-9", "--budget chooses atol itself; leave one out"),
-        ("--accuracy 1e-6 --budget 2s", "a run has one aim; give one of them"),
+        ("--accuracy 1e-6 --budget 2s", "a run has only one aim; give one of them"),
         ("--accuracy 0", "--accuracy: 0 is not between 0 and 0.1; give e.g. 1e-6"),
         ("--accuracy nan", "--accuracy: nan is not between 0 and 0.1; give e.g. 1e-6"),
         ("--accuracy 1", "--accuracy: 1 is not between 0 and 0.1; give e.g. 1e-6"),

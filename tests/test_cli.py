@@ -63,7 +63,9 @@ def test_a_digest_stands_for_a_module(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_check_says_which_module_is_stale(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Fresh, edited and missing modules are told apart; the exit code is 1; nothing is written."""
+    """Fresh, edited and missing modules are distinguished; the exit code is 1; nothing is
+    written.
+    """
     out = str(tmp_path)
     assert main(["generate", "pendulum", "two_body", "-o", out]) == 0
     edited = tmp_path / "two_body.py"
@@ -112,6 +114,21 @@ def test_a_file_that_only_mentions_this_program_is_not_ours(
         target = str(tmp_path / f"pendulum.{form}")
         for _ in range(2):
             assert main(["derive", "pendulum", "--format", form, "-o", target]) == 0
+
+
+def test_the_ending_of_a_file_says_the_format(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A page into .html and LaTeX into .tex, unless a format is asked for; never a PDF."""
+    assert main(["derive", "pendulum", "-o", str(tmp_path / "a.pdf")]) == 1
+    assert "a.tex, of which pdflatex makes a PDF" in capsys.readouterr().err
+    begins = {"a.html": "<!doctype html>", "a.tex": "% Generated", "a.txt": "Simple pendulum"}
+    for name, begin in begins.items():
+        assert main(["derive", "pendulum", "-o", str(tmp_path / name)]) == 0
+        assert (tmp_path / name).read_text("utf-8").startswith(begin)
+    target = str(tmp_path / "a.html")
+    assert main(["derive", "pendulum", "--format", "text", "-o", target]) == 0
+    assert (tmp_path / "a.html").read_text("utf-8").startswith(begins["a.txt"])
 
 
 def test_only_our_own_files_are_removed(tmp_path: Path) -> None:
@@ -262,7 +279,7 @@ def test_notices_and_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     scene.write_text(ARM, "utf-8")
     notices = [
         "eomgen: note: arm.toml:9: joints[0].axis: has length 2; taken as a direction of length 1",
-        "eomgen: note: arm.toml:13: initial.q: the quaternion from w_qw on has length 2; "
+        "eomgen: note: arm.toml:13: initial.q: the quaternion that starts at w_qw has length 2; "
         "scaled to 1",
     ]
     out = str(tmp_path / "out")
@@ -374,10 +391,10 @@ def test_the_route_is_explained(
     assert first[1].split()[:2] == ["route", "cost"]
     taken = [line.split() for line in first if line.endswith("<- taken")]
     assert len(taken) == 1
-    told = {line.split()[0]: line.split()[1] for line in first[2:5]}
-    assert set(told) == {"closed", "aba", "ldl"} and told["closed"] == "-"
+    counts = {line.split()[0]: line.split()[1] for line in first[2:5]}
+    assert set(counts) == {"closed", "aba", "ldl"} and counts["closed"] == "-"
     docstring = (tmp_path / "quadruped.py").read_text("utf-8")
-    assert int(taken[0][1]) == min(int(cost) for cost in told.values() if cost != "-")
+    assert int(taken[0][1]) == min(int(cost) for cost in counts.values() if cost != "-")
     assert re.search(r"One call of `derivative` takes \d+ operations", docstring)
 
     def never(model: object) -> None:
@@ -416,11 +433,11 @@ def test_outputs_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
             "momentum,",
             "eomgen: --outputs: no output ''; known: all, forward_dynamics, ",
         ),
-        ("cart_pole", "jacobian", "eomgen: --outputs: 'jacobian' is always there; leave it out"),
+        ("cart_pole", "jacobian", "eomgen: --outputs: 'jacobian' is always included; leave it out"),
         (
             "chain",
             "momentum,input_jacobian",
-            "eomgen: chain.toml: --outputs: 'input_jacobian' is about inputs, and there are none",
+            "eomgen: chain.toml: --outputs: 'input_jacobian' needs inputs, and there are none",
         ),
     ):
         command = ["generate", scene, "--outputs", outputs, "-o", out]

@@ -395,7 +395,7 @@ def test_independent_of_the_recursions() -> None:
                 assert not str(node.module).startswith("eomgen.program"), path
 
 
-# Routes, modules, and the derivation told.
+# Routes, modules, and the derivation shown.
 
 
 def test_route_closed_and_auto() -> None:

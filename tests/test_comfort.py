@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import eomgen
 from eomgen.cli import main
 from eomgen.commands import durations, generating
 from eomgen.run import progress
@@ -114,7 +115,7 @@ def test_names_may_have_dashes_and_a_hundred_letters(
     assert "'upper_arm'" in source and LONG in source and '"s_1_angle"' in source
     for old, new, message in (
         (LONG, LONG + "l" * 8, "is longer than 100 characters"),
-        (f'"{LONG}", mass', '"upper_arm", mass', "bodies[1].name: 'upper_arm' is the name of bodi"),
+        (f'"{LONG}", mass', '"upper_arm", mass', "bodies[1].name: 'upper_arm' is also the"),
         ("= 2.0", "= 2.0, upper_mass = 1", "parameters.upper_mass: is the same name as 'upper-ma"),
         ("s-1_angle =", "s-1_angle = 1, s_1_angle =", "initial.q"),
     ):
@@ -188,3 +189,54 @@ def test_an_interrupt_says_what_is_kept(
     )
     assert main(["derive", "pendulum"]) == 130
     assert "interrupted; what was derived is kept" in capsys.readouterr().err
+
+
+DASHED = """\
+name = "dashed"
+inputs = ["wind-speed"]
+parameters = { arm-1 = 2.0 }
+definitions = { half = "arm_1/2" }
+bodies = [{ name = "left-arm", mass = "half", inertia_com = 0.1 }]
+[[joints]]
+name = "left-pin"
+type = "revolute"
+parent = "world"
+child = "left-arm"
+[[effects]]
+type = "motor"
+name = "drive"
+joint = "left-pin"
+torque = "wind_speed - left_pin_angle"
+"""
+
+
+def test_a_name_is_taken_with_either_sign(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`-` and `_` are one name wherever one is asked for; in formulas - subtracts."""
+    run = eomgen.simulate(
+        DASHED, parameters={"arm-1": 3.0}, inputs={"wind-speed": 1.0}, state={"left-pin_angle": 0.5}
+    )
+    assert run["left-pin_angle"].tolist() == run["left_pin_angle"].tolist() != []
+    found = eomgen.ensemble(DASHED, eomgen.grid({"arm-1": [1.0, 2.0], "wind-speed": [0, 1.0]}))
+    assert found.of("arm-1").tolist() == found.of("arm_1").tolist() == [1, 1, 2, 2]
+    assert found.statistics("left-pin_angle").mean.tolist() == [
+        found.of("left_pin_angle").mean().tolist()
+    ]
+    trimmed = eomgen.linearise(DASHED, hold=["left-pin_angle"], trim=["wind-speed"])
+    assert trimmed.u.tolist() == [0.0]
+    with pytest.raises(eomgen.RunError, match="a name is given twice"):
+        eomgen.grid({"arm-1": [1.0], "arm_1": [1.0]})
+    file = tmp_path / "dashed.toml"
+    file.write_text(DASHED)
+    command = ["sweep", str(file), "--vary", "arm-1=1,2", "--of", "left-pin_angle", "-o"]
+    assert main([*command, str(tmp_path / "out"), "--t-end", "0.1"]) == 0
+    assert "left_pin_angle at the end" in capsys.readouterr().out
+    hint = r"did you mean '{}'\? In formulas - subtracts"
+    for text, name in (
+        (DASHED.replace('"half"', '"2*(arm-1)"'), "arm_1"),
+        (DASHED.replace("arm_1/2", "2*(arm-1)"), "arm_1"),
+        (DASHED.replace("left_pin_angle", "left-pin-angle"), "left_pin_angle"),
+    ):
+        with pytest.raises(eomgen.SceneError, match=hint.format(name)):
+            eomgen.check(text)

@@ -101,7 +101,7 @@ def test_a_run_goes_on_in_either() -> None:
 
 @compiler
 def test_each_step_is_followed() -> None:
-    """And the run ends at the very step at which it is told to."""
+    """And the run ends at the very step at which it is asked to."""
 
     def following(seen: list[tuple[float, bytes]]) -> Callable[[float, Any], bool]:
         def follow(t: float, y: Any) -> bool:
@@ -170,11 +170,11 @@ def test_without_a_compiler_long_runs_say_so(
     monkeypatch.setattr(accelerator, "AN_OPERATION", 0.0)
     run = eomgen.simulate("two_body", t_end=0.1, integrator="DOP853")
     assert run.finished and not run.compiled
-    assert [line for line in run.warnings if "no C compiler is found" in line]
-    with pytest.raises(RunError, match="no C compiler is found"):
+    assert [line for line in run.warnings if "no C compiler was found" in line]
+    with pytest.raises(RunError, match="no C compiler was found"):
         eomgen.simulate("two_body", t_end=0.1, backend="c")
 
 
 def test_an_unknown_backend_is_refused() -> None:
-    with pytest.raises(RunError, match="backend: 'fortran' is none of auto, numpy, c"):
+    with pytest.raises(RunError, match="backend: 'fortran' is not one of auto, numpy, c"):
         eomgen.simulate("two_body", backend="fortran")  # type: ignore[arg-type]

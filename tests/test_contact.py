@@ -689,7 +689,7 @@ BAD = {
         "effects[0].radius: -1 is negative; give a number >= 0 in m"
     ),
     (*SOFT, "friction = 0.3"): (
-        "effects[0].slip_speed: is missing; it smooths friction, give a small one in m/s"
+        "effects[0].slip_speed: is missing; it smooths friction; give a small value in m/s"
     ),
     (*SOFT, "slip_speed = 0.3"): (
         "effects[0].slip_speed: smooths friction, which is missing; give both"
@@ -713,7 +713,7 @@ BAD = {
         "effects[0].other: 'a' cannot touch itself; name another body or world"
     ),
     (*SOFT, "radii = { b = 0.3 }"): (
-        "effects[0].radii.b: is none of the bodies in contact; leave it out"
+        "effects[0].radii.b: is not one of the bodies in contact; leave it out"
     ),
     (*SOFT, EACH): (
         "effects[0].body: one body has no other to touch; give two or more in bodies"
@@ -738,10 +738,10 @@ BAD_STOPS = {
         "effects[0].restitution: 1.1 is not from 0 to 1; give one that is"
     ),
     ("low = 0", "restitution = 0.5", "stiffness = 9"): (
-        "effects[0].stiffness: a restitution replaces it; give one"
+        "effects[0].stiffness: a restitution replaces it; give only one of them"
     ),
     ("low = 0",): "effects[0].stiffness: missing; give it or a restitution",
-    ("restitution = 0.5",): "effects[0].low: missing, and high too; give one of them or both",
+    ("restitution = 0.5",): "effects[0].low: missing, as is high; give one of them or both",
 }
 
 
@@ -796,10 +796,10 @@ def test_what_starts_pressed_in_is_reported(
     scene = tmp_path / "deep.toml"
     scene.write_text("".join(lines))
     expected = [
-        f"contact 'floor' starts 0.06 m deep, with {450 * 0.06**2:.3g} J in it",
-        f"contact 'wall' starts 0.16 m deep, with {360 * 0.16**2.5:.3g} J in it",
-        f"stop 'end' starts 0.3 m deep, with {50 * 0.3**2:.3g} J in it",
+        f"contact 'floor' starts 0.06 m deep, with {450 * 0.06**2:.3g} J stored in it",
+        f"contact 'wall' starts 0.16 m deep, with {360 * 0.16**2.5:.3g} J stored in it",
+        f"stop 'end' starts 0.3 m deep, with {50 * 0.3**2:.3g} J stored in it",
     ]
     assert main(["check", str(scene)]) == 0
-    told = [line for line in capsys.readouterr().out.splitlines() if "starts" in line]
-    assert told == [f"at start    {line}" for line in expected]
+    reported = [line for line in capsys.readouterr().out.splitlines() if "starts" in line]
+    assert reported == [f"at start    {line}" for line in expected]

@@ -369,7 +369,7 @@ MISTAKES = [
     (servo("pid").replace("target = 0.5", 'target = "qq"'),
      "effects[0].target: unknown parameter 'qq' (did you mean 'q'?)"),
     (servo("pd") + servo("pid"),
-     "effects[1].name: 'hold' is the name of effects[0] too; give each its own"),
+     "effects[1].name: 'hold' is also the name of effects[0]; give each its own"),
     (CONTROLLER.format('torques = { axel = "1" }'), "effects[0].torques.axel: no revolute or "
      "prismatic joint is named 'axel' (did you mean 'axle'?)"),
     (CONTROLLER.format("torques = {}"), "effects[0].torques: has 0 entries; give at least 1"),

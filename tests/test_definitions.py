@@ -126,10 +126,10 @@ def defined(*lines: str, **fields: str) -> str:
 
 MISTAKES = [
     (defined('u = "w + 1"', 'w = "2*u"'),
-     "definitions.u: is defined by itself: u needs w, w needs u; break it"),
-    (defined('u = "u + 1"'), "definitions.u: is defined by itself: u needs u; break it"),
+     "definitions.u: is defined in terms of itself: u needs w, w needs u; break it"),
+    (defined('u = "u + 1"'), "definitions.u: is defined in terms of itself: u needs u; break it"),
     (defined('r = "u"', 'u = "p*w"', 'w = "b + s"', 's = "max(u, 1)"'),
-     "definitions.u: is defined by itself: u needs w, w needs s, s needs u; break it"),
+     "definitions.u: is defined in terms of itself: u needs w, w needs s, s needs u; break it"),
     (defined('error = "p_dott"'),
      "definitions.error: unknown parameter 'p_dott' (did you mean 'p_dot'?)"),
     (defined('error = "eror2 + p"', 'eror = "p"'),
@@ -142,26 +142,26 @@ MISTAKES = [
      "effects[2].force[1]: unknown parameter 'erorr' (did you mean 'error'?)"),
     (defined('error = "p"', rate='"erorr"'),
      "effects[1].states.z.rate: unknown parameter 'erorr' (did you mean 'error'?)"),
-    (defined('a = "p"'), "definitions.a: is the name of a parameter too; rename one of them"),
+    (defined('a = "p"'), "definitions.a: is also the name of a parameter; rename one of them"),
     (defined('p_dot = "p"'),
-     "definitions.p_dot: is the name of something of the motion too; rename one of them"),
+     "definitions.p_dot: is also the name of a quantity of the motion; rename one of them"),
     (defined('z = "p"'),
-     "definitions.z: is the name of something of the motion too; rename one of them"),
-    (defined('pi = "3"'), "definitions.pi: is the name of a number too; rename one of them"),
+     "definitions.z: is also the name of a quantity of the motion; rename one of them"),
+    (defined('pi = "3"'), "definitions.pi: is also the name of a number; rename one of them"),
     (defined('x = "p"', force='["x", "1"]'),
      "effects[2].force[0]: 'x' of definition 'x' is predefined here; "
-     "rename it where it comes from"),
+     "rename it where it is defined"),
     (defined('far = "2*x"', force='["far", "1"]').replace('coordinate = "p"', 'coordinate = "x"')
      .replace(" - p", " - x").replace("p_dot", "x_dot"),
      "effects[2].force[0]: 'x' of definition 'far' is predefined here; "
-     "rename it where it comes from"),
+     "rename it where it is defined"),
     (defined('far = "2*p"', mass='"far"'),
      "bodies[0].mass: 'p' changes with the motion, which this value must not; use parameters"),
     (defined('u = "p.real"'),
      "definitions.u: 'p.real' has '.real' at column 2, which is not allowed"),
     (defined('u = true'), "definitions.u: True is neither a number nor a formula; give one"),
     (defined('_u = "p"'), "definitions._u: '_u' is not an identifier; use letters a-z, digits, "
-     "_ and -, a letter first"),
+     "_ and -, starting with a letter"),
     (defined('u = "1/(a - 2)"', torque='"p*u"'),
      "effects[0].torque: its part '(1.0 / (a - 2.0))' is not a finite number; change it or its "
      "parameters"),

@@ -56,7 +56,7 @@ OMEGA = np.array([0.3, -0.7, 1.1])
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 0.4, 2.9])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_ball_is_pulled_back_about_the_axis_of_its_turn(angle: float, sign: float) -> None:
-    """-k θ n - c ω, whichever of its two quaternions tells the turn; energy ½ k θ²."""
+    """-k θ n - c ω, whichever of its two quaternions describes the rotation; energy ½ k θ²."""
     made = tree(SPRING + 'joint = "ball"\n')
     q = sign * np.array([math.cos(angle / 2), *(math.sin(angle / 2) * AXIS)])
     y = state([*q, 0.1, 0.2, 0.3], [*OMEGA, 0.5, 0.6, 0.7])
@@ -201,7 +201,7 @@ def test_powers_add_up() -> None:
         (SPRING, "effects[0].joint: is missing; give one of joint, joints"),
         (
             SPRING + 'joint = "pin"\njoints = "all"\n',
-            "effects[0].joint: is given beside 'joints'; give one of joint, joints",
+            "effects[0].joint: is given in addition to 'joints'; give one of joint, joints",
         ),
         (
             SPRING + 'joints = ["pin", "crass"]\n',
@@ -213,7 +213,7 @@ def test_powers_add_up() -> None:
         ),
         (
             SPRING + 'joints = "all"\ncoordinate = "pin_angle"\n',
-            "effects[0].coordinate: is one of a joint; name that as joint",
+            "effects[0].coordinate: belongs to one joint; name that joint as joint",
         ),
         (
             SPRING + 'joint = "ball"\nrest = 0.3\n',
@@ -230,11 +230,11 @@ def test_powers_add_up() -> None:
         ),
         (
             STOP + 'joints = "all"\nhigh = 1\nrestitution = 1\n',
-            "effects[0].joints: a rigid stop is of one joint; name it as joint",
+            "effects[0].joints: a rigid stop acts on one joint; name it as joint",
         ),
         (
             STOP + 'joint = "cross"\nhigh = 1\nrestitution = 1\n',
-            "effects[0].coordinate: missing; a rigid stop is of one coordinate, and 'cross' has "
+            "effects[0].coordinate: missing; a rigid stop acts on one coordinate, and 'cross' has "
             "cross_angle_1, cross_angle_2",
         ),
         (

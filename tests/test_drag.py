@@ -261,7 +261,7 @@ def test_absence_is_free() -> None:
         ("linear = 0.1", "effects[0].body: is missing; give one of body, bodies, points"),
         (
             'body = "drop"\nbodies = "all"\nlinear = 0.1',
-            "effects[0].body: is given beside 'bodies'; give one of body, bodies, points",
+            "effects[0].body: is given in addition to 'bodies'; give one of body, bodies, points",
         ),
         (
             'points = ["tip"]\nlinear = 0.1',
@@ -298,7 +298,7 @@ def test_absence_is_free() -> None:
         ),
         (
             'body = "drop"\nquadratic = 0.1\ndensity = 1.2\narea = 0.1\ncoefficient = 1',
-            "effects[0].quadratic: is given beside 'density'; leave one of them out",
+            "effects[0].quadratic: is given in addition to 'density'; leave one of them out",
         ),
         (
             'body = "drop"\nlinear = 1\nwind = [1, 0, 0]',

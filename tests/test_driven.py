@@ -348,7 +348,7 @@ THRESHOLDS = {
     80: 0.05540519898770802,
     160: 0.02768868395437137,
 }
-"""Amplitude from which a pendulum of 1 m stands on a pivot shaken at so many rad/s (g = 9.81):
+"""Amplitude from which a pendulum of 1 m stands on a pivot shaken at this many rad/s (g = 9.81):
 trace 2 of the monodromy matrix of θ'' = (g/l - a Ω²/l cos Ωt) θ, by Floquet's theory, DOP853 with
 rtol 1e-13 and Brent's method. For fast shaking it goes to sqrt(2 g l) / Ω (Kapitza 1951).
 """

@@ -1,4 +1,4 @@
-"""Derivations as they are told: every scene, its effects, recursions, impacts, state forms."""
+"""Derivations as they are shown: every scene, its effects, recursions, impacts, state forms."""
 
 import re
 import unicodedata
@@ -28,7 +28,9 @@ from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.results import Derivation
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
+from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.derivation import as_html, as_latex, as_text
+from eomgen.show.drawing import Label, Line
 from eomgen.show.prose import blocks, pieces
 from eomgen.show.terms import explained
 
@@ -69,7 +71,7 @@ def test_the_algorithm_followed_by_hand(scene: str) -> None:
 
 @pytest.mark.parametrize("case", TRIED[:: some(3, 1)], ids=lambda case: case.name)
 def test_each_effect_by_its_formulas(case: Case) -> None:
-    """Every type and key: forces and the rates of its states, by the formulas that are told."""
+    """Every type and key: forces and the rates of its states, by the formulas that are shown."""
     model = model_of(case.text())
     at = instant(model)
     rates, forces = follow_recursion(model, at.known)
@@ -77,6 +79,67 @@ def test_each_effect_by_its_formulas(case: Case) -> None:
     assert_close(rates, at.solver.articulated_forward())
     states = [at.known[dotted(x.name, "dot")] for x in model.states]
     assert_close(states, at.solver.state_rates)
+
+
+STEERED = """
+name = "steered"
+dimensions = {n}
+inputs = ["thrust", "wind"]
+parameters = {{ k = 3.0, lean = 0.4 }}
+definitions = {{ gust = "wind if q_1 > thrust else max(t, 0.2)" }}
+bodies = [
+    {{ name = "a", mass = "k", inertia_com = {inertia} }},
+    {{ name = "b", mass = 1, inertia_com = {inertia} }},
+]
+joints = [
+    {{ name = "pin", type = "revolute", parent = "world", child = "a", r_child = {r}, \
+coordinate = "q_1", orientation = {turned} }},
+    {{ name = "rail", type = "prismatic", parent = "a", child = "b", r_parent = {r}, \
+axis = {axis}, orientation = {turned} }},
+]
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "external_force"
+name = "rotor"
+body = "b"
+axes = "body"
+force = {force}
+[[effects]]
+type = "spring"
+name = "rope"
+body_1 = "world"
+body_2 = "b"
+at_2 = {r}
+stiffness = 3.0
+rest_length = 0.1
+[[effects]]
+type = "motor"
+name = "drive"
+joint = "pin"
+torque = "k*sin(t) + thrust*cos(q_1) - wind*abs(q_1_dot) + gust + tanh(rail_slide)"
+"""
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_formulas_of_inputs_and_time_beside_orientations_of_parameters(n: int) -> None:
+    """Inputs of the scene, definitions, time and turned joints: what the numeric solver has."""
+    text = STEERED.format(
+        n=n,
+        inertia=[0.1, 0.2, 0.15] if n == 3 else 0.1,
+        r=[0.3, 0.1, -0.2][:n],
+        axis=[0.6, 0.8, 0.0][:n],
+        turned='["lean", "45 deg", "-k*lean"]' if n == 3 else '"-lean"',
+        force=["3*thrust + wind", "thrust*sin(t)", "gust"][:n],
+    )
+    model = model_of(text)
+    at = instant(model)
+    rates, forces = follow_recursion(model, at.known)
+    assert_close(forces, at.solver.applied_force)
+    assert_close(rates, at.solver.articulated_forward())
+    found = eomgen.derive(text)
+    assert "thrust" in found.text() and "thrust" in found.latex() and "thrust" in found.html()
 
 
 @pytest.mark.parametrize("seed", range(some(4, 30)))
@@ -177,9 +240,9 @@ BY = {
 def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
     """M v̇ + V + G = F and its solution, F written out."""
     model = model_of(BY[by])
-    told, at = exposition_of(model), instant(model)
+    exposition, at = exposition_of(model), instant(model)
     bare = exposition_of(replace(model, effects=model.effects[:1], states=()))
-    found, other = told.matrices, bare.matrices
+    found, other = exposition.matrices, bare.matrices
     assert found is not None and other is not None
     for letter in "MVG":
         assert getattr(found, letter) == getattr(other, letter)
@@ -240,9 +303,9 @@ def test_the_impulse_equations() -> None:
     """Gap, opening speed and slip of each contact, against the solver's rows."""
     model = model_of("bouncing_two_body")
     at = instant(model)
-    told = derived_effects(model)
-    follow_effects(model, told, at.known)
-    steps = list(impact_steps(model, told))
+    effects = derived_effects(model)
+    follow_effects(model, effects, at.known)
+    steps = list(impact_steps(model, effects))
     assert len(steps) == 4 and {"v^+", "P_II"} <= {e.left.name for e in steps[0].equations}
     solver: Dynamics = at.solver
     for step, contact in zip(steps[1:], solver.contacts, strict=True):
@@ -288,9 +351,9 @@ def test_no_character_is_lost_on_paper() -> None:
     """Descriptions of all effects have LaTeX for every letter: a question mark would be a loss."""
     for case in CASES[:: some(4, 1)]:
         model = model_of(case.text())
-        for told in derived_effects(model):
-            paper = as_latex(model, (report_words(told.words),), ())
-            assert "?" not in paper, told.effect.type
+        for derived in derived_effects(model):
+            paper = as_latex(model, (report_words(derived.words),), ())
+            assert "?" not in paper, derived.effect.type
 
 
 def report_words(words: str) -> Any:
@@ -317,6 +380,95 @@ def labels(text: str) -> list[str]:
     return [part.strip() for part in text.split("|")]
 
 
+def test_weights_point_down_and_forces_along_rails() -> None:
+    """In free-body diagrams, also where other forces act at the same point, and on both bodies."""
+    held = """
+    name = "held"
+    initial = { q = { swing_deg = 35, reach = 0.3 } }
+    bodies = [
+        { name = "arm", mass = 2.0, inertia_com = 0 },
+        { name = "hand", mass = 1.0, inertia_com = 0 },
+    ]
+    effects = [
+        { type = "gravity", g = 9.81 },
+        { type = "pd", name = "servo", joint = "rail", target = 0.5, stiffness = 9.0 },
+    ]
+    [[joints]]
+    name = "pin"
+    type = "revolute"
+    parent = "world"
+    child = "arm"
+    r_child = [0, 1]
+    coordinate = "swing"
+    [[joints]]
+    name = "rail"
+    type = "prismatic"
+    parent = "arm"
+    child = "hand"
+    axis = [0, -1]
+    coordinate = "reach"
+    """
+    disc = """
+    name = "disc"
+    initial = { q = { a = 0.1, c_deg = 50 } }
+    bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.1 }]
+    [[effects]]
+    type = "pd"
+    name = "servo"
+    joint = "table"
+    coordinate = "b"
+    target = 0.5
+    stiffness = 9.0
+    [[joints]]
+    name = "table"
+    type = "planar"
+    parent = "world"
+    child = "disc"
+    orientation_deg = 20
+    coordinates = ["a", "b", "c"]
+    """
+    expected = {
+        held: {
+            "gravity_g*m_arm": -90.0,
+            "gravity_g*m_hand": -90.0,
+            "tau_servo": -55.0,
+            "-tau_servo": 125.0,
+        },
+        disc: {"tau_servo": 110.0},
+        disc + "[locked]\nb = 0.3": {"tau_servo": 110.0},
+    }
+    for text, directions in expected.items():
+        model, angles = model_of(text), {}
+        for drawing in body_diagrams(model, derived_effects(model)):
+            for line, label in zip(drawing.items, drawing.items[1:], strict=False):
+                if isinstance(line, Line) and line.arrow and isinstance(label, Label):
+                    (x0, y0), (x1, y1) = line.points
+                    angles[str(label.text)] = np.degrees(np.arctan2(y1 - y0, x1 - x0))
+        for name, degrees in directions.items():
+            assert angles[name] == pytest.approx(degrees, abs=1e-6), name
+
+
+def test_one_name_for_a_mass_in_all_steps() -> None:
+    """A mass without a name is m_<body>, in sketches and in every step."""
+    text = eomgen.derive(
+        {
+            "name": "slider",
+            "bodies": [{"name": "cart", "mass": 2.0, "inertia_com": 0}],
+            "joints": [
+                {
+                    "name": "rail",
+                    "type": "prismatic",
+                    "parent": "world",
+                    "child": "cart",
+                    "axis": [0.6, 0.8],
+                }
+            ],
+            "effects": [{"type": "gravity", "g": 9.81}],
+        }
+    ).text()
+    assert "m_cart" in text and "cart_mass" not in text
+
+
 def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """`derive --form`, and what has no such state."""
     assert main(["derive", "bouncing_two_body", "--form", "redundant"]) == 0
@@ -327,10 +479,25 @@ def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_large_mechanisms_have_steps_and_no_matrices() -> None:
+    """What is said instead can be copied: it gives the numbers of M, V, G and F."""
     found = derived("human_figure")
     assert len(found.steps) > 30
-    with pytest.raises(eomgen.SceneError, match="too long to be written out"):
+    with pytest.raises(eomgen.SceneError, match="too long to be written out") as error:
         _ = found.M
+    _, code, _ = str(error.value).split("`")
+    *statements, last = code.split("; ")
+    names = {"eomgen": eomgen, "scene": "human_figure"}
+    exec("; ".join(statements), names)
+    M, V, G, F = eval(last, names)
+    n = len(found.model.velocities)
+    assert M.shape == (n, n) and np.linalg.eigvalsh(M).min() > 0
+    y = names["m"].initial_state()
+    left = M @ names["m"].derivative(0.0, y)[-n:] + V + G
+    assert np.abs(left - F).max() < 1e-9 * np.abs(G).max()
+    rope = 'name = "rope"\n[[chains]]\nname = "link"\ncount = 7\nmass = 1\ninertia_com = 1\n'
+    rope += "r_parent = [0.1, 0]\nr_child = [-0.1, 0]\n"
+    with pytest.raises(eomgen.SceneError, match="there are 7; use velocity; a module has it"):
+        eomgen.derive(rope, form="momentum")
 
 
 def test_words() -> None:

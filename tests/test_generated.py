@@ -434,14 +434,14 @@ STATES = "x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot"
 )  # fmt: skip
 @pytest.mark.parametrize("function", ["derivative", "jacobian", "joint_forces"])
 def test_errors(function: str, arguments: tuple, message: str) -> None:
-    """What a user gives wrongly is told by name, shape and value, by every function alike."""
+    """What a user gives wrongly is reported by name, shape and value, by every function alike."""
     module = compiled("two_body_forced").module
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         getattr(module, function)(*arguments)
 
 
 def test_errors_of_dynamics() -> None:
-    """Forces and accelerations of the wrong length are told too."""
+    """Forces and accelerations of the wrong length are reported too."""
     module = compiled("two_body").module
     with pytest.raises(ValueError, match=r"^tau has shape \(3,\), not \(4,\)$"):
         module.forward_dynamics(Y[:4], Y[4:], [0.0] * 3)

@@ -36,7 +36,9 @@ STILL = np.zeros(2)
 
 @pytest.mark.parametrize("order", list(permutations([0.0, -0.0, 1.0])))
 def test_answers_do_not_depend_on_earlier_calls(order: tuple[float, ...]) -> None:
-    """atan2 tells 0.0 from -0.0, though they are equal: so does what keeps constants by value."""
+    """atan2 distinguishes 0.0 from -0.0, though they are equal: so does what keeps constants by
+    value.
+    """
     source = quick(TURNED.format(a=1.0, torque="atan2(b, a)")).source
     module = load_module(source)
     for a in order:
@@ -281,7 +283,9 @@ def test_the_length_of_a_quaternion(spun: Any) -> None:
             if isinstance(found, Exception):
                 refused += 1
                 assert isinstance(found, ValueError)
-                assert str(found).startswith(f"{name}: the quaternion from 'tip_qw' on has length ")
+                assert str(found).startswith(
+                    f"{name}: the quaternion that starts at 'tip_qw' has length "
+                )
                 assert str(found).endswith("; scale it to 1")
                 assert np.isnan(columns[name][..., 1]).all()
                 assert not 1e-100 < 10.0**power < 1e100
@@ -290,7 +294,9 @@ def test_the_length_of_a_quaternion(spun: Any) -> None:
                 assert columns[name][..., 1] == pytest.approx(found, rel=1e-12, abs=1e-12)
     assert refused > 100
     zero = np.array([0.0] * 4 + RIGHT[4:])
-    with pytest.raises(ValueError, match=r"^derivative: the quaternion from 'tip_qw' on has leng"):
+    with pytest.raises(
+        ValueError, match=r"^derivative: the quaternion that starts at 'tip_qw' has leng"
+    ):
         spun.derivative(0.0, zero)
 
 

@@ -170,7 +170,7 @@ def test_a_domain_that_is_left_and_a_quaternion_that_drifts_are_reported() -> No
     )
     monitor = RoundingMonitor(Guard(lambda t, y: np.zeros(4), ((0, 1, 2, 3),)), spun, LOST)
     assert monitor.loss(0.0, spun.initial) == 0.0
-    with pytest.raises(StepFailure, match="quaternion from w on differs from 1 by 1e-06"):
+    with pytest.raises(StepFailure, match="quaternion that starts at w differs from 1 by 1e-06"):
         monitor.loss(0.0, np.array([1.000001, 0.0, 0.0, 0.0]))
 
 

@@ -22,7 +22,7 @@ DIGITS = np.finfo(float).eps / 2
 
 
 def chain(count: int) -> Model:
-    """The built-in chain with so many links, and nothing but its derivative."""
+    """The built-in chain with this many links, and nothing but its derivative."""
     text = (BUILT_IN / "chain.toml").read_text("utf-8").replace("count = 10", f"count = {count}")
     return replace(elaborate(parse_scene(text)), outputs=())
 

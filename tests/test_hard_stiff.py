@@ -118,7 +118,7 @@ def test_implicit_methods_hold_what_explicit_ones_do_not() -> None:
 
 
 def test_an_adaptive_explicit_method_names_stiffness() -> None:
-    """Long before its steps are over, ten million unless told."""
+    """Long before its steps are over, ten million by default."""
     run = integrate(problem("servo"), "RK45", 2.0, rtol=1e-6, max_steps=20_000)
     assert not run.finished and run.counts["steps"] <= 10_000
     assert "the motion is stiff: a mode decays at 9.1e+06/s" in run.message

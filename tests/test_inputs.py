@@ -102,9 +102,9 @@ def test_what_is_wrong_with_inputs_and_states_is_said(
         "--input push=3*y": "--input push: unknown name 'y'",
         "--input push=3*": "--input push: '3*' is not a formula at column 3",
         "--input push=__import__('os')": "--input push: \"__import__('os')\" has '__import__'",
-        "--input none.csv": "--input: none.csv:1: needs a first line with t and names",
-        "--input text.csv": "--input: text.csv:3: is not 2 finite numbers",
-        "--input order.csv": "--input: order.csv: its times t must ascend",
+        "--input none.csv": "--input: none.csv:1: needs a first line with t and the names",
+        "--input text.csv": "--input: text.csv:3: does not have 2 finite numbers",
+        "--input order.csv": "--input: order.csv: the times t must ascend",
         "--input who.csv": "--input: no input 'pull'",
         "--input missing.csv": "missing.csv: cannot be read",
         "--input push=push": "--input push: unknown name 'push'",
@@ -128,7 +128,7 @@ def test_what_is_wrong_with_inputs_and_states_is_said(
             eomgen.check(text)
         assert message in str(error.value)
     for other in ({"accuracy": 1e-6}, {"estimate": True}, {"guard": "stop"}, {"backend": "c"}):
-        with pytest.raises(eomgen.RunError, match="with tables and functions of time"):
+        with pytest.raises(eomgen.RunError, match="tables and functions of time do not go"):
             eomgen.simulate(CART, inputs={"push": math.sin}, **other)
     with pytest.raises(eomgen.RunError, match="inputs: Taylor series need constant inputs"):
         eomgen.simulate(CART, inputs={"push": math.sin}, integrator="taylor")
@@ -160,3 +160,36 @@ def test_formulas_are_compiled_and_functions_are_not_forgotten() -> None:
     assert run.y[-1, 1] == pytest.approx(3.0 / 2 * 5, rel=1e-9)
     varied = eomgen.simulate(CART, inputs={"push": math.sin}, t_end=1)
     assert "starts anew" in eomgen.simulate(CART, resume=varied, t_end=2).begun
+
+
+def test_inputs_of_time_go_wherever_a_motion_is_computed(tmp_path: Path) -> None:
+    """Sweeps, measurements and checks follow formulas and tables as a run does; linearisation
+    takes constants only.
+    """
+    table = tmp_path / "inputs.csv"
+    table.write_text("t, push\n0, 1\n0.3, -2\n1.7, 3\n")
+    ways = ({"push": "m*sin(3*t) - x", "thrust": 0.5}, str(table))
+    for inputs in ways:
+        members = eomgen.ensemble(CART, {"m": [1.0, 2.5]}, inputs=inputs, t_end=2.0)
+        for m, final in zip((1.0, 2.5), members.final, strict=True):
+            run = eomgen.simulate(CART, inputs=inputs, parameters={"m": m}, t_end=2.0)
+            assert run.y[-1].tobytes() == final.tobytes()
+        found = eomgen.accuracy(CART, inputs=inputs, methods=["rk4"], quick=True, t_end=2.0)
+        run = eomgen.simulate(CART, inputs=inputs, rtol=1e-11, atol=1e-13, t_end=2.0)
+        assert np.abs(found.reference.y[-1] - run.y[-1]).max() < 1e-9
+        assert eomgen.verify(CART, states=1, inputs=inputs).missed == ()
+    # Without the motor the cart stays; with it x = push t²/2m.
+    bill = eomgen.effects(CART, motion=2.0, each=True, inputs={"push": 6.0, "thrust": "0*t"})
+    (change,) = [item.change for item in bill.items if "push" in item.label and item.change]
+    assert change.distance == pytest.approx(6 / 2 / 2 * change.until**2)
+    for wrong in ({"push": "3*t"}, {"push": math.sin}, str(table)):
+        with pytest.raises(eomgen.RunError, match="linearise takes constant inputs"):
+            eomgen.linearise(CART, at="initial", inputs=wrong)
+    assert eomgen.linearise(CART, at="initial", inputs={"push": "2*3"}).u.tolist() == [0, 0, 6]
+    with pytest.raises(eomgen.RunError, match="only simulate takes"):
+        eomgen.ensemble(CART, {"m": [1.0]}, inputs={"push": math.sin})
+    with pytest.raises(eomgen.RunError, match="push is also given a fixed value"):
+        eomgen.ensemble(CART, {"push": [1.0]}, inputs=str(table))
+    long = {"push": Table(np.arange(200.0), np.arange(200.0) % 2)}
+    with pytest.raises(eomgen.RunError, match="has 200 corners"):
+        eomgen.verify(CART, inputs=long)

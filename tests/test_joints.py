@@ -60,13 +60,13 @@ def load(text: str, route: str) -> Any:
 
 
 def rates(module: Any, values: dict[str, float], u: Any = None) -> dict[str, float]:
-    """The state's rates by name, at a state told by name: 0 else, quaternions 1, 0, 0, 0."""
+    """The state's rates by name, at a state given by name: 0 else, quaternions 1, 0, 0, 0."""
     y = state(module, values)
     return dict(zip(module.STATES, module.derivative(0.0, y, u=u).tolist(), strict=True))
 
 
 def state(module: Any, values: dict[str, float]) -> np.ndarray:
-    """A state told by name."""
+    """A state given by name."""
     assert set(values) <= set(module.STATES)
     y = np.array([values.get(name, 0.0) for name in module.STATES])
     for indices in map(list, module.QUATERNIONS):
@@ -244,17 +244,17 @@ QUATERNION = np.array([0.5, -0.7, 0.1, 0.5])
 
 
 def quaternion(prefix: str) -> dict[str, float]:
-    """A quaternion told by name."""
+    """A quaternion given by name."""
     return {f"{prefix}_q{c}": x for c, x in zip("wxyz", QUATERNION.tolist(), strict=True)}
 
 
 def spin_of(prefix: str, spin: np.ndarray) -> dict[str, float]:
-    """An angular velocity told by name."""
+    """An angular velocity given by name."""
     return {f"{prefix}_w{c}": x for c, x in zip("xyz", spin.tolist(), strict=True)}
 
 
 def vector(found: dict[str, float], *names: str) -> np.ndarray:
-    """Some of what is told by name."""
+    """Some of what is given by name."""
     return np.array([found[name] for name in names])
 
 
@@ -605,7 +605,7 @@ def test_inertia_is_in_body_axes_with_its_own_signs() -> None:
 
 
 def upright(tree: SpatialTree) -> str:
-    """A planar tree told in space: its x is x, its y is z, and it turns about -y."""
+    """A planar tree written as one in space: its x is x, its y is z, and it turns about -y."""
     tables = []
     for b in tree.bodies:
         j = b.joint

@@ -139,7 +139,7 @@ def kernels(scene: str, width: int = 0) -> tuple[Lanes, Any]:
 
 
 def members(module: Any, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States, parameters and inputs of so many members, as columns."""
+    """States, parameters and inputs of this many members, as columns."""
     rng = np.random.default_rng(3)
     y = np.array([random_state(module, rng) for _ in range(count)]).T
     own = np.array([*module.PARAMETERS.values()])

@@ -67,7 +67,7 @@ def compiled(name: str, route: str = "") -> Engine:
 class Moment:
     """An engine at one state: outputs in 60 digits, each found once.
 
-    The plane is told as space: wrenches, velocities and places have all three components.
+    The plane is treated as space: wrenches, velocities and places have all three components.
     """
 
     def __init__(self, e: Engine, seed: int) -> None:
@@ -161,7 +161,7 @@ class Moment:
         return turned @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], object) @ turned.T
 
     def twists(self, velocities: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Linear and angular part of motions, or of wrenches, that the module tells."""
+        """Linear and angular part of motions, or of wrenches, that the module returns."""
         if not self.plane:
             return [(row[:3], row[3:]) for row in velocities]
         nothing = MP.mpf(0)
@@ -175,7 +175,7 @@ class Moment:
 
     @cached_property
     def others(self) -> list[Any]:
-        """Loads of effects but the plainest, as they tell them: each has a test of its own."""
+        """Loads of effects but the plainest, as they state them: each has a test of its own."""
         moving = self.moving(self.y)
         effects = (e for e in self.model.effects if not isinstance(e, PLAIN))
         return [load for effect in effects for load in effect.loads(moving)]
@@ -236,7 +236,7 @@ class Moment:
 
 
 PLAIN = (Gravity, ExternalForce, Motor)
-"""Effects whose loads are told here by hand."""
+"""Effects whose loads are written here by hand."""
 
 
 def in_space(vector: np.ndarray) -> np.ndarray:
@@ -335,10 +335,10 @@ def test_mass_matrix(m: Moment) -> None:
     energy = m["kinetic_energy"]
     assert apart(v @ M @ v / 2, energy) < EXACT
     turned, _ = m.places(m["body_poses"])
-    told = sum(m.armatures() * v * v, MP.mpf(0))
+    value = sum(m.armatures() * v * v, MP.mpf(0))
     for k, (linear, spin) in enumerate(m.twists(m["body_velocities"])):
-        told += m.masses[k] * (linear @ linear) + spin @ m.inertia(k, turned[k]) @ spin
-    assert apart(told / 2, energy) < EXACT
+        value += m.masses[k] * (linear @ linear) + spin @ m.inertia(k, turned[k]) @ spin
+    assert apart(value / 2, energy) < EXACT
 
 
 def ways(m: Moment) -> np.ndarray:
@@ -461,8 +461,8 @@ def test_poses_change_as_velocities_say(m: Moment) -> None:
         assert apart(m["point_jacobians"] @ m.v, velocities) < EXACT
         turned, centres = m.places(m["body_poses"])
         for point, place in zip(m.model.points, m["point_positions"], strict=True):
-            told = centres[point.body] + turned[point.body] @ m.vector(point.at)
-            assert apart(in_space(place), told) < EXACT
+            value = centres[point.body] + turned[point.body] @ m.vector(point.at)
+            assert apart(in_space(place), value) < EXACT
 
 
 def momentum(m: Moment) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from engine import DERIVATIVES, along, apart, engine, exact
 from spatial_trees import PLANE, SPACE, random_spatial_tree
 
 from eomgen.cli import main
-from eomgen.codegen.backends.javascript import body_poses
+from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.interface import interface_of
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
@@ -340,15 +340,15 @@ def test_poses_of_every_function_in_javascript() -> None:
     e = engine(text)
     y, times = np.array([0.4, -1.0]), [0.0, 0.4, 1.1, 1.3, 1.9, 2.7]
     p = list(e.module.PARAMETERS.values())
-    call = f"bodyPoses({json.dumps(y.tolist())}, {json.dumps(p)}, t)"
-    script = f"{body_poses(e.system.program, interface_of(e.system))}\n"
-    script += f"console.log(JSON.stringify({json.dumps(times)}.map((t) => {call})));"
+    call = f"mechanism.bodyPoses(t, {json.dumps(y.tolist())}, {json.dumps(p)}, [])"
+    script = f"{mechanism(e.system.program, interface_of(e.system))}\n"
+    script += f"console.log(JSON.stringify({json.dumps(times)}.map((t) => [...{call}])));"
     answer = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
-    expected = [e.module.body_poses(t, y) for t in times]
+    expected = [e.module.body_poses(t, y).ravel() for t in times]
     assert apart(json.loads(answer.stdout), expected) < 1e-14
 
 
-# What a user is told.
+# What is reported to a user.
 
 CART = (
     DOUBLE.replace('leave_out = ["velocity_forces"]\n', "")
@@ -388,7 +388,7 @@ BAD = [
     ('joint = "first"', 'joint = "loose"', "effects[1].joint: 'loose' is a free joint, which "
      "'driven' does not act on; name a revolute or prismatic joint"),
     ("[parameters]", MORE.format("other", "first", 0.2) + "[parameters]", "effects[2].joint: "
-     "'first' is driven by 'swing' too; give one of them"),
+     "'first' is driven by 'swing', too; give only one of them"),
     ("[parameters]", "[initial.q]\nfirst_angle_deg = 5\n[parameters]", "initial.q.first_angle_deg: "
      "'first_angle' is driven by 'swing'; leave it out"),
     ("[parameters]", "[initial.v]\nfirst_angle_dot = 5\n[parameters]", "initial.v.first_angle_dot: "
@@ -396,11 +396,11 @@ BAD = [
     ("[parameters]", "[initial]\nq = [0, 0, 0, 0, 0]\n[parameters]", "initial.q: has 5 numbers for "
      "4 coordinates; give one each for ball_x, ball_y, ball_angle, second_angle"),
     ("[parameters]", "[locked]\nfirst_angle = 1\n[parameters]", "locked: 'first_angle' is driven "
-     "by 'swing' too; give one of them"),
+     "by 'swing', too; give only one of them"),
     ("[parameters]", "[locked]\nsecond_angel = 1\n[parameters]", "locked.second_angel: no "
      "coordinate has this name (did you mean 'second_angle'?)"),
     ("[parameters]", "[locked]\nsecond_angle = 1\nsecond_angle_deg = 2\n[parameters]",
-     "locked.second_angle_deg: second_angle is given too; give one of them"),
+     "locked.second_angle_deg: second_angle is also given; give only one of them"),
     ("[parameters]", '[locked]\nsecond_angle = "1"\n[parameters]',
      "locked.second_angle: '1' is not a number; give one"),
     ("[parameters]", "[locked]\nsecond_angle = 1\nball_x = 0\nball_y = 0\nball_angle = 0\n"
@@ -433,7 +433,7 @@ OTHERS = [
      "it takes no locked coordinate ('knee_angle'); leave it out"),
     ("", 'leave_out = ["velocity_forces"]\nroute = "closed"\n', "route: 'closed' needs the closed "
      "form, and it leaves nothing out ('velocity_forces'); leave it out"),
-    ("", 'outputs = ["driving_forces"]\n', "outputs[0]: 'driving_forces' is about driven joints, "
+    ("", 'outputs = ["driving_forces"]\n', "outputs[0]: 'driving_forces' needs driven joints, "
      "and there are none"),
 ]  # fmt: skip
 

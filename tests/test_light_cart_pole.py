@@ -82,7 +82,7 @@ def test_published_ladder(rtol: str) -> None:
     """Error and evaluations of DOP853.
 
     At rtol 1e-4 the error is left to rounding: starts that differ by single doubles give 3e-3 to
-    1e-1, and one of them tells nothing.
+    1e-1, and one of them proves nothing.
     """
     found, calls = cart.errors(7 if rtol == "1e-4" else 1, "DOP853", rtol)
     error, count = cart.LADDER[rtol]
@@ -112,8 +112,8 @@ def test_lu_has_a_floor(rtol: str, tightest: Any) -> None:
 
 
 def test_energy_keeps_its_digits_in_a_spike() -> None:
-    """The pole turns about its own end there, of which the cart's rate and its own tell by a
-    difference: ½ M ẋ² + ½ m |v|² is to be summed, not multiplied out.
+    """The pole turns about its own end there, which is the difference of two large terms in
+    the cart's rate and its own: ½ M ẋ² + ½ m |v|² is to be summed, not multiplied out.
     """
     theta, rate = 1e-3, 4000.0
     y = np.array([0.0, theta, -rate * np.cos(theta), rate])

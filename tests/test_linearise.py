@@ -232,7 +232,7 @@ def test_messages() -> None:
         (lambda: linearise(cart, np.zeros(4), {"pull": 1.0}), "no input 'pull'; known: push"),
         (lambda: linearise(cart, np.zeros(4), [1.0, 2.0]), "shape"),
         (lambda: linearise(cart, np.zeros(4), p={"m_cart": -1.0}), "linearise: "),
-        (lambda: linearise(top, np.zeros(7)), "tip_qw on has length 0"),
+        (lambda: linearise(top, np.zeros(7)), "tip_qw has length 0"),
         (
             lambda: linearise(module_of("cart_pole", outputs=False), np.zeros(4)),
             "--outputs input_jacobian",
@@ -322,7 +322,9 @@ def test_the_command_on_quaternions_and_states(capsys: pytest.CaptureFixture[str
     options = ["--state", "tip_qw=2", "--state", "tip_qx=0", "--at", "initial"]
     assert main(["linearise", "spinning_top", "--route", "aba", *options]) == 0
     shown = capsys.readouterr()
-    assert shown.err.startswith("eomgen: note: spinning_top.toml: --state: the quaternion from")
+    assert shown.err.startswith(
+        "eomgen: note: spinning_top.toml: --state: the quaternion that starts at"
+    )
     assert "    A       tip_rx  tip_ry  tip_rz  tip_wx  tip_wy  tip_wz" in shown.out
     assert "control" not in shown.out
     options = ["--state", "theta_deg=90", "--state", "x_dot=2", "--at", "initial"]
@@ -338,7 +340,7 @@ def test_a_figure_is_reported_in_short(capsys: pytest.CaptureFixture[str]) -> No
     assert main(["linearise", "hanging_figure", "--at", "rest"]) == 0
     out = capsys.readouterr().out
     assert "A is 76 x 76; -o FILE.npz or -o FILE.csv writes them" in out
-    assert "stays, or drifts, " in out and "stability   marginal" in out
+    assert "stays or drifts, " in out and "stability   marginal" in out
     assert max(map(len, out.splitlines())) <= 100
 
 

@@ -275,6 +275,30 @@ def replace_effects(scene: Any, name: str) -> Any:
     return scene.replaced(effects=effects, form="velocity", route="auto")
 
 
+DRIVEN = f"""{PUSHED}
+[[effects]]
+type = "driven"
+name = "swing"
+joint = "elbow"
+coordinate = "sin(3*t)"
+"""
+
+
+def test_driven_joints_move_with_time() -> None:
+    """They have no switch; derivative and poses depend on time as in the module."""
+    scene = parse_scene(DRIVEN)
+    model = replace(elaborate(scene), outputs=OUTPUTS)
+    code, module = live_code(model), module_of(model)
+    table = live_table(model, code, scene.simulation)
+    assert [e["name"] for e in table["effects"] if e["switch"] is None] == ["swing"]
+    t, y = random_states(module, 20)
+    for of, name in (("derivative", "derivative"), ("bodyPoses", "body_poses")):
+        own = getattr(module, name)
+        expected = np.array([own(a, b) for a, b in zip(t, y, strict=True)]).reshape(20, -1)
+        found = in_page(code, of, t, y, table)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
 def test_names_of_switches_and_pulls_are_new() -> None:
     """No name of a scene contains two underscores."""
     model = model_of(read("ragdoll"), "ragdoll")

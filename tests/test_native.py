@@ -298,8 +298,8 @@ def test_it_stands_alone(scene: str, real: str, tmp_path: Path) -> None:
     else:
         assert found == pytest.approx(wanted, rel=1e-4, abs=1e-4 * np.max(np.abs(wanted)))
     first = next(iter(python.PARAMETERS))
-    told = result(lambda: python.derivative(0.0, python.initial_state(), {first: -1.0}))
-    assert bool(refusal) == isinstance(told, str)
+    outcome = result(lambda: python.derivative(0.0, python.initial_state(), {first: -1.0}))
+    assert bool(refusal) == isinstance(outcome, str)
 
 
 def test_the_header_is_checked_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -370,7 +370,7 @@ def test_which_compiler_is_taken(fresh: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("PATH", str(folder))
     monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(
-        RunError, match=r"^no C compiler is found; .* pip install 'eomgen\[compiled"
+        RunError, match=r"^no C compiler was found; .* pip install 'eomgen\[compiled"
     ):
         compiler.find_compiler()
     for name in ("clang", "gcc", "cc"):  # each comes before those before it
@@ -452,7 +452,7 @@ def test_a_library_says_what_it_holds() -> None:
     held = library.built(made.library)
     assert tuple((ctypes.c_long * 4).in_dll(held, "sizes"))[:3] == (4, 1, 5)
     compiled = eomgen.load(made)
-    assert compiled.jacobian.__doc__ == "Exact Jacobian of `derivative` by the state."
+    assert compiled.jacobian.__doc__ == "Exact Jacobian of `derivative` with respect to the state."
     assert compiled.STATES == pair("cart_pole")[1].STATES
 
 

@@ -42,7 +42,7 @@ MISSED: dict[tuple[object, ...], dict[int, float]] = {
 }
 """Seeds of the trees that are known to miss `AT_RANDOM`, and what they are off by at most: 1 of
 2000 of hinges, 2 of 1200 of other joints, 1 of 1000 chains. A heavy row holds an axis of theirs by
-1e-3 only, or 1e-5: rotated with it first, a light row loses so many digits to the next that holds
+1e-3 only, or 1e-5: rotated with it first, a light row loses as many digits to the next that holds
 the axis well. The better order changes with the state.
 """
 LOOSE = 'type = "free"\nname = "j0"\nchild = "b0"'
@@ -438,7 +438,7 @@ def test_taken_where_masses_call_for_it() -> None:
     lines = heavy_tip.explanation()
     assert all("would lose" in line for line in lines if " operations a call" in line)
     assert lines[-1].startswith("orthogonal") and lines[-1].endswith("<- taken")
-    assert "keeps digits that bodies and joints take from others" in lines[-1]
+    assert "keeps digits that the other routes lose" in lines[-1]
     ordinary = compile_program(elaborate(parse_scene(tip(2.0, 2))))
     assert ordinary.system.route != "orthogonal"
     assert not any("digits" in line or "orthogonal" in line for line in ordinary.explanation())
@@ -538,7 +538,7 @@ mass = 0.2
 inertia_com = 0.01
 
 [[joints]]
-name = "told"
+name = "guided"
 type = "revolute"
 parent = "C"
 child = "D"
@@ -546,8 +546,8 @@ r_child = [-0.1, 0]
 
 [[effects]]
 type = "driven"
-name = "tell"
-joint = "told"
+name = "guide"
+joint = "guided"
 coordinate = "0.3*sin(2*t)"
 
 [[effects]]
@@ -562,11 +562,11 @@ name = "hold"
 joint = "hinge"
 stiffness = 3.0
 """
-"""What is added to two bodies that bounce: a rotor, a motor, a spring, a motion that is told."""
+"""What is added to two bodies that bounce: a rotor, a motor, a spring, a driven joint."""
 
 
 def test_every_output() -> None:
-    """Contacts, impacts, inputs, told motions, derivatives: all outputs are those of `aba`."""
+    """Contacts, impacts, inputs, driven joints, derivatives: all outputs are those of `aba`."""
     text = find_scene("bouncing_two_body").read_text()
     text = text.replace("outputs = []", 'outputs = "all"') + EVERYTHING
     ours, theirs = (

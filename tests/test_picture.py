@@ -22,6 +22,7 @@ from eomgen.scene.reference import by_type
 from eomgen.scene.schema import Simulation
 from eomgen.show.formulas import plain_data
 from eomgen.show.of_run import world_points
+from eomgen.show.outlines import extent_points
 from eomgen.show.picture import Picture, picture_of, shapes_of
 from eomgen.show.picture_data import geometry_values, picture_data
 from eomgen.show.solid import rotation
@@ -83,6 +84,35 @@ def test_links_reach_their_joints_at_any_parameters(name: str) -> None:
             for body in {joint.parent, joint.child} - {-1}:
                 tips = [world_points(poses[np.newaxis], body, end) for end in ends(drawn, body)]
                 assert min(np.linalg.norm(tip - pin) for tip in tips) < 1e-12
+
+
+def gaps(picture: Picture, dimensions: int) -> dict[tuple[str, str], float]:
+    """For each joint and body the distance of its point from the bounds of the body's shapes, m."""
+    found = {}
+    for joint in picture.joints:
+        for body, at in ((joint.parent, joint.at_parent), (joint.child, joint.at_child)):
+            if body >= 0:
+                corners = extent_points(picture.bodies[body].shapes, dimensions)
+                place = np.array(numbers(at))
+                beyond = np.maximum(corners.min(axis=0) - place, place - corners.max(axis=0))
+                far = float(np.linalg.norm(np.maximum(beyond, 0.0)))
+                found[joint.name, picture.bodies[body].name] = far
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in built_in_names() if name != "puma560"])
+def test_shapes_of_built_in_scenes_stay_at_their_joints(name: str) -> None:
+    """Whatever the lengths. The PUMA's shapes are beside some of its joints from the beginning."""
+    scene = eomgen.read(name)
+    model = elaborate(scene)
+    picture = picture_of(model, appearance_of(expanded(scene)))
+    lengths = [p.name for p in model.parameters if p.unit == "m"]
+    before = gaps(picture.valued(model.defaults), model.dimensions)
+    random = np.random.default_rng(7)
+    for _ in range(3):
+        others = {key: model.defaults[key] * random.uniform(0.5, 2.0) for key in lengths}
+        after = gaps(picture.valued({**model.defaults, **others}), model.dimensions)
+        assert all(after[key] <= gap + 1e-9 for key, gap in before.items())
 
 
 def moments_of(shape: Any) -> np.ndarray:
@@ -266,7 +296,10 @@ WRONG = [
     ('{ type = "disc", radius = "l +" }', "bodies[0].shapes[0].radius: 'l +' is not a formula"),
     ('{ type = "box", size = ["l", 0.0] }', "bodies[0].shapes[0].size[1]: 0 is not positive"),
     ('{ type = "box", size = ["1/(l - 0.5)", 1] }', "bodies[0].shapes[0].size[0]: its value is "),
-    ('{ type = "disc", radius = 1, color = "red" }', "bodies[0].shapes[0].color: 'red' is no col"),
+    (
+        '{ type = "disc", radius = 1, color = "red" }',
+        "bodies[0].shapes[0].color: 'red' is not a colour",
+    ),
 ]
 CAMERAS = [
     ('mode = "fit"\nheight = 3.0', "camera.height: mode 'fit' finds"),

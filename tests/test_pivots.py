@@ -36,7 +36,7 @@ def derived(scene: Scene) -> Equations:
 
 
 class Signs:
-    """Tells what is positive by its build alone: positive symbols, even powers, sums, products.
+    """Decides what is positive from its form alone: positive symbols, even powers, sums, products.
 
     A symbol that is defined has the sign of what it stands for; SymPy's assumptions are not asked.
     An even power of what moves is nonnegative only; one of parameters alone is positive, as long as

@@ -1,6 +1,6 @@
 """Published and exact numbers, typed in here with where they come from.
 
-Each is told apart from eomgen: printed by others, or a formula of the books evaluated in 40 digits.
+Each is independent of eomgen: printed by others, or a formula of the books evaluated in 40 digits.
 """
 
 from collections.abc import Mapping

@@ -140,7 +140,10 @@ def test_a_quaternion_of_no_length_is_refused(length: float) -> None:
     asked = problem("spinning_top")
     y = asked.initial.copy()
     y[list(asked.quaternions[0])] = [length, 0.0, 0.0, 0.0]
-    message = "initial: the quaternion from tip_qw on has no length; give 1, 0, 0, 0 for no turn"
+    message = (
+        "initial: the quaternion that starts at tip_qw has no length; give 1, 0, 0, 0 for no "
+        "rotation"
+    )
     with pytest.raises(RunError) as caught:
         replace(asked, initial=y)
     assert str(caught.value) == message

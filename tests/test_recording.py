@@ -118,7 +118,7 @@ def test_what_cannot_be_saved_is_said(capsys: pytest.CaptureFixture[str]) -> Non
     for name, message in (
         ("energi", "--save: no 'energi' can be saved (did you mean 'energy'?)"),
         ("jacobian", "--save: no 'jacobian' can be saved"),
-        ("points", "--save: 'point_positions' is about points, and there are none"),
+        ("points", "--save: 'point_positions' needs points, and there are none"),
     ):
         assert main(["simulate", "pendulum", "--save", name]) == 1
         assert message in capsys.readouterr().err

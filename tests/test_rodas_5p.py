@@ -20,7 +20,7 @@ Tree = tuple[Any, ...]
 
 
 def trees(order: int) -> Iterator[Tree]:
-    """All rooted trees with so many vertices."""
+    """All rooted trees with this many vertices."""
 
     def forests(vertices: int, most: int) -> Iterator[Tree]:
         if not vertices:

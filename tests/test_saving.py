@@ -64,16 +64,16 @@ def changed(change: Callable[[Any], object]) -> str:
 
 FAULTS: dict[str, Callable[[Any], object]] = {
     "its format is not": lambda c: c.update(format="eomgen program 2"),
-    "is no finite number": lambda c: c["steps"].append(["constant", 0, 1e999]),
+    "is not a finite number": lambda c: c["steps"].append(["constant", 0, 1e999]),
     "is none of the": lambda c: c["steps"].append(["neg", 2, len(c["steps"])]),
     "takes 2 operands": lambda c: c["steps"].append(["add", 2, 0]),
     "there is no operation 'exec'": lambda c: c["steps"].append(["exec", 2, 0]),
     "is not a valid Stage": lambda c: c["steps"].append(["neg", 9, 0]),
-    "is no stage": lambda c: c["steps"].append(["neg", True, 0]),
+    "is not a stage": lambda c: c["steps"].append(["neg", True, 0]),
     "steps before": lambda c: c["outputs"].update(derivative=[[1], [-1]]),
     "a shape is": lambda c: c["outputs"].update(derivative=[["n"], [0]]),
-    "are no table": lambda c: c.update(outputs=[]),
-    "is no text": lambda c: c["steps"].append(["input", 2, 5]),
+    "are not a table": lambda c: c.update(outputs=[]),
+    "is not a text": lambda c: c["steps"].append(["input", 2, 5]),
     "neither true nor false": lambda c: c["checks"].append(["mass", 0, 1]),
     "no program: 'steps'": lambda c: c.pop("steps"),
 }

@@ -112,7 +112,7 @@ def test_outlines() -> None:
     np.testing.assert_allclose(distance, 0.2, rtol=1e-12)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg"])
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_figure_files_are_ours_and_reproducible(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"
     save_figure(swinging(), path)
@@ -128,8 +128,8 @@ def test_figure_files_are_ours_and_reproducible(tmp_path: Path, suffix: str) -> 
 
 
 def test_figure_files_refused(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match=r"\.png or \.svg; '\.pdf' is neither"):
-        save_figure(swinging(), tmp_path / "a.pdf")
+    with pytest.raises(RunError, match=r"\.png, \.svg or \.pdf; '\.jpg' is none of them"):
+        save_figure(swinging(), tmp_path / "a.jpg")
     foreign = tmp_path / "a.png"
     foreign.write_bytes(b"holiday")
     with pytest.raises(RunError, match="was not written by eomgen"):

@@ -11,10 +11,7 @@ import pytest
 from matplotlib.text import Text
 from pydantic import TypeAdapter
 
-from eomgen.codegen.backends.javascript import body_poses
 from eomgen.errors import SceneError
-from eomgen.program.program import Output, finish
-from eomgen.program.tape import Stage, Tape
 from eomgen.scene.joints.base import Primitive
 from eomgen.scene.look import BARE, Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
 from eomgen.show.figure import draw_motion, save_figure
@@ -387,7 +384,7 @@ def test_a_hundred_bodies_make_a_figure(tmp_path: Path) -> None:
     np.testing.assert_allclose(shown[:100, 0], motion.places[0, :, 0])
     np.testing.assert_allclose(shown[200:, -1], motion.places[-1, :, 2])
     names = [text.get_text() for text in lengths.get_yticklabels()]
-    assert (names[0], names[-1]) == (r"$\mathrm{link}_{1,x}$", r"$\mathrm{link}_{100,z}$")
+    assert (names[0], names[-1]) == ("link 1 x", "link 100 z")
     gaps = panel(figure, "Gap in the joints")
     assert [text.get_text() for text in gaps.get_legend().texts] == ["largest of 100", "median"]
     np.testing.assert_array_equal(gaps.get_lines()[0].get_ydata(), motion.joint_drift.max(axis=1))
@@ -476,20 +473,3 @@ def test_gaps_of_joints_that_hold_a_point() -> None:
     flat = np.zeros((3, 2, 3))
     flat[:, 0] = [2.0, 2.0, np.pi / 2]
     np.testing.assert_allclose(joint_drift(planar, flat), np.zeros((3, 1)), atol=1e-15)
-
-
-def test_poses_in_space_as_javascript() -> None:
-    tape = Tape()
-    angle, x = (tape.input(name, Stage.POSITIONS) for name in ("angle", "x"))
-    one, zero = tape.constant(1.0), tape.constant(0.0)
-    cos, sin = tape.apply("cos", angle), tape.apply("sin", angle)
-    rows = [cos, zero, sin, x, zero, one, zero, zero, -sin, zero, cos, zero]
-    output = Output((1, 3, 4), tuple(node.index for node in rows))
-    interface: Any = SimpleNamespace(
-        states=(SimpleNamespace(name="angle"), SimpleNamespace(name="x")), parameters=()
-    )
-    program = finish(tape, {"body_poses": output}, ())
-    assert body_poses(program, interface).split("return ")[1].split() == (
-        "[ [[cos_angle, 0.0, sin_angle, x], [0.0, 1.0, 0.0, 0.0], "
-        "[-sin_angle, 0.0, cos_angle, 0.0]], ]; }".split()
-    )

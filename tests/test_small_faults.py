@@ -50,7 +50,7 @@ def test_all_outputs_in_a_list() -> None:
          "no parent; name it as the parent, and give no body a second joint: closed loops are not "
          "supported"),
         ("g = 9.81 }", 'g = 9.81, direction = [1, -1] }', "route: 'closed' needs the closed form, "
-         "and it takes no 'gravity' with a direction of its own ('gravity'); leave it out"),
+         "and it takes no 'gravity' with its own direction ('gravity'); leave it out"),
     ],
 )  # fmt: skip
 def test_refusals_say_what_is_wrong(old: str, new: str, message: str) -> None:
@@ -74,13 +74,15 @@ def test_times_within_their_spread_are_no_times() -> None:
 
 @pytest.mark.parametrize("name", ["tumbling_body", "pendulum", "furuta_pendulum"])
 def test_routes_are_counted_alike(name: str) -> None:
-    """What is told of a route's operations is what its module takes, where closed is tried."""
+    """The operations reported for a route are those that its module takes, where closed is
+    tried.
+    """
     model = replace(elaborate(read_scene(name)), route="auto")
-    told = {c.route: c.operations for c in compile_program(model, jacobian=False).candidates}
-    for route in (route for route, count in told.items() if count is not None):
+    counts = {c.route: c.operations for c in compile_program(model, jacobian=False).candidates}
+    for route in (route for route, count in counts.items() if count is not None):
         system = compile_program(replace(model, route=route), jacobian=False).system
-        assert told[route] == cost(system.program, "derivative")["total"], route
-    assert told["closed"] and told["aba"]
+        assert counts[route] == cost(system.program, "derivative")["total"], route
+    assert counts["closed"] and counts["aba"]
 
 
 def test_the_licence_is_packaged() -> None:

@@ -595,7 +595,7 @@ BAD = {
     ),
     between("world", "b"): "effects[0].stiffness: missing; give it, or damping or a law",
     between("world", "b", "stiffness = 1", 'law = "stretch"'): (
-        "effects[0].stiffness: a law replaces it; give one of them"
+        "effects[0].stiffness: a law replaces it; give only one of them"
     ),
     between("world", "b", 'law = "3*strech"'): (
         "effects[0].law: unknown parameter 'strech' (did you mean 'stretch'?)"
@@ -615,7 +615,7 @@ BAD = {
     ),
     at_joint("joint_friction"): "effects[0].viscous: missing; give it, or coulomb and speed",
     at_joint("joint_friction", "coulomb = 1"): (
-        "effects[0].speed: missing; coulomb is smoothed as tanh(rate/speed), give a small one"
+        "effects[0].speed: missing; coulomb is smoothed as tanh(rate/speed); give a small value"
     ),
     at_joint("joint_friction", "coulomb = 1", "speed = 0"): (
         "effects[0].speed: 0 is not positive; give a number > 0 in m/s"
@@ -626,7 +626,7 @@ BAD = {
     at_joint("joint_stop", "low = 1", "high = 1", "stiffness = 1"): STOP.format(1, 1),
     at_joint("joint_stop", 'low = "pi"', "high = 1", "stiffness = 1"): STOP.format(3.14159, 1),
     at_joint("joint_stop", "stiffness = 1"): (
-        "effects[0].low: missing, and high too; give one of them or both"
+        "effects[0].low: missing, as is high; give one of them or both"
     ),
     at_joint("joint_stop", "low = 0", "stiffness = -1"): (
         "effects[0].stiffness: -1 is negative; give a number >= 0 in N/m"

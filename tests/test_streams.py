@@ -44,6 +44,8 @@ COMMANDS = {
     "accuracy": f"accuracy pendulum {QUICK} -o {{out}}",
     "effects": "effects pendulum --no-motion -o {out}",
     "linearise": "linearise cart_pole",
+    "plot": "plot pendulum --of theta,energy --t-end 0.1 -o {out}/p.pdf",
+    "film": "film pendulum --t-end 0.1 -o {out}/f.gif",
     "sweep": "sweep pendulum --vary theta=1,2 --t-end 0.1 --workers 1 -o {out}",
 }
 QUICKER = [name for name in COMMANDS if name != "accuracy"]
@@ -54,6 +56,8 @@ WRITES = {
     "simulate": 5,
     "view": 5,
     "accuracy": 3,
+    "plot": 1,
+    "film": 1,
     "sweep": 3,
     "gallery": 2,
     "effects": 1,
@@ -176,8 +180,8 @@ def test_ascii_and_a_closed_error_stream(
     monkeypatch.setattr(sys, "stderr", None)
     assert main([word.format(out=tmp_path) for word in COMMANDS[name].split()]) == 0
     terminal.seek(0)
-    told = terminal.read()
-    assert told and ("\\u" not in told or name == "schema")  # as JSON spells it anywhere
+    shown = terminal.read()
+    assert shown and ("\\u" not in shown or name == "schema")  # as JSON spells it anywhere
     assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
 
 
@@ -189,8 +193,8 @@ def test_a_derivation_in_ascii(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert main(["derive", "two_body"]) == 0
     assert main(["derive", "two_body", "-o", str(target)]) == 0
     terminal.seek(0)
-    told = terminal.read()
-    assert "omega_B = phidot + thetadot" in told and "\\u" not in told
+    shown = terminal.read()
+    assert "omega_B = phidot + thetadot" in shown and "\\u" not in shown
     assert "ψ_A = θ" in target.read_text("utf-8")
 
 
@@ -334,7 +338,7 @@ sys.exit(code)
 
 
 def injected(number: str, last: int, command: str, out: Path) -> subprocess.CompletedProcess[str]:
-    """A command that is told to stop at its n-th call of a function, or 0 for never."""
+    """A command that is to stop at its n-th call of a function, or 0 for never."""
     words = [word.format(out=out) for word in command.split()]
     return subprocess.run(
         [sys.executable, "-c", INJECTED, number, str(last), *words],

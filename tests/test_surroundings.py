@@ -247,9 +247,9 @@ def test_many_works_are_summed_by_type(
     if count == 4:
         gravity, *others = works.values()
         works = {"gravity": gravity, "drag (2)": sum(others[:2]), "motor (4)": sum(others[2:])}
-    told = dict(re.findall(r"(\w+(?: \(\d\))?) (\S+) J", said[1]))
-    assert list(told) == list(works)
-    np.testing.assert_allclose([*map(float, told.values())], [*works.values()], rtol=1e-5)
+    reported = dict(re.findall(r"(\w+(?: \(\d\))?) (\S+) J", said[1]))
+    assert list(reported) == list(works)
+    np.testing.assert_allclose([*map(float, reported.values())], [*works.values()], rtol=1e-5)
 
 
 def test_works_keep_their_names_while_they_are_few() -> None:

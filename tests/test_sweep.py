@@ -131,10 +131,30 @@ def test_what_was_stopped_goes_on(
     again = eomgen.ensemble("pendulum", {"theta": angles}, folder=folder, **asked)
     assert len(ran) == 4 and same(whole, again)
     assert {path.name: path.read_bytes() for path in sorted(folder.iterdir())} == before
-    with pytest.raises(RunError, match="holds another sweep; choose another folder"):
+    with pytest.raises(RunError, match="holds another sweep; remove it, or choose another"):
         eomgen.ensemble("two_body", design, folder=folder, **asked)
-    with pytest.raises(RunError, match="is no empty folder"):
+    with pytest.raises(RunError, match="is not an empty folder"):
         eomgen.ensemble("two_body", design, folder=tmp_path, **asked)
+
+
+def test_angles_are_varied_in_degrees_too() -> None:
+    """A grid, a list and a sample named in degrees are the same design in radians."""
+    degrees = np.array([0.0, 45.0, 90.0])
+    for by_degrees, by_radians in (
+        (eomgen.grid({"theta_deg": degrees}), eomgen.grid({"theta": np.radians(degrees)})),
+        ({"theta_deg": degrees}, {"theta": np.radians(degrees)}),
+        (
+            eomgen.sampled({"theta_dot_deg": ("uniform", -180.0, 180.0)}, 3),
+            eomgen.sampled({"theta_dot": ("uniform", -np.pi, np.pi)}, 3),
+        ),
+    ):
+        found, expected = (
+            eomgen.ensemble("pendulum", vary, t_end=0.5) for vary in (by_degrees, by_radians)
+        )
+        assert found.design.names == expected.design.names
+        assert np.allclose(found.design.values, expected.design.values, rtol=1e-15)
+        assert all(map(np.allclose, found.design.axes, expected.design.axes))
+        assert np.allclose(found.final, expected.final, rtol=1e-9)
 
 
 def test_a_full_disk_keeps_what_has_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,8 +262,9 @@ def test_samples_follow_their_laws() -> None:
         ("--vary bob_mass=1:2:0", "0 is not a number of values"),
         ("--vary bob_mass=1:2:2.5", "2.5 is not a number of values"),
         ("--vary bob_mass=-1:2:3:log", "a logarithmic axis needs positive ends"),
-        ("--vary bob_mass=a,b", "has something that is not a finite number"),
-        ("--vary bob_mass=1,nan", "has something that is not a finite number"),
+        ("--vary bob_mass=a,b", "'a' is not a finite number; write LOW:HIGH:COUNT"),
+        ("--vary bob_mass=1,nan", "'nan' is not a finite number; write LOW:HIGH:COUNT"),
+        ("--vary theta=1 --vary theta_deg=2", "an angle is given twice"),
         ("--vary q=1,2", "--vary: no parameter, state or input 'q'"),
         ("--vary bob_mass=1,2 --vary bob_mass=3,4", "a name is given twice"),
         (
@@ -252,7 +273,7 @@ def test_samples_follow_their_laws() -> None:
         ),
         ("--vary bob_mass=normal:1:0 --sample 3", "give a mean and a positive deviation"),
         ("--vary bob_mass=2:1 --sample 3", "give two numbers, the smaller first"),
-        ("--vary bob_mass=odd:1:2 --sample 3", "'odd' is no distribution"),
+        ("--vary bob_mass=odd:1:2 --sample 3", "'odd' is not a distribution"),
         ("--vary bob_mass=1:2 --sample 0", "--sample: 0 is not a number from 1 to"),
         ("--vary bob_mass=1:2 --sample 2 --seed -1", "--seed: -1 is negative"),
         ("--vary bob_mass=1,2 --of x", "--of: unknown name 'x'"),
@@ -261,13 +282,16 @@ def test_samples_follow_their_laws() -> None:
             "no output 'inverse_dynamics'",
         ),
         ("--vary bob_mass=1,2 --outputs all", "--outputs: name the functions to compute"),
-        ("--vary bob_mass=1,2 --workers 0", "--workers: 0 is no number of processes"),
+        (
+            "--vary bob_mass=1,2 --workers 0",
+            "--workers: 0 is not a number of processes; give 1 or more",
+        ),
         ("--vary bob_mass=1,2 --samples 1", "samples: 1 is too few"),
         ("--vary bob_mass=1,2 --t-end -1", "--t-end: -1 is not a positive time"),
         ("--vary bob_mass=1,2 --rtol 1e-20", "rtol: 1e-20 is too small"),
         ("--vary bob_mass=1,2 --dt 0.1", "dt: DOP853 chooses its own steps"),
         ("--vary bob_mass=1,2 --max-step -1", "max_step: -1 is not a positive step"),
-        ("--vary bob_mass=1,2 --backend x", "--backend: 'x' is none of auto, numpy, c"),
+        ("--vary bob_mass=1,2 --backend x", "--backend: 'x' is not one of auto, numpy, c"),
         ("--vary bob_mass=1:2:30000000", "is not a number of values from 1 to"),
     ],
 )

@@ -239,7 +239,7 @@ def test_without_a_compiler_the_run_says_so(monkeypatch: pytest.MonkeyPatch, tmp
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     run = eomgen.simulate("pendulum", t_end=0.5, integrator="taylor")
     assert run.finished and not run.compiled
-    assert [line for line in run.warnings if "no C compiler is found" in line]
+    assert [line for line in run.warnings if "no C compiler was found" in line]
 
 
 def test_guards_cannot_repair() -> None:

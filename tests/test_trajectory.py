@@ -12,6 +12,7 @@ import pytest
 from eomgen.errors import RunError
 from eomgen.run.archive import checked, packed, unpacked
 from eomgen.run.origin import Origin
+from eomgen.run.setup import Setup
 from eomgen.run.trajectory import (
     COUNTS,
     Event,
@@ -44,6 +45,7 @@ KEPT = replace(
     FINISHED,
     resume={"t": np.array(0.1), "y": AWKWARD[1], "held": np.empty(0)},
     origin=Origin({"body 'a'": "0f", "form": "1e"}, {"m": 0.1 + 0.2, "g": -0.0}, {"u": 5e-324}),
+    setup=Setup('{"name": "½"}', {"m": 0.1 + 0.2}, {}, AWKWARD),
 )
 
 
@@ -120,7 +122,7 @@ def test_npz_is_recognisable_and_needs_no_pickle(tmp_path):
             *("integrator", "finished", "message", "outcome"),
             *("counts", "events", "event_names", "digest"),
         ]
-        assert str(members["eomgen"]) == "trajectory 4"
+        assert str(members["eomgen"]) == "trajectory 5"
 
 
 def error_of(action, *arguments):
@@ -133,10 +135,10 @@ def test_npz_that_cannot_be_read(tmp_path):
     missing, foreign, older = (tmp_path / name for name in ("missing", "foreign", "older"))
     assert error_of(load_npz, missing) == f"{missing}: cannot be read: No such file or directory"
     foreign.write_bytes(b"PK\x03\x04 and so on")
-    assert error_of(load_npz, foreign) == f"{foreign}: is no trajectory written by eomgen"
+    assert error_of(load_npz, foreign) == f"{foreign}: is not a trajectory written by eomgen"
     older.write_bytes(packed({"eomgen": np.array("trajectory 1")}))
     assert error_of(load_npz, older) == (
-        f"{older}: is in format 'trajectory 1', but this eomgen reads 'trajectory 4'; "
+        f"{older}: is in format 'trajectory 1', but this eomgen reads 'trajectory 5'; "
         "simulate again"
     )
 
@@ -204,6 +206,9 @@ def members_of(path):
         {"t": None},
         {"event_names": None},
         {"inputs_names": None},
+        {"setup_scene": np.zeros(3)},
+        {"setup_scene": np.array([255], dtype=np.uint8)},
+        {"setup_varying": np.zeros(3)},
         {"work_names": np.array(["gravity"])},
     ],
     ids=str,

@@ -27,7 +27,7 @@ from eomgen.text import LONGEST_LINE
 
 @pytest.fixture
 def strange(tmp_path: Path) -> Iterator[dict[str, Path]]:
-    """Things with a name that are no plain files."""
+    """Things with a name that are not plain files."""
     things = {name: tmp_path / name for name in ("pipe", "socket", "folder", "device", "endless")}
     os.mkfifo(things["pipe"])
     things["folder"].mkdir()
@@ -41,7 +41,7 @@ def strange(tmp_path: Path) -> Iterator[dict[str, Path]]:
 def test_only_plain_files_are_read(strange: dict[str, Path]) -> None:
     """Nothing waits for a pipe's other end, and nothing endless is read."""
     for path in strange.values():
-        with pytest.raises(RunError, match="no plain file; save what it holds to a file"):
+        with pytest.raises(RunError, match="not a plain file; save its content to a file"):
             read_plain(path, 10)
 
 
@@ -76,10 +76,10 @@ def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
 def test_a_scene_is_a_plain_file(
     strange: dict[str, Path], capsys: pytest.CaptureFixture[str], kind: str
 ) -> None:
-    """`check <(command)` is told what to do instead of being waited for."""
+    """`check <(command)` is refused with a remedy instead of being waited for."""
     assert main(["check", str(strange[kind])]) == 1
     said = capsys.readouterr().err
-    assert said.startswith(f"eomgen: {kind}: is a ") and "no plain file; save" in said
+    assert said.startswith(f"eomgen: {kind}: is a ") and "not a plain file; save" in said
 
 
 @pytest.mark.parametrize("kind", ["pipe", "socket", "device", "endless", "folder"])
@@ -260,20 +260,23 @@ def test_a_title_is_text_wherever_it_lands(
     assert "<script>alert" not in page and "{{ 7*7 }} {% raw %} &amp; #$^~ ]]&gt;" in page
     for form in ("text", "latex", "html"):
         assert main(["derive", str(scene), "--format", form]) == 0
-        told = capsys.readouterr().out
-        assert "<script>alert" not in told or form != "html"
+        output = capsys.readouterr().out
+        assert "<script>alert" not in output or form != "html"
         if form == "latex":
-            begun = told.index(r"\begin{document}")
+            begun = output.index(r"\begin{document}")
             assert (
-                told.count(r"\end{document}") == 1 and r"\frac{x\_" not in told[begun : begun + 80]
+                output.count(r"\end{document}") == 1
+                and r"\frac{x\_" not in output[begun : begun + 80]
             )
-            assert r"\$\textbackslash{}frac\{x\_\{" in told
+            assert r"\$\textbackslash{}frac\{x\_\{" in output
 
 
 def test_a_name_with_control_characters_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Also of a file that is there: what is printed of it could not be told from other lines."""
+    """Also of a file that is there: what is printed of it could not be distinguished from other
+    lines.
+    """
     scene = tmp_path / "a\nb.toml"
     scene.write_text((BUILT_IN / "pendulum.toml").read_text("utf-8"), "utf-8")
     assert main(["check", str(scene)]) == 1

@@ -22,6 +22,7 @@ from eomgen.api.given import (
     read,
     values_of,
 )
+from eomgen.api.inputs import Inputs, in_formulas
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.entries import Entries
 from eomgen.errors import RunError
@@ -101,7 +102,7 @@ def accuracy(
     run_time: float = RUN_TIME,
     time: float = ALL_TIME,
     parameters: Values | None = None,
-    inputs: Values | None = None,
+    inputs: Inputs | None = None,
     form: Form | None = None,
     route: Route | None = None,
     table: str | PathLike[str] | None = None,
@@ -115,7 +116,8 @@ def accuracy(
     run_time    longest time of one run, s
     time        time after which no run is started, s
     parameters  values that replace those of the scene, by name
-    inputs      constant values, by name; others are 0
+    inputs      by name constant values, or formulas of t, the motion and parameters; or the path
+                of a table, as for `simulate`. Others have their defaults
     form        state form; None: the scene's own
     route       to the equations; None: the scene's own
     table       a CSV file to which runs are written and, unless `fresh`, from which earlier runs
@@ -124,7 +126,7 @@ def accuracy(
     Raises `SceneError`, or `RunError` for an invalid argument, or if the error of the reference is
     too large to compare methods.
     """
-    scene = read(source)
+    scene, constants = in_formulas(read(source), inputs)
     plan = plan_measurement(
         overridden(model_of(scene, source), form=form, route=route),
         scene.simulation,
@@ -134,7 +136,7 @@ def accuracy(
         run_time=run_time,
         time=time,
         parameters=parameters,
-        inputs=inputs,
+        inputs=constants,
     )
     return measure(plan, table=None if table is None else Path(table), fresh=fresh).found
 

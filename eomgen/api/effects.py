@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from eomgen.api.given import Source, check_time, model_of, read
+from eomgen.api.inputs import Inputs, all_in_formulas
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.scene.schema import Route, Scene
 
@@ -19,6 +20,7 @@ def effects(
     route: Route | None = None,
     each: bool = False,
     motion: float | None = MOTION,
+    inputs: Inputs | None = None,
 ) -> "Bill":
     """Measure what each effect adds to the operations and the time of a derivative, and how the
     motion changes without it.
@@ -26,11 +28,12 @@ def effects(
     route   to the equations; None: the scene's own
     each    each effect separately, not all of a type together
     motion  length of the motions that are compared, s; None: motions are not compared
+    inputs  constants, formulas or a table in place of inputs, as for `simulate`; others are 0
 
     Raises `SceneError`, or `RunError` unless `motion` is positive.
     """
     check_motion(motion)
-    scene = read(source)
+    scene = all_in_formulas(read(source), inputs)
     model_of(scene, source)
     return bill_of(scene.replaced(route=route or scene.route), each=each, motion=motion)
 

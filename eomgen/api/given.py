@@ -121,7 +121,7 @@ def check_outputs(outputs: Outputs, reporter: Reporter = SILENT) -> None:
     argument = reporter.argument("outputs")
     for name in () if outputs == "all" else outputs:
         if name in ("derivative", "jacobian"):
-            raise SceneError(f"{argument}: '{name}' is always there; leave it out")
+            raise SceneError(f"{argument}: '{name}' is always included; leave it out")
         if name not in OUTPUTS:
             hint = nearest(name, OUTPUTS) or f"; known: all, {', '.join(OUTPUTS)}"
             raise SceneError(f"{argument}: no output '{name}'{hint}")

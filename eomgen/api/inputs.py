@@ -8,13 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
-from eomgen.api.given import check_name
+from eomgen.api.given import check_name, named
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.files import read_plain
 from eomgen.language.base import identifier
 from eomgen.language.conditions import value_of
-from eomgen.language.formula import Formula, FormulaError, names_in, parse
+from eomgen.language.formula import (
+    ZERO,
+    Apply,
+    Constant,
+    Formula,
+    FormulaError,
+    Name,
+    names_in,
+    parse,
+)
 from eomgen.model.inputs import all_inputs, with_formulas
 from eomgen.run.inputs import InputsOfTime, Table
 from eomgen.scene.schema import Scene
@@ -25,6 +34,8 @@ Inputs = Mapping[str, Given] | str | PathLike[str]
 """Inputs by name, or the path of a table."""
 LARGEST_TABLE = 10**8
 """Size of the largest table that is read, bytes."""
+MOST_PIECES = 100
+"""The most corners of a table that becomes a formula."""
 
 
 def applied(
@@ -33,16 +44,128 @@ def applied(
     """A scene with the formulas given for some inputs in their place, the constants given for
     others, and all inputs if some of them are tables or functions.
 
-    Raises `RunError` for an unknown name, no formula, or a file that is no table of inputs.
+    Raises `RunError` for an unknown name, no formula, or a file that is not a table of inputs.
     """
+    argument = reporter.argument("inputs")
+    constants, formulas, varying = _by_kind(scene, inputs, reporter)
+    scene = with_formulas(scene, formulas, argument)
+    if not varying:
+        return scene, constants, None
+    every: dict[str, float | Table | Callable[[float], float]] = {
+        i.name: i.default for i in all_inputs(scene)
+    }
+    for name, value in constants.items():
+        if not (isinstance(value, int | float | np.number) and math.isfinite(value)):
+            raise RunError(f"{argument}: {name} is not a finite number")
+    return scene, {}, InputsOfTime({**every, **constants, **varying})
+
+
+def for_members(
+    scene: Scene, inputs: Inputs | None, reporter: Reporter = SILENT
+) -> tuple[Scene, dict[str, float], InputsOfTime | None]:
+    """As `applied`, for runs in several processes and on disk, which take no functions of time.
+
+    Raises `RunError` as `applied` does, and for a function.
+    """
+    scene, constants, varying = applied(scene, inputs, reporter)
+    for name, given in (varying.given if varying else {}).items():
+        if callable(given) and not isinstance(given, Table):
+            raise _of_functions(name, reporter.argument("inputs"))
+    return scene, constants, varying
+
+
+def in_formulas(
+    scene: Scene, inputs: Inputs | None, reporter: Reporter = SILENT
+) -> tuple[Scene, dict[str, float]]:
+    """A scene with the formulas and tables given for some inputs in their place, and the constants
+    given for others. A table becomes a formula, so that all that takes a scene takes it.
+
+    Raises `RunError` as `applied` does, and for a function of time or a table with too many rows.
+    """
+    argument = reporter.argument("inputs")
+    constants, formulas, varying = _by_kind(scene, inputs, reporter)
+    for name, given in varying.items():
+        if not isinstance(given, Table):
+            raise _of_functions(name, argument)
+        if len(corners := given.corners) > MOST_PIECES:
+            raise RunError(
+                f"{argument}: the table of {name} has {len(corners)} corners; here it becomes a "
+                f"formula, and may have {MOST_PIECES}; give fewer rows, or take simulate"
+            )
+        formulas[name] = piecewise(given)
+    return with_formulas(scene, formulas, argument), constants
+
+
+def _of_functions(name: str, argument: str) -> RunError:
+    return RunError(
+        f"{argument}: {name} is a function of time, which only simulate takes; give a formula of "
+        "t or a table"
+    )
+
+
+def all_in_formulas(scene: Scene, inputs: Inputs | None, reporter: Reporter = SILENT) -> Scene:
+    """The same with constants in place, too: a scene without these inputs."""
+    scene, constants = in_formulas(scene, inputs, reporter)
+    argument = reporter.argument("inputs")
+    values = named(constants, list(constants), argument, "input")
+    return with_formulas(scene, {n: Constant(x) for n, x in values.items()}, argument)
+
+
+def constant_inputs(inputs: Inputs | None, reporter: Reporter = SILENT) -> dict[str, float]:
+    """The constants given for inputs. Raises `RunError` for anything that changes."""
+    argument = reporter.argument("inputs")
+    found: dict[str, float] = {}
+    for name, given in (inputs if isinstance(inputs, Mapping) else {}).items():
+        formula = formula_of(name, given, argument) if isinstance(given, str) else ZERO
+        if callable(given) or next(names_in(formula), None) is not None:
+            raise RunError(
+                f"{argument}: {name} changes, and A and B are those of one instant; linearise "
+                f"takes constant inputs, {name}=1.5 for example"
+            )
+        found[name] = value_of(formula, {}) if isinstance(given, str) else given
+    if inputs is not None and not isinstance(inputs, Mapping):
+        raise RunError(
+            f"{argument}: a table changes, and A and B are those of one instant; linearise takes "
+            "constant inputs"
+        )
+    return found
+
+
+def piecewise(table: Table) -> Formula:
+    """A table as a formula of t: a choice by halving between the lines from corner to corner."""
+    t = np.array(table.corners)
+    if not t.size:
+        return Constant(table(0.0))
+    values = np.array([table(x) for x in t])
+    slopes = np.diff(values) / np.diff(t)
+    lines: list[Formula] = [Constant(float(values[0]))]
+    for x, y, slope in zip(t.tolist(), values.tolist(), slopes.tolist(), strict=False):
+        reach = Apply("-", (Name("t"), Constant(x)))
+        lines.append(Apply("+", (Constant(y), Apply("*", (Constant(slope), reach)))))
+    lines.append(Constant(float(values[-1])))
+
+    def among(low: int, high: int) -> Formula:
+        if high - low == 1:
+            return lines[low]
+        middle = (low + high) // 2
+        after = Apply("-", (Name("t"), Constant(float(t[middle - 1]))))
+        return Apply("select", (after, among(middle, high), among(low, middle)))
+
+    return among(0, len(lines))
+
+
+def _by_kind(
+    scene: Scene, inputs: Inputs | None, reporter: Reporter
+) -> tuple[dict[str, float], dict[str, Formula], dict[str, Table | Callable[[float], float]]]:
+    """The constants, the formulas, and the tables and functions among inputs."""
     argument, known = reporter.argument("inputs"), [i.name for i in all_inputs(scene)]
-    if inputs is None:
-        return scene, {}, None
-    if not isinstance(inputs, Mapping):
-        inputs = read_table(Path(inputs), reporter)
     constants: dict[str, float] = {}
     formulas: dict[str, Formula] = {}
     varying: dict[str, Table | Callable[[float], float]] = {}
+    if inputs is None:
+        return constants, formulas, varying
+    if not isinstance(inputs, Mapping):
+        inputs = read_table(Path(inputs), reporter)
     for name, value in inputs.items():
         name = identifier(name)
         check_name(name, known, argument, "input")
@@ -56,16 +179,7 @@ def applied(
                 formulas[name] = formula
         else:
             constants[name] = value
-    scene = with_formulas(scene, formulas, argument)
-    if not varying:
-        return scene, constants, None
-    every: dict[str, float | Table | Callable[[float], float]] = {
-        i.name: i.default for i in all_inputs(scene)
-    }
-    for name, value in constants.items():
-        if not (isinstance(value, int | float | np.number) and math.isfinite(value)):
-            raise RunError(f"{argument}: {name} is not a finite number")
-    return scene, {}, InputsOfTime({**every, **constants, **varying})
+    return constants, formulas, varying
 
 
 def formula_of(name: str, text: str, argument: str) -> Formula:
@@ -80,17 +194,17 @@ def read_table(path: Path, reporter: Reporter = SILENT) -> dict[str, Table]:
     """The inputs in a file of comma-separated values: a line with t and the names of inputs, then a
     line of numbers for each time, in ascending order. Between them the inputs are linear.
 
-    Raises `RunError`, which names the line, for a file that is no such table.
+    Raises `RunError`, which names the line, for a file that is not such a table.
     """
     argument = reporter.argument("inputs")
     try:
         text = read_plain(path, LARGEST_TABLE).decode("utf-8-sig")
         rows = list(csv.reader(text.splitlines()))
     except (UnicodeDecodeError, csv.Error) as error:
-        raise RunError(f"{argument}: {path}: is no table of text: {error}") from None
+        raise RunError(f"{argument}: {path}: is not a table of text: {error}") from None
     names = [word.strip() for word in rows[0]] if rows else []
     if "t" not in names or len(names) < 2:
-        raise RunError(f"{argument}: {path}:1: needs a first line with t and names of inputs")
+        raise RunError(f"{argument}: {path}:1: needs a first line with t and the names of inputs")
     if len(set(names)) < len(names):
         raise RunError(f"{argument}: {path}:1: a name is given twice")
     numbers = []
@@ -102,10 +216,12 @@ def read_table(path: Path, reporter: Reporter = SILENT) -> dict[str, Table]:
         except ValueError:
             values = []
         if len(values) != len(names) or not all(map(math.isfinite, values)):
-            raise RunError(f"{argument}: {path}:{line}: is not {len(names)} finite numbers")
+            raise RunError(f"{argument}: {path}:{line}: does not have {len(names)} finite numbers")
         numbers.append(values)
     table = np.array(numbers).reshape(-1, len(names))
     t = table[:, names.index("t")]
     if not len(t) or np.any(np.diff(t) <= 0):
-        raise RunError(f"{argument}: {path}: its times t must ascend; sort them, each once")
+        raise RunError(
+            f"{argument}: {path}: the times t must ascend; sort them, and give each only once"
+        )
     return {name: Table(t, table[:, i]) for i, name in enumerate(names) if name != "t"}

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Literal
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, values_of
+from eomgen.api.inputs import Inputs, constant_inputs
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, state_names, values_by_index
 from eomgen.errors import RunError
+from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
@@ -27,7 +29,7 @@ class Point:
     at: Place = "equilibrium"
     state: Values | None = None
     parameters: Values | None = None
-    inputs: Values | None = None
+    inputs: Inputs | None = None
     hold: Sequence[str] = ()
     trim: Sequence[str] = ()
 
@@ -37,7 +39,7 @@ class Linearised:
     """A linearisation with what it was made from.
 
     module         the module that was linearised, of form 'velocity'
-    start          the given state (ny,), from which an equilibrium was searched
+    start          the given state (ny,), from which an equilibrium was searched for
     linearisation  A, B and the point
     steady         whether a given state moves steadily: no velocity changes
     """
@@ -54,7 +56,7 @@ def linearise(
     at: Place = "equilibrium",
     state: Values | None = None,
     parameters: Values | None = None,
-    inputs: Values | None = None,
+    inputs: Inputs | None = None,
     hold: Sequence[str] = (),
     trim: Sequence[str] = (),
 ) -> "Linearisation":
@@ -66,8 +68,8 @@ def linearise(
                 degrees
     parameters  values that replace those of the scene, by name
     inputs      constant values, by name; others are 0
-    hold        coordinates that keep their values while an equilibrium is searched
-    trim        inputs whose values are searched as well
+    hold        coordinates that keep their values while an equilibrium is searched for
+    trim        inputs whose values are searched for as well
 
     Raises `SceneError`, or `RunError` for an invalid argument or if there is no equilibrium.
     """
@@ -91,10 +93,14 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
     from eomgen.linear.linearise import is_steady
     from eomgen.linear.linearise import linearise as linearised
 
-    at, hold, trim = point.at, point.hold, point.trim
+    at = point.at
+    hold, trim = (tuple(map(identifier, names)) for names in (point.hold, point.trim))
     if at not in ("equilibrium", "rest", "initial"):
-        raise RunError(f"{reporter.argument('at')}: '{at}' is none of equilibrium, rest, initial")
-    parameters, inputs = values_of(model, point.parameters, point.inputs, reporter)
+        raise RunError(
+            f"{reporter.argument('at')}: '{at}' is not one of equilibrium, rest, initial"
+        )
+    constants = constant_inputs(point.inputs, reporter)
+    parameters, inputs = values_of(model, point.parameters, constants, reporter)
     _, module = compiled(model, reporter=reporter)
     with reporter.located():
         problem = problem_of(module, parameters or None, inputs or None, model)
@@ -102,7 +108,7 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
         u: Mapping[str, float] | FloatArray = inputs
         if at != "initial":
             settle = at == "rest"
-            with reporter.waiting(f"searching an equilibrium of {model.name} …"):
+            with reporter.waiting(f"searching for an equilibrium of {model.name} …"):
                 y, u = equilibrium(
                     module, y, inputs, parameters, hold=hold, trim=trim, settle=settle
                 )

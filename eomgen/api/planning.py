@@ -6,16 +6,16 @@ from os import PathLike
 from typing import TYPE_CHECKING, Literal
 
 from eomgen.api.given import Values, values_of
-from eomgen.api.recording import wanted_outputs
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
 from eomgen.api.states import values_by_index
-from eomgen.errors import RunError
-from eomgen.model.elaborate import in_order
+from eomgen.errors import RunError, nearest
+from eomgen.model.elaborate import in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.results import Run
 from eomgen.run.inputs import InputsOfTime
 from eomgen.scene.schema import SHOWN, Scene
+from eomgen.study.recording import GROUPS, SAVED
 
 if TYPE_CHECKING:
     from eomgen.study.accuracy.trial import Setting
@@ -99,16 +99,16 @@ def plan_run(
     _check_aims(aims, bounds, resume, reporter)
     parameters, inputs = values_of(model, parameters, inputs, reporter)
     if guard not in (None, "stop", "repair"):
-        raise RunError(f"{reporter.argument('guard')}: '{guard}' is none of stop, repair")
+        raise RunError(f"{reporter.argument('guard')}: '{guard}' is not one of stop, repair")
     if backend not in ("auto", "numpy", "c"):
-        raise RunError(f"{reporter.argument('backend')}: '{backend}' is none of auto, numpy, c")
+        raise RunError(f"{reporter.argument('backend')}: '{backend}' is not one of auto, numpy, c")
     if varying is not None and (
         aims or estimate or guard is not None or resume is not None or backend == "c"
     ):
         raise RunError(
-            f"{reporter.argument('inputs')}: with tables and functions of time there is no choice "
-            "of method, estimate, guard, earlier run or compiled code; give a formula of t, or "
-            "leave the other out"
+            f"{reporter.argument('inputs')}: tables and functions of time do not go together with "
+            "a choice of method, an estimate, a guard, an earlier run or compiled code; give a "
+            "formula of t, or leave the other option out"
         )
     setting = None
     if not aims:
@@ -148,6 +148,24 @@ def plan_run(
     )
 
 
+def wanted_outputs(
+    names: Sequence[str], model: Model, reporter: Reporter = SILENT
+) -> tuple[str, ...]:
+    """The outputs that are needed to save what is named.
+
+    Raises `RunError` for an unknown name, or `SceneError` for one that the model lacks.
+    """
+    argument = reporter.argument("save")
+    found: list[str] = []
+    for name in names:
+        if name not in GROUPS and name not in SAVED:
+            known = (*GROUPS, *SAVED)
+            hint = nearest(name, known) or f"; known: {', '.join(known)}"
+            raise RunError(f"{argument}: no '{name}' can be saved{hint}")
+        found += GROUPS.get(name, (name,))
+    return outputs_for(found, argument, model.points, model.inputs, model.parameters, model.driven)
+
+
 def _check_aims(
     aims: Sequence[str],
     bounds: Mapping[str, float | None],
@@ -157,7 +175,7 @@ def _check_aims(
     """Raise `RunError` for two aims, or for an aim with a tolerance, a step or an earlier run."""
     if len(aims) > 1:
         both = ", ".join(map(reporter.argument, aims))
-        raise RunError(f"{both}: a run has one aim; give one of them")
+        raise RunError(f"{both}: a run has only one aim; give one of them")
     for aim in map(reporter.argument, aims):
         for name, value in bounds.items():
             if value is not None:
@@ -165,8 +183,8 @@ def _check_aims(
                 raise RunError(f"{aim}, {option}: {aim} chooses {name} itself; leave one out")
     if aims and resume is not None:
         raise RunError(
-            f"{reporter.argument('resume')}: continues with a given method; leave "
-            f"{reporter.argument('accuracy')}, {reporter.argument('budget')} out"
+            f"{reporter.argument('resume')}: continues with a given method; leave out "
+            f"{reporter.argument('accuracy')} and {reporter.argument('budget')}"
         )
 
 
@@ -185,8 +203,8 @@ def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
     asked = reporter.argument("unstable")
     if setting is None:
         raise RunError(
-            f"{asked}: is for a given step; leave {reporter.argument('accuracy')}, "
-            f"{reporter.argument('budget')} out"
+            f"{asked}: is for a given step; leave out "
+            f"{reporter.argument('accuracy')} and {reporter.argument('budget')}"
         )
     method = find_integrator(setting.integrator)
     if not (isinstance(method, FixedStep) and method.explicit):

@@ -10,7 +10,6 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, model_of, overridden, read
 from eomgen.api.inputs import Inputs, applied
 from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
-from eomgen.api.recording import recorded, unknown_forces
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, origin_from, split
 from eomgen.model.elaborate import expanded
@@ -22,6 +21,8 @@ from eomgen.run.problem import Problem
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.schema import Form, Route
 from eomgen.study.diagnosis import problem_of
+from eomgen.study.observed import setup_of
+from eomgen.study.recording import recorded, unknown_forces
 
 if TYPE_CHECKING:
     from eomgen.native.accelerator import Accelerator
@@ -71,18 +72,20 @@ def simulate(
     parameters  values that replace those of the scene, by name
     state       values that replace those of the scene's initial state, by name; `<name>_deg` in
                 degrees
-    inputs      by name constant values; formulas of t, the motion and parameters, as "3*sin(t)",
-                which become part of the module; or functions of t. Or the path of a table with a
-                line t and names, then a line for each time; between them inputs are linear. With
-                tables and functions nothing is compiled. Others have their defaults
+    inputs      a mapping by name: constants; formulas of t, the motion and parameters, for example
+                "3*sin(t)", which become part of the module; or functions of t. Or the path of a
+                table whose first line has t and the names of inputs, and which has a line for each
+                time; between these times inputs are linear. With tables and functions nothing is
+                compiled. Inputs that are not given have their defaults
     form        state form; None: the scene's own
     route       to the equations; None: the scene's own
-    samples     number of rows that are kept, about
+    samples     approximate number of rows to keep
     max_step    longest step of an adaptive method, s
     works       also compute the work of each effect, J
-    save        what results hold beside states: "energy", "points", "poses", "works", "inputs", or
-                outputs by name, "joint_forces" for example; see `Run.saved`
-    guard       check rounding errors at each step, and "stop" where digits are lost, or "repair"
+    save        what to save beside the states: "energy", "points", "poses", "works", "inputs", or
+                outputs by name, for example "joint_forces"; see `Run.saved`
+    guard       check rounding errors at each step; where digits are lost, "stop" the run or
+                "repair" the step
     unstable    allow steps of an explicit fixed-step method that are too long for stability
     estimate    estimate the error by a second run
     resume      continue an earlier run: a `Run`, or its archive `.npz`
@@ -169,15 +172,18 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
         estimate = by_second_run(case, trial)
         error = estimate.last
-    if told := _why_not_compiled(plan, accelerator):
-        warnings.append(told)
-        reporter.note(told)
+    varying = plan.varying(trajectory.t).T if plan.varying else None
+    if notice := _why_not_compiled(plan, accelerator):
+        warnings.append(notice)
+        reporter.note(notice)
     trajectory = replace(
-        trajectory, saved=recorded(plan.save, model, functions, trajectory, values)
+        trajectory,
+        saved=recorded(plan.save, model, functions, trajectory, values),
+        setup=setup_of(plan.scene, model, plan.parameters, plan.inputs, varying=varying),
     )
-    if told := unknown_forces(trajectory):
-        warnings.append(told)
-        reporter.note(told)
+    if notice := unknown_forces(trajectory):
+        warnings.append(notice)
+        reporter.note(notice)
     model = model.with_parameters(plan.parameters)
     # What varies is not 0.
     pushing = dict.fromkeys(plan.varying.given, 1.0) if plan.varying else plan.inputs
@@ -208,7 +214,7 @@ def _error_of_choice(choice: "Choice | None") -> tuple[float, list[str]]:
     if choice.met:
         return choice.error, []
     why = choice.reason or UNKNOWN
-    return choice.error, [f"accuracy: not reached, the estimate is {choice.error:.1g}: {why}"]
+    return choice.error, [f"accuracy: not reached; the error estimate is {choice.error:.1g}: {why}"]
 
 
 def _problem(
@@ -263,7 +269,7 @@ def _why_not_compiled(plan: Plan, accelerator: "Accelerator | None") -> str:
     if accelerator and plan.backend == "c" and not accelerator.used:
         return (
             "nothing was computed in C: a parameter, or a constant computed from them, is too "
-            "small or too large for that"
+            "small or too large"
         )
     return ""
 

@@ -32,7 +32,7 @@ def values_by_index(model: Model, given: Values | None, reporter: Reporter) -> d
     option, names = reporter.argument("state"), state_names(model)
     if given and model.form != "velocity":
         raise RunError(
-            f"{option}: is for form = 'velocity'; of the form '{model.form}' change [initial]"
+            f"{option}: is for form = 'velocity'; in the form '{model.form}', change [initial]"
         )
     count = len(model.coordinates) + len(model.velocities) + len(model.states)
     found: dict[int, float] = {}
@@ -41,7 +41,7 @@ def values_by_index(model: Model, given: Values | None, reporter: Reporter) -> d
         if index >= count:
             index, value = names.index(name.removesuffix("_deg")), math.radians(value)
         if index in found:
-            raise RunError(f"{option} {name}: {names[index]} is given too; give one of them")
+            raise RunError(f"{option} {name}: {names[index]} is also given; give only one of them")
         found[index] = value
     return found
 
@@ -60,10 +60,13 @@ def initial_with(
     for indices in map(list, model.quaternions):
         length = float(np.linalg.norm(y[indices]))
         if not length:
-            raise RunError(f"{option}: the quaternion from {names[indices[0]]} on has no length")
+            raise RunError(
+                f"{option}: the quaternion that starts at {names[indices[0]]} has no length"
+            )
         if abs(length - 1) > UNIT_TOLERANCE:
             reporter.note_scene(
-                f"{option}: the quaternion from {names[indices[0]]} on has length {length:g}; "
+                f"{option}: the quaternion that starts at {names[indices[0]]} has length "
+                f"{length:g}; "
                 "scaled to 1"
             )
         y[indices] /= length

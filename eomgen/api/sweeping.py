@@ -11,9 +11,11 @@ import numpy as np
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check_name, check_time, model_of, read, values_of
+from eomgen.api.inputs import Inputs, for_members
 from eomgen.api.planning import Backend
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
+from eomgen.api.states import state_names
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
@@ -27,12 +29,13 @@ from eomgen.run.checks import (
     check_tolerances,
     longest_steps,
 )
+from eomgen.run.inputs import InputsOfTime
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.fixed_step import count_steps
 from eomgen.run.problem import FloatArray
 from eomgen.scene.schema import Scene
 from eomgen.study.accuracy.trial import Setting
-from eomgen.sweep.design import Design, Law, grid, listed, sampled
+from eomgen.sweep.design import Design, Law, grid, in_radians, listed, sampled
 from eomgen.sweep.ensemble import Ensemble
 from eomgen.sweep.execute import chunk_size, execute
 from eomgen.sweep.layout import Memory, bytes_each, layout_of, worded
@@ -62,6 +65,7 @@ class SweepPlan:
     t_end: float
     parameters: Mapping[str, float]
     inputs: Mapping[str, float]
+    varying: InputsOfTime | None
     outputs: tuple[str, ...]
     samples: int
     max_step: float | None
@@ -78,7 +82,7 @@ def ensemble(
     rtol: float | None = None,
     atol: float | None = None,
     parameters: Values | None = None,
-    inputs: Values | None = None,
+    inputs: Inputs | None = None,
     outputs: Sequence[str] = (),
     samples: int = 2,
     max_step: float | None = None,
@@ -89,22 +93,24 @@ def ensemble(
 ) -> Ensemble:
     """Run a scene many times, with other parameters, initial states or inputs.
 
-    vary        lists of values by name of a parameter, a state or an input, one for each member;
-                or `grid(...)` or `sampled(...)`
+    vary        lists of values by name of a parameter, a state or an input, one for each member,
+                `<name>_deg` of an angle in degrees; or `grid(...)` or `sampled(...)`
     t_end, integrator, dt, rtol, atol, max_step  as for `simulate`
-    parameters, inputs  values that all members have
+    parameters, inputs  values that all members have; inputs may also be formulas of t, the motion
+                and parameters, or the path of a table, as for `simulate`; with a table nothing is
+                compiled
     outputs     functions of the module to compute: "kinetic_energy" for example
-    samples     number of rows that are kept, about; 2 keeps the ends alone
+    samples     approximate number of rows to keep; 2 keeps only the first and the last
     backend     "numpy": run in Python; "c": compile at once; "auto": compile if that pays
     workers     number of processes, or threads if members run together in compiled code. With more
                 than one, a script needs `if __name__ == "__main__":`
     scheduler   address of a Dask scheduler whose workers run the members
-    folder      keeps what has run, so that the same call goes on after it was stopped
+    folder      where finished members are kept, so that the same call continues a stopped sweep
 
     A member that stops or is refused is a row that says so. The results do not depend on backend,
     workers or scheduler. Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene = read(source)
+    scene, constants, varying = for_members(read(source), inputs)
     design = vary if isinstance(vary, Design) else listed(vary)
     plan = plan_sweep(
         scene,
@@ -116,7 +122,8 @@ def ensemble(
         rtol=rtol,
         atol=atol,
         parameters=parameters,
-        inputs=inputs,
+        inputs=constants,
+        varying=varying,
         outputs=outputs,
         samples=samples,
         max_step=max_step,
@@ -138,6 +145,7 @@ def plan_sweep(
     atol: float | None = None,
     parameters: Values | None = None,
     inputs: Values | None = None,
+    varying: InputsOfTime | None = None,
     outputs: Sequence[str] = (),
     samples: int = 2,
     max_step: float | None = None,
@@ -150,15 +158,22 @@ def plan_sweep(
     t_end = scene.simulation.t_end if t_end is None else t_end
     check_time(t_end, argument("t_end"))
     if backend not in ("auto", "numpy", "c"):
-        raise RunError(f"{argument('backend')}: '{backend}' is none of auto, numpy, c")
+        raise RunError(f"{argument('backend')}: '{backend}' is not one of auto, numpy, c")
     for name in outputs:
         check_name(name, [n for n in OUTPUTS if n not in DYNAMICS], argument("outputs"), "output")
     setting = setting_of(
         scene.simulation, integrator, dt=dt, rtol=rtol, atol=atol, reporter=reporter
     )
     fixed = values_of(model, parameters, inputs, reporter)
+    design = in_radians(design, _degrees(model))
+    if varying is not None and backend == "c":
+        raise RunError(
+            f"{argument('inputs')}: with a table nothing is compiled; give a formula of t, or "
+            "leave the backend out"
+        )
+    tables = [name for name, x in (varying.given if varying else {}).items() if callable(x)]
     for name in design.names:
-        if any(name in values for values in fixed):
+        if any(name in values for values in (*fixed, tables)):
             raise RunError(f"{argument('vary')}: {name} is also given a fixed value; leave one out")
     return SweepPlan(
         scene,
@@ -167,11 +182,20 @@ def plan_sweep(
         setting,
         t_end,
         *fixed,
+        varying,
         tuple(outputs),
         samples,
         max_step,
         backend,
     )
+
+
+def _degrees(model: Model) -> dict[str, str]:
+    """The names of angles in degrees, unless something else has them, with those in radians."""
+    plain = len(model.coordinates) + len(model.velocities) + len(model.states)
+    others = {*model.defaults, *(i.name for i in model.inputs)}
+    angles = state_names(model)[plain:]
+    return {name: name.removesuffix("_deg") for name in angles if name not in others}
 
 
 def run_sweep(
@@ -184,7 +208,10 @@ def run_sweep(
 ) -> Ensemble:
     """Run a plan. Raises `RunError` if it cannot begin, or if workers fail."""
     if workers < 1:
-        raise RunError(f"{reporter.argument('workers')}: {workers} is no number of processes")
+        raise RunError(
+            f"{reporter.argument('workers')}: {workers} is not a number of processes; give 1 or "
+            "more"
+        )
     model = plan.model
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     state_names: tuple[str, ...] = functions.STATES
@@ -202,6 +229,7 @@ def run_sweep(
         kinds=tuple(_kind(name, model, state_names, reporter) for name in plan.design.names),
         parameters=plan.parameters,
         inputs=plan.inputs,
+        varying=plan.varying,
         outputs=plan.outputs,
         t_end=plan.t_end,
         times=times,
@@ -249,8 +277,8 @@ def run_sweep(
 
 
 def _times(plan: SweepPlan) -> tuple[tuple[float, ...], float, int]:
-    """The times of the rows that are kept, s; for fixed steps also the step, and that each so many
-    are kept.
+    """The times of the rows that are kept, s; for fixed steps also the step, and the number of
+    steps from one row to the next.
     """
     method = find_integrator(plan.setting.integrator)
     if not isinstance(method, FixedStep):
@@ -281,10 +309,11 @@ def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] |
     from eomgen.native.compiler import find_compiler
     from eomgen.store import interfaced_program_of
 
-    if plan.backend == "numpy":
+    if plan.backend == "numpy" or plan.varying is not None:
         return None
     if plan.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
-        reporter.note(f"steps of {plan.setting.integrator} are not compiled, but their derivatives")
+        method = plan.setting.integrator
+        reporter.note(f"steps of {method} are not compiled, but their derivatives are")
     try:
         find_compiler()
     except RunError as error:

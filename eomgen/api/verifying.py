@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from eomgen.api.given import Source, check_states, check_time, model_of, read
+from eomgen.api.inputs import Inputs, all_in_formulas
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.model import Model
@@ -21,7 +22,12 @@ MOST_STATES = 10_000
 
 
 def verify(
-    source: Source, *, states: int | None = None, seed: int = 0, bound: float | None = None
+    source: Source,
+    *,
+    states: int | None = None,
+    seed: int = 0,
+    bound: float | None = None,
+    inputs: Inputs | None = None,
 ) -> "Verified":
     """Compare the generated module with an independent solver and with 60 digits.
 
@@ -31,22 +37,24 @@ def verify(
     seed    of the random states
     bound   greatest error of v̇, units in the last place; None: the effect of errors of half a unit
             in the data
+    inputs  constants, formulas or a table in place of inputs, as for `simulate`; others are
+            sampled, and 0 in the scene's own run
 
     Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene = read(source)
+    scene = all_in_formulas(read(source), inputs)
     return verified_model(
         model_of(scene, source), scene.simulation, states=states, seed=seed, bound=bound
     )
 
 
-def horizon(source: Source, *, seconds: float = 60.0) -> "Horizon":
+def horizon(source: Source, *, seconds: float = 60.0, inputs: Inputs | None = None) -> "Horizon":
     """Estimate for how long a run in doubles follows the exact motion of a scene.
 
-    It is compared with a run in extended precision that takes at most `seconds`. Raises
-    `SceneError`, or `RunError` for an invalid argument.
+    The run is compared with one in extended precision that takes at most `seconds`. `inputs` are
+    as for `verify`. Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene = read(source)
+    scene = all_in_formulas(read(source), inputs)
     return horizon_of(model_of(scene, source), scene.simulation, seconds=seconds)
 
 

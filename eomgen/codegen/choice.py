@@ -61,12 +61,12 @@ class Choice:
         if self.digits is None:
             return []
         return [
-            f"{_ILL_CONDITIONED}; by the best, '{self.derived.route}', "
+            f"{_ILL_CONDITIONED}; with the best, '{self.derived.route}', "
             f"{self.digits} of {ALL:.0f} digits of accelerations are right"
         ]
 
 
-_ILL_CONDITIONED = "bodies and joints so uneven cost every route digits"
+_ILL_CONDITIONED = "the bodies and joints are so uneven that every route loses digits"
 
 
 def choose(model: Model, *, closed: bool = True) -> Choice:
@@ -82,7 +82,7 @@ def choose(model: Model, *, closed: bool = True) -> Choice:
     if model.route != "auto":
         return _only(model, model.route, "named")
     if model.form != "velocity":
-        return _only(model, "closed", f"form '{model.form}' comes from it alone")
+        return _only(model, "closed", f"form '{model.form}' comes from this route alone")
     candidates, attempts = _attempts(model, closed)
     routes = {name: _route(model, attempt) for name, attempt in attempts.items()}
     judged, digits = _judged(candidates, digits_lost(model, routes)), None
@@ -93,9 +93,7 @@ def choose(model: Model, *, closed: bool = True) -> Choice:
         lost = digits_lost(model, routes, closely=True)
         judged = _judged(candidates, lost)
         if not _accepted(judged):
-            words = (
-                f"keeps digits that bodies and joints take from others, {lost['aba']:.0f} of aba"
-            )
+            words = f"keeps digits that the other routes lose: aba loses {lost['aba']:.0f}"
             judged.append(Candidate(last, _operations(attempts[last].alone), words))
             digits = _correct_digits(lost[last])
     best = min(_accepted(judged), key=lambda c: c.operations or 0)
@@ -173,9 +171,9 @@ def _correct_digits(lost: float) -> int | None:
     correct = max(0, math.floor(ALL - lost - SPARE))
     if correct < FEWEST:
         raise SceneError(
-            f"route: {_ILL_CONDITIONED}; by the best, 'orthogonal', "
+            f"route: {_ILL_CONDITIONED}; with the best, 'orthogonal', "
             f"only {correct} of {ALL:.0f} digits of accelerations would be right; make "
-            "them less uneven, or give route = 'orthogonal' to take it all the same"
+            "them less uneven, or give route = 'orthogonal' to take it anyway"
         )
     return correct if correct < ENOUGH else None
 

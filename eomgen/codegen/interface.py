@@ -11,7 +11,7 @@ from eomgen.model.model import Model, Prescribed
 from eomgen.outputs import DERIVATIVES, JACOBIAN, OUTPUTS
 
 ABOUT = {
-    "initial_state": "The scene's initial state; momenta follow the parameters.",
+    "initial_state": "The scene's initial state; momenta depend on the parameters.",
     "derivative": "Time derivative of the state.",
     "jacobian": JACOBIAN.about,
     "gaps": "Gap of each of `CONTACTS`, m or rad; negative if they overlap.",
@@ -112,7 +112,7 @@ def interface_of(system: System) -> Interface:
     model = system.model
     left_out = []
     if "velocity_forces" in model.leave_out:
-        rest = ", of which V keeps what driving takes" if model.driven else ": M v̇ + G = F"
+        rest = ", except the terms of the driven motion in V" if model.driven else ": M v̇ + G = F"
         left_out.append(f"Left out: velocity forces{rest}.")
     return Interface(
         name=model.name,

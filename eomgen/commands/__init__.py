@@ -96,6 +96,20 @@ def gallery(given: Arguments) -> int:
     return exhibiting.gallery(given)
 
 
+def plot(given: Arguments) -> int:
+    """Draw a figure of a run."""
+    from eomgen.commands import picturing
+
+    return picturing.plot(given)
+
+
+def film(given: Arguments) -> int:
+    """Make a film of a run."""
+    from eomgen.commands import picturing
+
+    return picturing.film(given)
+
+
 def sweep(given: Arguments) -> int:
     """Run a scene many times."""
     from eomgen.commands import sweeping

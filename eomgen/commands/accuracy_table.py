@@ -38,7 +38,7 @@ def print_table(name: str, made: Measurement) -> None:
     print_wrapped("    reference: ", f"{truth.origin} ({_time(truth.seconds)})")
     print_wrapped(
         "    ",
-        f"its own error {truth.error:.1g} of the motion's scale: errors are told apart from "
+        f"its own error {truth.error:.1g} of the motion's scale: errors are resolved down to "
         f"{floor:.1g} on",
     )
     print_wrapped("    energy: ", _energy(bench))

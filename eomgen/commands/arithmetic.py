@@ -88,8 +88,9 @@ def _print_notes(found: "Arithmetic", model: Model) -> None:
     print_wrapped("    condition of the mass matrix, its diagonal scaled to 1: ", conditions)
     print_wrapped(
         "    ulp: ",
-        "that of the greatest acceleration of the same unit, but at least of 1/1000 of its median "
-        "over the states; a correctly rounded result has 0.5. linalg.solve: M v̇ = F - V - G solved "
+        "the spacing of doubles at the greatest acceleration with the same unit, or at 1/1000 of "
+        "its median over the states if that is more; a correctly rounded result has an error of "
+        "0.5. linalg.solve: M v̇ = F - V - G solved "
         "by NumPy; its operations are those of the terms and of the elimination",
     )
     parts = [f"60 digits, of which two routes agree in {found.agreed:.0f}; inputs 0"]
@@ -97,7 +98,7 @@ def _print_notes(found: "Arithmetic", model: Model) -> None:
         if sample.until is not None:
             parts.append(f"{sample.kind} to t = {sample.until:.4g} s")
         if sample.left_out:
-            parts.append(f"{sample.left_out} {sample.kind} without a finite acceleration left out")
+            parts.append(f"{sample.left_out} {sample.kind} left out: no finite acceleration")
     if model.form != "velocity":
         parts.append(f"form '{model.form}' is evaluated as 'velocity'")
     if any(getattr(effect, "law", "") == "impact" for effect in model.effects):

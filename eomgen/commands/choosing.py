@@ -41,13 +41,16 @@ def print_choice(choice: "Choice", given: Arguments) -> str:
         return ""
     print(f"    chosen: {run.setting.options}")
     print(f"    error estimate {_error(choice.error)} at the end{_most(choice)}")
-    print(f"    it took {run.seconds:.2g} s, all {choice.runs} trial runs {choice.seconds:.2g} s")
+    print(
+        f"    this run took {run.seconds:.2g} s, all {choice.runs} trial runs "
+        f"{choice.seconds:.2g} s"
+    )
     if not choice.met:
         from eomgen.study.accuracy.aimed import UNKNOWN
 
         why = choice.reason or UNKNOWN
         return (
-            f"--accuracy {given.accuracy:g}: not reached, the best run's estimate is "
+            f"--accuracy {given.accuracy:g}: not reached; the best run's error estimate is "
             f"{choice.error:.1g}: {why}; take a shorter --t-end"
         )
     return ""

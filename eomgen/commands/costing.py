@@ -4,10 +4,19 @@ import math
 from typing import TYPE_CHECKING
 
 from eomgen.api.effects import bill_of, check_motion
+from eomgen.api.inputs import all_in_formulas
 from eomgen.api.reporter import Reporter
-from eomgen.commands.shared import OPTIONS, Arguments, print_wrapped, read_whole, reporter_of
+from eomgen.commands.shared import (
+    OPTIONS,
+    Arguments,
+    given_inputs,
+    print_wrapped,
+    read_whole,
+    reporter_of,
+)
 from eomgen.errors import InterruptedRunError
 from eomgen.files import check_folder
+from eomgen.scene.reader import read_scene
 
 if TYPE_CHECKING:
     from eomgen.study.cost.bill import Bill, Item
@@ -22,7 +31,9 @@ def effects(given: Arguments) -> int:
     from eomgen.show.style import check_figure
 
     check_motion(given.motion_time, Reporter(argument=OPTIONS.__getitem__))
-    scene, model, name = read_whole(given.scene, given)
+    reporter = reporter_of(given, given.scene)
+    tables = all_in_formulas(read_scene(given.scene), given_inputs(given.input), reporter)
+    scene, model, name = read_whole(given.scene, given, tables)
     path = given.output / f"{name}_effects.png"
     check_folder(path.parent)
     check_figure(path, force=given.force)
@@ -31,7 +42,7 @@ def effects(given: Arguments) -> int:
         each=given.each,
         motion=None if given.no_motion else given.motion_time,
         name=name,
-        reporter=reporter_of(given, given.scene),
+        reporter=reporter,
     )
     print(
         f"{name}: one derivative takes {found.operations} operations, {_us(found.seconds)} µs "
@@ -86,7 +97,9 @@ def _print_items(bill: "Bill") -> None:
         print("    left out by the scene, with what it would add:")
         lines("left out")
     if {bill.bare_route, *(item.route for item in bill.items)} - {"", bill.route}:
-        print_wrapped("    ", f"(route): the route without it; with all of them it is {bill.route}")
+        print_wrapped(
+            "    ", f"(route): the route without this effect; with all effects it is {bill.route}"
+        )
 
 
 def _needed(item: "Item") -> str:

@@ -1,25 +1,38 @@
 """The command `derive`."""
 
 import sys
+from pathlib import Path
 
 from eomgen.api.deriving import derivation_of
 from eomgen.commands.shared import Arguments, read_model, reporter_of
+from eomgen.errors import RunError
 from eomgen.files import check_writable, write_whole
 
 
 def derive(given: Arguments) -> int:
     """Print or write the derivation as text, LaTeX or HTML."""
+    kind = given.format or _kind(given.output)
     model, _ = read_model(given.scene, given)
     if given.output is not None:
         check_writable(given.output, force=given.force)
     found = derivation_of(model, reporter_of(given, given.scene), form=given.state_form)
-    if given.format == "text":
+    if kind == "text":
         text = found.text(encoding="utf-8" if given.output else sys.stdout.encoding)
     else:
-        text = found.latex() if given.format == "latex" else found.html()
+        text = found.latex() if kind == "latex" else found.html()
     if given.output is None:
         print(text)
     else:
         write_whole(given.output, text, force=given.force)
         print(f"wrote {given.output}")
     return 0
+
+
+def _kind(output: Path | None) -> str:
+    """What is written to a file, by its ending. Raises `RunError` for a PDF."""
+    if output is None:
+        return "text"
+    if output.suffix == ".pdf":
+        tex = output.with_suffix(".tex")
+        raise RunError(f"-o {output}: write {tex}, of which pdflatex makes a PDF")
+    return {".html": "html", ".tex": "latex"}.get(output.suffix, "text")

@@ -97,7 +97,7 @@ def _print_terms(module: Module) -> None:
     for line in explained(module.source):
         if line.kernel != kernel:
             kernel = line.kernel
-            print(f"    {kernel}: line, and the term that it is or is part of")
+            print(f"    {kernel}: each line, and the term that it computes or is part of")
         text = line.line if len(line.line) <= LONGEST_LINE else f"{line.line[: LONGEST_LINE - 2]} …"
         print(f"      {text:<{LONGEST_LINE}}  {line.term}")
 

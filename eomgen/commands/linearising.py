@@ -10,7 +10,7 @@ from eomgen.api.states import state_names
 from eomgen.commands.shared import (
     Arguments,
     assignments,
-    given_values,
+    given_inputs,
     located,
     print_listed,
     print_wrapped,
@@ -36,14 +36,14 @@ def linearise(given: Arguments) -> int:
     """Print the linearisation, its modes, stability and controllability; write A and B."""
     model, _ = read_model(given.scene, given)
     model = linearisable(model)
-    parameters, inputs = given_values(given, model)
+    parameters = assignments(given.set, model.defaults, "--set")
     if given.output is not None:
         check_writable(given.output, force=given.force)
         if given.output.suffix not in (".npz", ".csv"):
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
     with located(given.scene):
         state = assignments(given.state, state_names(model), "--state")
-    point = Point(given.at, state, parameters, inputs, given.hold, given.trim)
+    point = Point(given.at, state, parameters, given_inputs(given.input), given.hold, given.trim)
     found = linearised_at(model, point, reporter_of(given, given.scene))
     linearisation = found.linearisation
     reduced = linearisation.reduced()
@@ -78,8 +78,8 @@ def _print_point(
     nq = len(module.POSITIONS)
     kind = {
         "equilibrium": "an equilibrium",
-        "rest": "where it comes to rest",
-        "initial": "the state given",
+        "rest": "the state where it comes to rest",
+        "initial": "the given state",
     }
     print(f"{module.NAME}: linearised about {kind[at]}")
     velocities = range(nq, 2 * nq - len(module.QUATERNIONS))
@@ -92,7 +92,7 @@ def _print_point(
         after = f" ({_number(math.degrees(value))} deg)" if unit == "rad" and value else ""
         if (
             i >= velocities.stop and unit
-        ):  # a state of a controller: its name does not tell its unit
+        ):  # a state of a controller: its name does not give its unit
             after = f" {unit}"
         values.append(f"{name} = {_number(value)}{after}")
     print_listed("state       ", shortened(values, 80))
@@ -173,7 +173,7 @@ def _mode(mode: Mode) -> tuple[str, str]:
     if mode.rate:
         time = math.log(2) / abs(mode.rate)
         return _number(mode.rate), f"{'doubles' if mode.rate > 0 else 'halves'} in {time:.4g} s"
-    return "0", "stays, or drifts"
+    return "0", "stays or drifts"
 
 
 def _number(x: float) -> str:

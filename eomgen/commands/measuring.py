@@ -1,15 +1,24 @@
 """The command `accuracy`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from eomgen.api.accuracy import Accuracy, measure, plan_measurement
+from eomgen.api.inputs import in_formulas
 from eomgen.commands.arithmetic import check_files, print_arithmetic
-from eomgen.commands.shared import Arguments, given_values, print_listed, read_whole, reporter_of
+from eomgen.commands.shared import (
+    Arguments,
+    assignments,
+    given_inputs,
+    print_listed,
+    read_whole,
+    reporter_of,
+)
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_line
+from eomgen.scene.reader import read_scene
 from eomgen.scene.schema import Simulation
 
 if TYPE_CHECKING:
@@ -19,24 +28,32 @@ if TYPE_CHECKING:
 
 def accuracy(given: Arguments) -> int:
     """Print, write and draw time and error of runs by each method, and rounding errors of v̇."""
-    scene, model, name = read_whole(given.scene, given)
+    reporter = reporter_of(given, given.scene)
+    tables, inputs = in_formulas(read_scene(given.scene), given_inputs(given.input), reporter)
+    scene, model, name = read_whole(given.scene, given, tables)
     if not given.no_arithmetic:
         check_files(given, name)
     if not given.arithmetic:
-        _runs(given, model, scene.simulation, name)
+        _runs(given, model, inputs, scene.simulation, name)
     if not given.no_arithmetic:
         print_arithmetic(given, model, scene.simulation, name)
     return 0
 
 
-def _runs(given: Arguments, model: Model, simulation: Simulation, name: str) -> None:
+def _runs(
+    given: Arguments,
+    model: Model,
+    inputs: Mapping[str, float],
+    simulation: Simulation,
+    name: str,
+) -> None:
     """Run each method at its tolerances or steps; print, write and draw the results."""
     from eomgen.commands.accuracy_table import print_table
     from eomgen.show.style import check_figure
     from eomgen.study.accuracy.reference import save as save_reference
 
     reporter = reporter_of(given, given.scene)
-    parameters, inputs = given_values(given, model)
+    parameters = assignments(given.set, model.defaults, "--set")
     plan = plan_measurement(
         model,
         simulation,
@@ -90,7 +107,7 @@ def _print_origin(found: Accuracy, seconds: float) -> None:
             "repeats them)"
         )
     if found.left_out:
-        print(f"    {seconds:g} s passed before finer runs of these; the same command continues:")
+        print(f"    {seconds:g} s passed before all runs were made; the same command makes these:")
         print_listed("        ", found.left_out)
 
 
@@ -108,14 +125,14 @@ def _draw(
     truth = bench.reference
     energy = ""
     if bench.energy is not None:
-        energy = "Energy drift, in parts of the motion's own"
+        energy = "Energy drift, relative to the motion's own"
     elif any(work.energy_drift >= 0 for work in shown):
         energy = "Energy unaccounted for at the end"
     floor, _ = bench.floors
     about = (
         f"{model.title or model.name}, {t_end:g} s, form {model.form}; "
         "time is the least of repeated runs, outputs off\n"
-        f"reference: its own error {truth.error:.1g}, errors are told apart from {floor:.1g} on; "
+        f"reference: its own error {truth.error:.1g}, errors are resolved down to {floor:.1g}; "
         f"{truth.origin.partition(';')[0]}"
     )
     save(Diagram(name, about, floor, energy, model.form == "redundant"), shown, path, force=force)

@@ -5,6 +5,8 @@ import sys
 import webbrowser
 from pathlib import Path
 
+import numpy as np
+
 from eomgen.api.inputs import applied
 from eomgen.api.planning import plan_run
 from eomgen.api.saving import output_paths, save_run
@@ -28,6 +30,9 @@ from eomgen.results import Run
 from eomgen.run.parquet import check_parquet
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.reader import read_scene
+
+ROUNDING = 1e-12
+"""Energies smaller than this, relative to the greatest of the run, are printed as 0."""
 
 
 def simulate(given: Arguments) -> int:
@@ -154,15 +159,20 @@ def _print_energy(run: Run) -> None:
     of kinetic energy that the works do not explain, J.
     """
     motion, total = run.motion, run.energy
-    print(f"    energy {total[0]:.9g} J at the start, {total[-1]:.9g} J at the end")
+    least = ROUNDING * float(np.abs([motion.kinetic_energy, motion.potential_energy]).max())
+
+    def shown(energy: float) -> float:
+        return energy if abs(energy) > least else 0.0
+
+    print(f"    energy {shown(total[0]):.9g} J at the start, {shown(total[-1]):.9g} J at the end")
     if motion.works is None:
         return
     works, kinetic = motion.works[-1], motion.kinetic_energy
-    each = [f"{name} {work:.6g} J" for name, work in zip(motion.effects, works, strict=True)]
+    each = [f"{name} {shown(work):.6g} J" for name, work in zip(motion.effects, works, strict=True)]
     print_listed("    work: ", shortened(each))
     change = float(kinetic[-1] - kinetic[0])
     left = change - works.sum()
-    print(f"    kinetic energy changed by {change:.6g} J, {left:.2g} J unaccounted for")
+    print(f"    kinetic energy changed by {shown(change):.6g} J, {left:.2g} J unaccounted for")
 
 
 def _print_events(trajectory: Trajectory) -> None:
@@ -188,7 +198,7 @@ def _print_excursions(run: Run) -> None:
             f"farthest {out.farthest:.4g} {unit} at t = {out.at:.4g} s"
         )
     given = {c.position.name: "locked" if c.locked else "driven" for c in model.prescribed}
-    why = f"is no state of the form '{model.form}'"
+    why = f"is not a state of the form '{model.form}'"
     lines += [
         f"{name} has limits, but {f'is {given[name]}' if name in given else why}"
         for name in run.limits

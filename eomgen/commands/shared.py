@@ -111,7 +111,7 @@ def assignments(
 
     Raises `RunError` for an unknown name, or an X that is not a finite number.
     """
-    what = {"--set": "parameter", "--input": "input", "--state": "state"}[option]
+    what = {"--set": "parameter", "--state": "state"}[option]
     values = {}
     for text in texts:
         name, sign, number = text.partition("=")
@@ -128,12 +128,6 @@ def assignments(
             raise RunError(f"{option} {text}: gives no finite number; write {option} {name}=1.5")
         values[name] = value + 0.0  # -0.0 becomes 0.0, as in a scene
     return values
-
-
-def given_values(given: Arguments, model: Model) -> tuple[dict[str, float], dict[str, float]]:
-    """The values of `--set` and of `--input`. Raises `RunError` as `assignments` does."""
-    parameters = assignments(given.set, model.defaults, "--set")
-    return parameters, assignments(given.input, [i.name for i in model.inputs], "--input")
 
 
 def given_inputs(texts: list[str]) -> dict[str, Given]:
@@ -153,7 +147,7 @@ def overlap_lines(model: Model) -> list[str]:
     """A line for each soft contact or stop that overlaps at the initial state."""
     return [
         f"{found.kind} '{found.effect}' starts {found.depth:.3g} {found.unit} deep, "
-        f"with {found.energy:.3g} J in it"
+        f"with {found.energy:.3g} J stored in it"
         for found in overlaps_at_start(model)
     ]
 

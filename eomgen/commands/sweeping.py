@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from eomgen.api.generating import compiled
+from eomgen.api.inputs import for_members
 from eomgen.api.reporter import Reporter
 from eomgen.api.saving import save_statistics, save_sweep
 from eomgen.api.sweeping import (
@@ -22,7 +23,8 @@ from eomgen.api.sweeping import (
 )
 from eomgen.commands.shared import (
     Arguments,
-    given_values,
+    assignments,
+    given_inputs,
     named_outputs,
     read_whole,
     reporter_of,
@@ -30,8 +32,10 @@ from eomgen.commands.shared import (
 )
 from eomgen.errors import InterruptedRunError, RunError, nearest
 from eomgen.files import check_folder, check_writable
+from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import terminal_progress
+from eomgen.scene.reader import read_scene
 from eomgen.sweep.design import MOST
 from eomgen.sweep.storage import kept_members
 
@@ -45,9 +49,12 @@ def sweep(given: Arguments) -> int:
     if outputs == "all":
         raise RunError("--outputs: name the functions to compute, kinetic_energy for example")
     given.outputs = None
-    scene, model, name = read_whole(given.scene, given)
     reporter = reporter_of(given, given.scene)
-    parameters, inputs = given_values(given, model)
+    tables, inputs, varying = for_members(
+        read_scene(given.scene), given_inputs(given.input), reporter
+    )
+    scene, model, name = read_whole(given.scene, given, tables)
+    parameters = assignments(given.set, model.defaults, "--set")
     plan = plan_sweep(
         scene,
         model,
@@ -59,6 +66,7 @@ def sweep(given: Arguments) -> int:
         atol=given.atol,
         parameters=parameters,
         inputs=inputs,
+        varying=varying,
         outputs=outputs or (),
         samples=given.samples,
         max_step=given.max_step,
@@ -98,7 +106,7 @@ def _shown(given: Arguments, plan: SweepPlan, reporter: Reporter) -> str:
     """What the figure shows. Raises `RunError` for an unknown name."""
     _, functions = compiled(plan.model, asked=plan.outputs, reporter=reporter)
     known = dict.fromkeys((*functions.STATES, *plan.outputs, *plan.design.names))
-    of: str = given.of or next(iter(known))
+    of = identifier(given.of) if given.of else next(iter(known))
     if of not in known:
         raise RunError(f"--of: unknown name '{of}'{nearest(of, known)}; known: {', '.join(known)}")
     return of
@@ -163,12 +171,18 @@ def _law(name: str, text: str) -> Law:
 
 
 def _numbers(name: str, text: str, parts: Sequence[str]) -> list[float]:
-    try:
-        values = [float(part) for part in parts]
-    except ValueError:
-        values = [np.nan]
-    if not np.isfinite(values).all():
-        raise RunError(f"--vary {name}={text}: has something that is not a finite number")
+    values = []
+    for part in parts:
+        try:
+            value = float(part)
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value):
+            raise RunError(
+                f"--vary {name}={text}: '{part}' is not a finite number; write LOW:HIGH:COUNT, or "
+                "A,B,… for single values"
+            )
+        values.append(value)
     return values
 
 

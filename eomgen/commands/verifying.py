@@ -1,9 +1,11 @@
 """The command `verify`."""
 
+from eomgen.api.inputs import all_in_formulas
 from eomgen.api.reporter import Reporter
 from eomgen.api.verifying import check_verification, digest, horizon_of, verified_model
-from eomgen.commands.shared import Arguments, read_whole, reporter_of
+from eomgen.commands.shared import Arguments, given_inputs, read_whole, reporter_of
 from eomgen.errors import InterruptedRunError, RunError
+from eomgen.scene.reader import read_scene
 
 
 def verify(given: Arguments) -> int:
@@ -14,10 +16,11 @@ def verify(given: Arguments) -> int:
     options = {"states": given.states, "seed": given.seed, "bound": given.bound}
     reporter = Reporter(argument=lambda name: f"--{name}")
     check_verification(**options, horizon=given.horizon, reporter=reporter)
-    scene, model, name = read_whole(given.scene, given)
+    reporter = reporter_of(given, given.scene)
+    tables = all_in_formulas(read_scene(given.scene), given_inputs(given.input), reporter)
+    scene, model, name = read_whole(given.scene, given, tables)
     if given.save is not None:
         evidence.paths(given.save, name, force=given.force)
-    reporter = reporter_of(given, given.scene)
     found = verified_model(model, scene.simulation, **options, name=name, reporter=reporter)
     horizon = None
     if given.horizon is not None and not found.stopped:

@@ -47,7 +47,7 @@ def derive(model: Model) -> Equations:
     Raises `SceneError` for a model without a closed form.
     """
     if why_not := why_not_pins(model):
-        raise SceneError(f"route: no closed form of this scene: {why_not}")
+        raise SceneError(f"route: 'closed' does not derive this scene: {why_not}")
     symbols = make_symbols(model)
     kinematics = differentiate_joints(model, symbols)
     free_bodies = draw_free_bodies(model, symbols, kinematics)

@@ -93,7 +93,7 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
     yield (
         "(12)-(17)",
         "Free bodies",
-        "The same for the accelerations: three scalar equations a body.",
+        "The same for the accelerations: three scalar equations for each body.",
         list(equations.free_bodies.equations),
     )
     arms = []
@@ -117,7 +117,8 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
     yield (
         "(22), (23)",
         "Constraint differentiated twice",
-        "The child's acceleration by the parent's and by the angular velocities and accelerations.",
+        "The child's acceleration, from the parent's and from the angular velocities and "
+        "accelerations.",
         [
             pair
             for k in held
@@ -170,7 +171,7 @@ def _equations_of_motion(equations: Equations) -> Iterator[tuple[str, str, str, 
     yield "(26)", "Mass matrix", rows, [(sp.Symbol("M"), collected.M)]
     yield "(27)", "Velocity forces", "", [(sp.Symbol("V"), collected.V)]
     yield "(28)", "Gravity forces", "", [(sp.Symbol("G"), collected.G)]
-    words = "External forces and joint torques, eliminated alike."
+    words = "External forces and joint torques, eliminated in the same way."
     efforts = equations.free_bodies.efforts.items()
     yield "(29)-(36)", "Applied forces", words, [(sp.Symbol("F"), collected.F), *efforts]
 
@@ -188,7 +189,7 @@ def _solution(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
         "(37)",
         "Closed form",
         "Solved once, symbolically, for the angular acceleration α of every body. The pivots d "
-        "are sums of positive terms, so no division can fail at any pose; c couples a body to "
+        "are sums of positive terms, so no division can fail at any pose; c couples one body to "
         "another, b is its load, and M the mass of a whole tree.",
         _solved(equations),
     )

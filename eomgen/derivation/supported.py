@@ -13,7 +13,7 @@ MOST_GENERAL_BODIES, MOST_GENERAL_VELOCITIES = 6, 15
 MOST_REPORTED = 6
 """The most bodies of a derivation that anyone would read; writing it takes half a minute."""
 FEW_BODIES, FEW_VELOCITIES = 3, 3
-"""Up to so many the closed form takes about a second, and is worth a try."""
+"""Up to this many the closed form takes about a second, and is worth a try."""
 
 
 def why_not_closed(model: Model) -> str:
@@ -34,11 +34,11 @@ def why_not_closed(model: Model) -> str:
 def why_not_tried(model: Model) -> str:
     """Why deriving a closed form, if there is one, would take too long; "" if it would not."""
     if len(model.bodies) > FEW_BODIES:
-        return f"not tried on more than {FEW_BODIES} bodies; --route closed does"
+        return f"not tried on more than {FEW_BODIES} bodies; --route closed tries it"
     if not why_not_pins(model) or len(model.bodies) == 1:
         return ""
     if len(model.velocities) > FEW_VELOCITIES:
-        return f"not tried on more than {FEW_VELOCITIES} velocities; --route closed does"
+        return f"not tried on more than {FEW_VELOCITIES} velocities; --route closed tries it"
     return ""
 
 
@@ -72,8 +72,8 @@ def why_not_pins(model: Model) -> str:
             return f"it is for pins and free bodies, and '{joint.name}' is {joint.type}"
         if isinstance(joint, Revolute) and joint.motor_inertia != ZERO:
             return f"it takes no motor_inertia, and '{joint.name}' has one"
-        if isinstance(joint, Revolute) and joint.orientation_deg != 0.0:
-            return f"it takes no orientation_deg, and '{joint.name}' has one"
+        if isinstance(joint, Revolute) and (joint.orientation_deg or joint.orientation):
+            return f"it takes no orientation, and '{joint.name}' has one"
         if model.value(body.mass) == 0.0:
             return f"it divides by masses, and that of '{body.name}' is 0"
         if model.value(body.moment) == 0.0 and (

@@ -25,7 +25,7 @@ PLAIN = {
 since it would try to compare their arguments.
 """
 GUARD = 1e-15
-"""Lower bounds below this keep lengths from being 0 where points coincide; they are not told."""
+"""Lower bounds below this keep lengths from being 0 where points coincide; they are not shown."""
 HALVES = 8
 """Fractions with whole numerators up to this and denominator 2 or 4 are written as fractions."""
 

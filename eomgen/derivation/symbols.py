@@ -30,7 +30,7 @@ class SympyScalars(Scalars):
 def _quantity(formula: Formula, parameters: dict[str, Expr], formulas: dict[Formula, Expr]) -> Expr:
     """A quantity over the parameters' symbols.
 
-    A formula with a function in it becomes a symbol of its own: the trigonometry here is for sines
+    A formula with a function in it becomes a separate symbol: the trigonometry here is for sines
     and cosines of poses only, and the mechanics does not depend on what such a formula is.
     """
     if formula in formulas:

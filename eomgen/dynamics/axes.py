@@ -57,7 +57,7 @@ def with_simple_origins(
     frames, mounts = list(frames), list(mounts)
     for k, (children, riders) in enumerate(_carried(frames, mounts)):
         frame = frames[k]
-        if frame.kind == "spherical" or (graded and not is_straight(frame.fixed)):
+        if frame.kind in ("spherical", "fixed") or (graded and not is_straight(frame.fixed)):
             continue
         offset, shift = _better_origin(frame, scalars)
         offsets = [frames[n].offset for n in children]

@@ -57,7 +57,7 @@ class Overlap:
 def initial_overlaps(model: Model) -> list[Overlap]:
     """The soft contacts and stops of a model that overlap at its initial state.
 
-    Empty if an effect has no finite value there; that is an error of its own.
+    Empty if an effect has no finite value there; that is a separate error.
     """
     start = [*model.initial_q, *model.initial_v, *(x.initial for x in model.states)]
     dynamics = Dynamics(model, values_at(model, 0.0, start, {}, {}), FloatScalars())

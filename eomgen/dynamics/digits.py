@@ -39,7 +39,7 @@ last place has the greatest effect.
 SURE = 100.0
 """This many times the change of v̇ by half a unit in the last place of all numbers is no loss."""
 UNEXPLAINED = 1000.0
-"""An error of more than so many times that change has another cause, and counts in full."""
+"""An error of more than this many times that change has another cause, and counts in full."""
 TRUSTED = 100.0
 """`orthogonal` is the reference at all states if its error against extended precision is at most so
 many times what is allowed.

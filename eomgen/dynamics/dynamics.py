@@ -299,7 +299,9 @@ class Dynamics(MechanismState):
         accelerates such a tree as a whole; `_with_gravity` adds that.
         """
         falling = [
-            k for k, link in enumerate(self.kinematics.links) if link.v[0] in self._free_roots
+            k
+            for k, link in enumerate(self.kinematics.links)
+            if link.v and link.v[0] in self._free_roots
         ]
         base = sub(zeros(self.scalars), self.down)
         v, twists = self.felt

@@ -1,8 +1,9 @@
 """What a linkage is made of: frames with their joint primitives, and the bodies mounted on them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+from eomgen.dynamics.rotations import IdentityRotation, Rotation
 from eomgen.dynamics.vectors import Symmetric, Vec, add, plus
 from eomgen.scalars.exact import Matrix, Real
 from eomgen.scalars.protocol import Scalar
@@ -30,20 +31,23 @@ class Frame:
 
     offset    its origin at q = 0 from the parent's origin, in the parent's axes, m
     fixed     rotation at q = 0: the columns are its axes in the parent's axes, exact
-    kind      of the primitive, and `axis` the coordinate axis that it is about or along
+    kind      of the primitive, and `axis` the coordinate axis that it is about or along; "fixed" is
+              a frame that does not move in its parent's, rotated by formulas of parameters
     angle     in the plane: the angle of `fixed`, rad, exact
     lead      the angle of a revolute primitive at q = 0, rad, exact
     q, v      indices of its coordinates and velocities
     armature  reflected inertia of a motor's rotor, kg m² or kg
     rigid     inertia of the bodies on it
     driven    whether its motion is prescribed
+    held      of a fixed frame, the rotation after `fixed` that parameters give; in the plane also
+              its angle `turn`, rad
     """
 
     name: str
     parent: int
     offset: Vec
     fixed: Matrix
-    kind: Literal["revolute", "prismatic", "spherical"]
+    kind: Literal["revolute", "prismatic", "spherical", "fixed"]
     axis: int
     angle: Real
     lead: Real
@@ -52,6 +56,8 @@ class Frame:
     armature: Scalar
     rigid: Rigid
     driven: bool
+    held: Rotation = field(default_factory=IdentityRotation)
+    turn: Scalar = 0.0
 
 
 @dataclass(frozen=True)

@@ -138,12 +138,14 @@ def tree_kinematics(
     world: list[Mat] = []
     angles: list[Angle] = []
     for frame in linkage.frames:
-        fixed = fixed_rotation(frame.fixed, scalars)
+        fixed = still_rotation(frame, scalars)
         rotation, arm = fixed, frame.offset
         directions: tuple[MotionAxis, ...] = (
             MotionAxis(frame.kind == "revolute", eye[frame.axis], frame.axis),
         )
-        if frame.kind == "spherical":
+        if frame.kind == "fixed":
+            directions = ()
+        elif frame.kind == "spherical":
             rotation = both(fixed, from_quaternion([q[i] for i in frame.q], scalars))
             directions = tuple(MotionAxis(True, eye[k], k) for k in AXES)
         elif frame.kind == "revolute":
@@ -180,10 +182,18 @@ def tree_kinematics(
     return TreeKinematics(tuple(links), tuple(world), tuple(angles), axes)
 
 
+def still_rotation(frame: Frame, scalars: Scalars) -> Rotation:
+    """The rotation from a frame's axes at q = 0 to its parent's."""
+    fixed = fixed_rotation(frame.fixed, scalars)
+    return both(fixed, frame.held) if frame.kind == "fixed" else fixed
+
+
 def _angle(frame: Frame, angles: Sequence[Angle], q: Sequence[Scalar], scalars: Scalars) -> Angle:
     """A planar frame's angle, by that of its parent."""
     base = angles[frame.parent] if frame.parent >= 0 else Angle(scalars.number(0.0), ZERO)
     fixed = total(base.fixed, frame.angle)
+    if frame.kind == "fixed":
+        return Angle(base.moving + frame.turn, fixed)
     if frame.kind != "revolute":
         return Angle(base.moving, fixed)
     return Angle(scalars.named(base.moving + q[frame.q[0]], f"angle_{frame.name}"), fixed)

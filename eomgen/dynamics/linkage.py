@@ -2,10 +2,11 @@
 
 A joint with several primitives is a chain of frames, all but the last massless. A weld adds no
 frame, and neither does a locked coordinate: the body is on its parent's frame. The axes of a frame
-are those of its body, rotated so that the axis of the primitive is a coordinate axis.
+are those of its body, rotated so that the axis of the primitive is a coordinate axis. A joint whose
+orientation is given by formulas of parameters has a fixed frame for it, before its others.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from eomgen.dynamics.axes import (
@@ -15,6 +16,7 @@ from eomgen.dynamics.axes import (
     with_simple_origins,
 )
 from eomgen.dynamics.frames import Frame, Linkage, Mount, Rigid, joined
+from eomgen.dynamics.rotations import held_rotation
 from eomgen.dynamics.vectors import (
     ENTRIES,
     Symmetric,
@@ -33,6 +35,7 @@ from eomgen.dynamics.vectors import (
 )
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import Body, Model
+from eomgen.model.orientation import rows_of
 from eomgen.scalars import exact
 from eomgen.scalars.exact import EYE, ZERO, Matrix, Real
 from eomgen.scalars.floats import FloatScalars
@@ -98,9 +101,12 @@ def _drafted(
                 angle = exact.total(angle, exact.radians(joint.orientation_deg))
             point = vector(joint.r_child)
             if isinstance(joint, Geared):
-                armature = value(joint.motor_inertia)
-                if joint.gear_ratio is not None:
-                    armature = value(joint.gear_ratio) * value(joint.gear_ratio) * armature
+                armature = _armature(joint, value)
+            if joint.orientation is not None:
+                held = _held(rows_of(joint.orientation), value, scalars)
+                place = {"parent": frame, "offset": at, "fixed": axes, "angle": angle}
+                drafts.append(replace(held, name=f"{body.name}_orientation", **place))
+                frame, axes, angle, at = len(drafts) - 1, EYE, ZERO, zeros(scalars)
         primitives = joint.primitives(model.dimensions)
         for i, primitive in enumerate(primitives):
             to_axis, k = _to_coordinate_axis(primitive)
@@ -150,6 +156,37 @@ def _drafted(
             )
         )
     return drafts, mounts
+
+
+def _armature(joint: Geared, value: Callable[[Formula], Scalar]) -> Scalar:
+    """The reflected inertia of a motor's rotor, kg m² or kg."""
+    inertia = value(joint.motor_inertia)
+    if joint.gear_ratio is None:
+        return inertia
+    return value(joint.gear_ratio) * value(joint.gear_ratio) * inertia
+
+
+def _held(
+    rows: Sequence[Sequence[Formula]], value: Callable[[Formula], Scalar], scalars: Scalars
+) -> Frame:
+    """A frame without name, in the axes of its parent, but for a rotation by formulas."""
+    return Frame(
+        name="",
+        parent=-1,
+        offset=zeros(scalars),
+        fixed=EYE,
+        kind="fixed",
+        axis=2,
+        angle=ZERO,
+        lead=ZERO,
+        q=(),
+        v=(),
+        armature=scalars.number(0.0),
+        rigid=_nothing(scalars),
+        driven=False,
+        held=held_rotation(rows, value, scalars),
+        turn=value(rows[0][0]),
+    )
 
 
 def _numbers(vector: Sequence[Real], scalars: Scalars) -> Vec:

@@ -19,9 +19,8 @@ from functools import cached_property
 from eomgen.dynamics.composite import shifted
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.frames import Frame, Linkage, Rigid, joined
-from eomgen.dynamics.kinematics import Axes, TreeKinematics, tree_kinematics
+from eomgen.dynamics.kinematics import Axes, TreeKinematics, still_rotation, tree_kinematics
 from eomgen.dynamics.linkage import make_linkage
-from eomgen.dynamics.rotations import fixed_rotation
 from eomgen.dynamics.vectors import (
     ENTRIES,
     Symmetric,
@@ -110,13 +109,16 @@ def _spares(
 
 
 def _at_parent(linkage: Linkage, frame: Frame, part: Rigid, scalars: Scalars) -> Rigid:
-    rotation = fixed_rotation(frame.fixed, scalars)
+    rotation = still_rotation(frame, scalars)
     return shifted(rotation, frame.offset, part, scalars, planar=linkage.planar)
 
 
 def _parts(frame: Frame, rigid: Rigid, smaller: int, scalars: Scalars) -> Iterator[Rigid]:
     """The parts of a frame's inertia that its parent may have, in the frame's axes."""
     zero, nothing, none = scalars.number(0.0), zeros(scalars), no_matrix(scalars)
+    if frame.kind == "fixed":
+        yield rigid
+        return
     if frame.kind == "prismatic":
         yield Rigid(zero, nothing, rigid.inertia)
         return

@@ -1,6 +1,6 @@
 """Rotations between the axes of a frame and its parent's, in as few operations as possible."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,6 +14,8 @@ from eomgen.dynamics.vectors import (
     times,
     transposed,
 )
+from eomgen.language.formula import Formula
+from eomgen.model.orientation import turns_of
 from eomgen.scalars.exact import Matrix, axis_rotations
 from eomgen.scalars.protocol import Scalar, Scalars
 
@@ -231,6 +233,26 @@ def fixed_rotation(rotation: Matrix, scalars: Scalars) -> Rotation:
         if part.s:
             c, s = scalars.number(part.c), scalars.number(part.s)
             found = both(found, AxisRotation(part.k, c, s, scalars.number(2.0) * c))
+    return found
+
+
+def held_rotation(
+    rows: Sequence[Sequence[Formula]], value: Callable[[Formula], Scalar], scalars: Scalars
+) -> Rotation:
+    """The rotation by formulas of parameters (see `model.orientation`): Rz Ry Rx of three angles,
+    of one about z; of a quaternion; or a matrix, by its rows.
+    """
+    if len(rows) == 3:
+        a, b, c = ([value(part) for part in row] for row in rows)
+        return MatrixRotation(_matrix([a, b, c]))
+    if len(rows[0]) == 4:
+        return from_quaternion([value(part) for part in rows[0]], scalars)
+    found: Rotation = IdentityRotation()
+    for k, turn in turns_of(rows[0]):
+        if isinstance(turn, tuple):
+            found = both(found, fixed_rotation(turn, scalars))
+        else:
+            found = both(found, axis_rotation(k, value(turn), 0, scalars))
     return found
 
 

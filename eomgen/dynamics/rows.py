@@ -111,7 +111,7 @@ class EliminatedLink:
 
 
 class Rows:
-    """Makes rows, each with an index of its own, and rotates them."""
+    """Makes rows, each with its own index, and rotates them."""
 
     def __init__(self, scalars: Scalars) -> None:
         self._scalars = scalars

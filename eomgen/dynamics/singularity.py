@@ -78,7 +78,7 @@ def relative_pivots(model: Model, poses: Array) -> dict[int, Array]:
     """For each velocity its articulated-body pivot at n poses (n, nq), relative to the greatest at
     any of these and a few seeded poses: (n,). 1 where all of it is rounding, as with arms of 1e9 m.
 
-    As in `check_nonsingular` all masses are 1: a heavy body on a light one is no gimbal lock. In
+    As in `check_nonsingular` all masses are 1: a heavy body on a light one is not a gimbal lock. In
     gimbal lock, axes are in line, some motion moves no mass, and its pivot is 0: M is singular.
     """
     some = _seeded(random.Random(20), len(model.coordinates))
@@ -141,7 +141,7 @@ def _pivots(
     model: Model, poses: Array, scalars: Scalars, vanished: float = VANISHED
 ) -> dict[int, tuple[Array, Array]]:
     """For each velocity its pivots and its diagonal entries of M at n poses (n, nq), (n,) each. An
-    axis with a pivot of 0 is not eliminated. With scalars that are no arrays, n is 1.
+    axis with a pivot of 0 is not eliminated. With scalars that are not arrays, n is 1.
     """
     linkage = make_linkage(model, model.defaults, scalars)
     axes: Axes = "world" if model.dimensions == 2 else "own"

@@ -49,13 +49,14 @@ HANDOUT = (
 PROJECTED = (
     'The handout "CS229 Dynamics Handout" derives two rigid bodies in the plane with one '
     "rotational "
-    "joint. This mechanism is another, so the steps have numbers of their own. The equations "
+    "joint. This mechanism is a different one, so the steps have their own numbers. The equations "
     "M dv/dt + V + G = F have the handout's form (24), (36); M is symmetric here, the same as that "
     "of `mass_matrix()` in the generated module."
 )
 RECURSIVE = (
-    "The equations of this mechanism written out would be too long to be read, so they are told as "
-    "an algorithm: named quantities, one frame after another, each by those before. It solves "
+    "The equations of this mechanism written out would be too long to read, so they are given as "
+    "an algorithm: named quantities, one frame after another, each computed from those before. It "
+    "solves "
     'M dv/dt + V + G = F, the handout\'s (24) with (36) ("CS229 Dynamics Handout"), without '
     "forming "
     "M. The symmetric M is what `mass_matrix()` of the generated module returns."
@@ -72,8 +73,8 @@ SYMMETRIC = (
 )
 PRESCRIBED = (
     "Driven coordinates follow the formulas above, and their rates are the derivatives of these; "
-    "locked coordinates are constant. Neither is a state, and the forces that see to it are "
-    "whatever that takes."
+    "locked coordinates are constant. Neither is a state; the forces on them are whatever this "
+    "requires."
 )
 ALREADY = (
     "With the rows above M is symmetric already: it is the matrix that `mass_matrix()` of the "
@@ -99,9 +100,13 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
     effects = derived_effects(model)
     bare = replace(with_symbols(model, effects), form=form)
     small = len(model.bodies) <= MOST_REPORTED
-    why_not = why_not_pins(bare) or ("" if small else f"it has more than {MOST_REPORTED} bodies")
+    long = f"it is written out for up to {MOST_REPORTED} bodies, and there are {len(model.bodies)}"
+    why_not = why_not_pins(bare) or ("" if small else long)
     if form != "velocity" and why_not:
-        raise SceneError(f"form: no derivation in the form '{form}': {why_not}; use velocity")
+        module = f"; a module has it: eomgen generate --form {form}" if why_not == long else ""
+        raise SceneError(
+            f"form: no derivation in the form '{form}': {why_not}; use velocity{module}"
+        )
     if not why_not:
         return _of_pins(model, bare, effects, form)
     if small and not why_not_closed(bare):
@@ -137,7 +142,7 @@ def _of_pins(
 def _of_any(model: Model, bare: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
     equations = derive_projected(bare)
     names = reading_names(model)
-    found = list(projected_steps(equations))
+    found = [_renamed(step, names) for step in projected_steps(equations)]
     place = next(i for i, step in enumerate(found) if step.title == "Closed form")
     solved = {line.left.name: line.right for line in found[place].equations}
     rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
@@ -156,7 +161,7 @@ def _of_any(model: Model, bare: Model, effects: tuple[DerivedEffect, ...]) -> Ex
         *(_renamed(step, names) for step in ends),
     ]
     whole = numbered([replace(step, number="") for step in steps])
-    intro = Step("", "Beside the handout", PROJECTED, ())
+    intro = Step("", "Compared with the handout", PROJECTED, ())
     return Exposition((intro, *whole), _whole(of_projected(equations), model, effects), effects)
 
 
@@ -170,7 +175,7 @@ def _recursive(model: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
     state += prescribed_motion(model)
     form = plain_form(model, [real(c.acceleration) for c in model.velocities])
     words = "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
-    words += "axes of its own body."
+    words += "axes of the body to which it belongs."
     steps = [
         Step("", "State", words, tuple(state), "mechanism"),
         Step("", "Free bodies", _free_words(model), (), "bodies"),
@@ -179,9 +184,9 @@ def _recursive(model: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
         *impact_steps(model, effects),
         form_step(model, "velocity", form, effects),
     ]
-    told = (_renamed(step, names) for step in steps)
-    intro = Step("", "Beside the handout", RECURSIVE, ())
-    return Exposition((intro, *numbered(list(told))), None, effects)
+    renamed = [_renamed(step, names) for step in steps]
+    intro = Step("", "Compared with the handout", RECURSIVE, ())
+    return Exposition((intro, *numbered(renamed)), None, effects)
 
 
 def _effect_steps(
@@ -194,52 +199,56 @@ def _effect_steps(
     needed = dict.fromkeys(body for t in effects if every or not t.kept for body in used_bodies(t))
     if needed:
         words = (
-            "The forces below use where bodies are in the world and how they move. o is the place "
+            "The forces below depend on where bodies are in the world and how they move. o is the "
+            "position "
             "of a joint; "
         )
         words += (
-            "ψ is a body's angle from the world's x axis, ω its rate, x and y the place of its "
+            "ψ is a body's angle from the world's x axis, ω its rate, x and y the position of its "
             "centre of mass."
             if model.dimensions == 2
-            else "W turns a body's axes into the world's, Ω is its angular velocity in world axes, "
-            "x, y, z the place of its centre of mass."
+            else "W rotates a body's axes into the world's, Ω is its angular velocity in world "
+            "axes, "
+            "x, y, z the position of its centre of mass."
         )
         _, equations = poses(model, frames_of(model), needed)
         yield Step("", "Where the bodies are, and how they move", words, tuple(equations))
-    for told in effects:
-        lines = equations_of(told.definitions)
-        if told.kept:
-            lines = _loads_as_they_are(told)
-        lines += [Equation(symbol, rate) for symbol, rate in told.rates]
+    for derived in effects:
+        lines = equations_of(derived.definitions)
+        if derived.kept:
+            lines = _loads_as_they_are(derived)
+        lines += [Equation(symbol, rate) for symbol, rate in derived.rates]
         yield Step(
             "",
-            f"Effect `{told.effect.name}` ({told.effect.type.replace('_', ' ')})",
-            told.words,
+            f"Effect `{derived.effect.name}` ({derived.effect.type.replace('_', ' ')})",
+            derived.words,
             tuple(lines),
         )
 
 
-def used_bodies(told: DerivedEffect) -> Iterator[str]:
+def used_bodies(derived: DerivedEffect) -> Iterator[str]:
     """The bodies whose pose or motion the formulas of an effect, or its use, need."""
-    yield from told.bodies
-    weight = told.kept and told.effect.type == "gravity"
-    loads = [*(() if weight else told.loads)]
-    for contact in told.contacts:
+    yield from derived.bodies
+    weight = derived.kept and derived.effect.type == "gravity"
+    loads = [*(() if weight else derived.loads)]
+    for contact in derived.contacts:
         loads += [*contact.normal, *(load for tangent in contact.tangents for load in tangent)]
     yield from (load.body for load in loads if isinstance(load, Load) and load.body != WORLD)
 
 
-def _loads_as_they_are(told: DerivedEffect) -> list[Equation]:
+def _loads_as_they_are(derived: DerivedEffect) -> list[Equation]:
     """The loads of an effect that no motion changes, with the names of the scene."""
     lines = []
-    for load in told.loads:
+    for load in derived.loads:
         parts = load.force if isinstance(load, Load) else (load.force,)
         if all(part == 0 or part.is_Symbol for part in parts):
             continue  # inputs or parameters, which stand in F by their own names
         if isinstance(load, Load):
-            lines.append(Equation(real(f"f_{told.effect.name},{load.body}"), sp.Matrix(load.force)))
+            lines.append(
+                Equation(real(f"f_{derived.effect.name},{load.body}"), sp.Matrix(load.force))
+            )
         else:
-            lines.append(Equation(real(f"tau_{told.effect.name}"), load.force))
+            lines.append(Equation(real(f"tau_{derived.effect.name}"), load.force))
     return lines
 
 
@@ -298,9 +307,9 @@ def _numbered_within(steps: Iterator[Step], number: str) -> list[Step]:
 
 def _whole(found: Matrices, model: Model, effects: Sequence[DerivedEffect]) -> Matrices:
     """The matrices with the forces of the effects written out."""
-    needed = dict.fromkeys(body for told in effects for body in used_bodies(told))
+    needed = dict.fromkeys(body for derived in effects for body in used_bodies(derived))
     more, _ = poses(model, frames_of(model), needed)
-    more += [pair for told in effects for pair in told.definitions]
+    more += [pair for derived in effects for pair in derived.definitions]
     if not more:
         return found
     known = {s.name: s for e in (found.M, found.V, found.G, found.F) for s in e.free_symbols}

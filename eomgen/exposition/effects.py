@@ -59,10 +59,12 @@ class DerivedEffect:
 
 def derived_effects(model: Model) -> tuple[DerivedEffect, ...]:
     """All effects of a model, in order; drives are constraints and have no formula of their own."""
-    return tuple(_told(model, effect) for effect in model.effects if not isinstance(effect, Driven))
+    return tuple(
+        _derived(model, effect) for effect in model.effects if not isinstance(effect, Driven)
+    )
 
 
-def _told(model: Model, effect: Effect) -> DerivedEffect:
+def _derived(model: Model, effect: Effect) -> DerivedEffect:
     notes = Notes(effect.name)
     _run(model, effect, notes)
     notes = Notes(effect.name, totals=notes.counts)
@@ -167,16 +169,16 @@ class StandIn(EffectTable):
     M, V and G do not depend on them, and F is linear in them.
     """
 
-    told: Any
+    derived: Any
 
     @property
     def type(self) -> str:
         """The type of the effect itself."""
-        return str(self.told.effect.type)
+        return str(self.derived.effect.type)
 
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """Each force that is not 0."""
-        parts = (f for f in _forces(self.told.loads) if f != 0)
+        parts = (f for f in _forces(self.derived.loads) if f != 0)
         return tuple(Input(f.name, "", "") for f in parts)
 
     def loads(self, mechanism: Mechanism) -> Iterator[AnyLoad]:
@@ -191,7 +193,7 @@ class StandIn(EffectTable):
                 value.xreplace({s: mechanism.value(Name(s.name)) for s in free}) if free else value
             )
 
-        for load in self.told.loads:
+        for load in self.derived.loads:
             if isinstance(load, JointLoad):
                 yield replace(load, force=given(load.force))
                 continue
@@ -203,17 +205,17 @@ class StandIn(EffectTable):
         return True
 
 
-def with_symbols(model: Model, told: Sequence[DerivedEffect]) -> Model:
+def with_symbols(model: Model, derived: Sequence[DerivedEffect]) -> Model:
     """The model with a stand-in for each effect that depends on the motion."""
     effects: list[Any] = []
     inputs = list(model.inputs)
-    by_name = {t.effect.name: t for t in told}
+    by_name = {d.effect.name: d for d in derived}
     for effect in model.effects:
         found = by_name.get(effect.name)
         if found is None or found.kept:
             effects.append(effect)
             continue
-        stand_in = StandIn(name=effect.name, told=found)
+        stand_in = StandIn(name=effect.name, derived=found)
         effects.append(stand_in)
         inputs += stand_in.inputs(model.dimensions)
     states: tuple[ExtraState, ...] = ()

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.projected.constraints import about, of_quaternion
+from eomgen.derivation.projected.constraints import about, fixed_axes, of_quaternion
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
 from eomgen.exposition.mechanism import NamingMechanism, Notes
 from eomgen.language.formula import Formula
 from eomgen.model.model import Body, JointIndex, Model
-from eomgen.scalars.exact import direction, orientation, quarters, radians
+from eomgen.model.orientation import rows_of
+from eomgen.scalars.exact import direction, quarters, radians
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import Geared, Primitive
 
@@ -93,9 +94,10 @@ def _add(
     rotation, offset, centre = sp.eye(3), ORIGIN, ORIGIN
     armature = angle = sp.Integer(0)
     if not isinstance(joint, Free):
-        fixed = orientation(joint.orientation_deg)
-        rotation = sp.Matrix([[symbols.number(entry) for entry in row] for row in fixed])
-        if model.dimensions == 2:
+        rotation = fixed_axes(joint, symbols)
+        if model.dimensions == 2 and joint.orientation is not None:
+            angle = symbols.value(rows_of(joint.orientation)[0][0])
+        elif model.dimensions == 2:
             count, rest = quarters(radians(joint.orientation_deg))
             angle = count * sp.pi / 2 + symbols.number(rest)
         offset = _vector(joint.r_parent, symbols)

@@ -20,20 +20,20 @@ from eomgen.scene.effects.base import Contact, JointLoad, Load
 
 LAW = (
     "A rigid contact exerts no force while its gap g is positive. Where g becomes 0 with u_n < 0 "
-    "an impact takes place, in no time: the coordinates stay, and an impulse P along the normal "
+    "an instantaneous impact takes place: the coordinates stay, and an impulse P along the normal "
     "and the tangents changes the velocities. J holds the rows that give the speeds u of the "
     "contact from the velocities, and Jᵀ P are generalised impulses. A is the inverse mass that "
     "the contact point has in these directions. The law is that of A. Chatterjee and A. Ruina, A "
     "new algebraic rigid-body collision law based on impulse space considerations, J. Appl. Mech. "
     "65 (1998) 939-951: P_I ends the approach without friction, P_II ends the slip as well, e is "
-    "the coefficient of restitution and μ that of friction. κ is 1, or as much less as keeps the "
-    "tangential part of P within μ times its normal part."
+    "the coefficient of restitution and μ that of friction. κ is 1, or so much less that the "
+    "tangential part of P stays within μ times its normal part."
 )
 
 
-def impact_steps(model: Model, told: Sequence[DerivedEffect]) -> Iterator[Step]:
+def impact_steps(model: Model, effects: Sequence[DerivedEffect]) -> Iterator[Step]:
     """The impulse equations, and the gap and the speeds of each contact."""
-    contacts = [contact for t in told for contact in t.contacts]
+    contacts = [contact for effect in effects for contact in effect.contacts]
     if not contacts:
         return
     n, size = len(model.velocities), 1 + max(len(c.tangents) for c in contacts)

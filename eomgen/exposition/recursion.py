@@ -2,7 +2,7 @@
 
 Featherstone, "Rigid Body Dynamics Algorithms" (2008), table 7.1: outwards the velocities, inwards
 the articulated-body inertias and bias forces, outwards the accelerations. The cost is linear in the
-number of bodies, so that any mechanism can be told.
+number of bodies, so any mechanism can be derived.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,7 +33,7 @@ from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD
 
 ABOUT = (
-    "The algorithm is one page for any tree: R. Featherstone, Rigid Body Dynamics Algorithms "
+    "The algorithm fits on one page for any tree: R. Featherstone, Rigid Body Dynamics Algorithms "
     "(2008), table 7.1. Here it is with the bodies, joints and constants of this mechanism."
 )
 
@@ -46,7 +46,7 @@ class Recursion:
 
     model: Model
     frames: tuple[Frame, ...]
-    told: tuple[DerivedEffect, ...]
+    effects: tuple[DerivedEffect, ...]
 
     @property
     def size(self) -> int:
@@ -83,10 +83,10 @@ class Recursion:
 
 
 def recursive_steps(
-    model: Model, frames: tuple[Frame, ...], told: tuple[DerivedEffect, ...]
+    model: Model, frames: tuple[Frame, ...], effects: tuple[DerivedEffect, ...]
 ) -> Iterator[Step]:
     """The steps of the algorithm, frame by frame."""
-    r = Recursion(model, frames, told)
+    r = Recursion(model, frames, effects)
     yield Step("", "The algorithm", _algorithm(r), ())
     for k, frame in enumerate(frames):
         yield Step("", f"Frame `{frame.name}`: {_kind(r, k)}", "", tuple(_constants(r, frame)))
@@ -101,8 +101,8 @@ def recursive_steps(
     lines = [line for k in reversed(order) for line in _articulated(r, k)]
     yield Step("", "Inwards: articulated-body inertias", words, tuple(lines))
     words = (
-        "From the root to the leaves: the joint takes what the forces leave over after the "
-        "parent's acceleration a'. The world accelerates by minus g, which stands for gravity."
+        "From the root to the leaves: the joint's acceleration follows from the forces and from "
+        "the parent's acceleration a'. The world accelerates by minus g, which stands for gravity."
     )
     lines = [line for k in order for line in _accelerations(r, k)]
     yield Step("", "Outwards: accelerations", words, tuple(lines))
@@ -117,7 +117,7 @@ def _applied(r: Recursion) -> Step:
         frame = r.frames[k]
         applied = _wrench(r, frame, ["applied"])
         terms = [r.vector("f", frame)] if applied else []
-        if len(applied) < len(_wrench(r, frame)):  # a weight that is told as a load
+        if len(applied) < len(_wrench(r, frame)):  # a weight that is given as a load
             terms = [_sum(applied, r.size)] if applied else []
         for i, child in enumerate(r.frames):
             if child.parent == k and i in loaded:
@@ -132,8 +132,8 @@ def _applied(r: Recursion) -> Step:
             lines.append(Equation(r.joint("F", frame), _sum(force, len(frame.v))))
     words = (
         "The same F as in M dv/dt + V + G = F, joint by joint; M, V and G do not depend on it. Φ "
-        "is the sum of the loads f on a frame and on all that hangs on it, taken to its origin; "
-        "the joint feels what of it is along its motion, and its own loads."
+        "is the sum of the loads f on a frame and on all that hangs on it, moved to its origin; "
+        "F is its part along the joint's motion, plus the joint's own loads."
     )
     return Step("", "Applied forces, term by term", words, tuple(lines))
 
@@ -290,10 +290,10 @@ def _wrench(r: Recursion, frame: Frame, kinds: Sequence[str] = KINDS) -> list[Ex
         return []
     name, size = frame_name(r.model, frame), r.model.dimensions
     found: list[Expr] = []
-    for told in r.told:
-        if isinstance(told.effect, Gravity) and told.kept:
+    for derived in r.effects:
+        if isinstance(derived.effect, Gravity) and derived.kept:
             continue
-        for load in told.loads:
+        for load in derived.loads:
             if isinstance(load, Load) and load.body == name and load.kind in kinds:
                 found += _one_wrench(load, frame, name, size)
     return found
@@ -320,8 +320,8 @@ def _joint_force(r: Recursion, frame: Frame) -> Expr:
     """The loads along a frame's own coordinates."""
     parts = [sp.Integer(0)] * len(frame.v)
     start = [f.name for f in r.frames if f.joint == frame.joint].index(frame.name)
-    for told in r.told:
-        for load in told.loads:
+    for derived in r.effects:
+        for load in derived.loads:
             if isinstance(load, JointLoad) and load.joint == frame.joint:
                 i = load.coordinate - start
                 if 0 <= i < len(parts):
@@ -390,7 +390,7 @@ def _falling(r: Recursion) -> Expr:
     """Minus the acceleration of uniform gravity."""
     mechanism: Any = NamingMechanism(r.model, Notes())
     total = sp.zeros(r.model.dimensions, 1)
-    for told in r.told:
-        if isinstance(told.effect, Gravity) and told.kept:
-            total -= sp.Matrix(told.effect.acceleration(mechanism))
+    for derived in r.effects:
+        if isinstance(derived.effect, Gravity) and derived.kept:
+            total -= sp.Matrix(derived.effect.acceleration(mechanism))
     return sp.Matrix([0] * (r.size - r.model.dimensions) + list(total))

@@ -17,7 +17,7 @@ FORMS = {
     "redundant": "The redundant state (1): all that is known of every body, {count} numbers.",
     "momentum": "The state without what (21) gives: {count} numbers. Each further body of a tree "
     "adds its angle and its angular momentum.",
-    "velocity": "Coordinates q and velocities v: {count} numbers.",
+    "velocity": "The state of coordinates q and velocities v: {count} numbers.",
 }
 
 
@@ -25,9 +25,9 @@ QUATERNION = ("_qw", "_qx", "_qy", "_qz", "_wx", "_wy", "_wz")
 """How the names of quaternions and of their angular velocities end."""
 
 
-BELOW = "; below, what the lines are written with"
-OWN = ", in this state's own numbers. The lines on bodies are (4) to (11)."
-BEFORE = "; what the lines are written with stands in the steps before"
+BELOW = "; the quantities that the lines use are below"
+OWN = ", written in the numbers of this state. The lines on bodies are (4) to (11)."
+BEFORE = "; the quantities that the lines use are in the steps before"
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,11 @@ def form_step(
     """The last step: Y, and Ẏ line by line."""
     states, rates = list(written.states), list(written.rates)
     states += (real(x.name) for x in model.states)
-    rates += (rate for told in extra for _, rate in told.rates)
-    words = FORMS[form].format(count=len(states)) + " Its time derivative, one line for each number"
+    rates += (rate for derived in extra for _, rate in derived.rates)
+    words = (
+        FORMS[form].format(count=len(states))
+        + " Its time derivative follows, one line for each number"
+    )
     words += BELOW if written.definitions else BEFORE
     words += "." if form == "velocity" else OWN
     dotted = [rate_symbol(state) for state in states]

@@ -75,7 +75,9 @@ def _check_clashes(key: str, table: Any) -> None:
 def _identifier(name: str) -> str:
     name = identifier(name)
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise ValueError("is not an identifier; use letters a-z, digits, _ and -, a letter first")
+        raise ValueError(
+            "is not an identifier; use letters a-z, digits, _ and -, starting with a letter"
+        )
     if keyword.iskeyword(name) or keyword.issoftkeyword(name):
         raise ValueError("is a Python keyword; choose another name")
     if len(name) > LONGEST_NAME:

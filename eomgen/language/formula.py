@@ -8,7 +8,7 @@ import ast
 import keyword
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -94,6 +94,9 @@ _REMEDIES = {
     "!=": "compare with <, <=, > or >=",
 }
 _EXAMPLE = "write for example '2*m_A' or 'l_A/2'"
+_MEASURED = re.compile(r" *[-+]?[0-9.]+(?:[eE][+-]?[0-9]+)? +[A-Za-z]")
+"""A number followed by a word, as in '2.5 kg'."""
+_ALONE = "write the number alone, in SI units, or * to multiply"
 
 
 def parse(text: str) -> Formula:
@@ -116,7 +119,8 @@ def parse(text: str) -> Formula:
         tree = ast.parse(plain, mode="eval")
     except SyntaxError as error:
         column = start - 1 + (error.offset or len(plain) + 1)  # 0 stands for the end
-        raise FormulaError(f"is not a formula at column {column}; {_EXAMPLE}") from None
+        remedy = _ALONE if _MEASURED.match(text) else _EXAMPLE
+        raise FormulaError(f"is not a formula at column {column}; {remedy}") from None
     except (RecursionError, MemoryError):
         raise FormulaError(f"is nested deeper than {DEEPEST}") from None
     return _formula(tree.body, 0, start)
@@ -147,7 +151,7 @@ def _check_tokens(text: str) -> None:
 def _refuse(word: str, column: int) -> NoReturn:
     remedy = _REMEDIES.get(word)
     if remedy is None and word[0].isdigit():
-        remedy = "write numbers as 1000.0 or 1e3, and * to multiply"
+        remedy = "write numbers without a unit, as 1000.0 or 1e3, and * to multiply"
     tail = f"; {remedy}" if remedy else ""
     raise FormulaError(f"has {word!r} at column {column}, which is not allowed{tail}")
 
@@ -223,6 +227,33 @@ def _small_whole(power: Formula) -> bool:
         and power.value.is_integer()
         and 0 <= power.value <= LARGEST_POWER
     )
+
+
+def meant(formula: Formula, known: Collection[str]) -> str:
+    """A hint if a difference spells a known name with - for _; else "".
+
+    Names are written with _ in formulas, where - subtracts.
+    """
+    if not isinstance(formula, Apply):
+        return ""
+    words = _difference(formula)
+    for length in range(len(words), 1, -1):
+        for start in range(len(words) - length + 1):
+            if (name := "_".join(words[start : start + length])) in known:
+                return f" (did you mean '{name}'? In formulas - subtracts)"
+    return next(filter(None, (meant(part, known) for part in formula.operands)), "")
+
+
+def _difference(formula: Formula) -> list[str]:
+    """The names and whole numbers of a - b - c; a space stands for anything else."""
+    match formula:
+        case Name(name):
+            return [name]
+        case Constant(value) if value >= 0 and value.is_integer():
+            return [str(int(value))]
+        case Apply("-", (first, second)):
+            return [*_difference(first), *_difference(second)]
+    return [" "]
 
 
 def names_in(formula: Formula) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """Quantities: numbers of a scene that stay symbolic in the generated module.
 
 A number is the default of a parameter that is named after its location. A text is a formula of the
-scene's `[parameters]`. The number 0 is no parameter: it is structural and is folded away.
+scene's `[parameters]`. The number 0 is not a parameter: it is structural and is folded away.
 """
 
 import math
@@ -25,6 +25,7 @@ from eomgen.language.formula import (
     Formula,
     FormulaError,
     Name,
+    meant,
     names_in,
     parse,
 )
@@ -199,7 +200,7 @@ def name_quantities(
             moving = _check_names(formula, where, known, allowed)
             if isinstance(formula, Constant) and formula.value != 0.0:
                 what = of_joint(str(info.description), slides)
-                about = f"{what} of {prefix}{suffix.replace('_', ', ', 1)}"
+                about = f"{prefix}: {what}{suffix.replace('_', ', ', 1)}"
                 name = f"{prefix}_{field}{suffix}"
                 parameters.append(Parameter(name, formula.value, unit, about, where))
                 formula = Name(name)
@@ -253,7 +254,8 @@ def _check_names(
             raise SceneError(f"{where}: '{name}' is predefined here; rename the parameter")
         if name not in known and name not in allowed:
             words = [*known, *allowed, *FUNCTIONS, *CONSTANTS]
-            hint = nearest(name, words) or "; give it a value in [parameters]"
+            hint = meant(formula, words) or nearest(name, words)
+            hint = hint or "; give it a value in [parameters]"
             if name in FUNCTIONS:
                 hint = f"; the function is written {name}({', '.join('xyz'[: FUNCTIONS[name]])})"
             raise SceneError(f"{where}: unknown parameter '{name}'{hint}")

@@ -288,6 +288,6 @@ def _not_found(module: GeneratedModule, point: _Point, slopes: FloatArray) -> st
     if downhill <= 1e-6 * np.linalg.norm(slopes) * point.size:
         return (
             f"no equilibrium: {left}, and no free coordinate or input affects that; "
-            "start elsewhere, trim an input, or change what acts"
+            "start elsewhere, trim an input, or change the effects"
         )
-    return f"no equilibrium found: {left}; start elsewhere, trim an input, or change what acts"
+    return f"no equilibrium found: {left}; start elsewhere, trim an input, or change the effects"

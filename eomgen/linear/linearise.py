@@ -104,7 +104,8 @@ def linearise(
         if not abs(length - 1) < _UNIT:
             name = module.STATES[indices[0]]
             raise RunError(
-                f"linearise: the quaternion from {name} on has length {length:g}; scale it to 1"
+                f"linearise: the quaternion that starts at {name} has length {length:g}; scale it "
+                "to 1"
             )
     inputs = input_values(module, u)
     rates, by_state, by_input = (

@@ -6,7 +6,7 @@ from typing import Any
 
 from eomgen.errors import SceneError, nearest
 from eomgen.language.base import Table
-from eomgen.language.formula import CONSTANTS, DEEPEST, Apply, Formula, Name, names_in
+from eomgen.language.formula import CONSTANTS, DEEPEST, Apply, Formula, Name, meant, names_in
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.schema import Scene
 
@@ -32,9 +32,9 @@ def with_definitions(scene: Scene, motion: Sequence[str]) -> Scene:
     known = (*scene.parameters, *motion, *CONSTANTS)
     for name, formula in scene.definitions.items():
         if name in known:
-            what = "a parameter" if name in scene.parameters else "something of the motion"
+            what = "a parameter" if name in scene.parameters else "a quantity of the motion"
             what = "a number" if name in CONSTANTS else what
-            raise SceneError(f"definitions.{name}: is the name of {what} too; rename one of them")
+            raise SceneError(f"definitions.{name}: is also the name of {what}; rename one of them")
         _check_names(formula, (*known, *scene.definitions), f"definitions.{name}")
     expanded = _expanded_definitions(scene.definitions)
     tables = {
@@ -50,7 +50,8 @@ def with_definitions(scene: Scene, motion: Sequence[str]) -> Scene:
 def _check_names(formula: Formula, known: Collection[str], location: str) -> None:
     for name in names_in(formula):
         if name not in known:
-            hint = nearest(name, (*known, *FUNCTIONS)) or "; give it a value in [parameters]"
+            hint = meant(formula, known) or nearest(name, (*known, *FUNCTIONS))
+            hint = hint or "; give it a value in [parameters]"
             raise SceneError(f"{location}: unknown parameter '{name}'{hint}")
 
 
@@ -70,7 +71,9 @@ def _expanded_definitions(definitions: Mapping[str, Formula]) -> dict[str, Formu
             elif missing in path:
                 cycle = [*path[path.index(missing) :], missing]
                 chain = ", ".join(f"{a} needs {b}" for a, b in pairwise(cycle))
-                raise SceneError(f"definitions.{missing}: is defined by itself: {chain}; break it")
+                raise SceneError(
+                    f"definitions.{missing}: is defined in terms of itself: {chain}; break it"
+                )
             else:
                 path.append(missing)
     return expanded
@@ -127,7 +130,7 @@ def _expanded_table(
                 if name in expanded and hidden:
                     raise SceneError(
                         f"{at}: '{hidden[0]}' of definition '{name}' is predefined here; "
-                        "rename it where it comes from"
+                        "rename it where it is defined"
                     )
             return _substituted(value, expanded)
 

@@ -76,7 +76,7 @@ def effects_in_force(
     for i, effect in enumerate(scene.effects):
         location = f"effects[{i}]"
         if isinstance(effect, Gravity) and any(isinstance(other, Gravity) for other in effects):
-            raise SceneError(f"{location}.type: a second 'gravity'; give one")
+            raise SceneError(f"{location}.type: a second 'gravity'; give only one")
         given = effect.model_fields_set
         _check_names_in(effect, location, known, types)
         effect.check_dofs(dofs, names_of_dofs, location)

@@ -43,7 +43,7 @@ def elaborate(scene: Scene) -> Model:
     found = joined([Bindings(own), of_bodies, of_effects, of_points])
     inputs, states = inputs_and_states(scene, effects, scope)
     if not any(body.velocities for body in bodies):
-        raise SceneError("joints: nothing can move; give at least one that is no weld")
+        raise SceneError("joints: nothing can move; give at least one that is not a weld")
     _check_symbols(n, found.parameters, links, bodies, effects, scene)
     check_contacts(effects, [body.name for body in bodies])
     locked = locked_values(scene.locked, bodies, effects)
@@ -118,7 +118,7 @@ def outputs_for(
     for i, name in enumerate(wanted):
         if name in needs and not available[needs[name]]:
             raise SceneError(
-                f"{location.format(i)}: '{name}' is about {needs[name]}, and there are none"
+                f"{location.format(i)}: '{name}' needs {needs[name]}, and there are none"
             )
     return in_order(wanted)
 

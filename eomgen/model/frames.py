@@ -11,7 +11,7 @@ from eomgen.scene.joints import Free, Joint
 
 Vector = tuple[Formula, ...]
 Centres = Mapping[str, Vector]
-"""For each body that has a frame of its own the centre of mass in it, m."""
+"""For each body that has its own frame the centre of mass in it, m."""
 
 
 def from_centre(point: Vector, centre: Vector | None) -> Vector:
@@ -37,7 +37,7 @@ def effect_from_centres(
     """An effect with the points that are `given`, by field, from centres of mass; those that are
     absent are there already.
 
-    Raises `SceneError` for a point of several bodies of which one has a frame of its own.
+    Raises `SceneError` for a point of several bodies of which one has its own frame.
     """
     fields: dict[str, Any] = {}
     for field, naming in effect.points_of.items():

@@ -27,7 +27,7 @@ def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
     """
     if dimensions not in joint.spaces:
         raise SceneError(
-            f"{location}.type: a '{joint.type}' joint is one of space; give dimensions = 3"
+            f"{location}.type: a '{joint.type}' joint exists only in space; give dimensions = 3"
         )
     if isinstance(joint, Free):
         return joint
@@ -53,7 +53,9 @@ def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
             _direction(a, f"{location}.axes[{i}]", dimensions) for i, a in enumerate(axes)
         )
         if sine_between(first, second) < PARALLEL:
-            raise SceneError(f"{location}.axes: are parallel; give two that cross, or a revolute")
+            raise SceneError(
+                f"{location}.axes: are parallel; give two that cross, or a revolute joint"
+            )
         fields["axes"] = (first, second)
     if isinstance(joint, Geared):
         if joint.limits is not None and joint.limits[0] >= joint.limits[1]:
@@ -64,7 +66,9 @@ def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
                 f"{location}.gear_ratio: does nothing without a motor_inertia; give one"
             )
         if joint.gear_ratio == ZERO:
-            raise SceneError(f"{location}.gear_ratio: is 0, so that no rotor turns; give another")
+            raise SceneError(
+                f"{location}.gear_ratio: is 0, so the rotor would not turn; give another"
+            )
     return joint.replaced(**fields)
 
 

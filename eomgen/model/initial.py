@@ -53,7 +53,8 @@ def _unit(parts: Sequence[float], first: str, is_given: bool) -> list[float]:
         return [part / length for part in parts]
     if is_given:
         raise SceneError(
-            f"initial.q: the quaternion from {first} on has no length; give 1, 0, 0, 0 for no turn"
+            f"initial.q: the quaternion that starts at {first} has no length; give 1, 0, 0, 0 for "
+            "no rotation"
         )
     return [1.0, 0.0, 0.0, 0.0]
 
@@ -62,7 +63,7 @@ def _length_notice(parts: Sequence[float], first: str) -> list[str]:
     length = math.hypot(*parts)
     if length == 0.0 or abs(length - 1.0) <= ROUNDING:
         return []
-    return [f"initial.q: the quaternion from {first} on has length {length:g}; scaled to 1"]
+    return [f"initial.q: the quaternion that starts at {first} has length {length:g}; scaled to 1"]
 
 
 def _values(

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from eomgen.errors import SceneError, listed, nearest
-from eomgen.language.formula import CONSTANTS, Formula, Name, names_in
+from eomgen.language.formula import CONSTANTS, Formula, Name, meant, names_in
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.chains import written_out
 from eomgen.scene.effects import Effect
@@ -39,7 +39,8 @@ def with_formulas(scene: Scene, formulas: Mapping[str, Formula], argument: str) 
     for name, formula in formulas.items():
         for word in names_in(formula):
             if word not in known:
-                hint = nearest(word, (*known, *FUNCTIONS)) or f"; known: {listed(known)}"
+                hint = meant(formula, known) or nearest(word, (*known, *FUNCTIONS))
+                hint = hint or f"; known: {listed(known)}"
                 raise SceneError(f"{argument} {name}: unknown name '{word}'{hint}")
     left = tuple(
         InputTable(name=i.name, unit=i.unit.partition(" | ")[0], about="", default=i.default)

@@ -304,10 +304,7 @@ class Model:
             yield from (body.mass, *body.inertia_com)
         for table in (*(body.joint for body in self.bodies), *self.effects):
             for field in type(table).model_fields:
-                value = getattr(table, field)
-                for part in value if isinstance(value, tuple) else (value,):
-                    if isinstance(part, Formula):
-                        yield part
+                yield from _formulas(getattr(table, field))
         for point in self.points:
             yield from point.at
 
@@ -344,6 +341,15 @@ class Model:
     def value(self, formula: Formula) -> float:
         """A quantity's value at the scene's parameter values."""
         return float(evaluate(formula, self.defaults, FloatScalars()))
+
+
+def _formulas(value: object) -> Iterator[Formula]:
+    """The formulas in a value and in its rows."""
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _formulas(part)
+    elif isinstance(value, Formula):
+        yield value
 
 
 def off_centre(joint: Joint) -> TypeGuard[Revolute]:

@@ -73,7 +73,7 @@ def check_names(tables: Sequence[tuple[str, str]]) -> None:
     for name, location in tables:
         if name in seen:
             raise SceneError(
-                f"{location}.name: '{name}' is the name of {seen[name]} too; give each its own"
+                f"{location}.name: '{name}' is also the name of {seen[name]}; give each its own"
             )
         seen[name] = location
         if name == WORLD and location.startswith("bodies"):

@@ -28,10 +28,12 @@ def values_by_name(
             values[key] = float(value)
         elif key in degrees:
             if degrees[key] in given:
-                raise SceneError(f"{location}.{key}: {degrees[key]} is given too; give one of them")
+                raise SceneError(
+                    f"{location}.{key}: {degrees[key]} is also given; give only one of them"
+                )
             values[degrees[key]] = math.radians(value)
         else:
-            hint = nearest(key, names) or f"; known: {listed(names)}"
+            hint = nearest(key, (*names, *degrees)) or f"; known: {listed(names)}"
             raise SceneError(f"{location}.{key}: no coordinate has this name{hint}")
     return values
 
@@ -54,8 +56,8 @@ def locked_values(
                 )
             if c.name in values and body.joint.name in driven:
                 raise SceneError(
-                    f"locked: '{c.name}' is driven by '{driven[body.joint.name]}' too; "
-                    "give one of them"
+                    f"locked: '{c.name}' is driven by '{driven[body.joint.name]}', too; "
+                    "give only one of them"
                 )
     return values
 
@@ -75,7 +77,8 @@ def check_drive(
     for other in before:
         if isinstance(other, Driven) and other.joint == drive.joint:
             raise SceneError(
-                f"{location}.joint: '{drive.joint}' is driven by '{other.name}' too; give one of "
+                f"{location}.joint: '{drive.joint}' is driven by '{other.name}', too; give only "
+                "one of "
                 "them"
             )
     own = next(b.positions[0].name for b in bodies if b.joint.name == drive.joint)

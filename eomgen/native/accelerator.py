@@ -90,7 +90,7 @@ class Accelerator:
     """The compiled steps and functions of a model's module, at given parameters and inputs.
 
     `program` is that of the model with its interface; None takes it from the store, or derives it.
-    `used` tells whether a run has taken some. `notice` is why there are none although a run was
+    `used` says whether a run has taken some. `notice` is why there are none although a run was
     long enough for them, or "".
     """
 

@@ -22,8 +22,8 @@ from eomgen.templating import render
 
 MAIN = "adaptive_lanes.c"
 PACES = ((10_000.0, 20.0), (100_000.0, 99.0))
-"""A member is given up after so many steps if the rest takes more than so many times as long: it is
-then run by itself, where it is checked for stiffness."""
+"""A member is given up after this many steps if the rest takes more than this many times as long:
+it is then run by itself, where it is checked for stiffness."""
 MOST_STEPS = 1e7
 _POINTER, _LONG, _REAL = ctypes.c_void_p, ctypes.c_long, ctypes.c_double
 _VALID = 1

@@ -29,7 +29,7 @@ NOT_JOINED = "-fno-tree-slp-vectorize"
 `FLAGS`."""
 KNOWN = ("cc", "gcc", "clang")
 ABSENT = (
-    "no C compiler is found; install gcc or clang, name one in CC, or run: "
+    "no C compiler was found; install gcc or clang, name one in CC, or run: "
     "pip install 'eomgen[compiled]'"
 )
 LONGEST = 600.0
@@ -75,7 +75,7 @@ class Compiler:
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise RunError(f"{self.command[0]}: not done after {LONGEST:g} s") from None
+            raise RunError(f"{self.command[0]}: not finished after {LONGEST:g} s") from None
         if done.returncode:
             lines = [line for line in done.stderr.splitlines() if "error" in line]
             why = (lines or done.stderr.splitlines() or ["it failed without a message"])[0]
@@ -123,7 +123,7 @@ def _asked(command: tuple[str, ...]) -> Compiler:
 
 
 def _processor() -> str:
-    """What tells processors apart that need code of their own; "" if that is not known."""
+    """What distinguishes processors that need different code; "" if that is not known."""
     kept = ("model name", "flags", "Features", "CPU part")
     try:
         with Path("/proc/cpuinfo").open(encoding="utf-8") as file:

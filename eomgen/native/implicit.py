@@ -34,7 +34,7 @@ GAUSS: Mapping[str, ImplicitMethod] = {
 }
 """The methods of adaptive and of equal steps, by the names of their compiled steps."""
 OPERATIONS = 3600
-"""The methods take as long to compile as a function of about so many operations."""
+"""The methods take as long to compile as a function of about this many operations."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _UNUSUAL = 2
 """What C returns before a step that Python must make."""
@@ -181,7 +181,7 @@ class CompiledImplicit:
 
 
 def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:
-    """Space for numbers and for whole numbers in which methods solve for so many unknowns."""
+    """Space for numbers and for whole numbers in which methods solve for `unknowns` unknowns."""
     square = unknowns * unknowns
     return np.empty(5 * square + 24 * unknowns), np.empty(square + 2 * unknowns, np.int64)
 

@@ -27,7 +27,7 @@ FLAGS: dict[int, tuple[str, ...]] = {
     4: ("-O3", "-mavx2", "-mfma"),
     2: ("-O3",),
 }
-"""Flags of the compiler for vectors of so many doubles."""
+"""Flags of the compiler for vectors of this many doubles."""
 PROBE = """
 int width(void) {
 #if defined __x86_64__ || defined __i386__

@@ -19,7 +19,7 @@ LONG = 50
 TOGETHER = 2
 """Operations that begin in a cycle."""
 WINDOW = 64
-"""The next step is one of so many, from the first that has not been placed."""
+"""The next step is one of this many, from the first that has not been placed."""
 
 
 def ordered(program: Program) -> Program:

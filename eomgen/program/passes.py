@@ -1,6 +1,6 @@
 """Optimisation passes: each returns a program with the same outputs in fewer operations.
 
-Every output is computed by a function of its own, which reads nothing that others compute. So each
+Every output is computed by its own function, which reads nothing that others compute. So each
 is optimised by itself: a step that another one needs as it stands is no obstacle to a shorter form.
 """
 
@@ -63,7 +63,7 @@ def optimise_and_report(program: Program) -> tuple[Program, tuple[PassReport, ..
 
 
 def parts_of(program: Program) -> list[Program]:
-    """Each output as a program of its own, without steps that it does not need; the checks too."""
+    """Each output as a separate program, without steps that it does not need; the checks too."""
     parts = [replace(program, outputs={n: o}, checks=()) for n, o in program.outputs.items()]
     if program.checks:
         parts.append(replace(program, outputs={}))

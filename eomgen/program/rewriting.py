@@ -12,7 +12,7 @@ from eomgen.program.program import Output, Program, finish, live_steps
 from eomgen.program.tape import ExactTape, Stage, Step, Tape
 
 MOST_FACTORS = 8
-"""Products of so many factors are not taken apart."""
+"""Products of this many factors are not taken apart."""
 MOST_TRIED = 1000
 """Steps of a program up to which `take_apart_shared` tries what may help."""
 Rule = Callable[[Tape, str, list[int]], int]

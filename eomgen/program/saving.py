@@ -68,7 +68,7 @@ def _step(i: int, parts: Any) -> Step:
     if operation == "constant":
         (value,) = rest
         if type(value) is not float or not math.isfinite(value):
-            raise ProgramError(f"step {i}: '{value}' is no finite number")
+            raise ProgramError(f"step {i}: '{value}' is not a finite number")
         return Step(operation, (), _stage(stage), value)
     if operation == "input":
         (name,) = rest
@@ -89,7 +89,7 @@ def _output(parts: Any, count: int) -> Output:
 
 def _stage(stage: Any) -> Stage:
     if type(stage) is not int:
-        raise ProgramError(f"'{stage}' is no stage")
+        raise ProgramError(f"'{stage}' is not a stage")
     return Stage(stage)
 
 
@@ -101,7 +101,7 @@ def _node(node: Any, count: int) -> int:
 
 def _text(text: Any) -> str:
     if type(text) is not str:
-        raise ProgramError(f"'{text}' is no text")
+        raise ProgramError(f"'{text}' is not a text")
     return text
 
 
@@ -114,5 +114,5 @@ def _truth(value: Any) -> bool:
 def _table(content: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     table = content[name]
     if not isinstance(table, dict):
-        raise ProgramError(f"its {name} are no table")
+        raise ProgramError(f"its {name} are not a table")
     return table

@@ -135,7 +135,7 @@ class BranchMonitor:
 
     def watched(self, t: float, length: float, most: int) -> Watched | None:
         """What compiled steps from t on are checked with; None if the next step must be checked
-        here. Up to so many steps of about this length, s, are to be made.
+        here. Up to `most` steps of about this length, s, are to be made.
         """
         functions = self.switching
         if functions.of_state and (len(self._ends) < 2 or self._ends[-1][0] != t):

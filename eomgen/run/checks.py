@@ -125,7 +125,7 @@ def check_series(problem: Problem, integrator: str, series: str) -> None:
     """Raise `RunError` if a problem does not have the Taylor series that a method needs."""
     if series not in problem.series:
         raise RunError(
-            f"integrator: {integrator} serves single runs of scenes; take --integrator DOP853"
+            f"integrator: {integrator} is only for single runs of scenes; take --integrator DOP853"
         )
     problem.series[series]()
 
@@ -140,6 +140,6 @@ def check_steps(
         raise RunError(f"dt: {dt:g} is not a positive step; give e.g. --dt 0.001")
     steps = fixed_step.count_steps(span, dt)
     if steps > max_steps:
-        raise RunError(f"dt: {dt:g} takes {steps:g} steps, but at most {max_steps} are made")
+        raise RunError(f"dt: {dt:g} takes {steps:g} steps, but at most {max_steps} are allowed")
     every = 1 if samples is None else math.ceil(steps / (samples - 1))
     return float(dt), every

@@ -79,7 +79,8 @@ class RoundingMonitor:
             if abs(defect) > UNIT:
                 state = self.problem.states[indices[0]]
                 raise StepFailure(
-                    f"the length of the quaternion from {state} on differs from 1 by {defect:.2g}",
+                    f"the length of the quaternion that starts at {state} differs from 1 by "
+                    f"{defect:.2g}",
                     "take a smaller step or tighter tolerances",
                 )
         true = self.guard.exact(t, y)

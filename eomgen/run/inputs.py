@@ -56,6 +56,14 @@ class InputsOfTime:
             return np.array([self(time) for time in np.asarray(t).tolist()]).T
         return np.array([x(float(t)) if callable(x) else x for x in self.given.values()])
 
+    @property
+    def plain(self) -> list[tuple[str, Any]]:
+        """The numbers of constants and tables, by name, from which a digest can be made."""
+        return [
+            (name, x if not isinstance(x, Table) else (x.t.tolist(), x.values.tolist()))
+            for name, x in self.given.items()
+        ]
+
     def over(self, t: Interval) -> tuple[Interval, ...]:
         """All their values in an interval of time. There are no functions among them."""
         return tuple(

@@ -68,7 +68,8 @@ def _unsolvable(error: Exception) -> str:
     """The reason why there is no derivative at the start, as far as the module knows."""
     if isinstance(error, ZeroDivisionError):
         return (
-            "the mass matrix is singular at the initial state, or an effect infinite: change that, "
+            "the mass matrix is singular at the initial state, or an effect is infinite there: "
+            "change that state, "
             "or lengths, masses or inertias"
         )
     return str(error).removeprefix("derivative: ").replace("at this state", "at the initial state")

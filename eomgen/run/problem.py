@@ -153,8 +153,9 @@ class Problem:
         for indices in self.quaternions:
             if math.hypot(*(float(initial[i]) for i in indices)) < SHORTEST:
                 raise RunError(
-                    f"initial: the quaternion from {self.states[indices[0]]} on has no length; "
-                    "give 1, 0, 0, 0 for no turn"
+                    f"initial: the quaternion that starts at {self.states[indices[0]]} has no "
+                    "length; "
+                    "give 1, 0, 0, 0 for no rotation"
                 )
         assert len(set(self.positions)) == len(self.positions)
         assert all(0 <= index < len(self.states) for index in self.positions)

@@ -38,7 +38,7 @@ def terminal_progress(label: str, *, countdown: bool = True) -> Iterator[Progres
     """Yield a function that draws a bar on one line of standard error, erased when the block ends.
 
     With `countdown` it also shows about how long the rest will take, if it goes on as since the
-    first call. If standard error is no terminal, the function does nothing.
+    first call. If standard error is not a terminal, the function does nothing.
     """
     with terminal_line() as write:
         first: tuple[float, float] | None = None
@@ -76,7 +76,7 @@ def terminal_notice(text: str, expected: float | None = None) -> Iterator[None]:
             return
         began, over = time.monotonic(), threading.Event()
 
-        def tell() -> None:
+        def report() -> None:
             while not over.wait(TICK):
                 spent = time.monotonic() - began
                 left = f", about {rough_time(expected - spent)} left" if expected else ""
@@ -84,20 +84,20 @@ def terminal_notice(text: str, expected: float | None = None) -> Iterator[None]:
                     left = ", longer than last time"
                 write(f"{text} {rough_time(spent)}{left}")
 
-        teller = threading.Thread(target=tell, daemon=True)
-        teller.start()
+        reporter = threading.Thread(target=report, daemon=True)
+        reporter.start()
         try:
             yield
         finally:
             over.set()
-            teller.join()
+            reporter.join()
 
 
 @contextmanager
 def terminal_line() -> Iterator[Callable[[str], None]]:
     """Yield a function that rewrites one line on standard error, erased when the block ends.
 
-    If standard error is no terminal, it does nothing.
+    If standard error is not a terminal, it does nothing.
     """
     stream = sys.stderr
     if not stream.isatty():

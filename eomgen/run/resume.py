@@ -95,10 +95,10 @@ def going_on(
     if not _same_bits(ended, problem):
         words = (
             f"continues from t = {begin:g} s; the derivative there differs in its last bits from "
-            "that run, by another --route, version or machine"
+            "that run's, because of another --route, version or machine"
         )
     elif asked.dt is None and problem.contacts and ANEW not in ended.resume:
-        words += ", within its tolerances: the end shortened a step in which contacts were located"
+        words += ", within its tolerances: its end shortened a step in which contacts were located"
     else:
         exactly = True
     capped = bool(ended.counts["capped"]) if exactly else None

@@ -51,8 +51,8 @@ class Schedule:
         return found, True
 
     def clear(self, start: float, length: float, most: int) -> float:
-        """A time up to which no function changes sign after `start`, s: up to so many steps of this
-        length ahead. `start` if none is found so.
+        """A time up to which no function changes sign after `start`, s: up to `most` steps of this
+        length ahead. `start` if none is found.
         """
         known = self._no_change[1] if self._no_change[0] <= start else start
         ahead = float(most)

@@ -15,14 +15,18 @@ from eomgen.files import is_ours, read_plain, write_whole
 from eomgen.run.archive import Array, checked, packed, unpacked
 from eomgen.run.origin import Origin
 from eomgen.run.problem import FloatArray
+from eomgen.run.setup import Setup
 
-FORMAT = "trajectory 4"
+FORMAT, READ = "trajectory 5", ("trajectory 5", "trajectory 4")
+"""The format that is written, and those that are read: the fourth holds no setup."""
 LARGEST = 2**32
 """Size of the largest file that is read, bytes: a million samples of 500 states."""
 RESUME = "resume_"
 """Prefix of the members of a file from which a later run continues."""
 SAVED, COLUMNS = "saved_", "columns_"
 """Prefixes of the members of a file that hold outputs, and the names of their columns."""
+SETUP = "setup_"
+"""Prefix of the members of a file that hold the setup."""
 COUNTS = ("steps", "derivatives", "jacobians", "impacts", "capped", "cut")
 Kind = Literal["impact", "rest", "lift"]
 Ending = Literal["finished", "interrupted", "ended", "stopped"]
@@ -92,6 +96,7 @@ class Trajectory:
     origin        what the motion depends on; None if not known
     outcome       how it ended
     saved         further outputs at each row, by name
+    setup         what other outputs can be computed from; None if not known
 
     Raises `ValueError` if the values are inconsistent.
     """
@@ -111,6 +116,7 @@ class Trajectory:
     origin: Origin | None = None
     outcome: Outcome = Outcome()
     saved: Mapping[str, Saved] = field(default_factory=dict)
+    setup: Setup | None = None
 
     def __post_init__(self) -> None:
         if not self.finished and self.outcome.kind == "finished":
@@ -194,7 +200,14 @@ def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
     for name, saved in trajectory.saved.items():
         members |= {f"{SAVED}{name}": saved.values, f"{COLUMNS}{name}": _names(saved.columns)}
     if trajectory.origin is not None:
-        members |= _origin_members(trajectory.origin)
+        origin = trajectory.origin
+        members["scene"] = _names([*origin.scene.items()]).reshape(-1, 2)
+        members |= _value_members("", origin)
+    if trajectory.setup is not None:
+        scene = np.frombuffer(trajectory.setup.scene.encode(), dtype=np.uint8)
+        members |= {f"{SETUP}scene": scene, **_value_members(SETUP, trajectory.setup)}
+        if trajectory.setup.varying is not None:
+            members[f"{SETUP}varying"] = trajectory.setup.varying
     members |= {f"{RESUME}{name}": trajectory.resume[name] for name in sorted(trajectory.resume)}
     write_whole(path, packed(members), force=force)
 
@@ -203,13 +216,13 @@ def _names(names: Any) -> Array:
     return np.array(names, dtype=np.str_)
 
 
-def _origin_members(origin: Origin) -> dict[str, Array]:
-    """The members of a file that hold an origin."""
-    members = {"scene": _names([*origin.scene.items()]).reshape(-1, 2)}
+def _value_members(prefix: str, given: Origin | Setup) -> dict[str, Array]:
+    """The members of a file that hold parameters and inputs."""
+    members = {}
     for kind in ("parameters", "inputs"):
-        values: Mapping[str, float] = getattr(origin, kind)
-        members[f"{kind}_names"] = _names([*values])
-        members[kind] = np.array([*values.values()], dtype=np.float64)
+        values: Mapping[str, float] = getattr(given, kind)
+        members[f"{prefix}{kind}_names"] = _names([*values])
+        members[f"{prefix}{kind}"] = np.array([*values.values()], dtype=np.float64)
     return members
 
 
@@ -221,12 +234,12 @@ def load_npz(path: Path) -> Trajectory:
     """
     data = read_plain(path, LARGEST)
     if not is_ours(data):
-        raise RunError(f"{path}: is no trajectory written by eomgen")
+        raise RunError(f"{path}: is not a trajectory written by eomgen")
     # The errors that zipfile and NumPy raise for a broken archive have no common base class.
     try:
         members = unpacked(data)
         form = _text(members["eomgen"])
-        if form == FORMAT:
+        if form in READ:
             return _trajectory(checked(members))
     except Exception:
         raise RunError(f"{path}: is damaged; simulate again") from None
@@ -277,9 +290,10 @@ def _trajectory(members: dict[str, Array]) -> Trajectory:
             for name in members
             if name.startswith(SAVED)
         },
+        setup=_setup(rest) if f"{SETUP}scene" in rest else None,
     )
     if rest:
-        raise ValueError("members that no trajectory has")
+        raise ValueError("members that trajectories do not have")
     return made
 
 
@@ -292,24 +306,40 @@ def _outcome(texts: Sequence[str]) -> Outcome:
 
 def _origin(rest: dict[str, Array]) -> Origin:
     """The origin of a motion, whose members are removed from `rest`."""
+    values = _values(rest, "")
+    return Origin(dict(_strings(rest.pop("scene"), 2)), *values)
+
+
+def _setup(rest: dict[str, Array]) -> Setup:
+    """The setup of a run, whose members are removed from `rest`."""
+    scene, varying = rest.pop(f"{SETUP}scene"), rest.pop(f"{SETUP}varying", None)
+    if scene.dtype != np.uint8 or scene.ndim != 1:
+        raise ValueError("no text")
+    parameters, inputs = _values(rest, SETUP)
+    known = None if varying is None else _floats(varying, 2)
+    return Setup(scene.tobytes().decode(), parameters, inputs, known)
+
+
+def _values(rest: dict[str, Array], prefix: str) -> list[dict[str, float]]:
+    """Parameters and inputs, whose members are removed from `rest`."""
     values = []
-    for kind in ("parameters", "inputs"):
+    for kind in (f"{prefix}parameters", f"{prefix}inputs"):
         names = _strings(rest.pop(f"{kind}_names"), 1)
         values.append(dict(zip(names, _floats(rest.pop(kind), 1).tolist(), strict=True)))
-    return Origin(dict(_strings(rest.pop("scene"), 2)), *values)
+    return values
 
 
 def _floats(array: Array, dimensions: int | None = None) -> FloatArray:
     """An array of doubles. Raises `ValueError` for another type or number of axes."""
     if array.dtype != np.float64 or dimensions not in (None, array.ndim):
-        raise ValueError("no doubles, or not in that shape")
+        raise ValueError("not doubles, or not in that shape")
     return array
 
 
 def _strings(array: Array, dimensions: int) -> list[Any]:
     """A list of texts, or of lists of texts. Raises `ValueError` for anything else."""
     if array.dtype.kind != "U" or array.ndim != dimensions:
-        raise ValueError("no texts, or not in that shape")
+        raise ValueError("not texts, or not in that shape")
     found: list[Any] = array.tolist()
     return found
 

@@ -16,7 +16,7 @@ def written_out(scene: Scene) -> tuple[list[tuple[BodyTable, str]], list[tuple[J
     """
     count = len(scene.bodies) + sum(chain.count for chain in scene.chains)
     if count > MOST:
-        raise SceneError(f"chains: make {count} bodies in all; the most is {MOST}")
+        raise SceneError(f"chains: make {count} bodies in all; at most {MOST} are allowed")
     bodies = [(body, f"bodies[{i}]") for i, body in enumerate(scene.bodies)]
     joints = [(joint, f"joints[{i}]") for i, joint in enumerate(scene.joints)]
     for i, chain in enumerate(scene.chains):

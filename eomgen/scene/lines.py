@@ -21,7 +21,7 @@ _STRING = re.compile(
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _OTHER = re.compile(r"[^,\]}#\n]+")
 _HEADER = re.compile(r"\[\[?")
-_SYNTAX = re.compile(r"\(at line (\d+), column \d+\)$")
+_SYNTAX = re.compile(r"\(at line (\d+), column \d+\)(?=$|; )")
 
 MOST_PARTS = 100
 """Greatest number of parts of a key; locations of longer ones would take much memory."""

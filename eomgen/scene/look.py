@@ -20,7 +20,7 @@ def _colour(text: str) -> str:
         and len(digits) == 6
         and all(c in "0123456789abcdefABCDEF" for c in digits)
     ):
-        raise ValueError("is no colour: write #rrggbb, for example '#3366cc'")
+        raise ValueError("is not a colour: write #rrggbb, for example '#3366cc'")
     return text
 
 
@@ -58,9 +58,9 @@ color = "#33658a"
     type: Literal["box"]
     size: Vector = quantity("m", "lengths of its edges", "positive")
     center: Vector | None = _center()
-    angle: Number = Field(default=0.0, description="rad, in the plane")
+    angle: Number = Field(default=0.0, description="angle of rotation, rad, in the plane")
     orientation_deg: Angles = Field(
-        default=(0.0, 0.0, 0.0), description="about x, then y, then z, in space"
+        default=(0.0, 0.0, 0.0), description="rotation about x, then y, then z, in space"
     )
     color: Colour | None = _colour_field()
 
@@ -207,9 +207,11 @@ height = 3.0
     background: Colour | None = Field(
         default=None, description="colour of the background; white, or the page's theme, if absent"
     )
-    azimuth_deg: Number = Field(default=-60.0, description="in space")
+    azimuth_deg: Number = Field(
+        default=-60.0, description="direction of view, from x towards y, in space"
+    )
     elevation_deg: Annotated[Number, Field(ge=-90, le=90)] = Field(
-        default=20.0, description="in space"
+        default=20.0, description="direction of view, towards z, in space"
     )
 
 

@@ -68,7 +68,7 @@ def _weight(detail: ErrorDetails) -> int:
 
 
 def _hint(detail: ErrorDetails) -> str:
-    """A hint at a similar word. A number given as text is no typing error of the number."""
+    """A hint at a similar word. A number given as text is not a mistyped number."""
     given, known = str(detail["input"]), _expected(detail)
     return "" if given in known else nearest(given, known)
 
@@ -127,8 +127,10 @@ def _line(detail: ErrorDetails) -> str:
         case "list_of_lists":
             return f"{location}: has lists in it; give everything in one list"
         case "list_of_no_lists":
-            return f"{location}: has entries that are no lists; give a list of lists"
+            return f"{location}: has entries that are not lists; give a list of lists"
         case "string_type" | "tuple_type" | "dict_type" | "model_type" | "model_attributes_type":
+            if kind == "tuple_type" and isinstance(detail["input"], dict):
+                return f"{location}: is one table, not a list; write [[{location}]]"
             wanted = {"string_type": "a text", "tuple_type": "a list"}.get(kind, "a table")
             return f"{location}: {value} is not {wanted}; give one"
         case _:
@@ -142,7 +144,7 @@ def _entries(detail: ErrorDetails) -> str:
 
 def _wanted_entries(location: str, context: dict[str, Any]) -> str:
     if location.endswith("inertia_com"):
-        return "one number in the plane, in space [xx, yy, zz] or those and xy, xz, yz"
+        return "one number in the plane; in space [xx, yy, zz], or those and xy, xz, yz"
     if "min_length" in context:
         return f"at least {context['min_length']}"
     return f"at most {context['max_length']}"

@@ -45,8 +45,12 @@ def find_scene(scene: str) -> Path:
     if folder:
         raise SceneError(f"{scene}: is a folder; give a scene file in it")
     if not there:
-        hint = nearest(scene, built_in_names()) or f"; known: {', '.join(built_in_names())}"
-        raise SceneError(f"{scene}: no such file, nor a built-in scene{hint}")
+        beside = sorted(file.name for file in path.parent.glob("*.toml"))
+        names = built_in_names()
+        hint = f" (did you mean '{path}.toml'?)" if f"{path.name}.toml" in beside else ""
+        hint = hint or nearest(scene, names) or nearest(path.name, beside)
+        hint = hint or f"; known: {', '.join(names)}"
+        raise SceneError(f"{scene}: no such file or built-in scene{hint}")
     return path
 
 
@@ -82,10 +86,17 @@ def parse_scene(text: str, source: str = "scene") -> Scene:
     except RecursionError:
         raise SceneError(f"{source}: is not TOML: nested too deep") from None
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{source}: is not TOML: {error}") from None
+        raise SceneError(f"{source}: is not TOML: {error}{_toml_remedy(str(error))}") from None
     except ValueError:  # Python's message is advice to programmers
         raise SceneError(f"{source}: has a whole number of thousands of digits; {REMEDY}") from None
     return _scene(table, source)
+
+
+def _toml_remedy(message: str) -> str:
+    """What to do about the mistakes that are made most, which the parser's message leaves open."""
+    if message.startswith(("Cannot declare", "Cannot overwrite")):
+        return "; a key stands once in a table; lists of tables have double brackets, [[effects]]"
+    return "; a text stands in quotes" if message.startswith("Invalid value") else ""
 
 
 def read_tables(tables: Mapping[Any, Any], source: str = "scene") -> Scene:

@@ -108,7 +108,7 @@ def _section(name: str, table: type[Table], heading: str = "# ") -> Iterator[str
 def _row(key: str, field: FieldInfo) -> tuple[str, str, str, str]:
     marks = field.json_schema_extra
     extra: Mapping[str, Any] = marks if isinstance(marks, Mapping) else {}
-    description = "its own name" if key == "name" else field.description or ""
+    description = "its name" if key == "name" else field.description or ""
     about = re.sub(r"(<\w+>\w*)", r"`\1`", description)
     words = _words(field.annotation)
     if words:

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
 from eomgen.integrators import INTEGRATORS
-from eomgen.language.base import ByName, Identifier, Number, Positive, Table, Text
+from eomgen.language.base import (
+    AngleOrNumber,
+    ByName,
+    Identifier,
+    Number,
+    Positive,
+    Table,
+    Text,
+)
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
 from eomgen.routes import ROUTES
@@ -85,7 +93,7 @@ inputs = [{ name = "thrust", unit = "N", about = "of the engine" }, "wind"]
     name: Identifier
     unit: Annotated[str, Field(max_length=40, pattern=UNIT)] = Field(default="", description="unit")
     about: Text = Field(default="", description="one line of text")
-    default: Number = Field(default=0.0, description="its value unless given")
+    default: Number = Field(default=0.0, description="its value if none is given")
 
 
 class BodyTable(Table):
@@ -94,10 +102,10 @@ class BodyTable(Table):
     In the plane the inertia is a number; in space [xx, yy, zz], or [xx, yy, zz, xy, xz, yz], the
     entries of the matrix about the centre of mass in body axes.
 
-    Points of a body are given from its centre of mass; with `com` in a frame of its own, in which
-    the centre of mass is at `com`. Then joints without `r_parent` or `r_child` are at its origin.
-    Other points that are absent are the centre of mass, and so are the coordinates of a free joint
-    and the outputs of poses.
+    Points of a body are given relative to its centre of mass, or, with `com`, in the body's own
+    frame, in which the centre of mass is at `com`. Joints without `r_parent` or `r_child` are then
+    at the origin of that frame. All other points that are not given are at the centre of mass. The
+    coordinates of a free joint and the outputs of poses are those of the centre of mass, too.
     """
 
     example: ClassVar[str] = """
@@ -114,7 +122,8 @@ inertia_com = "m*l**2/12"
     )
     inertia_check: Literal["on", "off"] = Field(
         default="on",
-        description="whether to refuse an inertia that no body has, with a principal moment larger "
+        description="whether to refuse an inertia that no body can have, with a principal moment "
+        "larger "
         "than the other two together by more than 0.1 %",
     )
     shapes: tuple[Shape, ...] = Field(default=(), description="shapes in pictures")
@@ -142,9 +151,11 @@ r_child = [-0.05, 0]
     mass: Quantity = quantity("kg", "mass", "nonnegative")
     inertia_com: Inertia = inertia()
     start: Vector = quantity("m", "first pin on the parent", default=(), validate_default=False)
-    r_parent: Vector = quantity("m", "pin on the link before")
+    r_parent: Vector = quantity("m", "pin on the previous link")
     r_child: Vector = quantity("m", "pin on the link itself")
-    axis: Numbers | None = Field(default=None, description="of the pins, in space; z if absent")
+    axis: Numbers | None = Field(
+        default=None, description="direction of the pins, in space; z if absent"
+    )
     shapes: tuple[Shape, ...] = Field(default=(), description="shapes of each link in pictures")
 
 
@@ -186,10 +197,10 @@ class Simulation(Table):
     """Settings of a run, which options of the command line override.
 
     Rigid contacts that close more slowly than `rest_speed`, m/s or rad/s, do not bounce; without
-    it, those that would rise by less than 5e-8 of the mechanism's size. Without `atol`, the
-    absolute tolerance of each state is 1e-12 of its size, which is estimated from the scene's
-    lengths and initial motion; or a thousandth of `rtol` of it if `rtol` is below 1e-9; but not
-    less than its rounding error.
+    it, contacts that would rise by less than 5e-8 of the mechanism's size do not. Without `atol`,
+    the absolute tolerance of each state is 1e-12 of the state's size, or `rtol`/1000 of it if
+    `rtol` is below 1e-9, but not less than the rounding error of the state. Sizes are estimated
+    from the scene's lengths and initial motion.
     """
 
     example: ClassVar[str] = """
@@ -227,8 +238,11 @@ class Scene(Table):
         description="functions of the module beside derivative and jacobian",
     )
     form: Form = Field(default="velocity", description="state form")
-    parameters: Annotated[dict[Identifier, Number | ParameterTable], Field(max_length=MOST)] = (
-        Field(default={}, description="named numbers, or tables of value, unit and about")
+    parameters: Annotated[
+        dict[Identifier, AngleOrNumber | ParameterTable], Field(max_length=MOST)
+    ] = Field(
+        default={},
+        description="named numbers, angles as '90 deg', or tables of value, unit and about",
     )
     inputs: Annotated[tuple[Identifier | InputTable, ...], Field(max_length=MOST)] = Field(
         default=(),

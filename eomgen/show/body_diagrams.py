@@ -11,6 +11,7 @@ from eomgen.exposition.reading import read, reading_names
 from eomgen.model.model import Model
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints.planar import Planar
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
 from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, numbers, skeleton
 
@@ -50,16 +51,16 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Draw
 
     forces: list[tuple[Point, Point, Expr, str]] = []
     torques: dict[Point, dict[Expr, None]] = {}
-    if shape.own is not None:
-        name = body.joint.name
-        forces.append((at(shape.own), _unknown(name, -1), -sp.Symbol(f"f_{name}"), "force"))
-    for name, p in shape.others:
-        forces.append((at(p), _unknown(name, 1), sp.Symbol(f"f_{name}"), "force"))
     for start, direction, label, style in found:
         if direction is None:
             torques.setdefault(at(start), {})[label] = None
         else:
             forces.append((at(start), direction, label, style))
+    if shape.own is not None:
+        name = body.joint.name
+        forces.append((at(shape.own), _unknown(name, -1), -sp.Symbol(f"f_{name}"), "force"))
+    for name, p in shape.others:
+        forces.append((at(p), _unknown(name, 1), sp.Symbol(f"f_{name}"), "force"))
     items: list[Item] = [*skeleton(shape, at)]
     items.append(Dot(at(shape.centre), 3.2, True))
     items += (Dot(at(p), 4.2, False, "arm") for p in shape.joints)
@@ -113,7 +114,9 @@ def _drawn_forces(
     panel: float,
     numbers: Mapping[Expr, str],
 ) -> Iterator[Item]:
-    """Arrows with names or numbers; those at one point fan out if they have the same direction."""
+    """Arrows with names or numbers. Of those at one point with the same direction the first has it
+    and the others fan out, so forces of known direction come first.
+    """
     used: list[tuple[Point, float]] = []
     taken = [*busy, *(start for start, *_ in forces)]
     for start, direction, label, style in forces:
@@ -142,8 +145,10 @@ def _drawn_forces(
 
 
 def _unknown(joint: str, sign: int) -> Point:
-    """A direction for a force that is not known yet: opposite on the two bodies."""
-    angle = math.radians(35 + 40 * (sum(map(ord, joint)) % 3))
+    """A direction for a force that is not known yet: opposite on the two bodies, and neither along
+    a weight nor along a horizontal force.
+    """
+    angle = math.radians((35, 60, 130)[sum(map(ord, joint)) % 3])
     return (sign * math.cos(angle), sign * math.sin(angle))
 
 
@@ -166,17 +171,34 @@ def _loads_on(
             if load.body == body.name:
                 yield from _one_load(pose, load, told)
         elif load.joint == body.joint.name and shape.own is not None:
-            yield shape.own, None, _joint_name(load, told), "force"
+            yield shape.own, _slide(pose, load), _joint_name(load, told), "force"
         else:
             for name, p in shape.others:
                 if name == load.joint:
-                    yield p, None, -_joint_name(load, told), "force"
+                    along = _slide(pose, load)
+                    back = None if along is None else (-along[0], -along[1])
+                    yield p, back, -_joint_name(load, told), "force"
     for contact in told.contacts:
         for side in contact.normal:
             if isinstance(side, Load) and side.body == body.name:
                 start = pose.point(body.name, numbers(model, side.at))
                 direction = _direction(pose, side.force)
                 yield start, direction, sp.Symbol(f"P_{contact.name}"), "impulse"
+
+
+def _slide(pose: Pose, load: JointLoad) -> Point | None:
+    """Where the child goes when the coordinate of a load grows; None if it turns."""
+    model = pose.model
+    body = next(body for body in model.bodies if body.joint.name == load.joint)
+    found = body.joint.primitives(model.dimensions)[load.coordinate : load.coordinate + 1]
+    if not found or found[0].kind != "prismatic":  # a ball has three coordinates, one primitive
+        return None
+    x, y, z = found[0].axis
+    if isinstance(body.joint, Planar):  # its axes are those before it turns
+        angle = float(pose.state.coordinate(load.joint, 2))
+        c, s = math.cos(angle), math.sin(angle)
+        x, y = c * x + s * y, c * y - s * x
+    return pose.flat(pose.state.outward(body.name, (x, y, z)[: model.dimensions]))
 
 
 def _one_load(

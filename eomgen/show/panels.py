@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -23,6 +24,29 @@ MAP_TIMES = 600
 
 USUAL, BEYOND = 98, 3
 """A map's colours end at percentile `USUAL` if the greatest value exceeds `BEYOND` times it."""
+
+
+ROUNDING = 1e-12
+"""Changes smaller than this, relative to the quantities of their kind, are drawn as none."""
+LEAST_SPAN = 0.1
+"""What an axis spans then, relative to those quantities."""
+
+
+def widen(axes: Axes, values: Array, size: float = 0.0) -> None:
+    """Let the vertical axis span more than rounding errors, which would look like a motion.
+
+    values  what is drawn, (n, k)
+    size    the greatest absolute value of quantities of this kind, if not that of `values`
+    """
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return
+    low, high = float(finite.min()), float(finite.max())
+    size = max(size, abs(low), abs(high))
+    if high - low < ROUNDING * size:
+        middle = (low + high) / 2 if max(abs(low), abs(high)) > ROUNDING * size else 0.0
+        half = LEAST_SPAN * (abs(middle) or size) / 2
+        axes.set_ylim(middle - half, middle + half)
 
 
 def draw_curves(
@@ -49,8 +73,19 @@ def draw_curves(
         )
 
 
-def draw_map(axes: Axes, t: Array, values: Array, labels: Sequence[str], unit: str) -> None:
-    """Draw many quantities (n, k) of one unit as a map: a row each, time from left to right."""
+def draw_map(
+    axes: Axes,
+    t: Array,
+    values: Array,
+    labels: Sequence[str],
+    unit: str,
+    *,
+    every: bool = False,
+) -> None:
+    """Draw many quantities (n, k) of one unit as a map: a row each, time from left to right.
+
+    every  name every row, not only some; there must be room for the names
+    """
     # An image needs equally spaced times; those of a trajectory may be anywhere.
     times = np.linspace(t[0], t[-1], min(MAP_TIMES, max(2, len(t))))
     after = np.clip(np.searchsorted(t, times, side="right"), 1, max(1, len(t) - 1))
@@ -74,7 +109,10 @@ def draw_map(axes: Axes, t: Array, values: Array, labels: Sequence[str], unit: s
         extent=(start, end, count - 0.5, -0.5),
     )
     named = np.unique(np.linspace(0, count - 1, FEW_NAMES - 1).round().astype(int))
-    axes.set_yticks(named, [labels[k] for k in named])
+    if every:
+        named = np.arange(count)
+    letters = 7 if every else matplotlib.rcParams["ytick.labelsize"]
+    axes.set_yticks(named, [labels[k] for k in named], fontsize=letters)
     axes.grid(visible=False)
     figure = axes.get_figure()
     assert figure is not None

@@ -14,6 +14,7 @@ from eomgen.scene.joints import Free
 from eomgen.scene.look import Polygon, Rod, Shape, is_drawable
 from eomgen.show.body_points import BodyPoints, points_of, typical_length
 from eomgen.show.colours import body_colours
+from eomgen.show.connections import hidden_rods
 from eomgen.show.effect_elements import SYMBOL, elements_of
 from eomgen.show.elements import (
     WORLD_INDEX,
@@ -115,6 +116,7 @@ def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Pic
         if given:
             shapes = tuple(shape_from_centre(shape, body.com) for shape in given)
             colour = next((shape.color for shape in shapes if shape.color), colour)
+            shapes = (*hidden_rods(model, shapes, own.joints, size, colour), *shapes)
         else:
             shapes = invented_shapes(inventor, body, own, colour)
         painted = tuple(s if s.color else s.replaced(color=colour) for s in shapes)

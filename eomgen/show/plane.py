@@ -1,5 +1,7 @@
 """The mechanism in the plane, as drawn in the figure."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -23,16 +25,26 @@ FILL, SURFACE, REACH = 0.08, 0.4, 0.25
 """Strength of the ink of fixed objects: their inside, their surface, the reach of a field."""
 
 
-def draw_plane(axes: Axes, motion: Motion) -> None:
-    """Draw the bodies at a few times, with increasing strength, and their paths."""
+def draw_plane(
+    axes: Axes,
+    motion: Motion,
+    rows: Sequence[tuple[int, float]] | None = None,
+    until: int | None = None,
+) -> None:
+    """Draw the bodies at a few times, with increasing strength, and their paths.
+
+    rows   the samples that are drawn, each with its strength; None: those of `instants`
+    until  the paths end before this sample
+    """
     paper = motion.camera.background
     axes.grid(color=mixed(paper, ink_on(paper), 0.1))
     for path, colour in paths(motion):
-        axes.plot(*path.T, color=colour, linewidth=0.8, alpha=0.5, zorder=2)
-    rows = instants(motion)
-    for order, (row, strength) in enumerate(rows, 3 + INSTANTS - len(rows)):
+        axes.plot(*path[:until].T, color=colour, linewidth=0.8, alpha=0.5, zorder=2)
+    rows = instants(motion) if rows is None else rows
+    orders = np.linspace(2 + INSTANTS, 3, len(rows))[::-1].tolist()
+    for (row, strength), order in zip(rows, orders, strict=True):
         draw_pose(axes, motion, motion.poses[row], strength, zorder=order)
-    draw_symbols(axes, motion, np.eye(3))
+    draw_symbols(axes, motion, rows[-1][0], np.eye(3))
     for ball in motion.balls:
         draw_ball(axes, ball, np.array(ball.center), motion.camera)
     _draw_planes(axes, motion)
@@ -42,13 +54,13 @@ def draw_plane(axes: Axes, motion: Motion) -> None:
     axes.set_ylabel("y, m")
 
 
-def draw_symbols(axes: Axes, motion: Motion, eye: Array) -> None:
-    """Draw springs, motors, supports and the like at the last pose, seen along the axes `eye`."""
+def draw_symbols(axes: Axes, motion: Motion, row: int, eye: Array) -> None:
+    """Draw springs, motors, supports and the like at a sample, seen along the axes `eye`."""
     if motion.drawn is None:
         return
     paper = motion.camera.background
     ink = mixed(paper, ink_on(paper), 0.75)
-    for stroke in strokes(Sight(motion.drawn, motion.poses[-1], eye)):
+    for stroke in strokes(Sight(motion.drawn, motion.poses[row], eye)):
         order = LAYERS[stroke.layer]
         if motion.dimensions == 3 and stroke.layer == "middle":
             order = LAYERS["back"]  # all bodies are one image there
@@ -107,7 +119,7 @@ def _draw_planes(axes: Axes, motion: Motion) -> None:
         axes.add_artist(line)
 
 
-def draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: int) -> None:
+def draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: float) -> None:
     """Draw the bodies at one pose (nb, 3), with a share of ink from 0 to 1."""
     paper = motion.camera.background
     edge = mixed(paper, ink_on(paper), strength)

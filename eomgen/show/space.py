@@ -3,6 +3,8 @@
 Bodies are a raster image, in an SVG as well; floor, paths and marks are lines.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
@@ -28,13 +30,20 @@ EDGE = 0.6
 """Strength of edges, between the body's colour and ink."""
 
 
-def draw_space(axes: Axes, motion: Motion) -> None:
-    """Draw the bodies at a few times, with increasing strength, and their paths."""
+def draw_space(
+    axes: Axes,
+    motion: Motion,
+    rows: Sequence[tuple[int, float]] | None = None,
+    until: int | None = None,
+) -> None:
+    """Draw the bodies at a few times, with increasing strength, and their paths; `rows` and `until`
+    are as in `draw_plane`.
+    """
     paper, camera = motion.camera.background, motion.camera
     cast = cast_of(solids(motion.shapes, camera.height, BUDGET))
     eye = eye_axes(camera.azimuth_deg, camera.elevation_deg)
     floor = floor_under(motion, cast)
-    rows = instants(motion)
+    rows = instants(motion) if rows is None else rows
     _draw_floor(axes, floor, eye, paper)
     for ball in motion.balls:
         draw_ball(axes, ball, eye @ ball.center, camera)
@@ -44,12 +53,12 @@ def draw_space(axes: Axes, motion: Motion) -> None:
             axes, look(cast, motion.poses[rows[-1][0]], np.eye(3)).faces, floor, eye, paper
         )
     for path, colour in paths(motion):
-        seen = path @ eye.T
+        seen = path[:until] @ eye.T
         axes.plot(seen[:, 0], seen[:, 1], color=colour, linewidth=0.8, alpha=0.5, zorder=2)
-    _draw_bodies(axes, motion, cast, eye)
+    _draw_bodies(axes, motion, rows, cast, eye)
     for order, (row, strength) in enumerate(rows):
         _draw_points(axes, motion, motion.poses[row], eye, strength, zorder=4 + order)
-    draw_symbols(axes, motion, eye)
+    draw_symbols(axes, motion, rows[-1][0], eye)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.04)
     axes.autoscale_view()
@@ -63,11 +72,13 @@ def draw_space(axes: Axes, motion: Motion) -> None:
     axes.set_xlabel(f"{step}, at z = {height}; seen without perspective", loc="right", color=FAINT)
 
 
-def _draw_bodies(axes: Axes, motion: Motion, cast: Cast, eye: Array) -> None:
+def _draw_bodies(
+    axes: Axes, motion: Motion, rows: Sequence[tuple[int, float]], cast: Cast, eye: Array
+) -> None:
     """Draw the bodies at each time over those before, mixed with the paper by their strength."""
     paper = motion.camera.background
     ink, below = np.array(to_rgb(ink_on(paper))), np.array(to_rgb(paper))
-    sights = [(look(cast, motion.poses[row], eye), share) for row, share in instants(motion)]
+    sights = [(look(cast, motion.poses[row], eye), share) for row, share in rows]
     points = np.concatenate([sight.faces.reshape(-1, 3)[:, :2] for sight, _ in sights])
     if not len(points):  # smaller than rounding errors, or that far away
         return

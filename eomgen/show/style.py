@@ -5,6 +5,7 @@ import re
 import warnings
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
 import matplotlib.style
 import numpy as np
@@ -48,28 +49,68 @@ STYLE = {
     "svg.hashsalt": "eomgen",  # without a salt, the ids in an SVG are random
 }
 
-# No PDF: Matplotlib writes its metadata too late in the file for the mark that `files` looks for.
-METADATA = {".png": {"Software": "eomgen"}, ".svg": {"Creator": "eomgen", "Date": None}}
+PAPER = {
+    **STYLE,
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.linewidth": 0.5,
+    "grid.linewidth": 0.4,
+    "lines.linewidth": 1.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.fontsize": 7.0,
+    "savefig.dpi": 300,
+    "pdf.fonttype": 42,  # TrueType: some journals refuse Type 3
+}
+"""The style of figures in a paper, where they are printed in the size that they are drawn in."""
+
+METADATA: dict[str, dict[str, str | None]] = {
+    ".png": {"Software": "eomgen"},
+    ".svg": {"Creator": "eomgen", "Date": None},
+    ".pdf": {"Creator": "eomgen", "CreationDate": None},
+}
+PDF_MARK = b"% eomgen figure\n"
+"""A comment near the start of a PDF, by which `files` knows it: its metadata come at its end."""
 
 
-def style() -> AbstractContextManager[None]:
+class _MarkedPdf(io.BytesIO):
+    """Takes what Matplotlib writes, and adds the mark after the second line of a PDF, which says
+    that the rest is binary. Positions in the file are counted by `tell`, so they stay right.
+    """
+
+    def write(self, data: Any) -> int:
+        count = super().write(data)
+        if bytes(data[:2]) == b"%\xac":
+            super().write(PDF_MARK)
+        return count
+
+
+def style(paper: bool = False) -> AbstractContextManager[None]:
     """A context with our style over Matplotlib's defaults, whatever the user's settings."""
-    return matplotlib.style.context(["default", STYLE])
+    return matplotlib.style.context(["default", PAPER if paper else STYLE])
 
 
 def check_figure(path: Path, *, force: bool = False) -> None:
     """Raise `RunError` if `path` has no suffix of a figure, or may not be written."""
     if path.suffix.lower() not in METADATA:
-        raise RunError(f"{path}: a figure is written as .png or .svg; '{path.suffix}' is neither")
+        raise RunError(
+            f"{path}: a figure is written as .png, .svg or .pdf; '{path.suffix}' is none of them"
+        )
     check_writable(path, force=force)
 
 
-def write_figure(figure: Figure, path: Path, *, force: bool = False) -> None:
-    """Write `figure` to `path`. Raises `RunError` as `check_figure` and `write_whole` do."""
+def write_figure(figure: Figure, path: Path, *, force: bool = False, paper: bool = False) -> None:
+    """Write `figure`, drawn in the style of a `paper` or not, to `path`.
+
+    Raises `RunError` as `check_figure` and `write_whole` do.
+    """
     check_figure(path, force=force)
     suffix = path.suffix.lower()
-    buffer = io.BytesIO()
-    with style(), warnings.catch_warnings():
+    buffer = _MarkedPdf()
+    with style(paper), warnings.catch_warnings():
         # A title in a script that the font lacks shows boxes, but the figure is still useful.
         warnings.filterwarnings("ignore", message=r"Glyph \d+ .* missing from font")
         _settle(figure)

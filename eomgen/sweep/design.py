@@ -8,6 +8,7 @@ from statistics import NormalDist
 import numpy as np
 
 from eomgen.errors import RunError
+from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 
 MOST = 10_000_000
@@ -43,7 +44,7 @@ class Law:
 
     def __post_init__(self) -> None:
         if self.kind not in LAWS:
-            raise RunError(f"'{self.kind}' is no distribution; take one of {', '.join(LAWS)}")
+            raise RunError(f"'{self.kind}' is not a distribution; take one of {', '.join(LAWS)}")
         fits = math.isfinite(self.a) and math.isfinite(self.b)
         fits = fits and (self.b > 0 if self.kind == "normal" else self.a < self.b)
         if not fits or (self.kind == "loguniform" and self.a <= 0):
@@ -74,23 +75,24 @@ def listed(values: Mapping[str, Values]) -> Design:
     lengths = {len(column) for column in columns}
     if len(lengths) != 1 or any(column.ndim != 1 for column in columns):
         raise RunError("vary: give a list of values for each name, all of the same length")
-    return _checked(Design(tuple(values), np.array(columns).T.copy()))
+    return _checked(Design(tuple(map(identifier, values)), np.array(columns).T.copy()))
 
 
 def grid(axes: Mapping[str, Values]) -> Design:
-    """All combinations of the values of each name. Raises `RunError` as `listed` does."""
+    """All combinations of the values of each name. Raises `RunError` if there are no
+    members or too many, or if a value is not finite."""
     columns = tuple(np.atleast_1d(np.asarray(axis, dtype=float)) for axis in axes.values())
     count = math.prod(len(column) for column in columns)
     if not columns or not 0 < count <= MOST:
         raise RunError(f"vary: makes {count if columns else 0} members; 1 to {MOST} are possible")
     rows = np.stack([mesh.ravel() for mesh in np.meshgrid(*columns, indexing="ij")], axis=1)
-    return _checked(Design(tuple(axes), rows, columns))
+    return _checked(Design(tuple(map(identifier, axes)), rows, columns))
 
 
 def sampled(
     laws: Mapping[str, Law | tuple[str, float, float]], count: int, seed: int = 0
 ) -> Design:
-    """So many members drawn from distributions: ("normal", mean, deviation), ("uniform", low, high)
+    """Draw `count` members from distributions: ("normal", mean, deviation), ("uniform", low, high)
     or ("loguniform", low, high). A longer sample begins with the shorter one.
 
     Raises `RunError` if the number is not positive, or nothing is varied.
@@ -100,13 +102,28 @@ def sampled(
     shares = np.random.default_rng(seed).random((count, len(laws)))
     known = [law if isinstance(law, Law) else Law(*law) for law in laws.values()]
     columns = [law.at(shares[:, i]) for i, law in enumerate(known)]
-    return _checked(Design(tuple(laws), np.array(columns).T.copy()))
+    return _checked(Design(tuple(map(identifier, laws)), np.array(columns).T.copy()))
+
+
+def in_radians(design: Design, degrees: Mapping[str, str]) -> Design:
+    """The design with angles in radians that it names in degrees: `degrees` gives the name of each.
+
+    Raises `RunError` if an angle is named twice.
+    """
+    names = tuple(degrees.get(name, name) for name in design.names)
+    if len({*names}) < len(names):
+        raise RunError("vary: an angle is given twice, in radians and in degrees; leave one out")
+    scales = [np.pi / 180 if name in degrees else 1.0 for name in design.names]
+    axes = tuple(axis * scale for axis, scale in zip(design.axes, scales, strict=False))
+    return Design(names, design.values * scales, axes)
 
 
 def _checked(design: Design) -> Design:
     count = len(design.values)
     if not 0 < count <= MOST or not design.names:
         raise RunError(f"vary: makes {count} members; 1 to {MOST} are possible")
+    if len(set(design.names)) < len(design.names):
+        raise RunError("vary: a name is given twice")
     if not np.isfinite(design.values).all():
         raise RunError("vary: a value is not a finite number")
     return design

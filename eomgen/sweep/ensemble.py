@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.errors import RunError, nearest
+from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 from eomgen.sweep.design import Design
 from eomgen.sweep.members import FINISHED, WORDS
@@ -66,6 +67,7 @@ class Ensemble:
 
         Raises `RunError` for an unknown name.
         """
+        name = identifier(name)
         if name in self.states:
             return np.asarray(self.final[:, self.states.index(name)])
         if name in self.outputs:
@@ -80,7 +82,7 @@ class Ensemble:
     def on_grid(self, name: str) -> FloatArray:
         """The same over the axes of a grid: (n1, n2, …). Raises `RunError` without a grid."""
         if not self.design.axes:
-            raise RunError("on_grid: the members are no grid")
+            raise RunError("on_grid: the members do not form a grid")
         values = self.of(name)
         return values.reshape(*map(len, self.design.axes), *values.shape[1:])
 
@@ -91,6 +93,7 @@ class Ensemble:
         Members without a value at a time do not count there. Only a part of the times is in memory
         at once. Raises `RunError` for an unknown name, or an output with several numbers.
         """
+        name = identifier(name)
         self.of(name)
         if self.rows is None:
             ends = self.of(name).astype(float)

@@ -84,7 +84,7 @@ def execute(
     sizes = {number: len(values) for number, values in jobs}
     progress(ended / total)
 
-    def running(members: int) -> None:  # so many have ended in chunks that are not done
+    def running(members: int) -> None:  # that have ended, in chunks that are not done
         progress(min(1.0, (ended + members) / total))
 
     for number, arrays in _results(task, jobs, workers, scheduler, running):

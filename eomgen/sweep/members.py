@@ -15,6 +15,7 @@ from eomgen.errors import EomgenError
 from eomgen.model.model import Model
 from eomgen.native.accelerator import Accelerator
 from eomgen.program.program import Program
+from eomgen.run.inputs import InputsOfTime, ModuleWithInputs, with_corners
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, given_values, load_module
 from eomgen.run.problem import FloatArray, Problem
@@ -43,6 +44,7 @@ class Task:
     together    whether members run together, see `sweep.together`, or one by one
     names       what is varied; `kinds` says of each whether it is a "parameter", "state" or "input"
     parameters, inputs  fixed values by name
+    varying     all inputs, if some of them are tables
     outputs     functions of the module that are computed at the kept rows
     t_end       end time, s
     times       (n,) of the rows that are kept, s; the last is `t_end`
@@ -66,15 +68,18 @@ class Task:
     settings: Mapping[str, Any] = field(default_factory=dict)
     dt: float = 0.0
     every: int = 1
+    varying: InputsOfTime | None = None
 
     @cached_property
     def digest(self) -> str:
         """A digest of all that, beside its values, determines the results of a member."""
-        parts = (
+        parts: tuple[object, ...] = (
             *(key_of(self.model), self.source, self.names, self.kinds, self.outputs, self.t_end),
             *(sorted(self.parameters.items()), sorted(self.inputs.items())),
             *(self.times, sorted(self.settings.items()), self.together),
         )
+        if self.varying is not None:
+            parts = (*parts, self.varying.plain)
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
     @property
@@ -156,24 +161,33 @@ class _Prepared:
         }
         for name, kind, value in zip(self.task.names, self.task.kinds, row, strict=True):
             given[kind][name] = value
-        values = given["parameter"] or None, given["input"] or None
+        module, varying = self.module, self.task.varying
+        if varying is not None:
+            varying = InputsOfTime({**varying.given, **given.pop("input")})
+            module = ModuleWithInputs(module, varying)
+        values = given["parameter"] or None, given.get("input") or None
         own = self.accelerator and self.accelerator.at(*values)
         try:
-            run = self._run(self._problem(given["state"], values, own))
+            problem = self._problem(module, given["state"], values, own)
+            if varying is not None:
+                problem = with_corners(problem, module, values[0], varying)
+            run = self._run(problem)
         except EomgenError as error:
             nothing = np.full((len(self.times), len(self.module.STATES)), np.nan)
             text = " ".join(error.lines)
-            return _Member(nothing[0], 0.0, REFUSED, text, nothing, self._outputs(nothing, values))
+            return _Member(
+                nothing[0], 0.0, REFUSED, text, nothing, self._outputs(module, nothing, values)
+            )
         rows = self._rows(run)
-        outputs = self._outputs(rows, values, own)
+        outputs = self._outputs(module, rows, values, own)
         status = FINISHED if run.finished else STOPPED
         return _Member(run.y[-1], float(run.t[-1]), status, run.message, rows, outputs)
 
     def _problem(
-        self, states: Mapping[str, float], values: Values, own: Accelerator | None
+        self, module: Any, states: Mapping[str, float], values: Values, own: Accelerator | None
     ) -> Problem:
-        explain = explained(self.task.model, *given_values(self.module, *values))
-        problem = as_problem(self.module, *values, explain=explain)
+        explain = explained(self.task.model, *given_values(module, *values))
+        problem = as_problem(module, *values, explain=explain)
         if states:
             initial = problem.initial.copy()
             for name, value in states.items():
@@ -185,7 +199,7 @@ class _Prepared:
     def _run(self, problem: Problem) -> Trajectory:
         task = self.task
         run = integrate(problem, t_end=task.t_end, samples=len(task.times), **task.settings)
-        if run.outcome.kind == "interrupted":  # which is no result of the member's
+        if run.outcome.kind == "interrupted":  # which is not a result of the member
             raise KeyboardInterrupt
         return run
 
@@ -198,12 +212,12 @@ class _Prepared:
         return rows
 
     def _outputs(
-        self, rows: FloatArray, values: Values, own: Accelerator | None = None
+        self, module: Any, rows: FloatArray, values: Values, own: Accelerator | None = None
     ) -> list[FloatArray]:
         """The outputs at the kept rows, nan where they have no value."""
         found = []
         for name, shape in zip(self.task.outputs, self.shapes, strict=True):
-            python = partial(_called, getattr(self.module, name), values)
+            python = partial(_called, getattr(module, name), values)
             function = own.function(name, python) if own else python
             array = np.full((len(self.kept), *shape), np.nan)
             for i, (t, y) in enumerate(zip(self.kept, rows[-len(self.kept) :], strict=True)):

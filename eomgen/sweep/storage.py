@@ -181,10 +181,12 @@ def opened(
     check_folder(folder)
     if path.exists():
         if _digest(path) != about["digest"]:
-            raise RunError(f"{folder}: holds another sweep; choose another folder with -o")
+            raise RunError(
+                f"{folder}: holds another sweep; remove it, or choose another folder with -o"
+            )
     else:
         if any(folder.iterdir()):
-            raise RunError(f"{folder}: is no empty folder; choose another one with -o")
+            raise RunError(f"{folder}: is not an empty folder; choose another one with -o")
         write_whole(path, text)
     with _alone(path):
         storage = Storage(folder, str(about["digest"]), layout, len(design.values), size)
@@ -205,7 +207,7 @@ def _alone(path: Path) -> Iterator[None]:
             locks.flock(file, locks.LOCK_EX | locks.LOCK_NB)
         except BlockingIOError:
             raise RunError(
-                f"{path.parent}: another process runs this sweep; wait for its end, or choose "
+                f"{path.parent}: another process runs this sweep; wait until it ends, or choose "
                 "another folder with -o"
             ) from None
         except OSError:  # a file system without locks

@@ -10,7 +10,19 @@ const makeStage = (canvas, mechanism) => {
   const [LIGHT, AMBIENT] = [2.1, 1.75];
   const NEAR = 14; // a pointer that misses a body by so many pixels still takes it
   const stage = { view, failed: "" };
-  const context = canvas.getContext("webgl2", { antialias: true, alpha: false });
+
+  function isSoftware() {
+    const probe = document.createElement("canvas").getContext("webgl2");
+    const about = probe?.getExtension("WEBGL_debug_renderer_info");
+    const name = about ? `${probe.getParameter(about.UNMASKED_RENDERER_WEBGL)}` : "";
+    probe?.getExtension("WEBGL_lose_context")?.loseContext();
+    return /swiftshader|llvmpipe|software/i.test(name);
+  }
+
+  // Software in place of a graphics card takes three times as long to smooth edges, which only a
+  // picture that stands still is worth.
+  const smooth = !isSoftware() || location.hash.includes("still");
+  const context = canvas.getContext("webgl2", { antialias: smooth, alpha: false });
   const renderer = context ? new THREE.WebGLRenderer({ canvas, context, antialias: true }) : null;
   if (!renderer) {
     stage.failed = "This browser offers no WebGL, so the picture cannot be drawn; values, plots and controls work without it.";

@@ -4,14 +4,14 @@
 const makeTraces = (scene, paper) => {
   const { place, vector } = tools;
   const { traces, bodies } = DATA.drawing;
-  const MOST = 4000; // points of a live path; the oldest make way
+  const MOST = 4000; // segments of a live path; the oldest make way
   const LAYER = -10;
   const paths = traces.map((trace) => {
     const line = lines.make({ color: "#888888", width: 1.6 });
     line.renderOrder = LAYER;
     line.visible = false;
     scene.add(line);
-    return { trace, line, points: new Float32Array(3 * MOST), count: 0 };
+    return { trace, line, count: 0, last: null }; // segments of the live path, and its last point
   });
   let [times, whole] = [null, null]; // of a run: the time of each point
 
@@ -34,17 +34,21 @@ const makeTraces = (scene, paper) => {
     },
     clear() {
       times = null;
-      for (const path of paths) path.count = 0;
+      for (const path of paths) Object.assign(path, { count: 0, last: null });
     },
     // One more point of a live motion.
     append(poses, geometry) {
       for (const path of paths) {
-        if (path.count === MOST) {
-          path.points.copyWithin(0, 3 * (MOST / 4));
-          path.count -= MOST / 4;
+        const point = spot(path, poses, geometry);
+        if (path.last) {
+          if (path.count === MOST) {
+            path.line.drop(MOST / 4);
+            path.count -= MOST / 4;
+          }
+          path.line.extend(path.count, MOST, path.last, point);
+          path.count += 1;
         }
-        path.points.set(spot(path, poses, geometry), 3 * path.count);
-        path.count += 1;
+        path.last = point;
       }
     },
     // The paths up to a time of a run, or as far as a live motion came.
@@ -52,11 +56,9 @@ const makeTraces = (scene, paper) => {
       let count = 0;
       if (times) while (count < times.length && times[count] <= t) count += 1;
       for (const path of paths) {
-        const n = times ? count : path.count;
-        path.line.visible = show.traces && n > 1;
-        if (!path.line.visible) continue;
-        if (times) path.line.geometry.instanceCount = n - 1;
-        else path.line.setPoints(path.points, n);
+        const segments = times ? count - 1 : path.count;
+        path.line.visible = show.traces && segments > 0;
+        if (path.line.visible) path.line.setCount(segments);
       }
     },
   };

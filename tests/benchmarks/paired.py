@@ -17,7 +17,7 @@ COLUMNS = 2000
 
 
 def chain(count: int) -> Model:
-    """The built-in chain with so many links."""
+    """The built-in chain with this many links."""
     text = (BUILT_IN / "chain.toml").read_text("utf-8").replace("count = 10", f"count = {count}")
     return replace(elaborate(parse_scene(text)), outputs=())
 

@@ -16,8 +16,8 @@ and on all of them.
 Runs at true errors of 1e-6, 1e-9 and 1e-12: our Taylor series and DOP853 in C, beside heyoka's
 Taylor series fed with the same program, and SciPy's DOP853 over the NumPy module. For each the
 loosest of a ladder of tolerances whose end is that near to a reference in extended precision.
-Compilation comes first and is told apart. The same beside MuJoCo, and beside Pinocchio and SymPy's
-lambdify in SciPy.
+Compilation comes first and is reported separately. The same beside MuJoCo, and beside Pinocchio
+and SymPy's lambdify in SciPy.
 
 Each call for a derivative is made twice, and the second is timed: the calls before it would else
 decide what is in the caches. Printed of derivatives are the least times and the ratios of these, of

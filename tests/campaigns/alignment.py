@@ -1,9 +1,9 @@
-"""Mechanisms 1e-17 to 1 off alignment: right, told, or refused; twenty thousand of them.
+"""Mechanisms 1e-17 to 1 off alignment: right, reported, or refused; twenty thousand of them.
 
     python tests/campaigns/alignment.py [--count N] [--first N] [--closed N]
 
 What `test_alignment` tries a few of, by number, so that it can be run in parts: all failures are
-told, each with the number that makes it again. In every N-th case the closed form is among the
+reported, each with the number that makes it again. In every N-th case the closed form is among the
 routes, which takes a second or two.
 """
 

@@ -44,7 +44,7 @@ TARGETS = (1e-3, 1e-6, 1e-9)
 METHODS = "DOP853,LSODA,Radau,gragg_bulirsch_stoer,RK45,rk4,gauss_6"
 """Among which the quickest is looked for afterwards."""
 FACTOR = 3.0
-"""What is told: how many times lie within so many times the quickest."""
+"""What is reported: how many times lie within this many times the quickest."""
 EPS = float(np.finfo(float).eps)
 
 

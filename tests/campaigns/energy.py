@@ -201,7 +201,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--periods", type=float, default=1e5)
     parser.add_argument("--only", metavar="NAME", nargs="*", default=[], help="forms or methods")
-    parser.add_argument("--stretch", type=float, default=1.0, help="steps so many times as long")
+    parser.add_argument("--stretch", type=float, default=1.0, help="steps this many times as long")
     parser.add_argument("--kept", type=Path, default=Path("out/energy"), help="folder of runs")
     parser.add_argument("-o", type=Path, default=Path("docs/energy_two_body.png"))
     given = parser.parse_args(arguments)

@@ -3,8 +3,8 @@
     python tests/campaigns/fuzz_files.py [--scenes N] [--archives N] [--first N]
 
 Of each comes a refusal in a few lines, or it is taken: no traceback, nothing that a terminal would
-obey, no hang, no memory beyond bounds. All failures are told, each with the number that makes its
-file again (`hostile.scene_file`, `hostile.archive_file`).
+obey, no hang, no memory beyond bounds. All failures are reported, each with the number that makes
+its file again (`hostile.scene_file`, `hostile.archive_file`).
 """
 
 import argparse

@@ -2,7 +2,7 @@
 
     python tests/campaigns/fuzz_scenes.py [--count N] [--first N]
 
-All failures are told, each with the number that makes its scene again (`fuzzing.scene`).
+All failures are reported, each with the number that makes its scene again (`fuzzing.scene`).
 """
 
 import argparse

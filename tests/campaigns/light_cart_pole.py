@@ -40,7 +40,7 @@ LADDER = {  # rtol: error, evaluations where published
     "1e-12": (1.222e-10, 53240),
     "1e-13": (9.119e-12, 70214),
 }
-"""Of DOP853 with atol = rtol / 100, which the counts of evaluations tell."""
+"""Of DOP853 with atol = rtol / 100, as the counts of evaluations show."""
 DEFAULT = {"RK45": 2.29, "DOP853": 0.086, "LSODA": 2.21, "BDF": 3.85, "Radau": 0.134}
 """Errors of SciPy's methods at their default tolerances."""
 FLOOR = {"1e-12": 9.4e-10, "1e-13": 3.05e-9}

@@ -3,7 +3,7 @@
     python tests/campaigns/silent_errors.py [--count N] [--first N]
 
 What `test_no_silent_error` tries a few hundred of, by number, so that it can be run in parts: all
-failures are told, each with the number that makes it again.
+failures are reported, each with the number that makes it again.
 """
 
 import argparse

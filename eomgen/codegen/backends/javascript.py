@@ -9,7 +9,7 @@ from eomgen.codegen.backends.division import divided
 from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.program.ordering import ordered
-from eomgen.program.printing import Dialect, Names, print_block
+from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
 from eomgen.scalars.functions import FUNCTIONS
@@ -34,6 +34,12 @@ DIALECT = Dialect({name: name if name in OWN else f"Math.{name}" for name in FUN
 
 IN_PAGE = replace(DIALECT, reserved=RESERVED)
 """The dialect for functions in a page, in which no name of a scene occurs."""
+OF_PAGE = (
+    *("initial_state", "derivative", "kinetic_energy", "potential_energy", "joint_forces"),
+    *("body_poses", "body_velocities", "loads", "geometry", "switching_functions"),
+    *("gaps", "gap_rates", "impact", "held"),
+)
+"""The outputs that a page uses."""
 MOST = 300
 """Lines of a part of a function in a page; up to twice as many are one function. V8 does not
 optimise functions whose bytecode is longer than 60 KB; a line takes up to 100 bytes of it."""
@@ -91,38 +97,6 @@ def _given(names: Sequence[str], array: str) -> list[tuple[str, str]]:
     return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
 
 
-def body_poses(program: Program, interface: Interface) -> str:
-    """The source of `function bodyPoses(y, p)`, which computes the poses of all bodies from state
-    and parameters; if joints are driven, of `bodyPoses(y, p, t)`. "" for a program without poses.
-
-    It returns for each body [x, y, angle] in the plane, m and rad; in space the three rows, of four
-    numbers each, of [world_R_body | position], 1 and m.
-    """
-    if "body_poses" not in program.outputs:
-        return ""
-    names = Names(program, DIALECT)
-    poses = program.outputs["body_poses"]
-    block = print_block(program, poses.nodes, names, DIALECT, fixed=True)
-    states = [s.name for s in interface.states]
-    parameters = [p.name for p in interface.parameters]
-    used = {names[i] for i in block.constants}
-    given = [
-        *((names.safe(n), f"p[{i}]") for i, n in enumerate(parameters) if names.safe(n) in used),
-        *((names.safe(n), f"y[{i}]") for i, n in enumerate(states) if n in block.inputs),
-    ]
-    rows = _bracketed(block.results, poses.shape[-1], ", ")
-    if len(poses.shape) == 3:  # a matrix for each body
-        rows = _bracketed(rows, poses.shape[-2], ",\n     ")
-    context = {
-        "timed": TIME in block.inputs,
-        "own_functions": [(name, OWN[name]) for name in block.functions if name in OWN],
-        "given": given,
-        "lines": block.lines,
-        "rows": rows,
-    }
-    return render(TEMPLATES, "poses.js.jinja", context)
-
-
 def mechanism(
     program: Program, interface: Interface, contacts: Sequence[Mapping[str, Any]] = ()
 ) -> str:
@@ -133,7 +107,7 @@ def mechanism(
     the interface. `held` and `impact` take an array of their further inputs last. `contacts` are
     described by tables, one for each, which the object has as `contacts`.
     """
-    program, interface = _numbered(ordered(program), interface)
+    program, interface = _numbered(*_of_page(program, interface))
     kernels, constants = kernels_of(program, interface, IN_PAGE, sharing=True)
     called = {f for kernel in kernels for f in kernel.block.functions} | {*constants.functions}
     names = tuple(dict.fromkeys(name for kernel in kernels for name in kernel.constants))
@@ -153,14 +127,18 @@ def mechanism(
         ],
         "fixed": constants.lines,
         "kernels": written,
-        "missing": [
-            in_page(name)
-            for name in ("gaps", "gap_rates", "impact", "held", "switching_functions")
-            if name not in program.outputs
-        ],
+        "missing": [in_page(name) for name in OF_PAGE if name not in program.outputs],
         "contacts": json.dumps(list(contacts)),
     }
     return render(TEMPLATES, "mechanism.js.jinja", context)
+
+
+def _of_page(program: Program, interface: Interface) -> tuple[Program, Interface]:
+    """The same with those outputs only that a page uses."""
+    outputs = {name: output for name, output in program.outputs.items() if name in OF_PAGE}
+    functions = tuple(f for f in interface.functions if f.name in OF_PAGE)
+    program = ordered(replace(program, outputs=outputs))
+    return program, replace(interface, functions=functions)
 
 
 def _numbered(program: Program, interface: Interface) -> tuple[Program, Interface]:
@@ -233,9 +211,3 @@ def _divided(kernel: Kernel, place: Mapping[str, str]) -> dict[str, Any]:
 def _rest(defaults: Sequence[float]) -> str:
     """The source of the inputs that are not given."""
     return repr(list(defaults)) if any(defaults) else "INPUTS.map(() => 0)"
-
-
-def _bracketed(parts: Sequence[str], width: int, between: str) -> list[str]:
-    """The sources of arrays of `width` parts each."""
-    groups = (parts[i : i + width] for i in range(0, len(parts), width))
-    return [f"[{between.join(group)}]" for group in groups]

@@ -270,7 +270,7 @@ def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
             for i in interface.inputs
         ]
         if any(i.default for i in interface.inputs):
-            lines[-1] = "Inputs u, each 0 or as here unless given:"
+            lines[-1] = "Inputs u, each 0 unless another value is shown or given:"
         lines += _table(rows)
     if interface.parameters:
         lines += ["", "Parameters p, with the scene's values:"]
@@ -284,13 +284,13 @@ def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
     effects = ", ".join(kind for _, kind in interface.effects) or "none"
     lines += ["", f"Effects: {effects}."]
     if interface.contacts:
-        lines += ["", "Contacts that strike, each with the unit of its gap and its effect:"]
+        lines += ["", "Rigid contacts, each with the unit of its gap and its effect:"]
         lines += _table([(c.name, c.unit, c.effect) for c in interface.contacts])
         lines += [""]
     lines += interface.left_out
     lines += textwrap.wrap(
         f"One call of `derivative` takes {_operations(counts)}; "
-        f"{counts['parameters']} more on parameters alone are done once.",
+        f"{counts['parameters']} more depend on parameters alone and are done once.",
         WIDTH,
     )
     return lines
@@ -301,11 +301,13 @@ def _given(interface: Interface) -> list[str]:
     lines: list[str] = []
     if interface.driven:
         rows = [(f"{c.name} = {c.value}", c.unit, c.about) for c in interface.driven]
-        lines += ["", "Driven coordinates, which are no states:", *_table(rows)]
-        lines.append("M, V, G, F are of the other velocities; V holds what driving takes, too.")
+        lines += ["", "Driven coordinates, which are not states:", *_table(rows)]
+        lines.append(
+            "M, V, G, F belong to the other velocities; V includes the terms of the driven motion."
+        )
     if interface.locked:
         rows = [(f"{c.name} = {c.value}", c.unit, c.about) for c in interface.locked]
-        lines += ["", "Locked coordinates, which are no states:", *_table(rows)]
+        lines += ["", "Locked coordinates, which are not states:", *_table(rows)]
     return lines
 
 

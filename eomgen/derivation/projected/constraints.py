@@ -10,15 +10,18 @@ components. A point that is fixed in axes turning at ω moves by r' + ω x r.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import sympy as sp
 
 from eomgen.derivation.projected.symbols import Ledger, Symbols, rate, real, triple
 from eomgen.derivation.symbols import Expr
+from eomgen.language.formula import Formula
 from eomgen.model.model import Body, Model
-from eomgen.scalars.exact import direction, orientation, quarters, radians
+from eomgen.model.orientation import rows_of, turns_of
+from eomgen.scalars.exact import Real, direction, orientation, quarters, radians
 from eomgen.scene.joints import Free, Joint
-from eomgen.scene.joints.base import Primitive
+from eomgen.scene.joints.base import JointTable, Primitive
 
 
 @dataclass(frozen=True)
@@ -91,8 +94,7 @@ def _differentiated(
     joint = body.joint
     axes, r_parent, arm = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
     if not isinstance(joint, Free):
-        fixed = orientation(joint.orientation_deg)
-        axes = sp.Matrix([[symbols.number(entry) for entry in row] for row in fixed])
+        axes = fixed_axes(joint, symbols)
         r_parent, arm = symbols.vector(joint.r_parent), symbols.vector(joint.r_child)
     primitives = joint.primitives(model.dimensions)
     rotation, relative_omega, slide = _relative_motion(body.name, primitives, q, v, symbols, ledger)
@@ -125,6 +127,36 @@ def _differentiated(
         acceleration=back * (inward * parent.acceleration + in_joint(moved))
         - in_child(in_child(arm)),
     )
+
+
+class Quantities(Protocol):
+    """The symbols of quantities and of fixed numbers."""
+
+    def value(self, formula: Formula) -> Expr:
+        """A quantity."""
+
+    def number(self, value: Real) -> Expr:
+        """A number."""
+
+
+def fixed_axes(joint: JointTable, symbols: Quantities) -> Expr:
+    """The axes of a joint at q = 0 in its parent's, by numbers or by formulas of parameters."""
+    if joint.orientation is None:
+        fixed = orientation(joint.orientation_deg)
+        return sp.Matrix([[symbols.number(entry) for entry in row] for row in fixed])
+    rows = rows_of(joint.orientation)
+    if len(rows) == 3:
+        return sp.Matrix([[symbols.value(part) for part in row] for row in rows])
+    if len(rows[0]) == 4:
+        q = [symbols.value(part) for part in rows[0]]
+        return of_quaternion(q, 2 / sum(x**2 for x in q))
+    axes = sp.eye(3)
+    for k, turn in turns_of(rows[0]):
+        if isinstance(turn, tuple):
+            axes = axes * sp.Matrix([[symbols.number(x) for x in row] for row in turn])
+        else:
+            axes = axes * about(sp.Matrix([int(i == k) for i in range(3)]), symbols.value(turn))
+    return axes
 
 
 def _relative_motion(
@@ -182,7 +214,11 @@ def _axis_angle_of(
     """
     axis, angle = sp.zeros(3, 1), sp.Integer(0)
     degrees = 0.0 if isinstance(joint, Free) else joint.orientation_deg
-    if dimensions == 2 and not isinstance(degrees, tuple) and degrees != 0.0:
+    if not isinstance(joint, Free) and joint.orientation is not None:
+        if dimensions == 3:
+            return None
+        axis, angle = sp.Matrix([0, 0, 1]), symbols.value(rows_of(joint.orientation)[0][0])
+    elif dimensions == 2 and not isinstance(degrees, tuple) and degrees != 0.0:
         count, rest = quarters(radians(degrees))
         axis, angle = sp.Matrix([0, 0, 1]), count * sp.pi / 2 + symbols.number(rest)
     elif degrees not in (0.0, (0.0, 0.0, 0.0)):

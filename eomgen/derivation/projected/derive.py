@@ -50,7 +50,7 @@ def derive_projected(model: Model) -> ProjectedEquations:
     Raises `SceneError` for a model that is too large to be read or derived.
     """
     if why_not := why_not_closed(model):
-        raise SceneError(f"route: no closed form of this scene: {why_not}")
+        raise SceneError(f"route: 'closed' does not derive this scene: {why_not}")
     symbols = make_symbols(model)
     few = len(model.velocities) <= FEW_VELOCITIES
     ledger = Ledger(symbols.fixed, *(WRITTEN if few else NAMED))

@@ -47,7 +47,7 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     yield (
         "State",
         "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
-        "axes of its own body.",
+        "axes of the body to which it belongs.",
         [
             (sp.Symbol("q"), sp.Matrix([s.q])),
             (sp.Symbol("v"), sp.Matrix([s.v])),
@@ -82,9 +82,9 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
 
 def _joint_words(name: str, parent: str) -> str:
     """What the rotation R and the vector r of a joint are."""
-    turns = f"R_{name} turns axes of `{name}` into"
+    turns = f"R_{name} rotates axes of `{name}` into"
     if parent == WORLD:
-        place = f"r_{name} is the place of the centre of mass of `{name}` in the world"
+        place = f"r_{name} is the position of the centre of mass of `{name}` in the world"
         return f"{turns} the world's, and {place}."
     runs = f"r_{name} runs from the centre of mass of `{parent}` to that of `{name}`"
     return f"{turns} those of `{parent}`, and {runs}, axes of `{parent}`."
@@ -150,17 +150,17 @@ def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     if named:
         yield (
             "Parts of the motion",
-            "Named to keep what follows short: ω, u with a velocity as index are the partial "
-            "velocities, the motion of a body while this velocity is 1 and all others are 0; α, a "
-            "the accelerations that are left while all derivatives of velocities are 0; g is the "
-            "acceleration of gravity; W turns axes of a body into the world's.",
+            "These parts have names, to keep what follows short. ω, u with a velocity as index are "
+            "the partial velocities: the motion of a body while this velocity is 1 and all others "
+            "are 0. α, a are the accelerations that remain while all derivatives of velocities are "
+            "0. g is the acceleration of gravity, and W rotates axes of a body into the world's.",
             named,
         )
     weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
     yield (
         "Virtual power",
-        "In every velocity that the joints leave free the forces of inertia do the work of the "
-        f"loads: m a for each body's force{weights}. Forces in the joints do none. This is "
+        "For every velocity that the joints leave free, the forces of inertia do the work of "
+        f"the loads: m a for each body's force{weights}. Forces in the joints do none. This is "
         "M dv/dt + V + G = F; first the mass matrix,",
         [(sp.Symbol("M"), terms.M)],
     )
@@ -184,10 +184,12 @@ def _solution(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]
     yield (
         "Closed form",
         "Gauss: of all motions that the joints allow, the true one has the least sum of weighted "
-        "squares of the bodies' accelerations from free ones. Eliminated velocity by velocity, "
-        "from the leaves inwards, each pivot d is a sum of weighted squares: it vanishes at no "
-        "pose at which the mass matrix is regular. c couples a velocity to another, β is the "
-        "acceleration that it would need to stay behind, Q the force on it, f what of it is left.",
+        "squares of the differences between the bodies' accelerations and those of free bodies. "
+        "Velocities are eliminated one by one, from the leaves inwards. Each pivot d is a sum of "
+        "weighted squares, so it vanishes at no pose at which the mass matrix is regular. c "
+        "couples "
+        "one velocity to another, β is the acceleration that it would need to stay behind, Q is "
+        "the force on it, and f the part of Q that is left.",
         pairs,
     )
 

@@ -21,7 +21,7 @@ sums for the change of y, the error of order 5 and that of order 3."""
 
 @cache
 def written_out(ny: int, sums: tuple[tuple[tuple[int, float], ...], ...]) -> Stages:
-    """The stages for so many states. `sums` has the factors of stages 1 to 11, then those of the
+    """The stages for `ny` states. `sums` has the factors of stages 1 to 11, then those of the
     change and of both errors.
     """
     head = ("from numpy import array", "def stages(fun, t, h, y, f):")

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from eomgen.run.problem import FloatArray
 
 SMALL = 20
-"""Up to so many unknowns Python's numbers are quicker than arrays; the operations are the same."""
+"""Up to this many unknowns Python's numbers are quicker than arrays; the operations are the
+same."""
 
 
 class Factors(Protocol):

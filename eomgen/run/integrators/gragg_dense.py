@@ -163,7 +163,7 @@ def _middle(rows: Sequence[Row], half: float) -> FloatArray:
     substeps = [len(row.slopes) for row in rows]
     found = [extrapolated([row.middle for row in rows], substeps)]
     for order in range(1, max(2, 2 * len(rows) - 2)):
-        first = order // 2  # the first row with so many slopes
+        first = order // 2  # the first row with enough slopes
         raw = [_difference(row.slopes, order - 1) for row in rows[first:]]
         found.append(half / factorial(order) * extrapolated(raw, substeps[first:]))
     return np.array(found)

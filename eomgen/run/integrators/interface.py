@@ -80,8 +80,8 @@ class Adaptive:
 
     solver         SciPy's `OdeSolver` of the method, or a class with the same interface
     uses_jacobian  whether it is given the problem's Jacobian
-    asks_more      whether it is told whether the derivative depends on `timed`, and how many states
-                   are `positions` that come first
+    asks_more      whether it takes `timed`, which says whether the derivative depends on time, and
+                   `positions`, the number of states that are positions and come first
     one_step       whether a step depends on the state alone, not on earlier steps; then the state
                    may be corrected between steps
     remedy         what to change when a run fails

@@ -69,7 +69,7 @@ class Strides:
         self._unusual = False
 
     def made(self, stepper: Stepper, sampled: int, most: int) -> Stride | None:
-        """Make at most so many steps and put the stepper at their end; None if Python must make the
+        """Make at most `most` steps and put the stepper at their end; None if Python must make the
         next, or if there are no compiled ones yet. `sampled` is the number of rows so far.
         """
         steps = self._steps(self._method.compiled, self._needed)

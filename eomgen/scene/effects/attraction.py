@@ -32,9 +32,9 @@ at = [5, 0]
 
     type: Literal["point_gravity"]
     name: Identifier
-    mu: Quantity = quantity("m^3/s^2", "μ = G M of what attracts", "nonnegative")
+    mu: Quantity = quantity("m^3/s^2", "μ = G M of the attracting mass", "nonnegative")
     at: VectorField = quantity(
-        "m", "point it pulls toward, world axes", default=(), validate_default=False
+        "m", "position of the attracting mass, world axes", default=(), validate_default=False
     )
     except_bodies: tuple[Identifier, ...] = Field(
         default=(), description="bodies it does not act on"

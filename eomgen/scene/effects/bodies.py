@@ -38,7 +38,7 @@ class OnBodies(EffectTable):
     def _one_or_several(self) -> Self:
         given = [key for key in ("body", "bodies", "points") if getattr(self, key) is not None]
         if len(given) != 1:
-            what = f"is given beside '{given[1]}'" if given else "is missing"
+            what = f"is given in addition to '{given[1]}'" if given else "is missing"
             key = given[0] if given else "body"
             raise wrong(key, f"{what}; give one of body, bodies, points")
         if given == ["points"] and self.at:

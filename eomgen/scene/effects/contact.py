@@ -51,14 +51,14 @@ class BodyContact(OnBodies):
     Each body of `body` or `bodies` has a sphere of `radius` at `at`, or each of the named `points`
     is the centre of one. `radii` gives single bodies another radius; a sphere of radius 0 is a
     point. With `corners`, half sizes along the body's axes, the corners of a box at `at` are used
-    instead, rounded by the radius. They touch
+    instead, rounded by the radius. These touch
 
     - `against = "plane"`: the half-space n·x <= `offset`, with n along `normal`, by default up;
     - `against = "ball"`: the sphere of `other_radius` at `other_at`;
     - `against = "each_other"`: each other, every pair of `bodies`.
 
-    Plane and ball are fixed in the world, or to the body `other` and then given from its centre of
-    mass in its axes. An offset cannot depend on time: a moving floor is a body.
+    Plane and ball are fixed in the world, or to the body `other`; then they are given relative to
+    its centre of mass, in its axes. An offset cannot depend on time: a moving floor is a body.
 
     With the gap g, the depth d = max(0, -g) and ḋ = -dg/dt, the normal force is
 
@@ -121,7 +121,7 @@ dissipation = 0.2
     )
     stiffness: Quantity = quantity(
         "N/m or N/m^1.5",
-        "stiffness, which the soft laws need",
+        "stiffness (needed by the soft laws)",
         "nonnegative",
         default=ZERO,
         validate_default=False,
@@ -134,7 +134,7 @@ dissipation = 0.2
     )
     restitution: Quantity = quantity(
         "",
-        "coefficient of restitution, 0 to 1, which law 'impact' needs",
+        "coefficient of restitution, 0 to 1 (needed by law 'impact')",
         default=ZERO,
         validate_default=False,
     )
@@ -162,7 +162,7 @@ dissipation = 0.2
         if needed not in given:
             raise wrong(needed, f"is missing; law '{self.law}' needs it")
         if "friction" in given and self.slip_speed is None:
-            raise wrong("slip_speed", "is missing; it smooths friction, give a small one in m/s")
+            raise wrong("slip_speed", "is missing; it smooths friction; give a small value in m/s")
         if "friction" not in given and self.slip_speed is not None:
             raise wrong("slip_speed", "smooths friction, which is missing; give both")
         return self
@@ -181,7 +181,7 @@ dissipation = 0.2
             raise wrong("other", f"'{self.other}' cannot touch itself; name another body or world")
         for name in self.radii:
             if name not in listed and self.bodies != "all":
-                raise wrong(f"radii.{name}", "is none of the bodies in contact; leave it out")
+                raise wrong(f"radii.{name}", "is not one of the bodies in contact; leave it out")
         return self
 
     def checked(self, dimensions: int, location: str) -> Self:

@@ -16,7 +16,7 @@ from eomgen.scene.effects.vectors import dot, length, scale
 
 @dataclass(frozen=True)
 class Dof:
-    """One degree of freedom with a coordinate of its own, or the three of a ball joint together.
+    """One degree of freedom with its own coordinate, or the three of a ball joint together.
 
     first      index of its first velocity among those of the joint
     value      the coordinate, rad or m; for a ball joint the angle of rotation, 0 to π, about the
@@ -94,10 +94,10 @@ class OnJoints(EffectTable):
     @model_validator(mode="after")
     def _one_or_several(self) -> Self:
         if (self.joint is None) == (self.joints is None):
-            what = "is missing" if self.joint is None else "is given beside 'joints'"
+            what = "is missing" if self.joint is None else "is given in addition to 'joints'"
             raise wrong("joint", f"{what}; give one of joint, joints")
         if self.coordinate is not None and self.joint is None:
-            raise wrong("coordinate", "is one of a joint; name that as joint")
+            raise wrong("coordinate", "belongs to one joint; name that joint as joint")
         listed = self.joints if isinstance(self.joints, tuple) else ()
         for i, name in enumerate(listed):
             if name in listed[:i]:

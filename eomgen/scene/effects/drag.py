@@ -46,11 +46,11 @@ wind = ["3*sin(t)", 0]
     area: Quantity | None = quantity("m^2", "reference area", "nonnegative", default=None)
     coefficient: Quantity | None = quantity("", "drag coefficient", "nonnegative", default=None)
     turning_linear: Quantity = quantity(
-        "N m s/rad", "linear drag on turning", "nonnegative", default=ZERO, validate_default=False
+        "N m s/rad", "linear drag on rotation", "nonnegative", default=ZERO, validate_default=False
     )
     turning_quadratic: Quantity = quantity(
         "N m s^2/rad^2",
-        "quadratic drag on turning",
+        "quadratic drag on rotation",
         "nonnegative",
         default=ZERO,
         validate_default=False,
@@ -70,7 +70,7 @@ wind = ["3*sin(t)", 0]
     def _coefficients_fit(self) -> Self:
         given = [key for key in MADE_OF if getattr(self, key) is not None]
         if given and self.quadratic != ZERO:
-            raise wrong("quadratic", f"is given beside '{given[0]}'; leave one of them out")
+            raise wrong("quadratic", f"is given in addition to '{given[0]}'; leave one of them out")
         missing = [key for key in MADE_OF if key not in given]
         if given and missing:
             raise wrong(missing[0], "is missing; give density, area and coefficient together")

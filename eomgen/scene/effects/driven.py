@@ -12,7 +12,7 @@ from eomgen.scene.effects.base import EffectTable
 class Driven(EffectTable):
     """Prescribes the coordinate of a joint by `coordinate`, a formula of `t` and parameters.
 
-    The coordinate is no state. Its rate and acceleration are the exact derivatives of the formula;
+    The coordinate is not a state. Its rate and acceleration are exact derivatives of the formula;
     for step, select, abs, min and max they are those of the branch, so a jump gives no impulse. The
     output `driving_forces` is the generalised force of the drive along the coordinate, N m for a
     revolute and N for a prismatic joint, on the child, with its reaction on the parent. It lacks

@@ -71,14 +71,21 @@ force = ["-2*(vx - 1)", "-2*vy"]
     center: VectorField = quantity("m", "centre in the world", default=(), validate_default=False)
     strength: Quantity | None = quantity("N m^power", "strength", "nonnegative", default=None)
     steering: Quantity | None = quantity(
-        "kg/m", "steering away, mass times curvature of the way", "nonnegative", default=None
+        "kg/m",
+        "steering coefficient, mass times curvature of the path",
+        "nonnegative",
+        default=None,
     )
-    power: Number = Field(default=2.0, ge=0, le=MOST_POWER, description="of the distance, whole")
+    power: Number = Field(
+        default=2.0, ge=0, le=MOST_POWER, description="power of the distance, a whole number"
+    )
     softening: Quantity = quantity(
         "m", "softening length", "nonnegative", default=ZERO, validate_default=False
     )
     radius: Quantity | None = quantity("m", "radius of the obstacle", "nonnegative", default=None)
-    reach: Quantity | None = quantity("m", "reach from the surface", "positive", default=None)
+    reach: Quantity | None = quantity(
+        "m", "distance from the surface up to which it acts", "positive", default=None
+    )
 
     @model_validator(mode="after")
     def _keys_of_kind(self) -> Self:

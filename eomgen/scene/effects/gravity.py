@@ -16,7 +16,7 @@ class Gravity(EffectTable):
     """Weight m g of each body, along -y in the plane (handout (5), (9)), along -z in space.
 
     `direction` (world axes, not 0, need not have unit length) replaces these axes. Gravity does not
-    act on the bodies in `except_bodies`; with any of these, the weights of the other bodies are
+    act on the bodies in `except_bodies`; if there are any, the weights of the other bodies are
     applied forces, in F of M v̇ + V + G = F instead of G.
     """
 
@@ -93,5 +93,5 @@ g = 9.81
         return self.direction is None and not self.except_bodies
 
     def why_not_plain(self) -> str:
-        """It has a direction of its own, or does not act on all bodies."""
-        return "with except_bodies" if self.except_bodies else "with a direction of its own"
+        """It has its own direction, or does not act on all bodies."""
+        return "with except_bodies" if self.except_bodies else "with its own direction"

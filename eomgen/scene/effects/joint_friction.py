@@ -54,8 +54,8 @@ speed = 0.01
             raise SceneError(f"{location}.viscous: missing; give it, or coulomb and speed")
         if "coulomb" in self.model_fields_set and self.speed is None:
             raise SceneError(
-                f"{location}.speed: missing; coulomb is smoothed as tanh(rate/speed), give a small "
-                "one"
+                f"{location}.speed: missing; coulomb is smoothed as tanh(rate/speed); give a small "
+                "value"
             )
         if "coulomb" not in self.model_fields_set and self.speed is not None:
             raise SceneError(f"{location}.speed: it smooths coulomb, which is missing; give both")

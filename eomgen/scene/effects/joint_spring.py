@@ -43,7 +43,7 @@ rest = 0.5
     rest: Quantity = quantity("rad | m", "coordinate at rest", default=ZERO, validate_default=False)
     law: Quantity | None = quantity(
         "N m | N",
-        "pull back in place of stiffness",
+        "restoring torque or force in place of stiffness",
         sees=("motion", "stretch", "rate"),
         default=None,
     )

@@ -52,13 +52,15 @@ damping = 1.0
     def checked(self, dimensions: int, location: str) -> Self:
         """Check that there is a limit, and either stiffness or restitution."""
         if self.low is None and self.high is None:
-            raise SceneError(f"{location}.low: missing, and high too; give one of them or both")
+            raise SceneError(f"{location}.low: missing, as is high; give one of them or both")
         given = self.model_fields_set
         if self.restitution is None and "stiffness" not in given:
             raise SceneError(f"{location}.stiffness: missing; give it or a restitution")
         for key in ("stiffness", "damping", "allow_active"):
             if self.restitution is not None and key in given:
-                raise SceneError(f"{location}.{key}: a restitution replaces it; give one")
+                raise SceneError(
+                    f"{location}.{key}: a restitution replaces it; give only one of them"
+                )
         return self
 
     def conditions(self, location: str) -> Iterator[Condition]:
@@ -86,11 +88,11 @@ damping = 1.0
         if self.restitution is not None:
             if self.joints is not None:
                 raise SceneError(
-                    f"{location}.joints: a rigid stop is of one joint; name it as joint"
+                    f"{location}.joints: a rigid stop acts on one joint; name it as joint"
                 )
             if self.coordinate is None and len(joints[acted_on[0]]) > 1:
                 raise SceneError(
-                    f"{location}.coordinate: missing; a rigid stop is of one coordinate, and "
+                    f"{location}.coordinate: missing; a rigid stop acts on one coordinate, and "
                     f"'{self.joint}' has {', '.join(names[acted_on[0]])}"
                 )
 

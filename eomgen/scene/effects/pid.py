@@ -8,7 +8,11 @@ from eomgen.scene.effects.servo import Servo
 
 
 class Pid(Servo):
-    """c = k_p e + k_d (target_rate - v) + k_i z, dz/dt = e, e = target - q; see `Servo`.
+    """c = k_p e + k_d (target_rate - v) + k_i z, dz/dt = e, e = target - q.
+
+    The command acts on the joint's child, with its reaction on the parent: a torque, at a prismatic
+    joint a force. It is limited to ±`limit`, if given. With `lag` T the torque τ follows the
+    command by T dτ/dt = c - τ; τ is the state `<name>_torque`, initially 0.
 
     z is the state `<name>_integral`. While the command is limited, back-calculation prevents
     windup: dz/dt = e + (c_limited - c)/(k_i T), with the tracking time T, `tracking`, by default
@@ -31,7 +35,7 @@ integral_gain = 10.0
         "N m/(rad s) | N/(m s)", "gain k_i of the deviation's integral", "positive"
     )
     tracking: Quantity | None = quantity(
-        "s", "time in which a cut-off command is tracked", "positive", default=None
+        "s", "tracking time of the protection against windup", "positive", default=None
     )
 
     def states(self, dimensions: int) -> tuple[ExtraState, ...]:

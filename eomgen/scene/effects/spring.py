@@ -62,7 +62,7 @@ rest_length = 0.5
     rest_length: Quantity = quantity("m", "rest length", default=ZERO, validate_default=False)
     tension_only: bool = Field(default=False, strict=True, description="whether it is a rope")
     law: Quantity | None = quantity(
-        "N", "pull in place of stiffness", sees=("motion", "stretch", "rate"), default=None
+        "N", "tension in place of stiffness", sees=("motion", "stretch", "rate"), default=None
     )
     allow_active: bool = Field(
         default=False, strict=True, description="whether stiffness and damping may be negative"
@@ -183,4 +183,4 @@ def check_law(table: EffectTable, law: Formula | None, location: str) -> None:
     if law is None and not given & {"stiffness", "damping"}:
         raise SceneError(f"{location}.stiffness: missing; give it, or damping or a law")
     if law is not None and "stiffness" in given:
-        raise SceneError(f"{location}.stiffness: a law replaces it; give one of them")
+        raise SceneError(f"{location}.stiffness: a law replaces it; give only one of them")

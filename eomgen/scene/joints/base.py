@@ -87,14 +87,15 @@ class JointTable(Table):
     orientation_deg: Number | tuple[Number, Number, Number] = Field(
         default=0.0,
         union_mode="left_to_right",
-        description="child's axes in the parent's at zero: an angle; in space about x, then y, z",
+        description="orientation of the child's axes in the parent's where the coordinates are 0: "
+        "an angle; in space three angles about x, then y, z",
     )
 
     orientation: Orientation | None = Field(
         default=None,
-        description="the same: an angle, in space three about x, then y, z, a quaternion w, x, y, "
-        "z, or a matrix of three rows; in rad, as '90 deg', or formulas of parameters, whose "
-        "values are then fixed",
+        description="the same: an angle; in space three angles about x, then y, z, a quaternion w, "
+        "x, y, z, or a matrix of three rows. Angles are in rad or written as '90 deg'. Formulas of "
+        "parameters are allowed",
     )
 
 
@@ -106,10 +107,10 @@ class Geared(JointTable):
         "kg m^2", "rotor inertia", "nonnegative", default=ZERO, validate_default=False
     )
     gear_ratio: Quantity | None = quantity(
-        "", "turns of the rotor to one of the joint", default=None
+        "", "turns of the rotor for one turn of the joint", default=None
     )
     limits: tuple[AngleOrNumber, AngleOrNumber] | None = Field(
-        default=None, description="range of the coordinate; reported, not enforced"
+        default=None, description="range of the coordinate; leaving it is reported, not prevented"
     )
 
 

@@ -25,7 +25,7 @@ coordinate = "reach"
     axis: Numbers = Field(description="direction in the child's axes")
 
     limits: tuple[Number, Number] | None = Field(
-        default=None, description="range of the coordinate; reported, not enforced"
+        default=None, description="range of the coordinate; leaving it is reported, not prevented"
     )
 
     def positions(self, dimensions: int) -> tuple[Coordinate, ...]:

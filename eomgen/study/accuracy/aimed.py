@@ -36,7 +36,7 @@ def aimed(
         return within(case, budget, integrator, say)
     if accuracy is not None and budget is None:
         return meet(case, accuracy, integrator, say)
-    raise RunError("accuracy, budget: a run has one aim; give one of them")
+    raise RunError("accuracy, budget: a run has only one aim; give one of them")
 
 
 def made_again(

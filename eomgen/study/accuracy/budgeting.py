@@ -37,7 +37,7 @@ def within(
     Raises `RunError` if the budget is not positive and finite, or if no run reaches the end in it.
     """
     if not 0 < budget < math.inf:
-        raise RunError(f"--budget: {budget:g} s is no time to compute in; give e.g. 2s")
+        raise RunError(f"--budget: {budget:g} s is not a computing time; give e.g. 2s")
     search = Search(case, say, FIRST, budget)
     names = race(search, asked, False)
     while search.runs:

@@ -39,15 +39,15 @@ BESIDE = 10.0
 TIGHTER = 3.0
 """Another run is made only if it is to reduce the error at least by this factor."""
 SLACK = 1.5
-"""A method's first run may take so many times the work of the cheapest so far."""
+"""A method's first run may take this many times the work of the cheapest so far."""
 BETTER = 1.5
-"""Of the accepted runs, the most accurate is chosen that takes at most so many times the least
+"""Of the accepted runs, the most accurate is chosen that takes at most this many times the least
 work."""
 OVERRUN = 3.0
-"""A run is stopped after so many times its expected work, and other methods are tried."""
+"""A run is stopped after this many times its expected work, and other methods are tried."""
 SLOWED = 2.0
-"""Steps of DOP853 that last so many times the fastest decay are limited by stability, not accuracy:
-above about 6 they are unstable."""
+"""Steps of DOP853 that last this many times the fastest decay are limited by stability, not
+accuracy: above about 6 they are unstable."""
 LOOSE = 1e-5
 """Equal steps are tried for required errors down to this."""
 FEW_ROWS = 257
@@ -58,9 +58,9 @@ PATIENT = "gauss_6"
 """Tried if the other methods at their tightest tolerances are not accurate enough. It takes equal
 steps with compensated summation, which reduces rounding errors a thousandfold."""
 PATIENCE = 10.0
-"""The first run of `PATIENT` may take so many times the work of the best run so far."""
+"""The first run of `PATIENT` may take this many times the work of the best run so far."""
 LIMIT = 30.0
-"""Any run of `PATIENT` may be expected to take at most so many times the work of DOP853 at its
+"""Any run of `PATIENT` may be expected to take at most this many times the work of DOP853 at its
 tightest. It gains three digits in less; if it needs more, rounding errors dominate.
 """
 AGAIN = 8
@@ -70,7 +70,7 @@ SLIGHT = 0.02
 NO_WAY = 1e-9
 """The least share of its work that a stopped run is taken to have done."""
 NEAR = 100.0
-"""If the error asked for is less than doubles can represent, so many times their spacing in the
+"""If the error asked for is less than doubles can represent, this many times their spacing in the
 last state is aimed at instead."""
 FIRST_STEPS = 64
 """Least number of equal steps in a method's first run."""

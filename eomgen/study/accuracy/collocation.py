@@ -27,7 +27,7 @@ from eomgen.study.accuracy.forecast import Forecast, NoStep
 from eomgen.study.accuracy.gauss import ExtendedArray, Gauss, gauss
 
 MANY = 40
-"""From so many states on, one Jacobian serves all stages of a step."""
+"""From this many states on, one Jacobian serves all stages of a step."""
 MOST_CORRECTIONS = 12
 NEAR = 1e-12
 """Corrections in doubles end when they are this small, relative to the scale."""

@@ -24,12 +24,12 @@ from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
 LAST = 0.1
 """Part of a run's time, at its end, over which differences are taken."""
 NEAREST = 2
-"""Of the looser runs of a method, so many tell of the tightest run's error: errors of much looser
-ones may fall faster than theory says."""
+"""This many of the looser runs of a method are used to estimate the tightest run's error: errors of
+much looser ones may fall faster than theory says."""
 CAUTION = 0.8
 """If only one difference is known, the theoretical exponent is reduced by this factor."""
 MORE = 1.5
-"""Two runs count as different in their steps if one has so many times the steps of the other."""
+"""Two runs count as different in their steps if one has this many times the steps of the other."""
 ROUNDING, FEW = 2.0**-52, 8.0
 """An error is never stated below machine epsilon, nor, from a second run, below a few times
 it."""
@@ -44,7 +44,7 @@ SCATTER = 3.0
 """The errors of multistep methods, whose orders vary, scatter more; the estimate of their remaining
 error is multiplied by this."""
 ALIKE = 2.0
-"""The error of a run is taken as so many times its difference from a run of another method: both
+"""The error of a run is taken as this many times its difference from a run of another method: both
 may be off in the same direction, and the closest of several others is used."""
 WIDER = 10.0
 """Factor between a run's tolerances and those of the run that estimates its error."""
@@ -52,7 +52,7 @@ MOSTLY = 0.3
 """If more than this share of a run's steps is at the greatest length allowed, the tolerance does
 not determine its steps."""
 CHANCE = 1.5
-"""The error is taken to be at least so many times the difference between a run and one with other
+"""The error is taken to be at least this many times the difference between a run and one with other
 rounding errors."""
 SLOPES = (0.6, 1.2)
 """Bounds of a fitted exponent, relative to the theoretical one."""

@@ -17,7 +17,7 @@ FORECAST, ROUGHLY = 1e-10, 1e-5
 """Relative tolerances of the prediction by LSODA and by Radau; its error is the first correction
 of the collocation."""
 OF_NOISE = 10.0
-"""Tolerances are at least so many times the rounding error of a state."""
+"""Tolerances are at least this many times the rounding error of a state."""
 ASTRAY = 1e-6
 """The prediction restarts when it is this far off, relative to the scale."""
 MANY = 500

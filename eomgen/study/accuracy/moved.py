@@ -26,7 +26,7 @@ from eomgen.store import program_of
 from eomgen.study.diagnosis import problem_of
 
 TIMES = 2.0
-"""Rounded constants are moved by so many times their rounding error, or by a unit in the last
+"""Rounded constants are moved by this many times their rounding error, or by a unit in the last
 place."""
 UNIT = float(np.finfo(float).eps)
 

@@ -48,7 +48,7 @@ HARDLY = 0.3
 MARKS = 500
 """About how many times a run's progress is recorded."""
 SLOW = 2.5
-"""A run is stopped early if its speed so far predicts so many times the work allowed."""
+"""A run is stopped early if its speed so far predicts this many times the work allowed."""
 
 ShowProgress = Callable[[str], AbstractContextManager[Progress]]
 """Shows which run is being made, and its progress."""

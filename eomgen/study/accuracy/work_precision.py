@@ -27,7 +27,7 @@ from eomgen.study.accuracy.reference import Reference
 from eomgen.study.timing import least_seconds
 
 TELLS_APART = 100
-"""Errors below so many times the reference's own are not resolved."""
+"""Errors below this many times the reference's own are not resolved."""
 ONCE = 0.25
 """A run that takes more than this part of the time allowed is made once."""
 REPEATS = 0.3
@@ -35,7 +35,7 @@ REPEATS = 0.3
 LEAST_REPEATS, MOST_REPEATS = 2, 20
 """… and how many there are."""
 WORKS_COST = 8
-"""A run that integrates the works of effects takes at most about so many times longer."""
+"""A run that integrates the works of effects takes at most about this many times longer."""
 SAME_TIME = 1e-6
 """Rows count as simultaneous if they are this close, relative to the time between two rows."""
 OVER = "it took too long"

@@ -53,7 +53,7 @@ def in_single(system: System, output: str, t: FloatArray, y: FloatArray) -> Sing
         values = interpret(system.program, output, given, Single())
     result = np.empty((len(values), len(y)), dtype=np.float32)
     for row, value in zip(result, values, strict=True):
-        assert value.dtype == np.float32, f"{output} has left float32"
+        assert value.dtype == np.float32, f"{output} is beyond the range of float32"
         row[:] = value
     return result.reshape((*system.program.outputs[output].shape, len(y)))
 

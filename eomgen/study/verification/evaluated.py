@@ -12,6 +12,7 @@ from gmpy2 import mpfr
 
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import JointIndex, Model, dofs_of
+from eomgen.model.orientation import rows_of
 from eomgen.precision.extended import Array, along, extended, zeros
 from eomgen.precision.precise import Extended
 from eomgen.scalars.extended import Bits
@@ -21,6 +22,7 @@ from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.study.verification.poses import (
     Pose,
     about,
+    held,
     orientation,
     rotation_about,
     spun,
@@ -238,7 +240,10 @@ class EvaluatedModel:
         joint = index.body.joint
         if not isinstance(joint, Free):
             pose = pose.moved(self.in_space([self.value(r) for r in joint.r_parent]))
-            pose = pose.fixed(orientation(joint.orientation_deg))
+            if joint.orientation is None:
+                pose = pose.fixed(orientation(joint.orientation_deg))
+            else:
+                pose = pose.fixed(held(rows_of(joint.orientation), self.value))
         for i, primitive in enumerate(joint.primitives(self.dimensions)):
             pose = self._made(pose, primitive, index, i)
         if not isinstance(joint, Free):

@@ -76,7 +76,7 @@ def horizon(
     problem = problem_of(module, parameters, inputs, model)
     if problem.contacts is not None:
         raise RunError(
-            "horizon: rigid contacts strike, and there is no run in extended precision then"
+            "horizon: rigid contacts strike, and runs in extended precision do not take these"
         )
     try:
         true = reference(

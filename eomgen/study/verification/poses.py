@@ -2,7 +2,7 @@
 along every velocity, and its second time derivative at constant velocities. Extended precision.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +10,8 @@ import gmpy2
 import numpy as np
 from gmpy2 import mpfr
 
+from eomgen.language.angles import degrees_of
+from eomgen.language.formula import Constant, Formula
 from eomgen.precision.extended import Array, along, extended, eye, zeros
 from eomgen.precision.precise import Extended
 
@@ -117,6 +119,22 @@ def orientation(degrees: float | tuple[float, float, float]) -> Array:
     for axis, angle in zip(np.eye(3), angles, strict=True):
         radians = mpfr(angle) * gmpy2.const_pi() / 180
         rotation = about(extended(axis), gmpy2.cos(radians), gmpy2.sin(radians)) @ rotation
+    return rotation
+
+
+def held(rows: Sequence[Sequence[Formula]], value: Callable[[Formula], Extended]) -> Array:
+    """The rotation by formulas: of an angle about z, three angles, a quaternion, or a matrix."""
+    values = extended([[value(part) for part in row] for row in rows])
+    if len(values) == 3:
+        return values
+    if len(values[0]) == 4:
+        square = values[0] @ values[0]
+        return _bilinear(values[0], values[0]) / square
+    rotation, axes = eye(), eye()[-len(values[0]) :]
+    for axis, part, angle in zip(axes, rows[0], values[0], strict=True):
+        if isinstance(part, Constant):  # "90 deg" is a right angle, which no double is
+            angle = mpfr(degrees_of(part.value)) * gmpy2.const_pi() / 180
+        rotation = about(axis, gmpy2.cos(angle), gmpy2.sin(angle)) @ rotation
     return rotation
 
 

@@ -25,7 +25,7 @@ Exact = NDArray[np.object_]
 class Truth:
     """v̇ of a model of form 'velocity', with inputs 0 and no contact forces.
 
-    The articulated-body algorithm computes it from a recording of its own, in which nothing was
+    The articulated-body algorithm computes it from its own recording, in which nothing was
     rounded or rearranged. `factored` computes the same by LᵀDL factors, without a recording.
     """
 

@@ -5,9 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.api.reporter import SILENT, Reporter
-from eomgen.errors import RunError, nearest
-from eomgen.model.elaborate import outputs_for
 from eomgen.model.model import Model
 from eomgen.outputs import DERIVATIVES, OUTPUTS, Size
 from eomgen.run.trajectory import Saved, Trajectory
@@ -30,24 +27,6 @@ PARTS: Mapping[str, Mapping[int, tuple[str, ...]]] = {
     "momentum": {3: ("px", "py", "lz"), 6: ("px", "py", "pz", "lx", "ly", "lz")},
 }
 """Names of the components of an output, by their number."""
-
-
-def wanted_outputs(
-    names: Sequence[str], model: Model, reporter: Reporter = SILENT
-) -> tuple[str, ...]:
-    """The outputs that are needed to save what is named.
-
-    Raises `RunError` for an unknown name, or `SceneError` for one that the model lacks.
-    """
-    argument = reporter.argument("save")
-    found: list[str] = []
-    for name in names:
-        if name not in GROUPS and name not in SAVED:
-            known = (*GROUPS, *SAVED)
-            hint = nearest(name, known) or f"; known: {', '.join(known)}"
-            raise RunError(f"{argument}: no '{name}' can be saved{hint}")
-        found += GROUPS.get(name, (name,))
-    return outputs_for(found, argument, model.points, model.inputs, model.parameters, model.driven)
 
 
 def recorded(
@@ -74,7 +53,7 @@ def recorded(
             )
             if OUTPUTS[output].contacts and trajectory.events:
                 array = np.where(
-                    _held(trajectory).reshape(-1, *[1] * (array.ndim - 1)), np.nan, array
+                    held_rows(trajectory).reshape(-1, *[1] * (array.ndim - 1)), np.nan, array
                 )
             found[output] = Saved(array, tuple(_columns(output, model, module, array.shape[1:])))
         if name == "energy":
@@ -100,7 +79,7 @@ def _inputs(module: Any, trajectory: Trajectory, constants: Mapping[str, float] 
     return Saved(values, tuple(f"input_{name}" for name in module.INPUTS))
 
 
-def _held(trajectory: Trajectory) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def held_rows(trajectory: Trajectory) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """At which rows a rigid contact is held."""
     held = np.zeros(len(trajectory.t), dtype=bool)
     since: dict[str, float] = {}
@@ -119,14 +98,15 @@ def _columns(output: str, model: Model, module: Any, shape: tuple[int, ...]) -> 
     axes, _ = OUTPUTS[output].of(model.dimensions)
     names = [output]
     for i, (axis, count) in enumerate(zip(axes, shape, strict=True)):
-        labels = _labels(output, axis, count, model, module, last=i == len(shape) - 1)
+        labels = labels_of(output, axis, count, model, module, last=i == len(shape) - 1)
         names = [f"{name}_{label}" for name in names for label in labels]
     return names
 
 
-def _labels(
+def labels_of(
     output: str, axis: Size, count: int, model: Model, module: Any, *, last: bool
 ) -> Sequence[str]:
+    """The names along an axis of an output, `count` of them; `last` if it is its last axis."""
     if isinstance(axis, int):
         numbers = tuple(str(i + 1) for i in range(count))
         return PARTS.get(output, {}).get(count, numbers) if last else numbers

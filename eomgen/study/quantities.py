@@ -1,0 +1,252 @@
+"""Named quantities along a run: states, energies, outputs and their components.
+
+theta                  a state; t is the time
+energy                 kinetic, potential and total energy
+joint_forces           an output: all its components
+joint_forces.hinge     those of one joint, body, point or effect
+joint_forces.hinge.fx  one component; x is short for the first that ends in x
+works, inputs          what the run keeps of them
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from eomgen.errors import RunError, nearest
+from eomgen.outputs import OUTPUTS
+from eomgen.run.problem import FloatArray
+from eomgen.run.trajectory import Trajectory
+from eomgen.study.observed import Observed
+from eomgen.study.recording import GROUPS, SAVED, held_rows, labels_of
+
+ENERGIES: Mapping[str, str] = {
+    "kinetic": "kinetic_energy",
+    "potential": "potential_energy",
+    "total": "",
+}
+WORDS = ("t", "energy", "works", "inputs", "points", "poses")
+UNITS: Mapping[str, tuple[str, ...]] = {
+    "kinetic_energy": ("J",),
+    "potential_energy": ("J",),
+    "effect_powers": ("W",),
+    "momentum": ("kg m/s", "kg m²/s"),
+    "centre_of_mass": ("m",),
+    "joint_forces": ("N", "N m"),
+    "body_poses": ("m", "rad"),
+    "body_velocities": ("m/s", "rad/s"),
+    "point_positions": ("m",),
+    "point_velocities": ("m/s",),
+}
+"""Units of outputs; a second one is that of angular components."""
+TITLES: Mapping[str, tuple[str, str]] = {
+    "effect_powers": ("power",) * 2,
+    "momentum": ("momentum", "angular momentum"),
+    "joint_forces": ("joint force", "joint moment"),
+    "driving_forces": ("driving force",) * 2,
+    "body_poses": ("position", "angle"),
+    "body_velocities": ("velocity", "angular velocity"),
+    "point_positions": ("position",) * 2,
+    "point_velocities": ("velocity",) * 2,
+}
+"""What outputs are called in a figure, and their angular components."""
+ANGULAR = ("mx", "my", "mz", "wx", "wy", "wz", "lx", "ly", "lz", "angle")
+MOST = 200
+"""Greatest number of quantities in one figure."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A quantity at n times.
+
+    name    as it is asked for
+    label   its name among those of the same `title`
+    title   what it belongs to, in words; "" for a state
+    unit    "" if it has none, or if its unit is not known
+    values  (n,); nan where a rigid contact is held whose force would change it
+    size    the greatest absolute value of the quantities of its kind: what is much smaller is
+            rounding
+    """
+
+    name: str
+    label: str
+    title: str
+    unit: str
+    values: FloatArray
+    size: float
+
+
+def outputs_of(names: Sequence[str], trajectory: Trajectory, argument: str) -> tuple[str, ...]:
+    """The outputs that a module must have for quantities of these names.
+
+    Raises `RunError`, which calls the names `argument`, for a name that no run has.
+    """
+    found: list[str] = []
+    for name in names:
+        head = name.partition(".")[0]
+        if head in (*trajectory.states, *("t", "energy", "works", "inputs")):
+            continue
+        known = (*GROUPS, *SAVED)
+        if head not in known:
+            near = (*trajectory.states, *WORDS, *SAVED)
+            hint = nearest(head, near) or f"; states: {', '.join(trajectory.states[:12])}"
+            raise RunError(f"{argument}: no state or output '{head}'{hint}")
+        found += GROUPS.get(head, (head,))
+    return tuple(found)
+
+
+def quantities(
+    names: Sequence[str], run: Observed, t: FloatArray, y: FloatArray, *, argument: str = "of"
+) -> list[Quantity]:
+    """Quantities at states (n, ny) of a run, in the order of their names.
+
+    Raises `RunError` for an unknown name or component, or if the run does not keep it.
+    """
+    found: list[Quantity] = []
+    for name in names:
+        found += _found(name, run, t, y, argument)
+    if len(found) > MOST:
+        raise RunError(
+            f"{argument}: these are {len(found)} quantities; name at most {MOST}, "
+            f"{names[0]}.NAME for example"
+        )
+    return found
+
+
+def _found(
+    name: str, run: Observed, t: FloatArray, y: FloatArray, argument: str
+) -> Iterator[Quantity]:
+    head, *parts = name.split(".")
+    states, units = run.trajectory.states, run.functions.UNITS
+    if name in states:
+        alike = [k for k, other in enumerate(states) if units[other] == units[name]]
+        size = float(np.abs(run.trajectory.y[:, alike]).max())
+        yield Quantity(name, name, "", units[name], y[:, states.index(name)], size)
+    elif name == "t":
+        yield Quantity(name, name, "", "s", t, float(np.abs(t).max()))
+    elif head in states or head == "t":
+        raise RunError(f"{argument}: {name}: a state has no components; take {head}")
+    elif head == "energy":
+        yield from _energies(name, parts, run, t, y, argument)
+    elif head in ("works", "inputs"):
+        yield from _kept(head, parts, run, t, argument)
+    else:
+        for output in GROUPS.get(head, (head,)):
+            yield from _of_output(output, parts, run, t, y, argument)
+
+
+def _energies(
+    name: str, parts: list[str], run: Observed, t: FloatArray, y: FloatArray, argument: str
+) -> Iterator[Quantity]:
+    values = {label: run.output(of, t, y) for label, of in ENERGIES.items() if of}
+    size = float(max(np.abs(each).max(initial=0.0) for each in values.values()))
+    values["total"] = values["kinetic"] + values["potential"]
+    for (label,) in _chosen(name, parts, [list(ENERGIES)], argument):
+        yield Quantity(f"energy.{label}", label, "energy", "J", values[label], size)
+
+
+def _kept(
+    head: str, parts: list[str], run: Observed, t: FloatArray, argument: str
+) -> Iterator[Quantity]:
+    """Works or inputs, which are known at the rows of the run; between them they are linear."""
+    trajectory, setup = run.trajectory, run.setup
+    if head == "works":
+        if trajectory.works is None:
+            raise RunError(f"{argument}: works: this run has none; simulate with --works")
+        names, values = trajectory.work_names, trajectory.works
+    else:
+        names = tuple(run.functions.INPUTS)
+        constant = np.array([*{**run.functions.INPUTS, **setup.inputs}.values()])
+        varying = setup.varying
+        values = np.tile(constant, (len(trajectory.t), 1)) if varying is None else varying
+        if not names:
+            raise RunError(f"{argument}: inputs: {trajectory.name} has none")
+    for (label,) in _chosen(head, parts, [list(names)], argument):
+        column = np.interp(t, trajectory.t, values[:, names.index(label)])
+        unit = "J" if head == "works" else run.functions.UNITS[label].partition(" | ")[0]
+        title = "work" if head == "works" else "input"
+        yield Quantity(f"{head}.{label}", label, title, unit, column, float(np.abs(values).max()))
+
+
+def _of_output(
+    output: str, parts: list[str], run: Observed, t: FloatArray, y: FloatArray, argument: str
+) -> Iterator[Quantity]:
+    if not hasattr(run.functions, output):
+        raise RunError(f"{argument}: '{output}' is made for form = 'velocity' only")
+    array = run.output(output, t, y)
+    spec = OUTPUTS[output]
+    if spec.contacts and run.trajectory.events:
+        rows = np.searchsorted(run.trajectory.t, t, side="right") - 1
+        held = held_rows(run.trajectory)[rows].reshape(-1, *[1] * (array.ndim - 1))
+        array = np.where(held, np.nan, array)
+    shape = array.shape[1:]
+    axes = spec.of(run.model.dimensions)[0]
+    labels = [
+        list(labels_of(output, axis, count, run.model, run.functions, last=i == len(shape) - 1))
+        for i, (axis, count) in enumerate(zip(axes, shape, strict=True))
+    ]
+    columns = array.reshape(len(t), -1)
+    flat = _all(labels)
+    units = [_unit(output, entry, run) for entry in flat]
+    largest = np.nan_to_num(np.abs(columns)).max(axis=0, initial=0.0)
+    sizes = {unit: float(max(largest[[u == unit for u in units]])) for unit in dict.fromkeys(units)}
+    if output == "joint_forces":  # a moment is small beside a force on a lever of the mechanism
+        sizes["N m"] = max(sizes.get("N m", 0.0), run.length * sizes["N"])
+    for entry in _chosen(output, parts, labels, argument):
+        index = flat.index(entry)
+        yield Quantity(
+            ".".join((output, *entry)),
+            ".".join(entry) or output,
+            _title(output, entry),
+            units[index],
+            columns[:, index],
+            sizes[units[index]],
+        )
+
+
+def _all(labels: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
+    """All entries of an output by the names along its axes, row by row."""
+    found: list[tuple[str, ...]] = [()]
+    for names in labels:
+        found = [(*entry, name) for entry in found for name in names]
+    return found
+
+
+def _chosen(
+    name: str, parts: Sequence[str], labels: Sequence[Sequence[str]], argument: str
+) -> list[tuple[str, ...]]:
+    """The entries that the parts of a name choose: each part an axis, those not named all."""
+    kept = [list(names) for names in labels]
+    axis = 0
+    for part in parts:
+        matches = ((k, _match(part, kept[k])) for k in range(axis, len(kept)))
+        axis, match = next(((k, m) for k, m in matches if m is not None), (0, ""))
+        if not match:
+            known = [label for names in labels for label in names]
+            hint = nearest(part, known) or f"; known: {', '.join(known[:12]) or 'none'}"
+            raise RunError(f"{argument}: {name} has no component '{part}'{hint}")
+        kept[axis] = [match]
+        axis += 1
+    return _all(kept)
+
+
+def _match(part: str, names: Sequence[str]) -> str | None:
+    """The name itself, or the first short name that ends in it: fx for x."""
+    if part in names:
+        return part
+    short = (name for name in names if len(name) == 2 and len(part) == 1 and name[1] == part)
+    return next(short, None)
+
+
+def _title(output: str, entry: Sequence[str]) -> str:
+    """What an entry of an output is, in words."""
+    linear, angular = TITLES.get(output, (output.replace("_", " "),) * 2)
+    return angular if entry and entry[-1] in ANGULAR else linear
+
+
+def _unit(output: str, entry: Sequence[str], run: Observed) -> str:
+    """The unit of an entry of an output; "" if it is not known."""
+    if output == "body_poses" and run.model.dimensions == 3:
+        return "m" if entry[-1] == "4" else ""
+    known = UNITS.get(output, ("",))
+    return known[-1] if len(known) > 1 and entry[-1] in ANGULAR else known[0]
