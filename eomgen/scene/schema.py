@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
+from eomgen.displays import Displayed
 from eomgen.integrators import INTEGRATORS
 from eomgen.language.base import (
     AngleOrNumber,
@@ -226,7 +227,7 @@ def _all(value: Any) -> Any:
     return "all" if value == ["all"] else value
 
 
-class Scene(Table):
+class Scene(Table, Displayed):
     """A whole scene."""
 
     name: ModuleName

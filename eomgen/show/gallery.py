@@ -46,7 +46,9 @@ class Exhibit:
 
 def thumbnail(motion: Motion) -> bytes:
     """A small picture of a motion, as PNG: the mechanism and the paths of its bodies; in the plane
-    also where it was before, unless the camera follows it. Raises `RunError` if no sample is finite.
+    also where it was before, unless the camera follows it.
+
+    Raises `RunError` if no sample is finite.
     """
     whole = thinned(motion)
     last = round(SEEN * (len(whole.t) - 1))
