@@ -218,6 +218,21 @@ def check_slider(opened: Opened, steps: int = 5) -> str:
     raise AssertionError("no slider changes the motion")
 
 
+ALONE = """async (end) => {
+  const picture = () => new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(f)));
+  const where = async () => { await picture(); return window.eomgen.centers; };
+  const shown = [];
+  while (window.eomgen.time < end - 1e-9) {
+    const last = window.eomgen.time + 2 * (window.eomgen.step.seconds ?? 0) >= end;
+    if (last) shown.push(await where());
+    forth.click();
+  }
+  shown.push(await where());
+  return shown.slice(-2);
+}"""
+"""Makes the steps of a motion up to a time; where bodies are before and after it."""
+
+
 def check_dragging(opened: Opened) -> None:
     """A body that is dragged moves otherwise than if it is left alone."""
     opened.go_live()
@@ -244,13 +259,9 @@ def check_dragging(opened: Opened) -> None:
     mouse.up()
     assert opened.error is None
     opened.page.click("#restart")
-    opened.page.evaluate(
-        "(t) => { while (window.eomgen.time < t - 1e-9) forth.click(); }",
-        end,
-    )
-    opened.drawn()
-    assert abs(opened.time - end) < 1e-9
-    away = np.abs(np.array(opened.centers) - pulled).max()
+    # A method with steps of its own choice comes to other times: it is compared at both beside.
+    alone = opened.page.evaluate(ALONE, end)
+    away = min(np.abs(np.array(centers) - pulled).max() for centers in alone)
     assert away > 1e-3 * opened.view["height"], f"the pull moved it by {away:.2g} m only"
 
 

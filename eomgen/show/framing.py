@@ -21,7 +21,7 @@ SMALL = 0.36
 the whole motion, the camera follows."""
 FEWEST, SOUNDINGS = 60, 300
 """Number of samples at which the bounds of the bodies are found, with many points and with few."""
-ALONE = 2.3
+ALONE = 1.6
 """A view that follows a single body is so much larger than one of a mechanism."""
 GAIN = 1.3
 """It follows only if bodies are then larger by this factor."""
