@@ -23,6 +23,7 @@ const listenToKeys = ({ canvas, stage, setPlaying, step, goTo, reset, zoom, redr
     r: reset,
     l: () => press(isLive() ? "mode-replay" : "mode-live")(),
     t: press("theme"),
+    b: () => pointer.take(1),
     a: move(FAR, 0),
     d: move(-FAR, 0),
     w: move(0, FAR),
@@ -35,7 +36,14 @@ const listenToKeys = ({ canvas, stage, setPlaying, step, goTo, reset, zoom, redr
       3: view(() => stage.view.lookFrom(-90, 90)),
     });
   }
-  const shifted = { ArrowLeft: turn(FAR, 0), ArrowRight: turn(-FAR, 0), ArrowUp: turn(0, FAR), ArrowDown: turn(0, -FAR) };
+  const pull = { ArrowLeft: [-FAR, 0], ArrowRight: [FAR, 0], ArrowUp: [0, -FAR], ArrowDown: [0, FAR] };
+  const shifted = {
+    B: () => pointer.take(-1),
+    ArrowLeft: turn(FAR, 0),
+    ArrowRight: turn(-FAR, 0),
+    ArrowUp: turn(0, FAR),
+    ArrowDown: turn(0, -FAR),
+  };
 
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
@@ -53,7 +61,8 @@ const listenToKeys = ({ canvas, stage, setPlaying, step, goTo, reset, zoom, redr
     if (within && within.id !== "time") return;
     if (within && event.key !== " ") return;
     if (event.key === " " && event.target.closest("button, summary, input[type=checkbox]")) return;
-    const action = (event.shiftKey && shifted[event.key]) || keys[event.key];
+    const pulled = !event.shiftKey && pointer.held() && pull[event.key];
+    const action = pulled ? () => pointer.nudge(...pulled) : (event.shiftKey && shifted[event.key]) || keys[event.key];
     if (!action) return;
     event.preventDefault();
     action();

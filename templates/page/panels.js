@@ -24,8 +24,13 @@ const makePanels = (actions) => {
       const { name, unit, about, value } = quantity;
       const id = `${kind}-${name}`;
       const scale = scaleOf(value);
-      const slider = element("input", { type: "range", id, min: -1, max: 1, step: 0.01, "data-name": name, "aria-label": about ? `${name}, ${about}` : name });
-      const field = element("input", { type: "text", inputmode: "decimal", class: "field", "aria-label": `Value of ${name}${unit ? `, ${unit}` : ""}`, spellcheck: "false", autocomplete: "off" });
+      const slider = element("input", {
+        type: "range", id, min: -1, max: 1, step: 0.01, "data-name": name, "aria-label": about ? `${name}, ${about}` : name,
+      });
+      const field = element("input", {
+        type: "text", inputmode: "decimal", class: "field", spellcheck: "false", autocomplete: "off",
+        "aria-label": unit ? `Value of ${name}, ${unit}` : `Value of ${name}`,
+      });
       const reset = element("button", { type: "button", class: "undo", "aria-label": `Reset ${name}`, title: "Reset" }, "↺");
       const write = (x) => {
         field.value = plain(x);
@@ -72,12 +77,14 @@ const makePanels = (actions) => {
     const share = Math.round((100 * effect.operations) / total);
     const cost = effect.operations > 0 ? `${effect.operations} operations, ${share || "< 1"} %` : "no operations";
     box.addEventListener("change", () => actions.parameter(effect.switch, box.checked ? 1 : 0));
-    byId("effects").append(element("div", { class: "effect" }, box,
-      element("label", { for: id }, effect.name, element("span", { class: "faint" }, ` ${effect.type === effect.name ? "" : `${effect.type.replace(/_/g, " ")} · `}${cost}`))));
+    const kind = effect.type === effect.name ? "" : `${effect.type.replace(/_/g, " ")} · `;
+    const about = element("span", { class: "faint" }, ` ${kind}${cost}`);
+    byId("effects").append(element("div", { class: "effect" }, box, element("label", { for: id }, effect.name, about)));
     return box;
   });
   byId("effects-panel").hidden = !DATA.live || !effectBoxes.length;
-  byId("effects-total").textContent = `All effects: ${DATA.operations} operations for a derivative. Beside each effect: what leaving it out saves.`;
+  byId("effects-total").textContent = `All effects: ${DATA.operations} operations for a derivative. `
+    + "Beside each effect: what leaving it out saves.";
 
   // ---- Method and step ----
 

@@ -10,13 +10,29 @@ const player = (() => {
     ["shadows", "Shadows", true], ["forces", "Forces of effects", false], ["torques", "Torques of effects", false],
     ["velocities", "Velocities", false], ["reactions", "Joint forces", false],
   ];
+  // What this mechanism has nothing of is not offered.
+  const offered = {
+    shadows: Boolean(DATA.drawing.floor),
+    forces: DATA.loads.length > 0,
+    torques: DATA.loads.length > 0,
+    velocities: Boolean(mechanism.bodyVelocities),
+    reactions: Boolean(mechanism.jointForces),
+  };
   const canvas = byId("stage");
   const stage = makeStage(canvas, mechanism);
   const replay = makeReplay(mechanism);
   const values = makeValues();
   const slider = byId("time");
   const engine = DATA.live ? makeEngine(mechanism, DATA) : null;
-  const clock = { time: replay ? replay.begin : 0, playing: false, stamp: 0, frames: [], seen: null, remark: "", mode: replay ? "replay" : "live" };
+  const clock = {
+    mode: replay ? "replay" : "live",
+    time: replay ? replay.begin : 0, // of the replay
+    playing: false,
+    stamp: 0, // of the last picture, ms
+    seen: null, // what was, while the plots lead back in a live motion
+    remark: "", // of the engine, as it is shown
+    frames: [], // times of the last pictures
+  };
   const show = Object.fromEntries(SHOWS.map(([key, , on]) => [key, on]));
   const isLive = () => clock.mode === "live";
   let waiting = false; // for the next picture
@@ -41,7 +57,13 @@ const player = (() => {
       const grip = isLive() && engine.grip;
       const pull = grip && grip.point ? [grip.point, grip.target] : null;
       stage.draw(state.t, state.y, state.p, state.u, show, { pull, keep: isLive() });
-      values.show({ ...state, energy: energyOf(state), playing: clock.playing, stepCost: isLive() ? engine.cost() : NaN, single: !isLive() && DATA.run.single });
+      values.show({
+        ...state,
+        energy: energyOf(state),
+        playing: clock.playing,
+        stepCost: isLive() ? engine.cost() : NaN,
+        single: !isLive() && DATA.run.single,
+      });
       overlay.draw(state.t);
       plotting.cursor(state.t);
       if (!isLive()) {
@@ -251,7 +273,7 @@ const player = (() => {
   const plotting = makePlotting({ mechanism, replay, seek });
 
   for (const [key, text, on] of SHOWS) {
-    if (key === "shadows" && !DATA.drawing.floor) continue;
+    if (offered[key] === false) continue;
     const box = element("input", { type: "checkbox", id: `show-${key}`, checked: on });
     box.addEventListener("change", () => {
       show[key] = box.checked;
@@ -259,15 +281,11 @@ const player = (() => {
     });
     byId("shows").append(element("label", {}, box, text));
   }
-  const themes = { auto: "light", light: "dark", dark: "auto" };
   byId("theme").addEventListener("click", () => {
-    const root = document.documentElement;
-    const seen = root.dataset.theme ?? "auto";
-    // The first press changes what is seen, whatever the system prefers.
-    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
-    const next = seen === "auto" ? (dark ? "light" : "dark") : seen === (dark ? "light" : "dark") ? (dark ? "dark" : "light") : themes[seen];
-    if (next === "auto") delete root.dataset.theme;
-    else root.dataset.theme = next;
+    const { dataset } = document.documentElement;
+    const prefersDark = matchMedia("(prefers-color-scheme: dark)").matches;
+    const isDark = dataset.theme ? dataset.theme === "dark" : prefersDark;
+    dataset.theme = isDark ? "light" : "dark";
     repaint();
   });
   const repaint = () => {

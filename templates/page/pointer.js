@@ -7,6 +7,7 @@ const makePointer = (canvas, stage, { canPull, pull, release, redraw }) => {
   const touches = new Map(); // where each finger is
   let grip = null; // {body, at, world} of the pulled body
   let spread = 0; // distance of two fingers
+  let [chosen, aim] = [-1, [0, 0]]; // the body taken by keys, and where it is pulled to
 
   const spotOf = (event) => {
     const box = canvas.getBoundingClientRect();
@@ -65,11 +66,31 @@ const makePointer = (canvas, stage, { canPull, pull, release, redraw }) => {
       if (!touches.size) letGo();
     });
   }
+
+  // The same by keys: take the next body at its centre of mass, then pull it about.
+  function take(direction) {
+    if (!canPull()) return;
+    const count = DATA.bodies.length;
+    chosen = (chosen + direction + count) % count;
+    letGo();
+    const world = tools.center(stage.poses(), chosen);
+    grip = { body: chosen, world, at: space ? [0, 0, 0] : [0, 0] };
+    aim = stage.toScreen(world);
+    canvas.dataset.grip = chosen;
+    pull(grip, world);
+    redraw();
+  }
+  function nudge(dx, dy) {
+    aim = [aim[0] + dx, aim[1] + dy];
+    pull(grip, stage.toWorld(...aim, grip.world));
+    redraw();
+  }
+
   canvas.addEventListener("contextmenu", (event) => event.preventDefault()); // the right button moves the view
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
     stage.view.zoomBy(Math.exp(-0.0015 * event.deltaY), ...spotOf(event));
     redraw();
   }, { passive: false });
-  return { letGo, held: () => grip };
+  return { letGo, take, nudge, held: () => grip };
 };

@@ -54,8 +54,7 @@ const makeReplay = (mechanism) => {
       // How much a cubic with these slopes differs from the line.
       const [a, b] = [h * slope[0][k] - (to[k] - from[k]), h * slope[1][k] - (to[k] - from[k])];
       const bend = s * (1 - s) * (a * (1 - s) - b * s);
-      // An event between the rows makes the slopes useless: then a line is nearer to the truth.
-      state[k] = Math.abs(bend) <= 4 * Math.abs(to[k] - from[k]) + 1e-3 * h * (Math.abs(slope[0][k]) + Math.abs(slope[1][k])) ? line + bend : line;
+      state[k] = line + bend;
     }
     for (const four of DATA.quaternions ?? []) {
       const length = Math.hypot(...four.map((k) => state[k])) || 1;

@@ -108,7 +108,14 @@ const makeElements = (scene, mixed) => {
     toward = subtract(toward, scaled(axis, tools.dot(axis, toward)));
     toward = Math.hypot(...toward) > 1e-9 * size ? unit(toward) : across(axis)[0];
     const world = (r) => rotated(poses, joint.parent, r);
-    return { at, axis: world(axis), one: world(toward), two: world(cross(axis, toward)), slides: joint.type === "prismatic", line: world(joint.axis ? vector(joint.axis, values) : toward) };
+    return {
+      at,
+      axis: world(axis),
+      one: world(toward),
+      two: world(cross(axis, toward)),
+      slides: joint.type === "prismatic",
+      line: world(joint.axis ? vector(joint.axis, values) : toward),
+    };
   }
 
   function placedAtJoint(element, parts, factor = 1) {
@@ -197,8 +204,10 @@ const makeElements = (scene, mixed) => {
       const radius = Math.max(number(element.radius, values), 3 * pixel);
       let [one, two, three] = view.axes(); // a sphere's outline faces the eye
       if (element.kind === "wheel") {
-        three = space ? unit(rotated(poses, element.body, vector(element.axis ?? [0, 0, 1], values))) : [0, 0, 1];
-        one = space ? rotated(poses, element.body, across(unit(vector(element.axis ?? [0, 0, 1], values)))[0]) : rotated(poses, element.body, [1, 0, 0]);
+        const axis = space ? unit(vector(element.axis ?? [0, 0, 1], values)) : [0, 0, 1];
+        const spoke = space ? across(axis)[0] : [1, 0, 0];
+        three = space ? rotated(poses, element.body, axis) : axis;
+        one = rotated(poses, element.body, spoke);
         two = cross(three, one);
       }
       const put = (object, r) => frame(object, at, scaled(one, r), scaled(two, r), scaled(three, r));

@@ -145,9 +145,15 @@ def measured(name: str) -> str:
 
 
 if __name__ == "__main__":
-    head = f"{'scene':<20}{'kB':>8}{'op.s':>8}{'node µs':>9}{'C µs':>8}{'ratio':>7}"
-    print(
-        f"{head}{'rk4 steps/s':>12}{'in C':>10}  {'method':<18}{'step':<8}{'steps/s':>9}{'x time':>8}"
-    )
+    widths = {"scene": -20, "kB": 8, "op.s": 8, "node µs": 9, "C µs": 8, "ratio": 7}
+    widths |= {
+        "rk4 steps/s": 12,
+        "in C": 10,
+        "  method": -20,
+        "step": -8,
+        "steps/s": 9,
+        "x time": 8,
+    }
+    print("".join(f"{head:{'<' if n < 0 else '>'}{abs(n)}}" for head, n in widths.items()))
     for name in sys.argv[1:] or built_in_names():
         print(measured(name), flush=True)
