@@ -83,9 +83,9 @@ class Opened:
         return tuple(self.page.evaluate("[stage.clientWidth, stage.clientHeight]"))
 
     def pause(self) -> None:
-        """Stop the motion where it is."""
-        if self.playing:
-            self.page.click("#play")
+        """Stop the motion where it is, without moving the pointer."""
+        self.page.evaluate("() => { if (window.eomgen.playing) play.click(); }")
+        assert not self.playing
 
     def go_live(self) -> None:
         """At the start of a live motion that stands."""
