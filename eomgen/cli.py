@@ -14,6 +14,7 @@ from eomgen.options import (
     add_film,
     add_folder,
     add_force,
+    add_gallery,
     add_inputs,
     add_parameters,
     add_plot,
@@ -162,6 +163,10 @@ def _parser(
     add_plot(command("plot", commands.plot, about, "run"))
     about = "make a film of a run: GIF, or MP4 with ffmpeg"
     add_film(command("film", commands.film, about, "run"))
+    about = (
+        "write a folder of live pages, and one that shows them all with a picture and a sentence"
+    )
+    add_gallery(command("gallery", commands.gallery, about, None))
     about = "run a scene many times, with other parameters, initial states or inputs"
     _sweep(_route(_form(command("sweep", commands.sweep, about))))
     about = "compare the module with an independent solver and 60 digits"

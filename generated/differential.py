@@ -161,6 +161,7 @@ COST = {
     "project_position": {"add": 4, "sub": 4, "mul": 2, "total": 10, "parameters": 0},
     "project_velocity": {"add": 3, "sub": 5, "mul": 2, "total": 10, "parameters": 0},
     "constraint_margins": {"total": 0, "parameters": 6},
+    "constraint_jacobian": {"total": 0, "parameters": 2},
 }
 
 
@@ -243,16 +244,17 @@ def _fixed(final_drive, I_pinion, m_case, I_case, I_across, m_gear, I_gear, I_ge
         return "inertia_com zz of bevel_gear is negative"
     moment_bevel_gear_z = m_gear * r_gear
     k1 = g * moment_bevel_gear_z
-    k8 = I_case + (I_gear_across + r_gear * moment_bevel_gear_z) + final_drive * (final_drive * I_pinion)
-    pivot_turn_dot = I_wheel + (I_wheel + k8)
-    k9 = teeth * (teeth * I_wheel)
-    pivot_planet_dot = I_gear + (k9 + k9)
+    k9 = I_case + (I_gear_across + r_gear * moment_bevel_gear_z) + final_drive * (final_drive * I_pinion)
+    pivot_turn_dot = I_wheel + (I_wheel + k9)
+    k10 = teeth * (teeth * I_wheel)
+    pivot_planet_dot = I_gear + (k10 + k10)
     k2 = final_drive * torque
     k3 = ice * (1.0 / on_ice_speed)
     k4 = -final_drive
     k5 = asphalt * (1.0 / on_asphalt_speed)
     k6 = 1.0 / (1.0 + final_drive * final_drive)
     k7 = 1.0 / (2.0 + teeth * teeth)
+    k8 = -teeth
     return {
         "initial_state": (),
         "derivative": (final_drive, teeth, ice, asphalt, on_ice_speed, on_asphalt_speed, k1, pivot_turn_dot, pivot_planet_dot, k2),
@@ -262,6 +264,7 @@ def _fixed(final_drive, I_pinion, m_case, I_case, I_across, m_gear, I_gear, I_ge
         "project_position": (final_drive, teeth),
         "project_velocity": (final_drive, teeth),
         "constraint_margins": (k6, k7),
+        "constraint_jacobian": (teeth, k4, k8),
     }
 
 
@@ -517,6 +520,28 @@ def _constraint_margins(y, k, u=(), extra=()):
         k6,
         k7,
         k7,
+    )
+
+
+def _constraint_jacobian(y, k, u=(), extra=()):
+    """0 operations."""
+    teeth, k4, k8 = k
+    return (
+        1.0,
+        k4,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        -1.0,
+        1.0,
+        0.0,
+        k8,
+        0.0,
+        -1.0,
+        0.0,
+        1.0,
+        teeth,
     )
 
 
@@ -782,3 +807,8 @@ def project_velocity(t, y, p=None, u=None):
 def constraint_margins(t, y, p=None, u=None):
     """How far each of `CONSTRAINTS` is from following from others."""
     return _evaluate(_constraint_margins, "constraint_margins", (3,), (), y, p, u)
+
+
+def constraint_jacobian(t, y, p=None, u=None):
+    """Derivatives of `constraint_rates` by the velocities, (nc, nv)."""
+    return _evaluate(_constraint_jacobian, "constraint_jacobian", (3, 5), (), y, p, u)

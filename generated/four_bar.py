@@ -102,6 +102,7 @@ COST = {
     "project_position": {"add": 5, "sub": 6, "mul": 9, "div": 3, "sin": 3, "cos": 3, "total": 29, "parameters": 6},
     "project_velocity": {"add": 7, "sub": 4, "mul": 14, "div": 3, "sin": 3, "cos": 3, "total": 34, "parameters": 6},
     "constraint_margins": {"add": 9, "mul": 14, "div": 3, "sin": 3, "cos": 3, "total": 32, "parameters": 6},
+    "constraint_jacobian": {"add": 2, "sub": 1, "mul": 6, "neg": 1, "sin": 3, "cos": 3, "total": 16, "parameters": 8},
 }
 
 
@@ -163,26 +164,28 @@ def _fixed(crank_length, coupler_length, rocker_length, ground_length, line, sta
         return "mass of coupler is not positive"
     if not mass_coupler * (coupler_length * coupler_length) / 12.0 >= 0.0:
         return "inertia_com of coupler is negative"
-    k9 = crank_length / 2.0
-    k10 = mass_crank * (crank_length * crank_length) / 12.0
-    k11 = rocker_length / 2.0
-    k1 = k9 + k9
-    k12 = coupler_length / 2.0
-    moment_crank_x = k9 * mass_crank
-    k13 = k9 * moment_crank_x
-    moment_rocker_x = k11 * mass_rocker
-    inertia_rocker_zz = mass_rocker * (rocker_length * rocker_length) / 12.0 + k11 * moment_rocker_x
-    moment_coupler_x = k12 * mass_coupler
-    inertia_coupler_zz = mass_coupler * (coupler_length * coupler_length) / 12.0 + k12 * moment_coupler_x
-    k14 = k1 * mass_coupler
-    k15 = k1 * k14
-    k2 = inertia_coupler_zz + (k10 + k13 + k15)
-    k3 = g * (moment_crank_x + k14)
+    k11 = crank_length / 2.0
+    k12 = mass_crank * (crank_length * crank_length) / 12.0
+    k13 = rocker_length / 2.0
+    k1 = k11 + k11
+    k14 = coupler_length / 2.0
+    moment_crank_x = k11 * mass_crank
+    k15 = k11 * moment_crank_x
+    moment_rocker_x = k13 * mass_rocker
+    inertia_rocker_zz = mass_rocker * (rocker_length * rocker_length) / 12.0 + k13 * moment_rocker_x
+    moment_coupler_x = k14 * mass_coupler
+    inertia_coupler_zz = mass_coupler * (coupler_length * coupler_length) / 12.0 + k14 * moment_coupler_x
+    k16 = k1 * mass_coupler
+    k17 = k1 * k16
+    k2 = inertia_coupler_zz + (k12 + k15 + k17)
+    k3 = g * (moment_crank_x + k16)
     k4 = g * moment_rocker_x
-    k5 = k11 + k11
-    k6 = k12 + k12
-    k7 = k15 + (k13 + (k10 + inertia_coupler_zz))
+    k5 = k13 + k13
+    k6 = k14 + k14
+    k7 = k17 + (k15 + (k12 + inertia_coupler_zz))
     k8 = stall * (1.0 / no_load)
+    k9 = -k5
+    k10 = -k1
     return {
         "initial_state": (),
         "derivative": (stall, no_load, g, k1, inertia_rocker_zz, moment_coupler_x, inertia_coupler_zz, k2, k3, k4, k5, k6),
@@ -192,6 +195,7 @@ def _fixed(crank_length, coupler_length, rocker_length, ground_length, line, sta
         "project_position": (k1, k5, k6, ground_length),
         "project_velocity": (k1, k5, k6),
         "constraint_margins": (k1, k5, k6),
+        "constraint_jacobian": (k1, k6, k9, k10),
     }
 
 
@@ -534,6 +538,23 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
+def _constraint_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """16 operations: 2 add, 1 sub, 6 mul, 1 neg, 3 sin, 3 cos."""
+    k1, k6, k9, k10 = k
+    theta, psi, phi, _, _, _ = y
+    angle_coupler = theta + phi
+    s10 = cos(angle_coupler) * k6
+    s11 = sin(angle_coupler) * k6
+    return (
+        k1 * sin(theta) + s11,
+        cos(psi) * k9,
+        s11,
+        k10 * cos(theta) - s10,
+        sin(psi) * k9,
+        -s10,
+    )
+
+
 _ARRAY, _FLOAT, _from = np.ndarray, np.dtype(float), np.fromiter
 _LARGEST = 1e+100
 
@@ -794,3 +815,8 @@ def project_velocity(t, y, p=None, u=None):
 def constraint_margins(t, y, p=None, u=None):
     """How far each of `CONSTRAINTS` is from following from others."""
     return _evaluate(_constraint_margins, "constraint_margins", (2,), ('cos', 'sin'), y, p, u)
+
+
+def constraint_jacobian(t, y, p=None, u=None):
+    """Derivatives of `constraint_rates` by the velocities, (nc, nv)."""
+    return _evaluate(_constraint_jacobian, "constraint_jacobian", (2, 3), ('cos', 'sin'), y, p, u)

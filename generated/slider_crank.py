@@ -108,6 +108,7 @@ COST = {
     "project_position": {"add": 5, "sub": 2, "mul": 5, "div": 2, "sin": 2, "cos": 2, "total": 18, "parameters": 4},
     "project_velocity": {"add": 6, "sub": 2, "mul": 8, "div": 2, "sin": 2, "cos": 2, "total": 22, "parameters": 4},
     "constraint_margins": {"add": 7, "mul": 8, "div": 2, "sin": 2, "cos": 2, "total": 21, "parameters": 4},
+    "constraint_jacobian": {"add": 3, "mul": 4, "sin": 2, "cos": 2, "total": 11, "parameters": 4},
     "switching_functions": {"div": 1, "sin": 2, "total": 3, "parameters": 0},
 }
 
@@ -160,6 +161,7 @@ def _fixed(r, l, m_rod, I_rod, m_piston, m_crank, I_crank, gas, load, g):
         "project_position": (r, k4),
         "project_velocity": (r, k4),
         "constraint_margins": (r, k4),
+        "constraint_jacobian": (r, k4),
         "switching_functions": (),
     }
 
@@ -476,6 +478,23 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin):
     )
 
 
+def _constraint_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
+    """11 operations: 3 add, 4 mul, 2 sin, 2 cos."""
+    r, k4 = k
+    theta, _, phi, _, _, _ = y
+    angle_rod = theta + phi
+    s9 = sin(angle_rod) * k4
+    pivot_piston_pin_x = cos(angle_rod) * k4
+    return (
+        r * cos(theta) + pivot_piston_pin_x,
+        0.0,
+        pivot_piston_pin_x,
+        r * sin(theta) + s9,
+        1.0,
+        s9,
+    )
+
+
 def _switching_functions(y, k, u=(), extra=(), sin=sin):
     """3 operations: 1 div, 2 sin."""
     theta, _, _, _, _, _ = y
@@ -749,6 +768,11 @@ def project_velocity(t, y, p=None, u=None):
 def constraint_margins(t, y, p=None, u=None):
     """How far each of `CONSTRAINTS` is from following from others."""
     return _evaluate(_constraint_margins, "constraint_margins", (2,), ('cos', 'sin'), y, p, u)
+
+
+def constraint_jacobian(t, y, p=None, u=None):
+    """Derivatives of `constraint_rates` by the velocities, (nc, nv)."""
+    return _evaluate(_constraint_jacobian, "constraint_jacobian", (2, 3), ('cos', 'sin'), y, p, u)
 
 
 def switching_functions(t, y, p=None, u=None):
