@@ -192,9 +192,15 @@ class _Prepared:
         def start(y: FloatArray) -> FloatArray:
             for name, value in states.items():
                 y[self.module.STATES.index(name)] = value
-            return closed(self.task.model, values[0], y, states)
+            return y
 
-        problem = as_problem(module, *values, explain=explain, start=start)
+        def assembled(y: FloatArray) -> FloatArray:
+            return closed(self.task.model, values[0], start(y), states)
+
+        loops = bool(self.task.model.constraints)
+        problem = as_problem(module, *values, explain=explain, start=assembled if loops else None)
+        if states and not loops:
+            problem = replace(problem, initial=start(problem.initial.copy()))
         if states:
             problem = replace(problem, initial=problem.unit(problem.initial))
         return own.of(problem) if own else problem
