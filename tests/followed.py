@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.dynamics.assembly import Closure, newton
+from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.exposition.constraints import DerivedConstraint
 from eomgen.exposition.derivation import used_bodies

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from eomgen.commands.shared import print_listed, print_wrapped
-from eomgen.dynamics.assembly import Closure
+from eomgen.dynamics.closure import Closure
 from eomgen.model.model import Model
 
 

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from eomgen.dynamics.assembly import Array, Closure
+from eomgen.dynamics.closure import Array, Closure
 from eomgen.dynamics.clusters import clusters_of, span
 from eomgen.dynamics.constraints import rows_of
+from eomgen.language.formula import Formula, names_in
 from eomgen.model.model import Model
+from eomgen.scene.constraints import ConstraintTable
 
 STEP = 0.15
 """The distance of positions, rad, or in sizes of the mechanism."""
@@ -73,9 +75,12 @@ def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
 
 def with_safe_pivots(model: Model) -> Model:
     """The model with only those `pivots` whose dependent velocities follow from the others, with
-    large pivots, in all closed positions; all pivots of a cluster or none.
+    large pivots, in all closed positions; all pivots of a cluster or none. None where something is
+    driven: the walks know the positions at t = 0 only.
     """
     closure = Closure.of(model)
+    if model.driven or _timed(model):
+        return replace(model, pivots=())
     start = _pivots(closure.jacobian(np.array(model.initial_q)), model.pivots)
     safe = np.abs(start) >= SAFE
     for walk in range(WALKS):
@@ -91,6 +96,14 @@ def with_safe_pivots(model: Model) -> Model:
 def safely_dependent(model: Model) -> bool:
     """Whether that is so of all rows."""
     return len(with_safe_pivots(model).pivots) == len(model.rows)
+
+
+def _timed(model: Model) -> bool:
+    """Whether a constraint depends on time."""
+    tables = [c for c in model.constraints if isinstance(c, ConstraintTable)]
+    values = (getattr(c, field) for c in tables for field in type(c).model_fields)
+    formulas = (f for x in values for f in (x if isinstance(x, tuple) else (x,)))
+    return any("t" in names_in(f) for f in formulas if isinstance(f, Formula))
 
 
 def _rows_by_cluster(model: Model) -> list[set[int]]:
