@@ -257,7 +257,7 @@ def check_dragging(opened: Opened) -> None:
     opened.pause()
     pulled, end = np.array(opened.centers), opened.time
     mouse.up()
-    assert opened.error is None
+    assert opened.error is None, opened.error
     opened.page.click("#restart")
     # A method with steps of its own choice comes to other times: it is compared at both beside.
     alone = opened.page.evaluate(ALONE, end)
