@@ -103,17 +103,54 @@ def _inwards(
     links, sums = kinematics.links, list(forces)
     shares = list(tau)
     for k in reversed(range(len(links))):
-        link, p = links[k], sums[k]
-        for (axis, i), pivot in zip(link.free, pivots[k], strict=True):
-            left = tau[i] - along(axis, p.moment, p.force)
-            shares[i] = left / pivot.d
-            p = Wrench(add(p.moment, scale(left, pivot.u)), add(p.force, scale(left, pivot.w)))
-            if pivot.absolute:
-                # Along a free axis the joint transmits tau only.
-                p = Wrench(*with_component(axis, p.moment, p.force, tau[i]))
+        link, p = links[k], inwards(links[k], pivots[k], sums[k], tau, shares)
         if link.parent >= 0:
             sums[link.parent] = total(sums[link.parent], at_parent(link, p))
     return shares
+
+
+def inwards(
+    link: Link,
+    pivots: Sequence[Pivot],
+    p: Wrench,
+    tau: Sequence[Scalar],
+    shares: list[Scalar],
+) -> Wrench:
+    """The wrench of a link on its parent, from that of its subtree; enters (tau - sᵀ p) / d of each
+    of its axes into `shares`.
+    """
+    for (axis, i), pivot in zip(link.free, pivots, strict=True):
+        left = tau[i] - along(axis, p.moment, p.force)
+        shares[i] = left / pivot.d
+        p = Wrench(add(p.moment, scale(left, pivot.u)), add(p.force, scale(left, pivot.w)))
+        if pivot.absolute:
+            # Along a free axis the joint transmits tau only.
+            p = Wrench(*with_component(axis, p.moment, p.force, tau[i]))
+    return p
+
+
+def outwards(
+    link: Link,
+    pivots: Sequence[Pivot],
+    motion: tuple[Vec, Vec],
+    shares: Sequence[Scalar],
+    result: list[Scalar],
+) -> tuple[Vec, Vec]:
+    """The acceleration of a link, from that of a frame fixed to its parent; enters v̇ of each of
+    its axes into `result`.
+    """
+    angular, linear = motion
+    for (axis, i), pivot in reversed(list(zip(link.free, pivots, strict=True))):
+        value = shares[i] - (dot(pivot.u, angular) + dot(pivot.w, linear))
+        if pivot.absolute:
+            result[i] = value - along(axis, angular, linear)
+            angular, linear = with_component(axis, angular, linear, value)
+        else:
+            result[i] = value
+            more = scale(value, axis.direction)
+            angular = add(angular, more) if axis.angular else angular
+            linear = linear if axis.angular else add(linear, more)
+    return angular, linear
 
 
 def _outwards(
@@ -130,16 +167,7 @@ def _outwards(
             base_angular, base_linear = reached[link.parent]
             angular = link.rotation.into(base_angular)
             linear = link.rotation.into(add(base_linear, cross(base_angular, link.arm)))
-        for (axis, i), pivot in reversed(list(zip(link.free, pivots[k], strict=True))):
-            value = shares[i] - (dot(pivot.u, angular) + dot(pivot.w, linear))
-            if pivot.absolute:
-                result[i] = value - along(axis, angular, linear)
-                angular, linear = with_component(axis, angular, linear, value)
-            else:
-                result[i] = value
-                more = scale(value, axis.direction)
-                angular = add(angular, more) if axis.angular else angular
-                linear = linear if axis.angular else add(linear, more)
+        angular, linear = outwards(link, pivots[k], (angular, linear), shares, result)
         angular = named(angular, f"alpha_{link.name}", scalars)
         reached.append((angular, named(linear, f"delta_{link.name}", scalars)))
     return result

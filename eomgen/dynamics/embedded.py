@@ -18,12 +18,12 @@ from dataclasses import dataclass
 from eomgen.dynamics.articulated import (
     ArticulatedInertia,
     Pivot,
-    along,
     eliminated,
+    inwards,
     joined,
     moved_to_parent,
+    outwards,
     rigid_body_inertia,
-    with_component,
 )
 from eomgen.dynamics.cluster_joint import Equation, Joint, without
 from eomgen.dynamics.cluster_motion import (
@@ -164,13 +164,7 @@ def respond(
             parts[k] = _cluster_inwards(links, joint, column, sums, tau, bend, scalars, still)
         if k in found.inside:
             continue
-        link, p = links[k], sums[k]
-        for (axis, i), pivot in zip(link.free, found.pivots[k], strict=True):
-            left = tau[i] - along(axis, p.moment, p.force)
-            shares[i] = left / pivot.d
-            p = Wrench(add(p.moment, scale(left, pivot.u)), add(p.force, scale(left, pivot.w)))
-            if pivot.absolute:
-                p = Wrench(*with_component(axis, p.moment, p.force, tau[i]))
+        link, p = links[k], inwards(links[k], found.pivots[k], sums[k], tau, shares)
         if link.parent >= 0:
             sums[link.parent] = total(sums[link.parent], at_parent(link, p))
     return _outwards(links, found, column, parts, shares, bend, scalars, still)
@@ -248,17 +242,7 @@ def _outwards(
                 linear = linear if axis.angular else add(linear, more)
             reached.append((angular, linear))
             continue
-        for (axis, i), pivot in reversed(list(zip(link.free, found.pivots[k], strict=True))):
-            value = shares[i] - (dot(pivot.u, angular) + dot(pivot.w, linear))
-            if pivot.absolute:
-                result[i] = value - along(axis, angular, linear)
-                angular, linear = with_component(axis, angular, linear, value)
-            else:
-                result[i] = value
-                more = scale(value, axis.direction)
-                angular = add(angular, more) if axis.angular else angular
-                linear = linear if axis.angular else add(linear, more)
-        reached.append((angular, linear))
+        reached.append(outwards(link, found.pivots[k], (angular, linear), shares, result))
     return Response(result, rights)
 
 
