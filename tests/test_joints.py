@@ -466,7 +466,7 @@ PARTS = {
 
 @pytest.mark.parametrize("kind", PARTS)
 def test_a_joint_is_its_parts(route: str, kind: str) -> None:
-    """Cylindrical, universal, planar, particle and free move as their parts on massless bodies do."""
+    """Joints of several coordinates move as their parts on massless bodies do."""
     line, parts = PARTS[kind]
     first = ("r_parent = [0.2, 0.1, -0.3]", "orientation_deg = [10, 20, 30]")
     last = (at("r_child", R),)
