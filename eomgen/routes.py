@@ -51,6 +51,12 @@ ROUTES: dict[str, RouteSpec] = {
         "independent",
         loops=True,
     ),
+    "embedded": RouteSpec(
+        "for loops: each eliminated as one joint of the articulated-body recursion; the cost grows "
+        "linearly with their number",
+        "embedded",
+        loops=True,
+    ),
     "orthogonal": RouteSpec(
         "orthogonal elimination on Gauss's principle: keeps digits where masses or angles are "
         "uneven",

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.dynamics import constraints
+from eomgen.dynamics.clusters import jacobian_of
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.loads import generalised
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -36,7 +36,7 @@ ENOUGH = 6
 """So many positions found suffice to take the nearest."""
 INDEPENDENT = 1e-7
 """A row that leaves less than this of itself beside the others follows from them."""
-ALONG = (0.0, 0.05, 0.1, -0.05, 0.2)
+ALONG = (0.05, -0.05, 0.1, 0.1, 0.2, 0.3)
 """Positions along the motion at which rows are compared, rad, or in sizes."""
 LEAST_PIVOT = 1e-3
 """A coordinate that the scene gives is solved for where other pivots would be smaller than this."""
@@ -72,9 +72,8 @@ class Closure:
 
     def jacobian(self, q: Array) -> Array:
         """J (nc, nv) in sizes."""
-        d = self.dynamics(q)
-        rows = [generalised(d, row.loads)[: d.nv] for row in constraints.rows_of(d)]
-        matrix = np.array(rows, dtype=np.float64).reshape(len(rows), d.nv)
+        rows = jacobian_of(self.dynamics(q))
+        matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.model.velocities))
         scaled: Array = matrix * self.lengths / self._units[:, np.newaxis]
         return scaled
 
@@ -259,21 +258,35 @@ def _changes(model: Model, start: Array, q: Array) -> list[str]:
 
 def _dependent(mechanism: Closure, q: Array) -> tuple[str, ...]:
     """The names of rows that follow from those before them wherever the constraints are met."""
-    places = [q]
-    for step in ALONG[1:]:
+    if _independent(mechanism.jacobian(q)):
+        return ()
+    places, rng = [q], random.Random(13)
+    for step in ALONG:
         matrix = mechanism.jacobian(q)
         free = np.linalg.svd(matrix)[2][np.linalg.matrix_rank(matrix, tol=INDEPENDENT) :]
-        for direction in free:
-            there = newton(mechanism, mechanism.moved(q, step * direction),
-                            np.ones(len(direction), dtype=bool))  # fmt: skip
-            if there is not None:
-                places.append(there)
+        direction = sum((rng.uniform(-1.0, 1.0) * x for x in free), np.zeros(matrix.shape[1]))
+        there = newton(
+            mechanism, mechanism.moved(q, step * direction), np.ones(len(direction), dtype=bool)
+        )
+        if there is not None:
+            places.append(there)
     matrices = [mechanism.jacobian(place) for place in places]
+    if any(map(_independent, matrices)):
+        return ()
     kept: list[int] = []
     for i in range(len(mechanism.model.rows)):
         if any(_adds(matrix, kept, i) for matrix in matrices):
             kept.append(i)
     return tuple(name for i, (name, _) in enumerate(mechanism.model.rows) if i not in kept)
+
+
+def _independent(matrix: Array) -> bool:
+    """Whether no row of a matrix follows from the others."""
+    lengths = np.linalg.norm(matrix, axis=1)
+    if not lengths.min(initial=1.0) > INDEPENDENT:
+        return False
+    least = np.linalg.svd(matrix / lengths[:, np.newaxis], compute_uv=False)[-1]
+    return len(matrix) <= matrix.shape[1] and bool(least > INDEPENDENT)
 
 
 def _adds(matrix: Array, kept: Sequence[int], i: int) -> bool:

@@ -8,7 +8,7 @@ J is the matrix of the constraints' rates by the velocities: ġ = J v + drift an
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.dynamics.loads import generalised, power_of
+from eomgen.dynamics.loads import power_of
 from eomgen.dynamics.mechanism_state import MechanismState, Values
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar, Scalars
@@ -22,11 +22,6 @@ def rows_of(d: MechanismState) -> list[Row]:
     found = [row for constraint in d.model.constraints for row in constraint.rows(d)]
     names = [name for name, _ in d.model.every_row]
     return [row for name, row in zip(names, found, strict=True) if name not in d.model.dropped]
-
-
-def jacobian_of(d: MechanismState, rows: Sequence[Row]) -> list[list[Scalar]]:
-    """J: for each row its derivative by each velocity of the state, (nv,)."""
-    return [generalised(d, row.loads)[: d.nv] for row in rows]
 
 
 def residuals(d: MechanismState) -> list[Scalar]:

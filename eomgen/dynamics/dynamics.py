@@ -36,7 +36,7 @@ from eomgen.dynamics.motion import (
     kinetic_energy,
     velocities,
 )
-from eomgen.dynamics.null_space import NullSpace
+from eomgen.dynamics.null_space import Embedded, NullSpace
 from eomgen.dynamics.orthogonal import Elimination
 from eomgen.dynamics.range_space import Forward, RangeSpace, Response
 from eomgen.dynamics.solids import Solid, centres, ranked, solids
@@ -234,17 +234,29 @@ class Dynamics(MechanismState):
     def constrained(self, route: str) -> RangeSpace | NullSpace:
         """The constraints, solved with the recursion of a route."""
         if route not in self._constrained:
-            recursion = ROUTES[route].recursion
-            self._constrained[route] = (
-                NullSpace(self, self.mass_entries, self._right, self._fall)
-                if ROUTES[route].loops
-                else RangeSpace(
-                    self,
-                    getattr(self, f"{recursion}_forward"),
-                    getattr(self, f"{recursion}_response"),
-                )
-            )
+            self._constrained[route] = self._solver(ROUTES[route].recursion)
         return self._constrained[route]
+
+    def _solver(self, recursion: str) -> RangeSpace | NullSpace:
+        if recursion == "independent":
+            return NullSpace(self, self.mass_entries, self._right, self._fall)
+        if recursion == "embedded":
+            return Embedded(
+                self,
+                self._generalised_forces,
+                lambda: self._bias_wrenches(self.kinematics),
+                self._beyond_effects,
+                self._fall,
+            )
+        forward, response = (
+            getattr(self, f"{recursion}_{name}") for name in ("forward", "response")
+        )
+        return RangeSpace(self, forward, response)
+
+    def _beyond_effects(self, vd: Sequence[Scalar]) -> list[Scalar]:
+        """The generalised forces besides the effects that v̇ takes: M v̇ + V + G - F."""
+        pairs = zip(self.inverse(vd), self.applied_force, strict=True)
+        return [needed - applied for needed, applied in pairs]
 
     @cached_property
     def _constrained(self) -> dict[str, RangeSpace | NullSpace]:

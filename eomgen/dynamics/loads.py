@@ -50,15 +50,30 @@ def _wrenches(d: MechanismState, loads: Iterable[Load]) -> list[fc.Wrench]:
     for (body, at), (force, torque) in points.items():
         frame = -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame
         if frame >= 0:
-            own = in_space(at, d.scalars)
-            reach = arm(d.linkage, d.kinematics, d.index[body], own, d.scalars)
-            wrench = fc.Wrench(add(torque, cross(reach, force)), force)
+            wrench = _in_world(d, body, at, force, torque)
             sums[frame] = fc.total(sums[frame], wrench) if frame in sums else wrench
     wrenches = [fc.Wrench(nothing, nothing)] * len(d.kinematics.links)
     for frame, f in sums.items():
         rotated = (d.kinematics.from_world(frame, part) for part in (f.moment, f.force))
         wrenches[frame] = fc.Wrench(*rotated)
     return wrenches
+
+
+def _in_world(d: MechanismState, body: str, at: Vector, force: Vec, torque: Vec) -> fc.Wrench:
+    """A force and a torque on a body as a wrench about its frame's origin, in world axes."""
+    own = in_space(at, d.scalars)
+    reach = arm(d.linkage, d.kinematics, d.index[body], own, d.scalars)
+    return fc.Wrench(add(torque, cross(reach, force)), force)
+
+
+def wrench_of(d: MechanismState, load: Load) -> tuple[int, fc.Wrench]:
+    """The frame of a load's body, -1 for the world, and its wrench there, in the link's axes."""
+    frame = -1 if load.body == WORLD else d.linkage.mounts[d.index[load.body]].frame
+    if frame < 0:
+        return -1, fc.no_wrench(d.scalars)
+    force, torque = in_space(load.force, d.scalars), torque_in_space(load.torque, d.scalars)
+    f = _in_world(d, load.body, load.at, force, torque)
+    return frame, fc.Wrench(*(d.kinematics.from_world(frame, part) for part in (f.moment, f.force)))
 
 
 def power_of(d: MechanismState, loads: Iterable[AnyLoad]) -> Scalar:

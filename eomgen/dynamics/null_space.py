@@ -12,20 +12,21 @@ where the dependent velocities do not follow from the independent ones, as at a 
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
+from eomgen.dynamics.clusters import clusters_of, jacobian_of
 from eomgen.dynamics.composite import Entries
 from eomgen.dynamics.constraints import (
     Square,
     accelerations_at_rest,
     factored,
     inner,
-    jacobian_of,
     position_rates,
     rates,
     relative,
     residuals,
-    rows_of,
     triangular,
 )
+from eomgen.dynamics.embedded import Articulated, articulate, respond
+from eomgen.dynamics.forces import Wrench, no_wrench
 from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.scalars.protocol import Scalar
 
@@ -54,8 +55,12 @@ class NullSpace:
     @cached_property
     def _jacobian(self) -> list[list[Scalar]]:
         """J with its rows in the order of elimination."""
-        rows = jacobian_of(self._d, rows_of(self._d))
-        return [rows[i] for i in self._order]
+        return [self._rows[i] for i in self._order]
+
+    @cached_property
+    def _rows(self) -> list[list[Scalar]]:
+        """J."""
+        return jacobian_of(self._d)
 
     @cached_property
     def _factors(self) -> Square:
@@ -89,10 +94,8 @@ class NullSpace:
     def _bend(self) -> list[Scalar]:
         """γ (nv,) without `fall`."""
         rest = accelerations_at_rest(self._d)
-        J = jacobian_of(self._d, rows_of(self._d))
-        return self._dependents(
-            [b + inner(row, self._fall, self._scalars) for row, b in zip(J, rest, strict=True)]
-        )
+        pairs = zip(self._rows, rest, strict=True)
+        return self._dependents([b + inner(row, self._fall, self._scalars) for row, b in pairs])
 
     def _times_mass(self, v: Sequence[Scalar]) -> list[Scalar]:
         """M v."""
@@ -159,6 +162,59 @@ class NullSpace:
         """v with ġ = 0; independent velocities keep their values."""
         change = self._dependents(rates(self._d))
         return [v + dv for v, dv in zip(self._d.values.v, change, strict=True)]
+
+
+class Embedded(NullSpace):
+    """The same with loops embedded in the articulated-body recursion: see `embedded`.
+
+    inverse   M v̇ + h at v̇
+    applied   F without further generalised forces
+    biases    the wrenches that would make v̇ = 0
+    """
+
+    def __init__(
+        self,
+        d: MechanismState,
+        forces: Callable[[Sequence[Scalar] | None], list[Scalar]],
+        biases: Callable[[], Sequence[Wrench]],
+        needed: Callable[[Sequence[Scalar]], list[Scalar]],
+        fall: Sequence[Scalar],
+    ) -> None:
+        super().__init__(d, {}, forces, fall)
+        self._biases, self._needed = biases, needed
+
+    @cached_property
+    def _columns(self) -> list[tuple[int, list[Scalar]]]:
+        return list(zip(self._independent, self._basis, strict=True))
+
+    @cached_property
+    def _joints(self) -> Articulated:
+        d = self._d
+        names = [c.name for c in d.model.velocities]
+        return articulate(d.kinematics, clusters_of(d), self._columns, names, self._scalars)
+
+    def _respond(
+        self, wrenches: Sequence[Wrench], tau: Sequence[Scalar], bend: Sequence[Scalar]
+    ) -> list[Scalar]:
+        kinematics = self._d.kinematics
+        return respond(kinematics, self._joints, self._columns, wrenches, tau, bend, self._scalars)
+
+    def forward(self, tau: Sequence[Scalar] | None) -> list[Scalar]:
+        """v̇ under the effects and generalised forces `tau`."""
+        found = self._respond(self._biases(), self._right(tau), self._bend)
+        rates = zip(found, self._fall, self._d.model.velocities, strict=True)
+        return [self._scalars.named(a + b, c.acceleration) for a, b, c in rates]
+
+    def multipliers(self) -> list[Scalar]:
+        """λ of the rows under the effects, N or N m."""
+        over = self._needed(self.forward(None))
+        found = self._factors.solved_transposed([over[j] for j in self._dependent])
+        return [x for _, x in sorted(zip(self._order, found, strict=True), key=_first)]
+
+    def response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
+        """The change of the velocities by generalised impulses; the constraints stay met."""
+        still = [no_wrench(self._scalars)] * len(self._d.kinematics.links)
+        return self._respond(still, impulse, [self._zero] * self._d.nv)
 
 
 def _first(pair: tuple[int, Scalar]) -> int:

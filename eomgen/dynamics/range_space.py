@@ -10,17 +10,16 @@ definite if these are independent; its factors L D Lᵀ are written out.
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
+from eomgen.dynamics.clusters import jacobian_of
 from eomgen.dynamics.constraints import (
     Symmetric,
     accelerations_at_rest,
     factored,
     inner,
-    jacobian_of,
     position_rates,
     rates,
     relative,
     residuals,
-    rows_of,
 )
 from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.scalars.protocol import Scalar
@@ -43,7 +42,7 @@ class RangeSpace:
 
     @cached_property
     def _jacobian(self) -> list[list[Scalar]]:
-        return jacobian_of(self._d, rows_of(self._d))
+        return jacobian_of(self._d)
 
     @cached_property
     def _responses(self) -> list[list[Scalar]]:
