@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from eomgen.codegen.derive import Derived, derive, record
 from eomgen.derivation.supported import why_not_closed, why_not_tried
-from eomgen.dynamics.closed_positions import safely_dependent
+from eomgen.dynamics.closed_positions import with_safe_pivots
 from eomgen.dynamics.digits import ALL, Route, digits_lost
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.errors import SceneError
@@ -25,6 +25,8 @@ SPARE = 1.0
 """Margin in digits for the route of last resort: it may lose more at states not sampled."""
 ENOUGH = 10
 """Number of correct digits of v̇ from which on no notice is given."""
+MOST_DENSE = 12
+"""Rows of constraints beyond which only the route whose cost grows linearly with them is tried."""
 FEWEST = 6
 """Smallest number of correct digits of v̇; a scene that would have fewer is refused."""
 MOST_FACTORING = 20_000
@@ -80,6 +82,10 @@ def choose(model: Model, *, closed: bool = True) -> Choice:
     Raises `SceneError` if the named route does not apply to the model, or if every route loses too
     many digits.
     """
+    if model.constraints:
+        if model.route not in ("auto", "embedded"):
+            return _only(model, model.route, "named")
+        model = with_safe_pivots(model)
     if model.route != "auto":
         return _only(model, model.route, "named")
     if model.form != "velocity":
@@ -132,8 +138,7 @@ def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _A
     there = {name: ROUTES[name] for name in routes_for(bool(model.constraints))}
     others = [name for name, spec in there.items() if not (spec.symbolic or spec.last)]
     for name in sorted(others, key=_factors):
-        if ROUTES[name].loops and not safely_dependent(model):
-            words = "not taken: the velocities it solves for do not follow from others everywhere"
+        if words := why_not_loops(model, name):
             candidates.append(Candidate(name, None, words))
             continue
         if _factors(name) and least > fewest:
@@ -145,6 +150,15 @@ def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _A
         candidates.append(_candidate(name, operations))
         fewest = min(fewest, operations)
     return candidates, attempts
+
+
+def why_not_loops(model: Model, route: str) -> str:
+    """Why a route is not tried on a model with constraints; "" if it is."""
+    if route == "independent" and len(model.pivots) < len(model.rows):
+        return "not tried: dependent velocities do not follow from the others in every position"
+    if len(model.rows) > MOST_DENSE and route != "embedded":
+        return f"not tried on more than {MOST_DENSE} rows of constraints; --route {route} does"
+    return ""
 
 
 def _factors(route: str) -> bool:

@@ -70,9 +70,17 @@ class Closure:
         found = np.array(constraints.residuals(self.dynamics(q)))
         return np.asarray(found / self._units)
 
+    def both(self, q: Array) -> tuple[Array, Array]:
+        """`residuals` and `jacobian`."""
+        d = self.dynamics(q)
+        found = np.array(constraints.residuals(d), dtype=np.float64)
+        return np.asarray(found / self._units), self._in_sizes(jacobian_of(d))
+
     def jacobian(self, q: Array) -> Array:
         """J (nc, nv) in sizes."""
-        rows = jacobian_of(self.dynamics(q))
+        return self._in_sizes(jacobian_of(self.dynamics(q)))
+
+    def _in_sizes(self, rows: Sequence[Sequence[float]]) -> Array:
         matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.model.velocities))
         scaled: Array = matrix * self.lengths / self._units[:, np.newaxis]
         return scaled

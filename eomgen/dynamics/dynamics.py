@@ -25,6 +25,7 @@ from eomgen.dynamics.composite import (
     mass_entries,
     solved,
 )
+from eomgen.dynamics.embedding import Embedded
 from eomgen.dynamics.kinematics import TreeKinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.loads import power_of
@@ -36,7 +37,7 @@ from eomgen.dynamics.motion import (
     kinetic_energy,
     velocities,
 )
-from eomgen.dynamics.null_space import Embedded, NullSpace
+from eomgen.dynamics.null_space import NullSpace
 from eomgen.dynamics.orthogonal import Elimination
 from eomgen.dynamics.range_space import Forward, RangeSpace, Response
 from eomgen.dynamics.solids import Solid, centres, ranked, solids

@@ -12,7 +12,7 @@ where the dependent velocities do not follow from the independent ones, as at a 
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
-from eomgen.dynamics.clusters import clusters_of, jacobian_of
+from eomgen.dynamics.clusters import jacobian_of
 from eomgen.dynamics.composite import Entries
 from eomgen.dynamics.constraints import (
     Square,
@@ -25,8 +25,6 @@ from eomgen.dynamics.constraints import (
     residuals,
     triangular,
 )
-from eomgen.dynamics.embedded import Articulated, articulate, respond
-from eomgen.dynamics.forces import Wrench, no_wrench
 from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.scalars.protocol import Scalar
 
@@ -69,7 +67,7 @@ class NullSpace:
         names = [self._d.model.rows[i][0] for i in self._order]
         return triangular(square, names, self._scalars)
 
-    def _dependents(self, along: Sequence[Scalar]) -> list[Scalar]:
+    def dependents(self, along: Sequence[Scalar]) -> list[Scalar]:
         """Velocities (nv,) with J v = -`along`, where independent ones are 0."""
         found = [self._zero] * self._d.nv
         ordered = [-along[i] for i in self._order]
@@ -95,7 +93,7 @@ class NullSpace:
         """γ (nv,) without `fall`."""
         rest = accelerations_at_rest(self._d)
         pairs = zip(self._rows, rest, strict=True)
-        return self._dependents([b + inner(row, self._fall, self._scalars) for row, b in pairs])
+        return self.dependents([b + inner(row, self._fall, self._scalars) for row, b in pairs])
 
     def _times_mass(self, v: Sequence[Scalar]) -> list[Scalar]:
         """M v."""
@@ -137,14 +135,14 @@ class NullSpace:
         needed = self._times_mass(self._accelerations(right))
         over = [needed[j] - right[j] for j in self._dependent]
         found = self._factors.solved_transposed(over)
-        return [x for _, x in sorted(zip(self._order, found, strict=True), key=_first)]
+        return [x for _, x in sorted(zip(self._order, found, strict=True), key=first_of)]
 
     def margins(self) -> list[Scalar]:
         """The square of each pivot relative to the rows of J of its kind: 0 where its velocity does
         not follow from the others.
         """
-        pairs = sorted(zip(self._order, self._factors.pivots, strict=True), key=_first)
-        rows = sorted(zip(self._order, self._jacobian, strict=True), key=_first)
+        pairs = sorted(zip(self._order, self._factors.pivots, strict=True), key=first_of)
+        rows = sorted(zip(self._order, self._jacobian, strict=True), key=first_of)
         squares = [inner(row, row, self._scalars) for _, row in rows]
         return relative(self._d, [pivot * pivot for _, pivot in pairs], squares)
 
@@ -154,68 +152,16 @@ class NullSpace:
 
     def position(self) -> list[Scalar]:
         """q after one Newton step towards g = 0; independent coordinates keep their values."""
-        change = self._dependents(residuals(self._d))
+        change = self.dependents(residuals(self._d))
         pairs = zip(self._d.values.q, position_rates(self._d, change), strict=True)
         return [x + dx for x, dx in pairs]
 
     def velocity(self) -> list[Scalar]:
         """v with ġ = 0; independent velocities keep their values."""
-        change = self._dependents(rates(self._d))
+        change = self.dependents(rates(self._d))
         return [v + dv for v, dv in zip(self._d.values.v, change, strict=True)]
 
 
-class Embedded(NullSpace):
-    """The same with loops embedded in the articulated-body recursion: see `embedded`.
-
-    inverse   M v̇ + h at v̇
-    applied   F without further generalised forces
-    biases    the wrenches that would make v̇ = 0
-    """
-
-    def __init__(
-        self,
-        d: MechanismState,
-        forces: Callable[[Sequence[Scalar] | None], list[Scalar]],
-        biases: Callable[[], Sequence[Wrench]],
-        needed: Callable[[Sequence[Scalar]], list[Scalar]],
-        fall: Sequence[Scalar],
-    ) -> None:
-        super().__init__(d, {}, forces, fall)
-        self._biases, self._needed = biases, needed
-
-    @cached_property
-    def _columns(self) -> list[tuple[int, list[Scalar]]]:
-        return list(zip(self._independent, self._basis, strict=True))
-
-    @cached_property
-    def _joints(self) -> Articulated:
-        d = self._d
-        names = [c.name for c in d.model.velocities]
-        return articulate(d.kinematics, clusters_of(d), self._columns, names, self._scalars)
-
-    def _respond(
-        self, wrenches: Sequence[Wrench], tau: Sequence[Scalar], bend: Sequence[Scalar]
-    ) -> list[Scalar]:
-        kinematics = self._d.kinematics
-        return respond(kinematics, self._joints, self._columns, wrenches, tau, bend, self._scalars)
-
-    def forward(self, tau: Sequence[Scalar] | None) -> list[Scalar]:
-        """v̇ under the effects and generalised forces `tau`."""
-        found = self._respond(self._biases(), self._right(tau), self._bend)
-        rates = zip(found, self._fall, self._d.model.velocities, strict=True)
-        return [self._scalars.named(a + b, c.acceleration) for a, b, c in rates]
-
-    def multipliers(self) -> list[Scalar]:
-        """λ of the rows under the effects, N or N m."""
-        over = self._needed(self.forward(None))
-        found = self._factors.solved_transposed([over[j] for j in self._dependent])
-        return [x for _, x in sorted(zip(self._order, found, strict=True), key=_first)]
-
-    def response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
-        """The change of the velocities by generalised impulses; the constraints stay met."""
-        still = [no_wrench(self._scalars)] * len(self._d.kinematics.links)
-        return self._respond(still, impulse, [self._zero] * self._d.nv)
-
-
-def _first(pair: tuple[int, Scalar]) -> int:
+def first_of(pair: tuple[int, Scalar]) -> int:
+    """The index of a pair."""
     return pair[0]
