@@ -59,10 +59,13 @@ def body(name: str, mass: float, inertia: Any = None) -> str:
     return f'[[bodies]]\nname = "{name}"\nmass = {mass}\n{own.strip(", ")}\n'
 
 
-def scene(dimensions: int, *tables: str, start: str = "", outputs: str = "") -> str:
+def scene(
+    dimensions: int, *tables: str, start: str = "", outputs: str = "", route: str = "ldl"
+) -> str:
     """A scene of such tables."""
     gravity = '[[effects]]\ntype = "gravity"\ng = 9.81\n'
-    head = f'name = "rolling"\ndimensions = {dimensions}\noutputs = [{outputs}]\n'
+    head = f'name = "rolling"\ndimensions = {dimensions}\nroute = "{route}"\n'
+    head += f"outputs = [{outputs}]\n"
     return head + "".join(tables) + gravity + start
 
 
