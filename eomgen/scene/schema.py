@@ -79,8 +79,9 @@ Inertia = Quantity | Annotated[tuple[Quantity, ...], Field(min_length=3, max_len
 """A number in the plane, 3 or 6 entries of a symmetric matrix in space."""
 
 
-def inertia(about: str = "moment of inertia about the centre of mass", **options: Any) -> Any:
+def inertia(**options: Any) -> Any:
     """A field for the inertia of a body."""
+    about = "moment of inertia about the centre of mass"
     return quantity("kg m^2", about, "nonnegative", union_mode="left_to_right", **options)
 
 
@@ -98,9 +99,9 @@ inputs = [{ name = "thrust", unit = "N", about = "of the engine" }, "wind"]
 
 
 class BodyTable(Table):
-    """A rigid body; a particle has `inertia_com = 0`, and on a joint of type `particle` it needs
-    none.
+    """A rigid body.
 
+    `inertia_com` is needed unless the body is on a joint of type `particle`; of a particle it is 0.
     In the plane the inertia is a number; in space [xx, yy, zz], or [xx, yy, zz, xy, xz, yz], the
     entries of the matrix about the centre of mass in body axes.
 
@@ -118,11 +119,7 @@ inertia_com = "m*l**2/12"
 """
     name: Identifier
     mass: Quantity = quantity("kg", "mass", "nonnegative")
-    inertia_com: Inertia = inertia(
-        "moment of inertia about the centre of mass; needed unless its joint is a 'particle'",
-        default=ZERO,
-        validate_default=False,
-    )
+    inertia_com: Inertia = inertia(default=ZERO, validate_default=False)
     com: Vector = quantity(
         "m", "centre of mass in the body's frame", default=(), validate_default=False
     )
