@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from campaign import some
 from scipy.special import ellipj, ellipk
-from whipple import SPEEDS, TABLE, appendix, linearised, tangents
+from whipple import PRINTED, SPEEDS, TABLE, appendix, linearised, matrices, tangents
 
 from eomgen.dynamics import constraints
 from eomgen.dynamics.assembly import assembled
@@ -572,21 +572,25 @@ def test_the_linearised_bicycle(speed: int) -> None:
 
 @pytest.mark.parametrize("speed", some((5,), SPEEDS))
 def test_every_printed_digit_of_the_bicycle(speed: int) -> None:
-    """In 60 digits the linearisation is that of the paper's appendix; and so are its eigenvalues.
+    """In 60 digits the linearisation is that of the paper's appendix, whose matrices are those that
+    it prints, in every digit.
 
-    Table 2 has 14 decimals, of which double precision left the last ones uncertain: the exact
-    values differ from it by at most 3 units there, of the caster mode by 60 at 7 m/s and 4 at 10.
+    Its table 2 of eigenvalues was computed in double precision, which shows in the last of its 14
+    decimals: by up to 4 units, by 11 in the weave mode at 9 m/s and by 60 in the caster mode at 7.
     """
     model = assembled(elaborate(read_scene("bicycle")))
     matrix, exact = linearised(model, speed), appendix(speed)
     assert max(abs(x) for x in matrix - exact) < MP.mpf(10) ** -45
+    for name, own in matrices().items():
+        for i, row in enumerate(PRINTED[name]):
+            for j, text in enumerate(row):
+                assert abs(own[i, j] - MP.mpf(text)) <= MP.mpf("0.5e-14"), name
     found, printed = (
         sorted(eigenvalues, key=lambda x: (round(float(x.real), 6), x.imag))
         for eigenvalues in (MP.eig(matrix, left=False, right=False), TABLE[speed])
     )
-    last = {7: 62e-14, 10: 5e-14}.get(speed, 3e-14)
-    for a, b in zip(found, printed, strict=True):
-        assert abs(complex(a) - b) < (last if b.real < -4 else 3e-14)
+    last = {7: 61e-14, 9: 11e-14, 10: 5e-14}.get(speed, 4e-14)
+    assert max(abs(complex(a) - b) for a, b in zip(found, printed, strict=True)) < last
 
 
 # What is wrong is said in one line.

@@ -68,12 +68,18 @@ TABLE = {v: _row(v) for v in SPEEDS}
 """Eigenvalues by speed, 1/s: weave, capsize and caster, with the 14 decimals of the paper."""
 
 
-def appendix(speed: float) -> Any:
-    """The matrix (4, 4) of lean, steer and their rates, in 60 digits; steer is positive to the
-    left, as in the scene.
-    """
+PRINTED = {  # M, C1, K0 and K2 of the paper's section 5, in SI units
+    "M": (("80.81722", "2.31941332208709"), ("2.31941332208709", "0.29784188199686")),
+    "C1": (("0", "33.86641391492494"), ("-0.85035641456978", "1.68540397397560")),
+    "K0": (("-80.95", "-2.59951685249872"), ("-2.59951685249872", "-0.80329488458618")),
+    "K2": (("0", "76.59734589573222"), ("0", "2.65431523794604")),
+}
+
+
+def matrices() -> dict[str, Any]:
+    """M, C1, K0 and K2 of lean and steer, in 60 digits."""
     m = MP.mpf
-    w, c, g, tilt, v = m("1.02"), m("0.08"), m("9.81"), MP.pi / 10, m(speed)
+    w, c, tilt = m("1.02"), m("0.08"), MP.pi / 10
     r_R, m_R, R_xx, R_yy = m("0.3"), m(2), m("0.0603"), m("0.12")
     x_B, z_B, m_B, B_xx, B_xz, B_zz = m("0.3"), m("-0.9"), m(85), m("9.2"), m("2.4"), m("2.8")
     x_H, z_H, m_H = m("0.9"), m("-0.7"), m(4)
@@ -107,7 +113,15 @@ def appendix(speed: float) -> Any:
     ]
     K0 = [[m_T * z_T, -S_A], [-S_A, -S_A * sin]]
     K2 = [[m(0), (S_T - m_T * z_T) / w * cos], [m(0), (S_A + S_F * sin) / w * cos]]
-    M, C1, K0, K2 = map(MP.matrix, (M, C1, K0, K2))
+    return dict(zip(PRINTED, map(MP.matrix, (M, C1, K0, K2)), strict=True))
+
+
+def appendix(speed: float) -> Any:
+    """The matrix (4, 4) of lean, steer and their rates, in 60 digits; steer is positive to the
+    left, as in the scene.
+    """
+    m, g, v = MP.mpf, MP.mpf("9.81"), MP.mpf(speed)
+    M, C1, K0, K2 = matrices().values()
     signs = MP.matrix([[1, -1], [-1, 1]])
     matrix = MP.matrix(4, 4)
     matrix[0, 2] = matrix[1, 3] = m(1)
