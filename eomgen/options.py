@@ -115,6 +115,11 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", type=path, help="figure (DIR/NAME.png)")
     parser.add_argument("--no-pictures", action="store_true", help="write no figure and no page")
     parser.add_argument("--view", action="store_true", help="open the page when done")
+    parser.add_argument(
+        "--live",
+        action=argparse.BooleanOptionalAction,
+        help="a page that integrates by itself, or only replays (live where it can be)",
+    )
     add_force(parser)
 
 

@@ -6,16 +6,19 @@ Before it, `scene.reader` reads a scene and `model.elaborate` makes a model of i
 keeps the generated code, and `run` loads and integrates it.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.codegen.backends import python
-from eomgen.codegen.backends.javascript import body_poses
+from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.choice import Candidate, Choice, choose
 from eomgen.codegen.derive import record
 from eomgen.codegen.interface import Interface, interface_of
+from eomgen.codegen.live import live_system
 from eomgen.codegen.system import System, optimised
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.language.formula import Formula
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
@@ -25,13 +28,11 @@ from eomgen.scene.schema import Scene
 
 @dataclass(frozen=True)
 class Generated:
-    """What a model is compiled to: a Python module, the page's `bodyPoses`, the program of both
-    with its interface, what passes saved, why its route was taken, and what the report must say of
-    it.
+    """What a model is compiled to: a Python module, its program with the interface, what passes
+    saved, why its route was taken, and what the report must say of it.
     """
 
     module: str
-    poses: str
     program: Program
     interface: Interface
     reports: tuple[PassReport, ...]
@@ -93,17 +94,44 @@ def compile_program(model: Model, *, jacobian: bool = True, closed: bool = True)
 
 
 def render(compiled: Compiled) -> Generated:
-    """The NumPy module of a program, with its page function and reports."""
+    """The NumPy module of a program, with its reports."""
     program, interface = compiled.system.program, interface_of(compiled.system)
     return Generated(
         python.module(program, interface),
-        body_poses(program, interface),
         program,
         interface,
         compiled.system.reports,
         tuple(compiled.explanation()),
         tuple(compiled.choice.notices()),
     )
+
+
+@dataclass(frozen=True)
+class Live:
+    """What the page of a model computes with.
+
+    source      the JavaScript source of `const mechanism`
+    loads       for each load of the output `loads` the names of its effect and its body
+    operations  of one call of `derivative` with all effects on
+    saved       operations that leaving out each effect saves, by name
+    """
+
+    source: str
+    loads: tuple[tuple[str, str], ...]
+    operations: int
+    saved: Mapping[str, int]
+
+
+def live(model: Model, geometry: Sequence[Formula] = ()) -> Live:
+    """The functions of a model's page, of its interactive model; `geometry` are formulas of
+    parameters and time, the entries of the function of that name.
+    """
+    check_nonsingular(model)
+    found = live_system(model, geometry)
+    system = found.system
+    contacts = [{"name": c.name, "effect": c.effect, "unit": c.unit} for c in system.contacts]
+    source = mechanism(system.program, interface_of(system), contacts)
+    return Live(source, found.loads, found.operations, found.saved)
 
 
 def python_module(system: System) -> str:

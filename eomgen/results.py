@@ -13,6 +13,7 @@ from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Outcome, Trajectory, save_csv, save_npz
+from eomgen.scene.schema import Simulation
 from eomgen.study.diagnosis import joint_limits, locks
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from eomgen.run.progress import Progress
     from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
+    from eomgen.show.page import PageCode
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
     from eomgen.study.between import Direction
@@ -140,7 +142,6 @@ class Module:
 
     name         name of the scene
     source       source code
-    poses        JavaScript source of `bodyPoses` for the page; "" without the output `body_poses`
     explanation  a line for each route, with its operations and which was chosen
     notices      notices for the user
     reports      steps and operations of the program after each optimisation pass
@@ -153,7 +154,6 @@ class Module:
 
     name: str
     source: str
-    poses: str
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
     reports: "tuple[PassReport, ...]" = ()
@@ -194,6 +194,9 @@ class Run:
     estimate    the estimate of the error by a second run, if asked for
     begun       how it continues an earlier run; "" if it does not
     compiled    whether steps were made, or functions computed, in compiled code
+    simulation  settings of the scene
+    inputs      constant inputs that are not their defaults
+    varying     whether inputs were tables or functions of time
     """
 
     model: Model
@@ -207,6 +210,9 @@ class Run:
     estimate: "Estimate | None" = None
     begun: str = ""
     compiled: bool = False
+    simulation: Simulation = field(default_factory=Simulation)
+    inputs: Mapping[str, float] = field(default_factory=dict)
+    varying: bool = False
 
     @property
     def t(self) -> FloatArray:
@@ -297,6 +303,12 @@ class Run:
 
         return draw_motion(self.motion)
 
+    def page(self, *, live: bool | None = None) -> "PageCode":
+        """The functions of the page of this run, in JavaScript: `show.page_code.page_code`."""
+        from eomgen.show.page_code import page_code
+
+        return page_code(self, live=live)
+
     def plot(
         self,
         of: str | Sequence[str] = (),
@@ -366,10 +378,15 @@ class Run:
         ).path
 
     def save(
-        self, folder: str | Path, *, parquet: bool = False, force: bool = False
+        self,
+        folder: str | Path,
+        *,
+        parquet: bool = False,
+        live: bool | None = None,
+        force: bool = False,
     ) -> tuple[Path, ...]:
         """Write module, table, archive and page into a folder, with `parquet` also the table as a
-        Parquet file; return their paths.
+        Parquet file; return their paths. The page is live as `page` says.
 
         Raises `RunError` if a file cannot be written, or exists and this program did not write it.
         """
@@ -382,8 +399,7 @@ class Run:
         # Before the archive: a table is ours if the archive beside it has the same columns.
         save_csv(self.trajectory, table, force=force)
         save_npz(self.trajectory, archive, force=force)
-        parameters = tuple(self.model.defaults.values())
-        save_page(self.motion, self.module.poses, parameters, page, force=force)
+        save_page(self.motion, self.page(live=live), page, force=force)
         if parquet:
             from eomgen.run.parquet import save_parquet
 

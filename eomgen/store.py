@@ -14,6 +14,7 @@ import json
 import os
 import pickle
 import platform
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields, replace
 from functools import cache
@@ -31,6 +32,7 @@ from eomgen.templating import PACKAGE, templates_folder
 
 if TYPE_CHECKING:
     from eomgen.codegen.interface import Interface
+    from eomgen.language.formula import Formula
 
 AFTER = (
     *(
@@ -75,7 +77,6 @@ class Code:
     """
 
     module: str
-    poses: str
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
@@ -97,7 +98,7 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     from eomgen.pipeline import generate
 
     new = generate(model)
-    code = Code(new.module, new.poses, new.reports, new.explanation, new.notices, derived=True)
+    code = Code(new.module, new.reports, new.explanation, new.notices, derived=True)
     if directory is None:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
     entries = Entries(directory)
@@ -105,10 +106,53 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     trouble = trouble or _keep_program(entries, key, new.program, new.interface)
     if trouble:
         return replace(code, notice=f"the store {directory} is not used: {trouble}")
-    if kept and (kept.module, kept.poses) != (code.module, code.poses):
+    if kept and kept.module != code.module:
         notice = f"the store {directory} held other code for this scene, which was replaced"
         return replace(code, notice=notice)
     return code
+
+
+@dataclass(frozen=True)
+class LiveCode:
+    """What a model's page computes with, with the fields of `eomgen.pipeline.Live`."""
+
+    source: str
+    loads: tuple[tuple[str, str], ...]
+    operations: int
+    saved: Mapping[str, int]
+
+
+def live_code(model: Model, geometry: Sequence["Formula"] = ()) -> LiveCode:
+    """The functions of a model's page, from the store, or derived and stored; `geometry` are the
+    formulas of the function of that name.
+
+    A store that cannot be used is no obstacle.
+    """
+    directory = folder()
+    text = f"page of {key_of(model)} with {tuple(geometry)!r}"
+    key = hashlib.sha256(text.encode()).hexdigest()[:32]
+    if directory and (kept := _live_code(Entries(directory).get(key))):
+        return kept
+    # Imported here because the modules that derive equations take long to load.
+    from eomgen.pipeline import live
+
+    new = live(model, geometry)
+    code = LiveCode(new.source, new.loads, new.operations, new.saved)
+    if directory:
+        content = json.dumps([code.source, code.loads, code.operations, dict(code.saved)])
+        Entries(directory).put(key, content.encode())
+    return code
+
+
+def _live_code(content: bytes | None) -> LiveCode | None:
+    """The code of an entry that `live_code` wrote; None for any other bytes."""
+    with suppress(ValueError, TypeError, AttributeError, RecursionError):
+        source, loads, operations, saved = json.loads(content or b"")
+        source.encode()  # fails for lone surrogates
+        pairs = tuple((str(effect), str(body)) for effect, body in loads)
+        counts = {str(name): int(count) for name, count in saved.items()}
+        return LiveCode(source, pairs, int(operations), counts)
+    return None
 
 
 def program_of(model: Model) -> Program:
@@ -160,15 +204,15 @@ def _program_key(key: str) -> str:
 def _content(code: Code) -> bytes:
     """The bytes of an entry for code."""
     reports = [astuple(report) for report in code.reports]
-    return json.dumps([code.module, code.poses, reports, code.explanation, code.notices]).encode()
+    return json.dumps([code.module, reports, code.explanation, code.notices]).encode()
 
 
 def _code(content: bytes | None) -> Code | None:
     """The code of an entry that `_content` wrote; None for any other bytes."""
     try:
-        module, poses, reports, explanation, notices = json.loads(content or b"")
+        module, reports, explanation, notices = json.loads(content or b"")
         passes = tuple(PassReport(*report) for report in reports)
-        texts = [module, poses, *explanation, *notices, *(report.name for report in passes)]
+        texts = [module, *explanation, *notices, *(report.name for report in passes)]
         "".join(texts).encode()  # fails for lone surrogates
     except (ValueError, TypeError, RecursionError):
         return None
@@ -176,7 +220,7 @@ def _code(content: bytes | None) -> Code | None:
     lists = all(type(part) is list for part in (reports, explanation, notices))
     if not (lists and all(type(n) is int for n in counts)):
         return None
-    return Code(module, poses, passes, tuple(explanation), tuple(notices), derived=False)
+    return Code(module, passes, tuple(explanation), tuple(notices), derived=False)
 
 
 def key_of(model: Model) -> str:

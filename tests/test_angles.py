@@ -138,7 +138,7 @@ def test_formulas_of_an_orientation_stay_a_rotation() -> None:
     with pytest.raises(ValueError, match=r"joints\[0\].orientation: the quaternion has no length"):
         module.derivative(0.0, module.initial_state(), {"tilt": 0.0})
     turned = arm('orientation = [["k/3", 0, 0], [0, 1, 0], [0, 0, 1]]')
-    at = r"joints\[0\].orientation: is no rotation"
+    at = r"joints\[0\].orientation: is not a rotation"
     with pytest.raises(eomgen.EomgenError, match=at):
         eomgen.simulate(turned, parameters={"k": 3.001}, t_end=0.1)
 

@@ -27,6 +27,7 @@ from eomgen.scene.schema import Scene
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = [
     DOCS / "tutorial.md",
+    DOCS / "pictures.md",
     *sorted((DOCS / "howto").glob("*.md")),
     *sorted((DOCS / "concepts").glob("*.md")),
 ]

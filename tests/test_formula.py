@@ -32,7 +32,7 @@ from eomgen.scalars.functions import BY_MATH, FUNCTIONS
 from eomgen.scene.reader import parse_scene
 
 NO = "has {!r} at column {}, which is not allowed"
-NUMBERS = "; write numbers as 1000.0 or 1e3, and * to multiply"
+NUMBERS = "; write numbers without a unit, as 1000.0 or 1e3, and * to multiply"
 NAMES = "; a name starts with a letter, does not end in _, and contains no __"
 POWER = (
     "has a power at column {} that is not a whole number 0 to 16; "

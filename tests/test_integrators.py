@@ -630,11 +630,11 @@ def test_adaptive_run_stops_after_max_steps():
         ("euler", {"dt": 0}, "dt: 0 is not a positive step; give e.g. --dt 0.001"),
         ("euler", {"dt": math.nan}, "dt: nan is not a positive step; give e.g. --dt 0.001"),
         ("euler", {"dt": math.inf}, "dt: inf is not a positive step; give e.g. --dt 0.001"),
-        ("euler", {"dt": 1e-9}, "dt: 1e-09 takes 1e+09 steps, but at most 10000000 are made"),
+        ("euler", {"dt": 1e-9}, "dt: 1e-09 takes 1e+09 steps, but at most 10000000 are allowed"),
         (
             "euler",
             {"dt": 5e-324},
-            "dt: 4.94066e-324 takes inf steps, but at most 10000000 are made",
+            "dt: 4.94066e-324 takes inf steps, but at most 10000000 are allowed",
         ),
         (
             "BDF",

@@ -11,22 +11,16 @@ import pytest
 from campaign import some
 from engine import DERIVATIVES, along, apart, engine, exact
 from spatial_trees import PLANE, SPACE, random_spatial_tree
-from test_show_space import page_parts
 
 from eomgen.cli import main
-from eomgen.codegen.backends.javascript import body_poses
+from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.interface import interface_of
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
 from eomgen.linear.equilibrium import equilibrium
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
-from eomgen.run.integrate import integrate
-from eomgen.run.module import as_problem
-from eomgen.scene.appearance import Appearance
 from eomgen.scene.reader import parse_scene
-from eomgen.show.observe import observe
-from eomgen.show.page import render_page
 
 ROUTES = ("aba", "ldl")
 
@@ -346,63 +340,12 @@ def test_poses_of_every_function_in_javascript() -> None:
     e = engine(text)
     y, times = np.array([0.4, -1.0]), [0.0, 0.4, 1.1, 1.3, 1.9, 2.7]
     p = list(e.module.PARAMETERS.values())
-    call = f"bodyPoses({json.dumps(y.tolist())}, {json.dumps(p)}, t)"
-    script = f"{body_poses(e.system.program, interface_of(e.system))}\n"
-    script += f"console.log(JSON.stringify({json.dumps(times)}.map((t) => {call})));"
+    call = f"mechanism.bodyPoses(t, {json.dumps(y.tolist())}, {json.dumps(p)}, [])"
+    script = f"{mechanism(e.system.program, interface_of(e.system))}\n"
+    script += f"console.log(JSON.stringify({json.dumps(times)}.map((t) => [...{call}])));"
     answer = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
-    expected = [e.module.body_poses(t, y) for t in times]
+    expected = [e.module.body_poses(t, y).ravel() for t in times]
     assert apart(json.loads(answer.stdout), expected) < 1e-14
-
-
-DRAWN = """
-const parts = require("fs").readFileSync(0, "utf8").split("\\0");
-const document = { getElementById: (id) => ({ textContent: parts[0] }) };
-eval(parts[1] + `
-  ${parts[2]}
-  const found = { paths, drawn: [] };
-  { // in place of what the rest of the page has
-    const window = {}, canvas = { clientWidth: 4, clientHeight: 3 };
-    const pen = { setTransform() {}, fillRect() {} };
-    const scaleOfView = () => 1, drawScaleBar = () => {}, showValues = () => {};
-    const drawScene = (poses) => found.drawn.push(poses);
-    const clock = {};
-    ${parts[3]}
-    for (const time of t) { clock.time = time; draw(); }
-  }
-  console.log(JSON.stringify(found));
-`);
-"""
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="runs the page's script in Node")
-def test_the_page_of_a_driven_scene_moves() -> None:
-    """Pictures and traces of the page are where the module has the bodies at those times."""
-    drive = (
-        '[[effects]]\ntype = "driven"\nname = "swing"\njoint = "first"\ncoordinate = "sin(3*t)"\n'
-    )
-    model = elaborate(parse_scene(DOUBLE + drive))
-    code = generate(model)
-    e = engine(DOUBLE + drive)
-    run = integrate(as_problem(e.module), "RK45", 1.0, rtol=1e-6, atol=1e-9, samples=7)
-    motion = observe(model, e.module, run, Appearance())
-    expected = [e.module.body_poses(t, y) for t, y in zip(run.t, run.y, strict=True)]
-    np.testing.assert_allclose(motion.poses, expected, atol=1e-15)
-    assert np.ptp(motion.poses[:, 0, 2]) > 0.9
-    energy = [e.module.kinetic_energy(t, y) for t, y in zip(run.t, run.y, strict=True)]
-    np.testing.assert_allclose(motion.kinetic_energy, energy, rtol=1e-14)
-    data, scripts = page_parts(render_page(motion, code.poses, tuple(model.defaults.values())))
-    script = scripts[0] + scripts[1][: scripts[1].index("// View, traces and scale bar")]
-    picture = scripts[1]
-    paths = picture[picture.index("const paths") : picture.index("const canvas")]
-    draw = picture[picture.index("function draw()") :]
-    draw = draw[: draw.index("\n}\n") + 3]
-    given = "\0".join([json.dumps(data), script.replace('"use strict";', ""), paths, draw])
-    answer = subprocess.run(
-        ["node", "-e", DRAWN], input=given, capture_output=True, text=True, check=True
-    )
-    found = json.loads(answer.stdout)
-    np.testing.assert_allclose(found["drawn"], expected, atol=1e-14)
-    np.testing.assert_allclose(found["paths"], np.array(expected)[:, :, :2], atol=1e-14)
 
 
 # What is reported to a user.

@@ -1,13 +1,9 @@
-"""Figures and pages of a motion: true to its numbers, whole, reproducible, and safe to open."""
+"""Figures of a motion: true to its numbers, whole, and reproducible."""
 
-import base64
-import json
-import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -21,20 +17,16 @@ from matplotlib.text import Text
 from eomgen import templating
 from eomgen.errors import RunError
 from eomgen.files import is_ours
-from eomgen.scene.look import Box, Camera, Disc, Polygon, Rod
+from eomgen.scene.look import Box, Disc, Polygon, Rod, numbers
 from eomgen.show.figure import draw_motion, save_figure
+from eomgen.show.framing import View
 from eomgen.show.motion import Motion, thinned
-from eomgen.show.page import render_page, save_page
-from eomgen.show.plane import outline
+from eomgen.show.outlines import outline
 from eomgen.show.style import GREEK, symbol, write_figure
 
 NASTY = "</script><img src=x onerror=alert(1)> <!-- $x^2$ \u2028 鎖 \x01 {{ t }}"
 ARM = 0.6
 WORKED = {"works": np.outer(np.arange(201.0), (1.0, -1.0)), "effects": ("gravity", "air")}
-POSES = """function bodyPoses(y, p) {
-  const [x, theta] = y;
-  return [[x, 0, 0], [x + p[0] * Math.sin(theta), -p[0] * Math.cos(theta), theta]];
-}"""
 
 
 def swinging(n: int = 201, duration: float = 4.0, **changes: Any) -> Motion:
@@ -67,7 +59,7 @@ def swinging(n: int = 201, duration: float = 4.0, **changes: Any) -> Motion:
         kinetic_energy=kinetic,
         potential_energy=5.0 + 1e-9 * t / duration - kinetic,
         joint_drift=np.column_stack([zero, 1e-12 * t]),
-        camera=Camera(height=3.0, follow="pole"),
+        camera=View(height=3.0, follow="pole"),
         integrator="rk4, dt = 0.02 s",
         finished=True,
         message="",
@@ -109,7 +101,7 @@ def test_figure_shows_the_numbers() -> None:
 
 def test_outlines() -> None:
     triangle = Polygon(type="polygon", points=((0.0, 0.0), (2.0, 0.0), (0.0, 1.0)))
-    np.testing.assert_array_equal(outline(triangle), triangle.points)
+    np.testing.assert_array_equal(outline(triangle), [*map(numbers, triangle.points)])
     box = Box(type="box", size=(4.0, 2.0), center=(1.0, 0.0), angle=np.pi / 2)
     np.testing.assert_allclose(outline(box).min(axis=0), [0.0, -2.0], atol=1e-15)
     np.testing.assert_allclose(outline(box).max(axis=0), [2.0, 2.0], atol=1e-15)
@@ -178,7 +170,6 @@ def test_odd_motions_are_drawn(tmp_path: Path, changes: dict[str, Any], said: st
     figure = draw_motion(motion)
     write_figure(figure, tmp_path / "a.svg")  # every warning is an error here
     assert any(said in text.get_text() for text in figure.findobj(Text))
-    render_page(motion, POSES, (ARM,))
 
 
 def test_no_finite_sample() -> None:
@@ -206,104 +197,6 @@ def test_symbols() -> None:
     parser = MathTextParser("path")
     for name in names:
         parser.parse(symbol(name))  # raises where the mathtext is wrong
-
-
-class Page(HTMLParser):
-    """What a browser makes of a page: tags with attributes, scripts, and the text of the rest."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.scripts: list[str] = []
-        self.text = ""
-        self.feed(page)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        if tag == "script":
-            self.scripts.append("")
-
-    def handle_data(self, data: str) -> None:
-        if self.cdata_elem == "script":
-            self.scripts[-1] += data
-        else:
-            self.text += data
-
-    def run(self) -> dict[str, Any]:
-        """The data that the page plays, arrays unpacked."""
-        data: dict[str, Any] = json.loads(self.scripts[0])
-        for key in ("t", "y", "kinetic", "potential"):
-            data[key] = np.frombuffer(base64.b64decode(data[key]), dtype="<f8")
-        return data
-
-
-def test_page_holds_the_motion() -> None:
-    motion = swinging()
-    page = Page(render_page(motion, POSES, (ARM,)))
-    run = page.run()
-    np.testing.assert_array_equal(run["t"], motion.t)
-    np.testing.assert_array_equal(run["y"], motion.y.ravel())
-    np.testing.assert_array_equal(run["kinetic"], motion.kinetic_energy)
-    np.testing.assert_array_equal(run["potential"], motion.potential_energy)
-    assert run["states"] == list(motion.states) and run["units"] == list(motion.units)
-    assert run["parameters"] == [ARM] and run["anchors"] == [[1, 0.0, ARM]]
-    assert run["camera"]["follow"] == 1 and run["camera"]["height"] == 3.0
-    box = {"type": "box", "size": [0.5, 0.2], "center": [0.0, 0.0], "angle": 0.0}
-    assert run["shapes"][0] == [{**box, "color": "#4477aa"}]
-    assert run["shapes"][1] == [shape.model_dump(mode="json") for shape in motion.shapes[1]]
-    assert run["colors"] == ["#4477aa", "#4477aa"] and run["traced"] == [0, 1]
-    assert page.scripts[1].strip() == POSES
-    assert "run stopped" not in page.text
-    stopped = replace(motion, finished=False, message="<b>too fast</b>")
-    assert "at t = 4 s: <b>too fast</b>" in Page(render_page(stopped, POSES, (ARM,))).text
-
-
-def test_page_stands_alone() -> None:
-    source = render_page(swinging(), POSES, (ARM,))
-    page = Page(source)
-    code = source.replace(page.scripts[0], "")  # whose base64 may hold anything
-    assert not re.search(r"https?:|//[a-z]|@import|url\(|fetch\(|import\(", code)
-    attributes = {name for _, attrs in page.tags for name in attrs}
-    assert not {name for name in attributes if name.startswith("on")} | {"src", "href"} & attributes
-    policy = next(a for t, a in page.tags if a.get("http-equiv") == "Content-Security-Policy")
-    assert policy["content"] is not None and "default-src 'none'" in policy["content"]
-    # Whatever the script takes hold of is there, and whatever can be pressed has a name.
-    ids = [attrs["id"] for _, attrs in page.tags if "id" in attrs]
-    wanted = set(re.findall(r'byId\("(\w+)"\)', page.scripts[2]))
-    assert wanted and wanted <= set(ids) and len(ids) == len(set(ids))
-    for tag, attrs in page.tags:
-        if tag in ("button", "select", "canvas") or attrs.get("type") == "range":
-            assert attrs.get("aria-label"), (tag, attrs)
-
-
-def test_page_escapes_whatever_a_scene_says() -> None:
-    plain = Page(render_page(swinging(), POSES, (ARM,)))
-    texts: dict[str, Any] = {"title": NASTY, "integrator": NASTY, "states": ("x", NASTY, "y", "z")}
-    source = render_page(swinging(**texts), POSES, (ARM,))
-    page = Page(source)
-    assert page.tags == plain.tags and page.scripts[1:] == plain.scripts[1:]
-    assert page.run()["states"][1] == NASTY
-    assert "</script><img src=x onerror=alert(1)> <!-- $x^2$ 鎖 {{ t }}" in page.text
-    assert "\u2028" not in source and "<!--" not in source
-    for bad in ("</script>", "</SCRIPT >", "<!-- "):
-        with pytest.raises(AssertionError, match="would end its script"):
-            render_page(swinging(), f"function bodyPoses(y, p) {{}} // {bad}", (ARM,))
-
-
-def test_page_size(tmp_path: Path) -> None:
-    wide = {"y": np.random.default_rng(1).normal(size=(1001, 8)), "states": tuple("abcdefgh")}
-    usual = swinging(n=1001, duration=10.0, units=("m",) * 8, **wide)
-    save_page(usual, POSES, (ARM,), tmp_path / "a.html")
-    save_page(usual, POSES, (ARM,), tmp_path / "a.html")  # ours may be written again
-    written = (tmp_path / "a.html").read_bytes()
-    assert len(written) < 250_000
-    assert is_ours(written)
-    assert written.decode() == render_page(usual, POSES, (ARM,))
-    long = swinging(n=20_001)
-    times = Page(render_page(long, POSES, (ARM,))).run()["t"]
-    assert len(times) == 3000 and (np.diff(times) > 0).all()
-    assert (times[0], times[-1]) == (long.t[0], long.t[-1])
 
 
 @pytest.mark.parametrize("home", ["eomgen/templates", "templates"])

@@ -1,10 +1,5 @@
-"""Space in figures and pages: true projections, hidden surfaces, scenes of many bodies."""
+"""Space in figures: true projections, hidden surfaces, scenes of many bodies."""
 
-import base64
-import json
-import re
-import shutil
-import subprocess
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
@@ -16,32 +11,18 @@ import pytest
 from matplotlib.text import Text
 from pydantic import TypeAdapter
 
-from eomgen.codegen.backends.javascript import body_poses
 from eomgen.errors import SceneError
-from eomgen.program.program import Output, finish
-from eomgen.program.tape import Stage, Tape
 from eomgen.scene.joints.base import Primitive
-from eomgen.scene.look import Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
+from eomgen.scene.look import BARE, Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
 from eomgen.show.figure import draw_motion, save_figure
+from eomgen.show.framing import View
 from eomgen.show.motion import Motion, thinned
 from eomgen.show.observe import joint_drift
-from eomgen.show.page import render_page
 from eomgen.show.raster import Frame, frame_around, render_solids
-from eomgen.show.solid import Mesh, Solids, mesh, rotation, solids
+from eomgen.show.solid import Solids, mesh, rotation, solids
 from eomgen.show.style import write_figure
 from eomgen.show.view import Sight, cast_of, eye_axes, floor_under, look
 
-POSES = """function bodyPoses(y, p) {
-  const [c, s] = [Math.cos(y[0]), Math.sin(y[0])];
-  return [
-    [[1, 0, 0, y[1]],
-     [0, 1, 0, 0],
-     [0, 0, 1, p[0]]],
-    [[c, 0, s, y[1]],
-     [0, 1, 0, 0],
-     [-s, 0, c, p[0]]],
-  ];
-}"""
 HEIGHT = 1.5
 SLIDER = Sphere(type="sphere", radius=0.3, color="#228833")
 ARM = Rod(type="rod", start=(0.0, 0.0, 0.0), end=(0.0, 0.0, -1.0), width=0.1)
@@ -77,7 +58,7 @@ def sliding(n: int = 31, **changes: Any) -> Motion:
         kinetic_energy=1 + t,
         potential_energy=1 - t,
         joint_drift=np.zeros((n, 1)),
-        camera=Camera(center=(0.0, 0.0, 1.0), height=3.0),
+        camera=View(center=(0.0, 0.0, 1.0), height=3.0),
         integrator="made up",
         finished=True,
         message="",
@@ -112,7 +93,7 @@ def chain(count: int = 100, n: int = 40) -> Motion:
         kinetic_energy=t,
         potential_energy=-t,
         joint_drift=1e-14 * (1 + np.outer(t, np.arange(count))),
-        camera=Camera(height=12.0),
+        camera=View(height=12.0),
         integrator="made up",
         finished=True,
         message="",
@@ -256,7 +237,7 @@ def test_orientation_turns_about_x_then_y_then_z() -> None:
 def test_many_solids_are_coarser_and_alike_ones_shared() -> None:
     one = solids(((SLIDER,),), 3.0, 4000)
     many = solids(((SLIDER, ARM),) * 100, 3.0, 4000)
-    assert len(many.meshes) == 2 and many.bodies[7] == ((0, SLIDER.color), (1, ARM.color))
+    assert len(many.meshes) == 2 and many.bodies[7] == ((0, SLIDER.color), (1, BARE))
     assert len(many.meshes[0].faces) < len(one.meshes[0].faces)
     assert len(cast_of(many).faces) == 100 * sum(len(m.faces) for m in many.meshes)
     assert solids(((), ()), 3.0, 4000) == Solids((), ((), ()))
@@ -280,7 +261,7 @@ def test_the_eye_stands_where_the_camera_says() -> None:
 def picture(shapes: tuple[Shape, ...], azimuth: float, elevation: float) -> Any:
     """Red, green, blue and cover of some shapes of one body, and the frame they lie in."""
     cast = cast_of(Solids(tuple(mesh(s, 0.05) for s in shapes), (tuple(
-        (k, s.color) for k, s in enumerate(shapes)),)))  # fmt: skip
+        (k, s.color or BARE) for k, s in enumerate(shapes)),)))  # fmt: skip
     sight = look(cast, np.eye(3, 4)[np.newaxis], eye_axes(azimuth, elevation))
     frame = frame_around(sight.faces.reshape(-1, 3)[:, :2], 300)
     return rendered(sight, frame), frame
@@ -335,7 +316,7 @@ def test_the_floor_is_under_the_motion(lift: float, z: float) -> None:
     motion = sliding()
     motion.poses[..., 2, 3] += lift
     if lift > 1:
-        motion = replace(motion, camera=Camera(center=(0.0, 0.0, 51.0), height=3.0))
+        motion = replace(motion, camera=View(center=(0.0, 0.0, 51.0), height=3.0))
     floor = floor_under(motion, cast_of(solids(motion.shapes, 3.0, 1000)))
     assert floor.z == pytest.approx(z, abs=1e-3)
     lines = floor.lines()
@@ -421,7 +402,7 @@ def test_a_hundred_bodies_make_a_figure(tmp_path: Path) -> None:
         pytest.param({"n": 1, "joint_drift": np.zeros((1, 1))}, id="one sample"),
         pytest.param({"joints": (), "joint_drift": np.zeros((31, 0))}, id="no joint holds a point"),
         pytest.param(
-            {"camera": Camera(elevation_deg=-30.0, follow="arm", background="#102030")},
+            {"camera": View(elevation_deg=-30.0, follow="arm", background="#102030")},
             id="from below, on dark paper",
         ),
     ],
@@ -433,7 +414,6 @@ def test_odd_motions_in_space_are_drawn(tmp_path: Path, changes: dict[str, Any])
     figure = draw_motion(motion)
     write_figure(figure, tmp_path / "a.svg")  # every warning is an error here
     ElementTree.parse(tmp_path / "a.svg")
-    render_page(motion, POSES, (HEIGHT,))
     texts = [text.get_text() for text in figure.findobj(Text)]
     assert ("no joints that hold a point" in texts) == (not motion.joints)
 
@@ -493,127 +473,3 @@ def test_gaps_of_joints_that_hold_a_point() -> None:
     flat = np.zeros((3, 2, 3))
     flat[:, 0] = [2.0, 2.0, np.pi / 2]
     np.testing.assert_allclose(joint_drift(planar, flat), np.zeros((3, 1)), atol=1e-15)
-
-
-# ---- Page ----
-
-
-def page_parts(source: str) -> tuple[dict[str, Any], list[str]]:
-    """The data of a page and its scripts."""
-    data, *scripts = re.findall(r"<script[^>]*>(.*?)</script>", source, re.DOTALL)
-    return json.loads(data), scripts
-
-
-def unpacked(text: str, kind: str, shape: tuple[int, ...]) -> Any:
-    return np.frombuffer(base64.b64decode(text), dtype=kind).reshape(shape)
-
-
-def test_page_in_space_holds_the_solids() -> None:
-    motion = sliding()
-    source = render_page(motion, POSES, (HEIGHT,))
-    run, scripts = page_parts(source)
-    assert scripts[0].strip() == POSES
-    np.testing.assert_array_equal(unpacked(run["y"], "<f8", (31, 2)), motion.y)
-    assert run["anchors"] == [[1, 0.0, 0.0, 0.0]] and run["traced"] == [0, 1]
-    assert run["camera"]["azimuth"] == -60.0 and run["camera"]["center"] == [0.0, 0.0, 1.0]
-    assert "shapes" not in run and run["solids"] == [[[0, SLIDER.color]], [[1, ARM.color]]]
-    for packed, shape in zip(run["meshes"], (SLIDER, ARM), strict=True):
-        faces = unpacked(packed["faces"], "<i2", (-1, 4))
-        held = Mesh(unpacked(packed["vertices"], "<f4", (-1, 3)).astype(float), faces.astype(int))
-        volume = mesh(shape, 0.01)
-        np.testing.assert_allclose(
-            np.ptp(held.vertices, axis=0), np.ptp(volume.vertices, axis=0), rtol=0.02
-        )
-        assert unpacked(packed["across"], "<i2", (-1, 4)).shape == faces.shape
-    assert run["floor"]["z"] == 0.0 and len(run["floor"]["lines"]) > 4
-    # It stands alone, and what its script takes hold of is there.
-    code = source.replace(json.dumps(run), "")
-    assert not re.search(
-        r"https?:|//[a-z]|@import|url\(|fetch\(|import\(", code[code.find("POSES") :]
-    )
-    wanted = set(re.findall(r'byId\("(\w+)"\)', scripts[1]))
-    assert wanted <= set(re.findall(r'id="(\w+)"', source))
-    assert "turn the view" in source
-    assert source == render_page(motion, POSES, (HEIGHT,))
-
-
-def test_page_of_a_hundred_bodies_is_not_large() -> None:
-    motion = chain()
-    states = base64.b64encode(motion.y.tobytes())
-    source = render_page(motion, POSES, ())
-    assert len(source) - len(states) < 150_000
-    run, _ = page_parts(source)
-    assert len(run["meshes"]) == 1 and len(run["traced"]) == 12
-    assert run["quaternions"][1] == [10, 11, 12, 13]
-
-
-DOM = """
-const parts = require("fs").readFileSync(0, "utf-8").split("\\u0000");
-const window = { devicePixelRatio: 1 };
-const byText = { run: { textContent: parts[0] } };
-const document = {
-  getElementById: (id) => byText[id],
-  createElement: () => ({ getContext: () => ({ createImageData: (w, h) => (
-    { data: new Uint8ClampedArray(4 * w * h) }) }) }),
-};
-const pen = {};
-const [width, height, scale, left, top] = JSON.parse(parts[2]);
-eval(parts[1] + `
-  const view = { ...HOME };
-  const first = eyeAxes();
-  view.azimuth += 360;
-  const round = eyeAxes();
-  startRaster(width, height);
-  drawSolids(posesOf(stateAt(place(t[last])), t[last]), first, scale, left, top);
-  let covered = 0;
-  for (const pixel of raster.pixels) covered += pixel !== 0;
-  const at = (x, y) => raster.pixels[Math.round(raster.ratio * y) * raster.width
-    + Math.round(raster.ratio * x)];
-  const colours = [];
-  for (let x = 4; x < width; x += 8) for (let y = 4; y < height; y += 8) colours.push(at(x, y));
-  console.log(JSON.stringify({ first, round, covered: covered / raster.ratio ** 2, colours }));
-`);
-"""
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="runs the page's script in Node")
-def test_the_page_draws_what_the_figure_draws() -> None:
-    motion = sliding()
-    source = render_page(motion, POSES, (HEIGHT,))
-    run, scripts = page_parts(source)
-    script = scripts[0] + scripts[1][: scripts[1].index("// View, traces and scale bar")]
-    eye = eye_axes(-60.0, 20.0)
-    sight = look(cast_of(solids(motion.shapes, 3.0, 4000)), motion.poses[-1], eye)
-    frame = frame_around(sight.faces.reshape(-1, 3)[:, :2], 300)
-    image = rendered(sight, frame)
-    scale = frame.pixels_per_metre
-    numbers = [frame.width, frame.height, scale, -frame.left * scale, frame.top * scale]
-    given = "\0".join([json.dumps(run), script.replace('"use strict";', ""), json.dumps(numbers)])
-    answer = subprocess.run(
-        ["node", "-e", DOM], input=given, capture_output=True, text=True, check=True
-    )
-    drawn = json.loads(answer.stdout)
-    np.testing.assert_allclose(drawn["first"], eye, atol=1e-15)
-    np.testing.assert_allclose(drawn["round"], eye, atol=1e-13)
-    assert drawn["covered"] == pytest.approx((image[..., 3] > 0).sum(), rel=0.04)
-    there = image[4::8, 4::8].swapaxes(0, 1).reshape(-1, 4)
-    here = np.array(drawn["colours"], dtype="<u4").view("u1").reshape(-1, 4) / 255
-    # Next to an outline, half a pixel decides.
-    assert (np.abs(here - there).max(axis=1) < 0.04).mean() > 0.95
-
-
-def test_poses_in_space_as_javascript() -> None:
-    tape = Tape()
-    angle, x = (tape.input(name, Stage.POSITIONS) for name in ("angle", "x"))
-    one, zero = tape.constant(1.0), tape.constant(0.0)
-    cos, sin = tape.apply("cos", angle), tape.apply("sin", angle)
-    rows = [cos, zero, sin, x, zero, one, zero, zero, -sin, zero, cos, zero]
-    output = Output((1, 3, 4), tuple(node.index for node in rows))
-    interface: Any = SimpleNamespace(
-        states=(SimpleNamespace(name="angle"), SimpleNamespace(name="x")), parameters=()
-    )
-    program = finish(tape, {"body_poses": output}, ())
-    assert body_poses(program, interface).split("return ")[1].split() == (
-        "[ [[cos_angle, 0.0, sin_angle, x], [0.0, 1.0, 0.0, 0.0], "
-        "[-sin_angle, 0.0, cos_angle, 0.0]], ]; }".split()
-    )

@@ -1,9 +1,6 @@
-"""What stands still in the world in figures and pages, and where they say that energy goes."""
+"""What stands still in the world in figures, and where they say that energy goes."""
 
-import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +11,15 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Circle
 from matplotlib.patches import Polygon as Patch
 from matplotlib.path import Path as Outline
-from test_show import ARM, POSES, panel, swinging
-from test_show_space import HEIGHT, sliding
-from test_show_space import POSES as POSES_IN_SPACE
+from test_show import panel, swinging
+from test_show_space import sliding
 
 from eomgen.cli import main
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.figure import draw_motion
-from eomgen.show.motion import Ball, Motion, Plane
-from eomgen.show.page import render_page
+from eomgen.show.motion import Ball, Plane
 from eomgen.show.solid import solids
 from eomgen.show.surroundings import balls_of, planes_of
 from eomgen.show.view import cast_of, eye_axes, floor_under, patches
@@ -170,111 +165,6 @@ def test_planes_in_space() -> None:
 def cross_sum(count: int) -> np.ndarray:
     """Products of a unit square's sides: 1 of each with itself, -1 with the one across."""
     return np.eye(count) - np.roll(np.eye(count), 2, axis=0)
-
-
-DOM = """
-const [data, script, sizes] = require("fs").readFileSync(0, "utf-8").split("\\u0000");
-const window = { devicePixelRatio: 1 };
-const log = [];
-const pen = new Proxy({}, {
-  get: (at, name) => name in at ? at[name] : (...given) => {
-    log.push([name, ...given, at[name + "Style"]]); // of "fill" and "stroke"
-    const size = name === "createImageData" ? 4 * given[0] * given[1] : 0;
-    return { data: new Uint8ClampedArray(size) };
-  },
-});
-const sheet = { getContext: () => pen };
-const document = {
-  getElementById: (id) => ({ run: { textContent: data }, stage: sheet }[id] ?? { checked: false }),
-  createElement: () => sheet,
-};
-eval(script + `
-  const frame = JSON.parse(sizes);
-  drawScene(posesOf(stateAt(place(t[0])), t[0]), 0, frame);
-  console.log(JSON.stringify(log));
-`);
-"""
-
-
-def drawn_by_page(motion: Motion, poses: str, p: tuple[float, ...], frame: Any) -> Any:
-    """What the page asks of its pen: the paths that it fills and strokes, with their colours."""
-    source = render_page(motion, poses, p)
-    data, *scripts = re.findall(r"<script[^>]*>(.*?)</script>", source, re.DOTALL)
-    script = scripts[0] + scripts[1][: scripts[1].index("// Shows values")]
-    given = "\0".join([data, script.replace('"use strict";', ""), json.dumps(frame)])
-    answer = subprocess.run(
-        ["node", "-e", DOM], input=given, capture_output=True, text=True, check=True
-    )
-    paths: list[Any] = []
-    painted = []
-    for name, *given_ in json.loads(answer.stdout):
-        if name == "beginPath":
-            paths = []
-        elif name == "moveTo" or (name == "lineTo" and not paths):
-            paths.append([given_[:2]])
-        elif name == "lineTo":
-            paths[-1].append(given_[:2])
-        elif name == "arc":
-            paths.append(tuple(given_[:3]))
-        elif name in ("fill", "stroke"):
-            painted.append((name, given_[-1], list(paths)))
-    return painted
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="runs the page's script in Node")
-def test_the_page_draws_what_stands_still_in_the_plane() -> None:
-    motion = swinging(planes=(SLOPE, WALL), balls=(PEG, OBSTACLE))
-    frame = {"scale": 100.0, "ratio": 1, "width": 600, "height": 400}
-    painted = drawn_by_page(motion, POSES, (ARM,), frame)
-    (grounds,) = (p for do, ink, p in painted if do == "fill" and "0.08" in ink and len(p) == 2)
-    x, y = motion.places[0, 1]  # the camera follows the pole
-    points = np.stack(np.meshgrid(np.linspace(-3, 3, 30) + x, np.linspace(-2, 2, 30) + y), -1)
-    points = points.reshape(-1, 2)
-    expected = behind(points, (SLOPE, WALL))
-    assert 0.1 < expected.mean() < 0.9
-    np.testing.assert_array_equal(covered(points, [np.array(g) for g in grounds]), expected)
-    deep = drawn_by_page(swinging(planes=(Plane((0.0, 1.0), 30.0),)), POSES, (ARM,), frame)
-    (ground,) = next(p for do, ink, p in deep if do == "fill" and "0.08" in ink)
-    assert covered(points, [np.array(ground)]).all()
-    circles = [(do, *p) for do, ink, p in painted if ink[-5:] in ("0.08)", " 0.4)", "0.25)")]
-    arcs = [(do, *map(float, arc)) for do, arc, *more in circles if not more and len(arc) == 3]
-    assert arcs == [
-        ("stroke", 0.2, -0.5, 0.3),
-        ("fill", 0.2, -0.5, 0.3),
-        ("stroke", 1.0, 1.0, 0.2),
-        ("stroke", 1.0, 1.0, 0.7),
-    ]
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="runs the page's script in Node")
-def test_the_page_draws_what_stands_still_in_space() -> None:
-    motion = sliding(**SURROUNDED)
-    frame = {"scale": 100.0, "ratio": 1, "width": 60, "height": 40}
-    painted = drawn_by_page(motion, POSES_IN_SPACE, (HEIGHT,), frame)
-    eye = eye_axes(-60.0, 20.0)
-
-    def seen(points: Any) -> np.ndarray:
-        right, up = ((np.array(points) - [0.0, 0.0, 1.0]) @ eye.T)[..., :2].T
-        return np.array([30 + 100 * right, 20 - 100 * up]).T
-
-    floor = floor_under(motion, cast_of(solids(motion.shapes, 3.0, 4000)))
-    squares = [p[0] for do, ink, p in painted if do == "fill" and "0.04" in ink]
-    np.testing.assert_allclose(squares, [seen(square) for square in patches(motion, floor)])
-    arcs = [p[0] for do, ink, p in painted if do == "stroke" and p and len(p[0]) == 3]
-    balls = [(b.center, 100 * r) for b, r in zip(SURROUNDED["balls"], (0.3, 0.2), strict=True)]
-    balls.append((balls[1][0], 30.0))
-    for arc, (center, radius) in zip(arcs, balls, strict=False):
-        np.testing.assert_allclose(arc, (*seen(center), radius))
-
-
-def test_pages_without_them_hold_nothing_of_them() -> None:
-    pages = (
-        render_page(swinging(), POSES, (ARM,)),
-        render_page(sliding(), POSES_IN_SPACE, (HEIGHT,)),
-    )
-    for page in pages:
-        run = json.loads(re.findall(r"<script[^>]*>(.*?)</script>", page, re.DOTALL)[0])
-        assert not {"planes", "balls", "patches"} & set(run)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -127,10 +127,10 @@ def test_units_are_those_of_the_joint(joint: str, kind: int) -> None:
     about = {x.name: x.about for x in named}
     word = ("torque", "force")[kind]
     assert about["drive"] == f"motor {word} at {joint}"
-    assert about["push_torque"] == f"{word} of push"
+    assert about["push_torque"] == f"push: {word}"
     assert about["hold_torque"] == f"{word} of hold"
-    assert about["own_torques_pin"] == "torque of own, pin"
-    assert about["own_torques_rail"] == "force of own, rail"
+    assert about["own_torques_pin"] == "own: torque, pin"
+    assert about["own_torques_rail"] == "own: force, rail"
     assert about["z"] == "this | that"
 
 

@@ -82,7 +82,6 @@ def module_of(code: Code, model: Model) -> Module:
     return Module(
         model.name,
         code.module,
-        code.poses,
         code.explanation,
         code.notices,
         code.reports,

@@ -43,4 +43,7 @@ def load_run(path: str | PathLike[str]) -> Run:
         "",
         math.nan,
         tuple(model.notices),
+        simulation=run.scene.simulation,
+        inputs=run.setup.inputs,
+        varying=run.setup.varying is not None,
     )

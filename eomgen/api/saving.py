@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.errors import EomgenError
 from eomgen.files import check_folder, check_writable, remove_ours, write_pieces, write_whole
 from eomgen.results import Run
 from eomgen.run.trajectory import is_own_table, save_csv, save_npz
@@ -59,10 +59,16 @@ def _is_own(kind: str, path: Path) -> bool:
 
 
 def save_run(
-    run: Run, paths: dict[str, Path], *, pictures: bool = True, force: bool = False
+    run: Run,
+    paths: dict[str, Path],
+    *,
+    pictures: bool = True,
+    live: bool | None = None,
+    force: bool = False,
 ) -> str:
     """Write all files. If figure and page cannot be drawn, or without `pictures`, remove those of
-    an earlier run and their paths from `paths`. Return why they cannot be drawn, or "".
+    an earlier run and their paths from `paths`. Return why they cannot be drawn, or "". The page is
+    live as `Run.page` says.
     """
     run.module.save(paths["py"], force=force)
     # The table first: the archive of the earlier run shows whether its table is ours to overwrite.
@@ -73,21 +79,20 @@ def save_run(
 
         save_parquet(run.trajectory, paths["parquet"], force=force)
     if pictures:
-        return _save_pictures(run, paths, force)
+        return _save_pictures(run, paths, live, force)
     _remove_pictures(paths)
     return ""
 
 
-def _save_pictures(run: Run, paths: dict[str, Path], force: bool) -> str:
+def _save_pictures(run: Run, paths: dict[str, Path], live: bool | None, force: bool) -> str:
     """Write figure and page; return why they cannot be drawn, or ""."""
     from eomgen.show.figure import save_figure
     from eomgen.show.page import save_page
 
-    parameters = tuple(run.model.defaults.values())
     try:
         save_figure(run.motion, paths["png"], force=force)
-        save_page(run.motion, run.module.poses, parameters, paths["html"], force=force)
-    except (RunError, KeyboardInterrupt) as error:
+        save_page(run.motion, run.page(live=live), paths["html"], force=force)
+    except (EomgenError, KeyboardInterrupt) as error:
         _remove_pictures(paths)
         if isinstance(error, KeyboardInterrupt):
             raise

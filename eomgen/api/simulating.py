@@ -12,6 +12,7 @@ from eomgen.api.inputs import Inputs, applied
 from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, origin_from, split
+from eomgen.model.elaborate import expanded
 from eomgen.model.model import Model
 from eomgen.results import Run
 from eomgen.run.inputs import ModuleWithInputs, with_corners
@@ -190,7 +191,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         model,
         module,
         trajectory,
-        observe(model, functions, trajectory, appearance_of(plan.scene), pushing),
+        observe(model, functions, trajectory, appearance_of(expanded(plan.scene)), pushing),
         trial.setting.options,
         error,
         tuple(warnings),
@@ -198,6 +199,9 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         estimate=estimate,
         begun=start.reported(trajectory) if start else "",
         compiled=accelerator is not None and accelerator.used,
+        simulation=plan.scene.simulation,
+        inputs=plan.inputs,
+        varying=plan.varying is not None,
     )
 
 

@@ -40,6 +40,8 @@ def simulate(given: Arguments) -> int:
     if given.no_pictures and (given.view or given.plot is not None):
         other = "--view" if given.view else "--plot"
         raise RunError(f"--no-pictures draws nothing, and {other} asks for a picture; drop one")
+    if given.no_pictures and given.live:
+        raise RunError("--no-pictures writes no page, and --live asks for one; drop one")
     reporter = reporter_of(given, given.scene)
     applied_to = applied(read_scene(given.scene), given_inputs(given.input), reporter)
     scene, model, name = read_whole(given.scene, given, applied_to[0])
@@ -81,7 +83,9 @@ def simulate(given: Arguments) -> int:
         raise RunError(f"--from: {given.resume} would be overwritten; give another folder with -o")
     run = run_plan(plan, reporter=reporter)
     with reporter.waiting(f"writing {name} …"):
-        drawing = save_run(run, paths, pictures=not given.no_pictures, force=given.force)
+        drawing = save_run(
+            run, paths, pictures=not given.no_pictures, live=given.live, force=given.force
+        )
     missed = _report(given, run)
     for path in paths.values():
         print(f"    wrote {path}")

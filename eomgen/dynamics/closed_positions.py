@@ -42,12 +42,12 @@ def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
         size = float(np.abs(step).max())
         if size < 1e-9:
             return
-        q = closure.moved(q, np.asarray(step * (STEP / size)))
+        q = closure.moved(q, np.multiply(step, STEP / size, dtype=np.float64))
         for _ in range(4):
             g, matrix = closure.both(q)
             if float(np.abs(g).max()) < MET:
                 break
-            q = closure.moved(q, -np.linalg.lstsq(matrix, g, rcond=1e-9)[0])
+            q = closure.moved(q, np.asarray(-np.linalg.lstsq(matrix, g, rcond=1e-9)[0]))
         else:
             return
         if not closure.upright(q):

@@ -98,6 +98,11 @@ def elaborate(scene: Scene) -> Model:
     return replace(model, outputs=outputs_for(scene.outputs, "outputs[{}]", available_in(model)))
 
 
+def expanded(scene: Scene) -> Scene:
+    """The scene with its definitions expanded. Raises `SceneError` as `with_definitions` does."""
+    return with_definitions(scene, _moving(scene))
+
+
 def outputs_for(
     wanted: Literal["all"] | Sequence[str], location: str, available: Mapping[str, Collection[Any]]
 ) -> tuple[str, ...]:

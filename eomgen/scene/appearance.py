@@ -18,14 +18,19 @@ class Appearance:
 
 
 def appearance_of(scene: Scene) -> Appearance:
-    """The appearance of a scene, including its chains.
+    """The appearance of a scene, including its chains; its definitions have been expanded.
 
-    Raises `SceneError` for shapes or a camera of the wrong number of dimensions, and if the camera
-    follows an unknown body.
+    Raises `SceneError` for shapes or a camera of the wrong number of dimensions, for a formula with
+    an unknown name or with a value that a shape cannot have at the scene's parameters, and if the
+    camera follows an unknown body.
     """
     bodies, _ = written_out(scene)
+    known = {
+        name: float(entry if isinstance(entry, float | int) else entry.value)
+        for name, entry in scene.parameters.items()
+    }
     for body, location in bodies:
-        check_look(body.shapes, None, scene.dimensions, location)
+        check_look(body.shapes, None, scene.dimensions, location, known)
     shapes = {body.name: body.shapes for body, _ in bodies}
     check_look((), scene.camera, scene.dimensions, "camera")
     if scene.camera.follow is not None:

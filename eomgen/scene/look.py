@@ -1,12 +1,16 @@
 """The appearance of a scene: shapes on bodies, and the camera. No equation depends on it."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field
 
-from eomgen.errors import SceneError
+from eomgen.errors import SceneError, nearest
 from eomgen.language.base import Identifier, Number, Positive, Table
+from eomgen.language.conditions import of_quantity, require
+from eomgen.language.formula import Constant, Formula, names_in
+from eomgen.language.quantity import Quantity, Vector, quantity
 
 
 def _colour(text: str) -> str:
@@ -22,23 +26,20 @@ def _colour(text: str) -> str:
 
 Colour = Annotated[str, AfterValidator(_colour)]
 
+BARE = "#4477aa"
+"""The colour of a body, or of a shape, without one."""
+
 # The number of components depends on the scene's dimensions; `check_look` checks it.
 Point = Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)]
-Lengths = Annotated[tuple[Positive, ...], Field(min_length=2, max_length=3)]
 Angles = tuple[Number, Number, Number]
 
 
-def _metres(about: str, **options: Any) -> Any:
-    """A field for a length or a position, m."""
-    return Field(description=about, json_schema_extra={"unit": "m"}, **options)
-
-
 def _colour_field() -> Any:
-    return Field(default="#4477aa", description="colour, #rrggbb")
+    return Field(default=None, description="colour, #rrggbb; one for each body if absent")
 
 
 def _center() -> Any:
-    return _metres("centre; the body's centre of mass if absent", default=None)
+    return quantity("m", "centre; the body's centre of mass if absent", default=None)
 
 
 class Box(Table):
@@ -55,13 +56,13 @@ size = [0.4, 0.1]
 color = "#33658a"
 """
     type: Literal["box"]
-    size: Lengths = _metres("lengths of its edges")
-    center: Point | None = _center()
+    size: Vector = quantity("m", "lengths of its edges", "positive")
+    center: Vector | None = _center()
     angle: Number = Field(default=0.0, description="angle of rotation, rad, in the plane")
     orientation_deg: Angles = Field(
         default=(0.0, 0.0, 0.0), description="rotation about x, then y, then z, in space"
     )
-    color: Colour = _colour_field()
+    color: Colour | None = _colour_field()
 
 
 class Disc(Table):
@@ -73,9 +74,9 @@ type = "disc"
 radius = 0.05
 """
     type: Literal["disc"]
-    radius: Positive = _metres("radius")
-    center: Point | None = _center()
-    color: Colour = _colour_field()
+    radius: Quantity = quantity("m", "radius", "positive")
+    center: Vector | None = _center()
+    color: Colour | None = _colour_field()
 
 
 class Polygon(Table):
@@ -87,10 +88,10 @@ type = "polygon"
 points = [[0, 0], [0.3, 0], [0, 0.2]]
 """
     type: Literal["polygon"]
-    points: Annotated[tuple[Point, ...], Field(min_length=3, max_length=1000)] = _metres(
-        "corners in order"
+    points: Annotated[tuple[Vector, ...], Field(min_length=3, max_length=1000)] = quantity(
+        "m", "corners in order"
     )
-    color: Colour = _colour_field()
+    color: Colour | None = _colour_field()
 
 
 class Rod(Table):
@@ -99,15 +100,15 @@ class Rod(Table):
     example: ClassVar[str] = """
 [[bodies.shapes]]
 type = "rod"
-start = [-0.4, 0]
-end = [0.4, 0]
+start = ["-l/2", 0]
+end = ["l/2", 0]
 width = 0.06
 """
     type: Literal["rod"]
-    start: Point = _metres("one end")
-    end: Point = _metres("the other end")
-    width: Positive = _metres("width")
-    color: Colour = _colour_field()
+    start: Vector = quantity("m", "one end")
+    end: Vector = quantity("m", "the other end")
+    width: Quantity = quantity("m", "width", "positive")
+    color: Colour | None = _colour_field()
 
 
 class Sphere(Table):
@@ -120,9 +121,9 @@ radius = 0.05
 center = [0, 0, 0.1]
 """
     type: Literal["sphere"]
-    radius: Positive = _metres("radius")
-    center: Point | None = _center()
-    color: Colour = _colour_field()
+    radius: Quantity = quantity("m", "radius", "positive")
+    center: Vector | None = _center()
+    color: Colour | None = _colour_field()
 
 
 class Cylinder(Table):
@@ -136,10 +137,10 @@ end = [0, 0, 0.4]
 radius = 0.03
 """
     type: Literal["cylinder"]
-    start: Point = _metres("one end")
-    end: Point = _metres("the other end")
-    radius: Positive = _metres("radius")
-    color: Colour = _colour_field()
+    start: Vector = quantity("m", "one end")
+    end: Vector = quantity("m", "the other end")
+    radius: Quantity = quantity("m", "radius", "positive")
+    color: Colour | None = _colour_field()
 
 
 class Ellipsoid(Table):
@@ -151,30 +152,15 @@ type = "ellipsoid"
 radii = [0.1, 0.1, 0.3]
 """
     type: Literal["ellipsoid"]
-    radii: Lengths = _metres("half-axes")
-    center: Point | None = _center()
+    radii: Vector = quantity("m", "half-axes", "positive")
+    center: Vector | None = _center()
     orientation_deg: Angles = Field(default=(0.0, 0.0, 0.0), description="about x, then y, then z")
-    color: Colour = _colour_field()
+    color: Colour | None = _colour_field()
 
 
 Shape: TypeAlias = Annotated[
     Box | Cylinder | Disc | Ellipsoid | Polygon | Rod | Sphere, Field(discriminator="type")
 ]
-
-
-def from_centre(shape: Shape, com: Sequence[float]) -> Shape:
-    """A shape given in a body's frame, from its centre of mass `com`; () if that is the origin."""
-    fields: dict[str, object] = {}
-    for name in ("center", "start", "end") if com else ():
-        if (point := getattr(shape, name, None)) is not None:
-            fields[name] = _shifted(point, com)
-    if com and isinstance(shape, Polygon):
-        fields["points"] = tuple(_shifted(point, com) for point in shape.points)
-    return shape.replaced(**fields) if fields else shape
-
-
-def _shifted(point: Sequence[float], com: Sequence[float]) -> tuple[float, ...]:
-    return tuple(x - c for x, c in zip(point, com, strict=True))
 
 
 INSTEAD = {
@@ -185,24 +171,42 @@ INSTEAD = {
 
 
 class Camera(Table):
-    """The camera. It looks at `center` (m, world axes), or at the body that it follows.
+    """The camera of pictures.
 
-    `height` is the distance from the bottom to the top of the picture, m. In space the picture is a
-    parallel projection, seen from a direction that is rotated by `azimuth_deg` from x towards y and
-    by `elevation_deg` towards z.
+    In `mode = "fit"` the whole motion lies within the picture. With "follow" the picture moves with
+    the body `follow`, and with "fixed" it shows `height` m around `center`. Without a mode, it is
+    fixed if `center` or `height` is given, and follows if `follow` is; else the whole motion is
+    shown, unless the mechanism would be small in it: then the camera follows its heaviest body that
+    moves away. `height` is the distance from the bottom to the top of the picture; what the motion
+    needs if absent.
+
+    In space the picture is a parallel projection, seen from a direction that is rotated by
+    `azimuth_deg` from x towards y and by `elevation_deg` towards z.
     """
 
     example: ClassVar[str] = """
 [camera]
-height = 3.0
+mode = "follow"
 follow = "arm"
+height = 3.0
 """
-    center: Point | None = _metres(
-        "point that it looks at; the world's origin if absent", default=None
+    mode: Literal["fit", "follow", "fixed"] | None = Field(
+        default=None, description="what it shows, chosen if absent"
     )
-    height: Positive = _metres("height of the picture", default=4.0)
+    center: Point | None = Field(
+        default=None,
+        description="point that it looks at, if fixed; the middle of the motion if absent",
+        json_schema_extra={"unit": "m"},
+    )
+    height: Positive | None = Field(
+        default=None,
+        description="height of the picture; as the motion needs if absent",
+        json_schema_extra={"unit": "m"},
+    )
     follow: Identifier | None = Field(default=None, description="body that it follows")
-    background: Colour = Field(default="#ffffff", description="colour of the background")
+    background: Colour | None = Field(
+        default=None, description="colour of the background; white, or the page's theme, if absent"
+    )
     azimuth_deg: Number = Field(
         default=-60.0, description="direction of view, from x towards y, in space"
     )
@@ -212,33 +216,57 @@ follow = "arm"
 
 
 def check_look(
-    shapes: Sequence[Shape], camera: Camera | None, dimensions: int, location: str
+    shapes: Sequence[Shape],
+    camera: Camera | None,
+    dimensions: int,
+    location: str,
+    known: Mapping[str, float] | None = None,
 ) -> None:
     """Check that `shapes` and `camera` fit the plane (`dimensions` 2) or space (3).
 
-    `location` is that of the body or the camera in the scene, such as `bodies[0]`. Raises
-    `SceneError` with location, value and remedy.
+    `location` is that of the body or the camera in the scene, such as `bodies[0]`; `known` are the
+    values of the parameters that formulas of shapes may use. Raises `SceneError` with location,
+    value and remedy.
     """
     for i, shape in enumerate(shapes):
-        _check_shape(shape, dimensions, f"{location}.shapes[{i}]")
+        _check_shape(shape, dimensions, f"{location}.shapes[{i}]", known or {})
     if camera is not None:
-        _check_point(camera.center, dimensions, f"{location}.center")
-        if dimensions == 2:
-            for key in ("azimuth_deg", "elevation_deg"):
-                if key in camera.model_fields_set:
-                    raise SceneError(
-                        f"{location}.{key}: {getattr(camera, key):g}: the camera cannot be "
-                        "rotated in the plane; leave it out, or set dimensions = 3"
-                    )
+        _check_camera(camera, dimensions, location)
 
 
-def _check_shape(shape: Shape, dimensions: int, location: str) -> None:
+def _check_camera(camera: Camera, dimensions: int, location: str) -> None:
+    _check_components(camera.center, dimensions, f"{location}.center")
+    given = camera.model_fields_set
+    if dimensions == 2:
+        for key in ("azimuth_deg", "elevation_deg"):
+            if key in given:
+                raise SceneError(
+                    f"{location}.{key}: {getattr(camera, key):g}: the camera cannot be "
+                    "rotated in the plane; leave it out, or set dimensions = 3"
+                )
+    if camera.mode == "fit":
+        for key in ("center", "height", "follow"):
+            if getattr(camera, key) is not None:
+                raise SceneError(
+                    f"{location}.{key}: mode 'fit' finds the place of the camera itself; leave "
+                    "this key or the mode out"
+                )
+    if camera.mode == "fixed" and camera.follow is not None:
+        raise SceneError(
+            f"{location}.follow: a fixed camera follows nothing; leave this key or the mode out"
+        )
+
+
+def _check_shape(shape: Shape, dimensions: int, location: str, known: Mapping[str, float]) -> None:
     here, there = ("the plane", "space") if dimensions == 2 else ("space", "the plane")
     instead = INSTEAD[dimensions].get(shape.type)
     if instead:
         raise SceneError(f"{location}.type: '{shape.type}' is a shape of {there}; use '{instead}'")
-    for key, point in _points(shape):
-        _check_point(point, dimensions, f"{location}.{key}")
+    for key, vector in _vectors(shape):
+        _check_components(vector, dimensions, f"{location}.{key}")
+    for key, bound, formula in _quantities(shape):
+        _check_names(formula, f"{location}.{key}", known)
+        require(of_quantity(f"{location}.{key}", formula, bound, "m"), known)
     if isinstance(shape, Box):
         right, wrong = ("angle", "orientation_deg")[:: 1 if dimensions == 2 else -1]
         if wrong in shape.model_fields_set:
@@ -246,10 +274,34 @@ def _check_shape(shape: Shape, dimensions: int, location: str) -> None:
                 f"{location}.{wrong}: rotates a box in {there}; in {here} use '{right}'"
             )
     if isinstance(shape, Cylinder) and shape.start == shape.end:
-        raise SceneError(f"{location}.end: {list(shape.end)} is also the start; give it a length")
+        end = [part.value if isinstance(part, Constant) else "…" for part in shape.end]
+        raise SceneError(f"{location}.end: {end} is also the start; give it a length")
 
 
-def _points(shape: Shape) -> Iterator[tuple[str, tuple[float, ...] | None]]:
+def _check_names(formula: Formula, location: str, known: Mapping[str, float]) -> None:
+    for name in names_in(formula):
+        if name not in known:
+            hint = nearest(name, known) or "; shapes may use the scene's [parameters]"
+            raise SceneError(f"{location}: unknown parameter '{name}'{hint}")
+
+
+def _quantities(shape: Shape) -> Iterator[tuple[str, str, Formula]]:
+    """The quantities of a shape, each with its key and bound."""
+    for key, info in type(shape).model_fields.items():
+        extra = info.json_schema_extra
+        if isinstance(extra, dict) and "bound" in extra:
+            yield from _parts(key, str(extra["bound"]), getattr(shape, key))
+
+
+def _parts(key: str, bound: str, value: Any) -> Iterator[tuple[str, str, Formula]]:
+    if isinstance(value, tuple):
+        for i, part in enumerate(value):
+            yield from _parts(f"{key}[{i}]", bound, part)
+    elif value is not None:
+        yield key, bound, value
+
+
+def _vectors(shape: Shape) -> Iterator[tuple[str, tuple[Formula, ...] | None]]:
     """The vectors of a shape that have one component for each dimension, with their keys."""
     match shape:
         case Box():
@@ -264,9 +316,32 @@ def _points(shape: Shape) -> Iterator[tuple[str, tuple[float, ...] | None]]:
             yield from (("start", shape.start), ("end", shape.end))
 
 
-def _check_point(point: tuple[float, ...] | None, dimensions: int, location: str) -> None:
-    if point is not None and len(point) != dimensions:
+def _check_components(vector: tuple[Any, ...] | None, dimensions: int, location: str) -> None:
+    if vector is not None and len(vector) != dimensions:
         where = "the plane" if dimensions == 2 else "space"
+        shown = [part.value if isinstance(part, Constant) else part for part in vector]
+        shown = ["…" if isinstance(part, Formula) else part for part in shown]
         raise SceneError(
-            f"{location}: {list(point)} has {len(point)} components; in {where} give {dimensions}"
+            f"{location}: {shown} has {len(vector)} components; in {where} give {dimensions}"
         )
+
+
+def is_drawable(shape: Shape) -> bool:
+    """Whether the numbers of a shape, which other parameters than the scene's may give, are finite
+    and its lengths positive.
+    """
+    return all(
+        math.isfinite(number(part)) and (bound != "positive" or number(part) > 0)
+        for _, bound, part in _quantities(shape)
+    )
+
+
+def number(formula: Formula) -> float:
+    """The value of a quantity without names, such as those of `valued` shapes."""
+    assert isinstance(formula, Constant), "not evaluated"
+    return formula.value
+
+
+def numbers(vector: Sequence[Formula]) -> tuple[float, ...]:
+    """The values of a vector of quantities without names."""
+    return tuple(map(number, vector))

@@ -20,26 +20,23 @@ from PIL import Image
 from eomgen.errors import RunError
 from eomgen.files import check_writable, write_whole
 from eomgen.run.progress import Progress
+from eomgen.show.framing import ASPECT
 from eomgen.show.motion import Array, Motion
-from eomgen.show.plane import draw_plane, outline
-from eomgen.show.solid import solids
-from eomgen.show.space import BUDGET, draw_space
+from eomgen.show.plane import draw_plane
+from eomgen.show.space import draw_space
 from eomgen.show.style import ink_on, style
-from eomgen.show.view import cast_of, eye_axes
+from eomgen.show.view import eye_axes
 
 Picture = NDArray[np.uint8]
 SUFFIXES = (".gif", ".mp4")
 DPI = 100
 HEIGHT, WIDTH = 480, 960
 """The height of a film without a given size, pixels, and its greatest width."""
-MARGIN = 0.06
 NARROWEST, WIDEST = 0.6, 4.0
 """Width of a film relative to its height, if it has no given size."""
 MOST_FRAMES = 5000
 COLOURS = 254
 """Colours of a GIF beside that of its background."""
-SAMPLED = 200
-"""Greatest number of samples at which the extent of a motion is measured."""
 
 
 def check_film(path: Path, *, force: bool = False) -> None:
@@ -142,16 +139,10 @@ class _View:
 
     @classmethod
     def of(cls, motion: Motion) -> "_View":
-        """The view that holds the whole motion; or, around a body that the camera follows, the
-        camera's height.
-        """
-        if motion.camera.follow is not None:
-            half = motion.camera.height / 2 * np.array([4 / 3, 1.0])
-            return cls(motion, -half, half)
-        points = np.concatenate([*_extent(motion)])
-        low, high = points.min(axis=0), points.max(axis=0)
-        size = np.maximum(high - low, 0.05 * float((high - low).max()) or motion.camera.height)
-        middle, half = (low + high) / 2, size / 2 + MARGIN * float(size.max())
+        """The view of the motion's camera; around a body that it follows, from that body."""
+        view = motion.camera
+        half = np.array([view.width or ASPECT * view.height, view.height]) / 2
+        middle = _seen(motion, motion.center)
         return cls(motion, middle - half, middle + half)
 
     def pixels(self) -> tuple[int, int]:
@@ -204,23 +195,6 @@ def _seen(motion: Motion, points: Array) -> Array:
         return points
     eye = eye_axes(motion.camera.azimuth_deg, motion.camera.elevation_deg)
     return np.asarray((points @ eye.T)[..., :2])
-
-
-def _extent(motion: Motion) -> Iterator[Array]:
-    """Points (n, 2), in the picture, of all that moves."""
-    rows = np.linspace(0, len(motion.t) - 1, min(len(motion.t), SAMPLED)).round().astype(int)
-    yield _seen(motion, motion.places[rows].reshape(-1, motion.dimensions))
-    if motion.dimensions == 3:
-        cast = cast_of(solids(motion.shapes, motion.camera.height, BUDGET))
-        for pose in motion.poses[rows]:
-            yield _seen(motion, cast.world_vertices(pose))
-        return
-    for body, shapes in enumerate(motion.shapes):
-        for shape in shapes:
-            corners = outline(shape)
-            for x, y, angle in motion.poses[rows, body]:
-                c, s = np.cos(angle), np.sin(angle)
-                yield corners @ np.array([[c, s], [-s, c]]) + np.array([x, y])
 
 
 def _gif(

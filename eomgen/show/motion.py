@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.errors import RunError
-from eomgen.scene.look import Camera, Shape
+from eomgen.scene.look import BARE, Shape, numbers
+from eomgen.show.framing import View
+from eomgen.show.of_run import world_points
+from eomgen.show.picture import Picture
 
 Array = NDArray[np.float64]
 
@@ -18,9 +21,6 @@ MOST_ROWS = 3000
 
 INSTANTS = 8
 """Number of times at which a still figure shows the mechanism."""
-
-BARE = "#4477aa"
-"""The colour of a body without shapes."""
 
 MOST_TRACES = 12
 """Greatest number of bodies whose paths are drawn: more paths would hide everything else."""
@@ -62,6 +62,8 @@ class Motion:
     works         done since the start by each effect, or by all of a type; None if not asked for
     planes, balls fixed obstacles that bodies touch or avoid
     keeps_energy  whether exact motion conserves energy
+    picture       of which the shapes are a part; its numbers are formulas of parameters
+    drawn         the picture with the values of these formulas
     """
 
     name: str
@@ -78,7 +80,7 @@ class Motion:
     kinetic_energy: Array  # (n,) J
     potential_energy: Array  # (n,) J
     joint_drift: Array  # (n, nj) m
-    camera: Camera
+    camera: View
     integrator: str
     finished: bool
     message: str
@@ -89,6 +91,8 @@ class Motion:
     planes: tuple[Plane, ...] = ()
     balls: tuple[Ball, ...] = ()
     keeps_energy: bool = True
+    picture: Picture | None = None
+    drawn: Picture | None = None
 
     def __post_init__(self) -> None:
         n, ny, nb, nj = len(self.t), len(self.states), len(self.bodies), len(self.joints)
@@ -121,7 +125,7 @@ class Motion:
     @property
     def colours(self) -> tuple[str, ...]:
         """A colour for each body, that of its first shape."""
-        return tuple(shapes[0].color if shapes else BARE for shapes in self.shapes)
+        return tuple((shapes[0].color if shapes else None) or BARE for shapes in self.shapes)
 
     @property
     def center(self) -> Array:
@@ -161,6 +165,17 @@ def instants(motion: Motion) -> list[tuple[int, float]]:
     last = len(motion.t) - 1
     rows = np.unique(np.linspace(0, last, INSTANTS).round().astype(int)).tolist()
     return [(k, 1.0 if k == last else 0.14 + 0.45 * i / INSTANTS) for i, k in enumerate(rows)]
+
+
+def paths(motion: Motion) -> list[tuple[Array, str]]:
+    """The paths (n, 2) or (n, 3) of the traced points, m, world axes, with their colours."""
+    if motion.drawn is None:
+        return [(motion.places[:, body], motion.colours[body]) for body in motion.traced]
+    return [
+        (world_points(motion.poses, trace.body, np.array(numbers(trace.at))), color)
+        for trace in motion.drawn.traces
+        for color in [motion.drawn.bodies[trace.body].color]
+    ]
 
 
 def thinned(motion: Motion, most: int = MOST_ROWS) -> Motion:

@@ -13,9 +13,12 @@ from eomgen.run.trajectory import Trajectory
 from eomgen.scene.appearance import Appearance
 from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.show.balance import keeps_energy, works_by_type
+from eomgen.show.framing import framed
 from eomgen.show.motion import Anchor, Motion
-from eomgen.show.skeleton import shapes_of
+from eomgen.show.of_run import fixed_points, leading_bodies, spread, with_run
+from eomgen.show.picture import picture_of
 from eomgen.show.surroundings import balls_of, planes_of
+from eomgen.show.view import eye_axes
 
 
 class _Joint(Protocol):
@@ -49,6 +52,12 @@ def observe(
     effects, works = trajectory.work_names, trajectory.works
     if works is not None:
         effects, works = works_by_type(model, effects, works)
+    picture = with_run(picture_of(model, appearance, spread(poses)), model, poses)
+    drawn = picture.valued(model.defaults, float(trajectory.t[-1]))
+    shapes = tuple(body.shapes for body in drawn.bodies)
+    camera = appearance.camera
+    eye = eye_axes(camera.azimuth_deg, camera.elevation_deg)
+    leading = leading_bodies(model)
     return Motion(
         name=model.name,
         title=model.title,
@@ -58,13 +67,13 @@ def observe(
         units=tuple(module.UNITS[name] for name in trajectory.states),
         positions=module.POSITIONS,
         bodies=module.BODIES,
-        shapes=shapes_of(model, appearance),
+        shapes=shapes,
         joints=tuple(joint.name for _, joint in _joints(model, _holds_a_point)),
         poses=poses,
         kinetic_energy=kinetic,
         potential_energy=potential,
         joint_drift=drift,
-        camera=appearance.camera,
+        camera=framed(camera, module.BODIES, leading, shapes, poses, eye, fixed_points(drawn)),
         integrator=trajectory.integrator,
         finished=trajectory.finished,
         message=trajectory.message,
@@ -75,6 +84,8 @@ def observe(
         planes=planes_of(model),
         balls=balls_of(model),
         keeps_energy=keeps_energy(model, inputs or {}),
+        picture=picture,
+        drawn=drawn,
     )
 
 

@@ -1,134 +1,147 @@
-"""A motion as one HTML page that plays it, from disk and without a network or other files."""
+"""A run as one HTML page that plays it, and goes on live, from disk and without a network."""
 
 import base64
 import re
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from eomgen.errors import RunError
 from eomgen.files import write_whole
-from eomgen.scene.look import Shape
-from eomgen.show.motion import Array, Motion, thinned
-from eomgen.show.solid import Indices, solids
-from eomgen.show.view import AMBIENT, GLOSS, LIGHT, cast_of, floor_under, patches
-from eomgen.templating import render
+from eomgen.show.drawing_data import drawing_data
+from eomgen.show.motion import Array, Motion
+from eomgen.show.picture_data import geometry_values
+from eomgen.templating import render, templates_folder
 
-BUDGET = 4000
-"""About how many faces all bodies in space have: as many as a browser can draw many times a
-second."""
+MOST_NUMBERS = 16_000
+"""As many numbers of states as a page holds in double precision, or twice as many in single."""
+MOST_ROWS, ENOUGH_ROWS = 2000, 500
+"""Between rows the page interpolates with the slopes of the motion, so that `ENOUGH_ROWS` show a
+usual run; fewer are in double precision only if they are all that the run has.
+"""
 
 
-def render_page(motion: Motion, poses_source: str, parameters: tuple[float, ...]) -> str:
-    """Return the page that plays `motion` from its state vector.
+@dataclass(frozen=True)
+class PageCode:
+    """The mechanism of a page.
 
-    `poses_source` is the JavaScript text of `function bodyPoses(y, p, t)`. It returns the poses of
-    the bodies from the state `y` (ny,), the `parameters` `p` and the time: in the plane
-    `[[x, y, angle], …]` (m, m, rad), in space `[[[r11, r12, r13, x], […], […]], …]`, rows of
-    [world_R_body | position] (1, m). The page calls it for each picture. Arrays are embedded as
-    exact float64. Raises `RunError` if no sample is finite.
+    source  JavaScript source of `const mechanism`
+    table   entries of the page's data that describe its arguments and results
+    live    whether a page can integrate it
+    smooth  whether its derivative at the given inputs is that of the run
+    events  contacts that came to rest or lifted: t (s), contact, kind
+    y       rows of the run in the table's states, (n, ny); None if the run has these states
+    why     why it is not live, or ""
     """
-    assert not re.search(r"</script|<!--", poses_source, re.IGNORECASE), "would end its script"
-    shown = thinned(motion)
-    kept, camera = len(shown.t), motion.camera
-    run: dict[str, Any] = {
-        "states": motion.states,
-        "units": motion.units,
-        "colors": motion.colours,
-        "traced": motion.traced,
-        "anchors": motion.anchors,
-        "camera": {
-            "center": motion.center.tolist(),
-            "height": camera.height,
-            "follow": None if camera.follow is None else motion.bodies.index(camera.follow),
-            "background": camera.background,
-        },
-        "parameters": parameters,
-        "t": _packed(shown.t),
-        "y": _packed(shown.y),
-        "kinetic": _packed(shown.kinetic_energy),
-        "potential": _packed(shown.potential_energy),
-    }
-    if motion.dimensions == 2:
-        run["shapes"] = [[_in_plane(shape) for shape in shapes] for shapes in motion.shapes]
-        if motion.planes:
-            run["planes"] = [asdict(plane) for plane in motion.planes]
-    else:
-        run["camera"] |= {"azimuth": camera.azimuth_deg, "elevation": camera.elevation_deg}
-        run |= _in_space(shown)
-    if motion.balls:
-        run["balls"] = [asdict(ball) for ball in motion.balls]
-    context = {
+
+    source: str
+    table: Mapping[str, Any]
+    live: bool
+    smooth: bool = True
+    events: tuple[Mapping[str, Any], ...] = ()
+    y: Array | None = None
+    why: str = ""
+
+
+def page_data(motion: Motion, code: PageCode) -> dict[str, Any]:
+    """All that the page of a motion knows, as tables and lists for JSON.
+
+    Raises `RunError` if no sample is finite.
+    """
+    drawing, geometry = drawing_data(motion)
+    table = dict(code.table)
+    names = [state["name"] for state in table["states"]]
+    own = list(motion.states) == names
+    y = motion.y if code.y is None else code.y
+    run = _run(motion, y, code.smooth)
+    data: dict[str, Any] = {
+        **table,
+        "name": motion.name,
+        "title": motion.title,
         "heading": motion.heading,
-        "summary": motion.summary + (f", {kept} of them here" if kept < len(motion.t) else ""),
+        "dimensions": motion.dimensions,
+        "bodies": list(motion.bodies),
+        "quaternions": [list(four) for four in motion.quaternions] if own else table["quaternions"],
+        "keepsEnergy": motion.keeps_energy,
+        "live": code.live,
+        "drawing": drawing,
+        "run": run | {"events": list(code.events)},
+    }
+    if not code.live:
+        values = {p["name"]: p["value"] for p in table["parameters"]}
+        data["geometry"] = geometry_values(geometry, values)
+    else:
+        data["initial"] = y[np.flatnonzero(np.isfinite(y).all(axis=1))[0]].tolist()
+    return data
+
+
+def render_page(motion: Motion, code: PageCode) -> str:
+    """Return the page of a motion, which computes with `code`.
+
+    Raises `RunError` if no sample is finite.
+    """
+    assert not re.search(r"</script|<!--", code.source, re.IGNORECASE), "would end its script"
+    data = page_data(motion, code)
+    three = templates_folder() / "page" / "vendor" / "three" / "three.min.js"
+    context: Mapping[str, object] = {
+        "heading": motion.heading,
+        "summary": _summary(motion, data["run"]["rows"]),
         "stopped": motion.stopped,
         "space": motion.dimensions == 3,
-        "run": run,
-        "poses_source": poses_source,
+        "live": code.live,
+        "data": data,
+        "mechanism": code.source,
+        "three": three.read_text(encoding="utf-8"),
     }
     return render("page", "page.html", context, html=True)
 
 
-def save_page(
-    motion: Motion,
-    poses_source: str,
-    parameters: tuple[float, ...],
-    path: Path,
-    force: bool = False,
-) -> None:
+def save_page(motion: Motion, code: PageCode, path: Path, force: bool = False) -> None:
     """Write the page of `render_page` to `path`. Raises `RunError` as both functions do."""
-    write_whole(path, render_page(motion, poses_source, parameters), force=force)
+    write_whole(path, render_page(motion, code), force=force)
 
 
-def _in_plane(shape: Shape) -> dict[str, Any]:
-    """A shape with its centre, which is the origin if the scene gives none."""
-    table = shape.model_dump(exclude={"orientation_deg"})
-    if "center" in table:
-        table["center"] = table["center"] or (0.0, 0.0)
-    return table
+def _summary(motion: Motion, kept: int) -> str:
+    return motion.summary + (f", {kept} of them here" if kept < len(motion.t) else "")
 
 
-def _in_space(motion: Motion) -> dict[str, Any]:
-    """Faces of the bodies, floor and light, computed as for the figure."""
-    parts = solids(motion.shapes, motion.camera.height, BUDGET)
-    floor = floor_under(motion, cast_of(parts))
-    squares = patches(motion, floor).tolist()
-    return ({"patches": squares} if squares else {}) | {
-        "quaternions": motion.quaternions,
-        "meshes": [
-            {
-                "vertices": _packed_single(mesh.vertices),
-                "faces": _packed_indices(mesh.faces),
-                "across": _packed_indices(mesh.across),
-                "thickness": mesh.thickness,
-            }
-            for mesh in parts.meshes
-        ],
-        "solids": parts.bodies,
-        "floor": {
-            "z": floor.z,
-            "step": floor.step,
-            "lines": floor.lines().tolist(),
-            "through_origin": floor.through_origin().tolist(),
-        },
-        "light": {"toward": LIGHT.tolist(), "ambient": AMBIENT, "gloss": GLOSS},
+def _run(motion: Motion, y: Array, smooth: bool) -> dict[str, Any]:
+    """The finite rows of a run, fewer if there are many."""
+    finite = np.flatnonzero(np.isfinite(y).all(axis=1) & np.isfinite(motion.t))
+    if not len(finite):
+        raise RunError(f"{motion.name}: the run holds no finite sample, nothing can be shown")
+    width = max(1, y.shape[1])
+    fits = min(MOST_ROWS, MOST_NUMBERS // width)
+    single = fits < min(ENOUGH_ROWS, len(finite))
+    rows = _kept(motion.t[finite], min(MOST_ROWS, 2 * fits) if single else fits)
+    return {
+        "rows": len(rows),
+        "t": _packed(motion.t[finite[rows]], "<f8"),
+        "y": _packed(y[finite[rows]], "<f4" if single else "<f8"),
+        "single": single,
+        "smooth": smooth,
     }
 
 
-def _packed(values: Array) -> str:
-    """Base64 of the float64 values in row-major order, little-endian."""
-    return base64.b64encode(values.astype("<f8").tobytes()).decode("ascii")
+def _kept(t: Array, most: int) -> NDArray[np.int64]:
+    """Indices of at most about `most` of the rows at times `t`: evenly spread ones, and both rows
+    of an event, between which the state jumps.
+    """
+    most = max(most, 2)
+    if len(t) <= most:
+        return np.arange(len(t))
+    jumps = np.flatnonzero(np.diff(t) == 0.0)
+    jumps = jumps[: most // 4]
+    even = np.linspace(0, len(t) - 1, most - 2 * len(jumps)).round().astype(int)
+    return np.unique(np.concatenate([even, jumps, jumps + 1]))
 
 
-def _packed_single(values: Array) -> str:
-    """Base64 of the values as float32, precise enough for any screen."""
+def _packed(values: Array, kind: str) -> str:
+    """Base64 of the values in row-major order, as little-endian numbers of a kind."""
     most = float(np.finfo(np.float32).max)
-    single = np.clip(values, -most, most).astype("<f4")
-    return base64.b64encode(single.tobytes()).decode("ascii")
-
-
-def _packed_indices(values: Indices) -> str:
-    """Base64 of the indices as int16; no mesh has more faces than that."""
-    assert np.abs(values).max(initial=0) < 2**15
-    return base64.b64encode(values.astype("<i2").tobytes()).decode("ascii")
+    numbers = np.clip(values, -most, most) if kind == "<f4" else values
+    return base64.b64encode(numbers.astype(kind).tobytes()).decode("ascii")

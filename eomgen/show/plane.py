@@ -8,12 +8,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.patches import Polygon as Patch
 
-from eomgen.scene.look import Box, Camera, Disc, Polygon, Rod, Shape
-from eomgen.show.motion import BARE, MOST_MARKS, Array, Ball, Motion, instants
+from eomgen.scene.look import BARE
+from eomgen.show.framing import View
+from eomgen.show.motion import INSTANTS, MOST_MARKS, Array, Ball, Motion, instants, paths
+from eomgen.show.outlines import outline, turned
 from eomgen.show.style import ink_on, mixed
+from eomgen.show.symbols import Sight, strokes
 
 SPREAD = 20
 """Size of planes relative to that of the motion, since a wide view shows more than the motion."""
+
+LAYERS = {"back": 2.5, "middle": 1.5 + INSTANTS, "front": 3 + INSTANTS}
+"""Order in which lines are drawn; the bodies at the last time have 2 + INSTANTS."""
 
 FILL, SURFACE, REACH = 0.08, 0.4, 0.25
 """Strength of the ink of fixed objects: their inside, their surface, the reach of a field."""
@@ -32,16 +38,13 @@ def draw_plane(
     """
     paper = motion.camera.background
     axes.grid(color=mixed(paper, ink_on(paper), 0.1))
-    for body in motion.traced:
-        axes.plot(
-            *motion.places[:until, body].T,
-            color=motion.colours[body],
-            linewidth=0.8,
-            alpha=0.5,
-            zorder=2,
-        )
-    for order, (row, strength) in enumerate(instants(motion) if rows is None else rows):
-        draw_pose(axes, motion, motion.poses[row], strength, zorder=3 + order)
+    for path, colour in paths(motion):
+        axes.plot(*path[:until].T, color=colour, linewidth=0.8, alpha=0.5, zorder=2)
+    rows = instants(motion) if rows is None else rows
+    orders = np.linspace(2 + INSTANTS, 3, len(rows))[::-1].tolist()
+    for (row, strength), order in zip(rows, orders, strict=True):
+        draw_pose(axes, motion, motion.poses[row], strength, zorder=order)
+    draw_symbols(axes, motion, rows[-1][0], np.eye(3))
     for ball in motion.balls:
         draw_ball(axes, ball, np.array(ball.center), motion.camera)
     _draw_planes(axes, motion)
@@ -51,7 +54,24 @@ def draw_plane(
     axes.set_ylabel("y, m")
 
 
-def draw_ball(axes: Axes, ball: Ball, center: Array, camera: Camera) -> None:
+def draw_symbols(axes: Axes, motion: Motion, row: int, eye: Array) -> None:
+    """Draw springs, motors, supports and the like at a sample, seen along the axes `eye`."""
+    if motion.drawn is None:
+        return
+    paper = motion.camera.background
+    ink = mixed(paper, ink_on(paper), 0.75)
+    for stroke in strokes(Sight(motion.drawn, motion.poses[row], eye)):
+        order = LAYERS[stroke.layer]
+        if motion.dimensions == 3 and stroke.layer == "middle":
+            order = LAYERS["back"]  # all bodies are one image there
+        lines = ":" if stroke.dashed else "-"
+        if stroke.closed:
+            axes.fill(*stroke.points.T, fc=paper, ec=ink, lw=stroke.weight, zorder=order)
+        else:
+            axes.plot(*stroke.points.T, color=ink, lw=stroke.weight, ls=lines, zorder=order)
+
+
+def draw_ball(axes: Axes, ball: Ball, center: Array, camera: View) -> None:
     """Draw a fixed ball at its `center` in the picture, behind the bodies.
 
     The view is extended to show balls that are smaller than the camera's height.
@@ -99,40 +119,7 @@ def _draw_planes(axes: Axes, motion: Motion) -> None:
         axes.add_artist(line)
 
 
-def outline(shape: Shape) -> Array:
-    """Corners (k, 2) of a polygon that approximates a planar `shape`, m, body axes."""
-    match shape:
-        case Polygon():
-            return np.array(shape.points, dtype=float)
-        case Box():
-            corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * np.array(shape.size) / 2
-            return _center(shape) + _turned(corners, shape.angle)
-        case Disc():
-            return _center(shape) + shape.radius * _arc(0.0, 2 * np.pi, 72)
-        case Rod():
-            start, end = np.array(shape.start, dtype=float), np.array(shape.end, dtype=float)
-            along = float(np.arctan2(*(end - start)[::-1]))
-            cap = shape.width / 2 * _arc(along - np.pi / 2, along + np.pi / 2, 24)
-            return np.concatenate([end + cap, start - cap])
-    raise AssertionError(f"{shape.type} is no shape of the plane")
-
-
-def _center(shape: Box | Disc) -> Array:
-    return np.array(shape.center or (0.0, 0.0))
-
-
-def _arc(start: float, stop: float, count: int) -> Array:
-    angles = np.linspace(start, stop, count)
-    return np.column_stack([np.cos(angles), np.sin(angles)])
-
-
-def _turned(points: Array, angle: float) -> Array:
-    cos, sin = np.cos(angle), np.sin(angle)
-    x, y = points[..., 0], points[..., 1]
-    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
-
-
-def draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: int) -> None:
+def draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: float) -> None:
     """Draw the bodies at one pose (nb, 3), with a share of ink from 0 to 1."""
     paper = motion.camera.background
     edge = mixed(paper, ink_on(paper), strength)
@@ -140,8 +127,8 @@ def draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: 
         for shape in shapes:
             axes.add_patch(
                 Patch(
-                    _turned(outline(shape), angle) + np.array([x, y]),
-                    facecolor=mixed(paper, shape.color, strength),
+                    turned(outline(shape), angle) + np.array([x, y]),
+                    facecolor=mixed(paper, shape.color or BARE, strength),
                     edgecolor=edge,
                     linewidth=0.5,
                     zorder=zorder,
@@ -150,5 +137,5 @@ def draw_pose(axes: Axes, motion: Motion, pose: Array, strength: float, zorder: 
         if not shapes:
             axes.plot(x, y, "o", color=mixed(paper, BARE, strength), zorder=zorder)
     for body, *point in motion.anchors if len(motion.anchors) <= MOST_MARKS else ():
-        place = _turned(np.array(point), pose[body, 2]) + pose[body, :2]
+        place = turned(np.array(point), pose[body, 2]) + pose[body, :2]
         axes.plot(*place, "o", mfc=paper, mec=edge, mew=1.0, ms=4.5, zorder=zorder)

@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from eomgen.scene.look import Box, Cylinder, Ellipsoid, Rod, Shape, Sphere
+from eomgen.language.formula import Formula
+from eomgen.scene.look import BARE, Box, Cylinder, Ellipsoid, Rod, Shape, Sphere, number, numbers
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -74,14 +75,17 @@ def mesh(shape: Shape, grain: float) -> Mesh:
         case Box():
             return _box(shape)
         case Sphere() | Ellipsoid():
-            radii = shape.radii if isinstance(shape, Ellipsoid) else (shape.radius,) * 3
+            if isinstance(shape, Sphere):
+                radii: tuple[float, ...] = (number(shape.radius),) * 3
+            else:
+                radii = numbers(shape.radii)
             ball = _revolved(_arc(_sides(max(radii), grain) // 2), _sides(max(radii), grain))
             turned = ball @ np.diag(radii)
             if isinstance(shape, Ellipsoid):
                 turned = turned @ rotation(shape.orientation_deg).T
             return _joined([turned + _center(shape.center)], smooth=True)
         case Cylinder():
-            radius = shape.radius
+            radius = number(shape.radius)
             profile = [(0.0, 0.0), (radius, 0.0), (radius, 1.0), (0.0, 1.0)]
             return _around(shape, profile, radius, grain)
         case Rod():
@@ -103,11 +107,10 @@ def solids(shapes: Sequence[Sequence[Shape]], height: float, budget: int) -> Sol
 
     `budget` is the total number of faces aimed at; very many shapes exceed it.
     """
-    by_shape: dict[str, list[Shape]] = {}
+    by_shape: dict[Shape, list[Shape]] = {}
     for group in shapes:
         for shape in group:
-            key = shape.model_dump_json(exclude={"color"})
-            by_shape.setdefault(key, []).append(shape)
+            by_shape.setdefault(shape.replaced(color=None), []).append(shape)
     grain = height / FINEST
     for _ in range(TRIES):
         meshes = [mesh(group[0], grain) for group in by_shape.values()]
@@ -115,10 +118,8 @@ def solids(shapes: Sequence[Sequence[Shape]], height: float, budget: int) -> Sol
         if sum(sizes) <= budget:
             break
         grain *= COARSER
-    number = {key: k for k, key in enumerate(by_shape)}
-    of_bodies = (
-        tuple((number[s.model_dump_json(exclude={"color"})], s.color) for s in g) for g in shapes
-    )
+    index = {key: k for k, key in enumerate(by_shape)}
+    of_bodies = (tuple((index[s.replaced(color=None)], s.color or BARE) for s in g) for g in shapes)
     return Solids(tuple(meshes) if by_shape else (), tuple(of_bodies))
 
 
@@ -132,6 +133,24 @@ def rotation(turns_deg: Sequence[float]) -> Array:
     return np.asarray(about_z @ about_y @ about_x, dtype=float)
 
 
+def angles_of(matrix: Array) -> tuple[float, float, float]:
+    """The angles, degrees, of which `rotation` makes this rotation matrix."""
+    (a, b, _), (d, e, _), (g, h, i) = matrix
+    if np.hypot(h, i) < 1e-9:  # the angles about x and z turn about one axis
+        angles = (0.0, np.copysign(np.pi / 2, -g), np.arctan2(-b, e))
+    else:
+        angles = (np.arctan2(h, i), np.arctan2(-g, np.hypot(h, i)), np.arctan2(d, a))
+    x, y, z = (float(x) for x in np.degrees(angles))
+    return x, y, z
+
+
+def rotation_to(axis: Array) -> Array:
+    """A rotation matrix whose first column is the unit vector `axis` and whose second is level."""
+    aside = np.array([-axis[1], axis[0], 0.0]) if np.hypot(*axis[:2]) > 1e-9 else np.eye(3)[1]
+    aside = unit(aside)
+    return np.column_stack([axis, aside, np.cross(axis, aside)])
+
+
 def unit(vectors: Array) -> Array:
     """Vectors along the last axis with length 1; zero stays zero."""
     # Divided by the largest component first, because squares of tiny numbers underflow.
@@ -141,8 +160,8 @@ def unit(vectors: Array) -> Array:
     return np.asarray(scaled / np.where(length > 0, length, 1.0))
 
 
-def _center(center: tuple[float, ...] | None) -> Array:
-    return np.zeros(3) if center is None else np.array(center, dtype=float)
+def _center(center: tuple[Formula, ...] | None) -> Array:
+    return np.zeros(3) if center is None else np.array(numbers(center))
 
 
 def _sides(radius: float, grain: float) -> int:
@@ -151,7 +170,7 @@ def _sides(radius: float, grain: float) -> int:
 
 
 def _box(box: Box) -> Mesh:
-    half = np.array(box.size) / 2
+    half = np.array(numbers(box.size)) / 2
     sheets = []
     for axis in range(3):
         # The next two axes in cyclic order make a right-handed system with this one.
@@ -167,7 +186,8 @@ def _box(box: Box) -> Mesh:
 
 def _rod(rod: Rod, grain: float) -> Mesh:
     """A cylinder between two hemispheres."""
-    length, radius = float(np.linalg.norm(np.subtract(rod.end, rod.start))), rod.width / 2
+    length = float(np.linalg.norm(np.subtract(numbers(rod.end), numbers(rod.start))))
+    radius = number(rod.width) / 2
     ball = _arc(_sides(radius, grain) // 2) * radius
     half = len(ball) // 2
     below, above = ball[: half + 1], ball[half + (length == 0.0) :] + np.array([0.0, length])
@@ -193,12 +213,13 @@ def _revolved(profile: Array, sides: int) -> Array:
 
 def _around(shape: Cylinder | Rod, profile: ArrayLike, radius: float, grain: float) -> Mesh:
     """A profile of radii (m) and heights (parts of the length), rotated about the shape's axis."""
-    along = np.subtract(shape.end, shape.start)
+    along = np.subtract(numbers(shape.end), numbers(shape.start))
     axis = unit(along) if along.any() else np.array([0.0, 0.0, 1.0])
     scale = float(np.linalg.norm(along)) or 1.0
     aside = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
     frame = np.array([aside, np.cross(axis, aside), axis * scale])
-    surface = _revolved(np.array(profile), _sides(radius, grain)) @ frame + shape.start
+    surface = _revolved(np.array(profile), _sides(radius, grain)) @ frame
+    surface = surface + numbers(shape.start)
     return _joined([surface], smooth=isinstance(shape, Rod))
 
 

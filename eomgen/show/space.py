@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 
-from eomgen.show.motion import BARE, MOST_MARKS, Array, Motion, instants
-from eomgen.show.plane import FILL, SURFACE, draw_ball
+from eomgen.scene.look import BARE
+from eomgen.show.motion import MOST_MARKS, Array, Motion, instants, paths
+from eomgen.show.plane import FILL, SURFACE, draw_ball, draw_symbols
 from eomgen.show.raster import frame_around, render_solids
 from eomgen.show.solid import solids
 from eomgen.show.style import FAINT, ink_on, mixed
@@ -51,13 +52,13 @@ def draw_space(
         _draw_shadow(
             axes, look(cast, motion.poses[rows[-1][0]], np.eye(3)).faces, floor, eye, paper
         )
-    for body in motion.traced:
-        way = motion.places[:until, body] @ eye.T
-        colour = motion.colours[body]
-        axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.8, alpha=0.5, zorder=2)
+    for path, colour in paths(motion):
+        seen = path[:until] @ eye.T
+        axes.plot(seen[:, 0], seen[:, 1], color=colour, linewidth=0.8, alpha=0.5, zorder=2)
     _draw_bodies(axes, motion, rows, cast, eye)
     for order, (row, strength) in enumerate(rows):
         _draw_points(axes, motion, motion.poses[row], eye, strength, zorder=4 + order)
+    draw_symbols(axes, motion, rows[-1][0], eye)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.04)
     axes.autoscale_view()

@@ -159,6 +159,8 @@ def floor_under(motion: Motion, cast: Cast) -> Floor:
     if -NEAR_ZERO * height <= z <= NEAR_FLOOR * height:
         z = 0.0
     z = max(z, float(looks) - height / 2)
+    if abs(z) <= NEAR_ZERO * height:
+        z = 0.0
     levels = [plane.offset for plane in _near(motion) if plane.normal == UP]
     z = max(levels, default=z)
     step = round_length(height / 8)

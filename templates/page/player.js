@@ -1,222 +1,369 @@
-// Shows values, plays the run, and handles keys and pointers.
+// The page itself: replays the recorded run or integrates a live motion, and wires the controls.
 
-// ---- Numbers ----
+const player = (() => {
+  const { byId, element } = tools;
+  const LONGEST = 0.1; // s; a page that was hidden goes on where it was
+  const [BUDGET, SHARE] = [24, 0.5]; // ms of each picture that steps may take, or a part of it
+  const WARM = 250; // times 8 ms before a live motion
+  const SHOWS = [
+    ["traces", "Traces", true], ["joints", "Joints", true], ["centres", "Centres of mass", false],
+    ["shadows", "Shadows", true], ["forces", "Forces of effects", false], ["torques", "Torques of effects", false],
+    ["velocities", "Velocities", false], ["reactions", "Joint forces", false],
+  ];
+  // What this mechanism has nothing of is not offered.
+  const offered = {
+    shadows: Boolean(DATA.drawing.floor),
+    forces: DATA.loads.length > 0,
+    torques: DATA.loads.length > 0,
+    velocities: Boolean(mechanism.bodyVelocities),
+    reactions: Boolean(mechanism.jointForces),
+  };
+  const canvas = byId("stage");
+  const stage = makeStage(canvas, mechanism);
+  const replay = makeReplay(mechanism);
+  const values = makeValues();
+  const slider = byId("time");
+  const engine = DATA.live ? makeEngine(mechanism, DATA) : null;
+  const clock = {
+    mode: replay ? "replay" : "live",
+    time: replay ? replay.begin : 0, // of the replay
+    playing: false,
+    stamp: 0, // of the last picture, ms
+    seen: null, // what was, while the plots lead back in a live motion
+    remark: "", // of the engine, as it is shown
+    frames: [], // times of the last pictures
+  };
+  const show = Object.fromEntries(SHOWS.map(([key, , on]) => [key, on]));
+  const isLive = () => clock.mode === "live";
+  let waiting = false; // for the next picture
 
-function inWords(value) {
-  const size = Math.abs(value);
-  if (size >= 1e5 || (size > 0 && size < 1e-4)) return value.toExponential(3).replace("-", "−");
-  return value.toFixed(4).replace("-", "−");
-}
+  // ---- What is shown: a time, a state, parameters and inputs ----
 
-function row(table, name, unit, color) {
-  const line = byId(table).tBodies[0].insertRow();
-  const head = line.appendChild(document.createElement("th"));
-  head.scope = "row";
-  if (color) {
-    const swatch = head.appendChild(document.createElement("span"));
-    swatch.className = "swatch";
-    swatch.style.background = color;
+  function current() {
+    if (clock.seen) return clock.seen;
+    if (isLive()) return { t: engine.t, y: engine.y, p: engine.p, u: engine.u };
+    return { t: clock.time, y: replay.stateAt(clock.time), p: replay.p, u: replay.u };
   }
-  head.append(name);
-  const value = line.insertCell();
-  const last = line.insertCell();
-  last.className = "unit";
-  last.textContent = unit;
-  return value;
-}
 
-const timeCell = row("values", "t", "s");
-const stateCells = run.states.map((name, k) => row("values", name, run.units[k]));
-const energyCells = ["kinetic", "potential", "total"].map((name) =>
-  row("energies", name, "J", `var(--${name})`));
-
-// Tables with more values than this are updated only a few times a second while the run plays, to
-// save time for drawing.
-const RUNNING = 40;
-const PAUSE = 150; // ms
-
-function showValues(state, where) {
-  const now = performance.now();
-  if (!clock.playing || state.length <= RUNNING || now - clock.shown > PAUSE) {
-    clock.shown = now;
-    state.forEach((value, k) => { stateCells[k].textContent = inWords(value); });
+  function energyOf({ t, y, p, u }) {
+    const of = (name) => (mechanism[name] ? mechanism[name](t, y, p, u) : NaN);
+    return { kinetic: of("kineticEnergy"), potential: of("potentialEnergy") };
   }
-  timeCell.textContent = inWords(clock.time);
-  const [T, V] = [between(kinetic, where), between(potential, where)];
-  [T, V, T + V].forEach((value, k) => { energyCells[k].textContent = inWords(value); });
-  slider.value = clock.time;
-  slider.setAttribute("aria-valuetext", `${clock.time.toFixed(2)} s`);
-  const across = 1000 * share(clock.time);
-  cursor.setAttribute("x1", across);
-  cursor.setAttribute("x2", across);
-}
 
-// ---- Energy strip ----
-
-const strip = byId("strip");
-const duration = t[last] - t[0];
-const share = (time) => (duration > 0 ? (time - t[0]) / duration : 0);
-
-function svgChild(kind, attributes) {
-  const child = strip.appendChild(document.createElementNS(strip.namespaceURI, kind));
-  for (const [name, value] of Object.entries(attributes)) child.setAttribute(name, value);
-  return child;
-}
-
-function drawStrip() {
-  const curves = { potential, kinetic, total: kinetic.map((T, i) => T + potential[i]) };
-  let [low, high] = [Infinity, -Infinity];
-  for (const values of Object.values(curves)) {
-    for (const value of values) [low, high] = [Math.min(low, value), Math.max(high, value)];
-  }
-  const span = high - low || 1;
-  for (const [name, values] of Object.entries(curves)) {
-    const points = Array.from(values, (value, i) =>
-      `${(1000 * share(t[i])).toFixed(1)},${(96 - (92 * (value - low)) / span).toFixed(2)}`);
-    svgChild("polyline", { points: points.join(" "), style: `stroke: var(--${name})` });
-  }
-  byId("lowest").textContent = `lowest ${inWords(low)} J`;
-  byId("highest").textContent = `highest ${inWords(high)} J`;
-  return svgChild("line", { y1: 0, y2: 100 });
-}
-const cursor = drawStrip();
-
-// ---- Time ----
-
-const clock = { time: t[0], playing: false, stamp: 0, shown: 0 };
-const slider = byId("time");
-slider.min = t[0];
-slider.max = t[last];
-
-function goTo(time) {
-  setPlaying(false);
-  clock.time = Math.min(Math.max(time, t[0]), t[last]);
-  requestAnimationFrame(draw);
-}
-
-function setPlaying(playing) {
-  if (playing && clock.time >= t[last]) clock.time = t[0];
-  const starts = playing && !clock.playing;
-  clock.playing = playing;
-  clock.stamp = performance.now();
-  byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
-  if (starts) requestAnimationFrame(tick);
-}
-
-function tick(now) {
-  if (!clock.playing) return;
-  // A page that was hidden continues where it was.
-  const passed = Math.min(Math.max((now - clock.stamp) / 1000, 0), 0.1);
-  clock.stamp = now;
-  clock.time += passed * Number(byId("speed").value);
-  if (clock.time >= t[last]) {
-    if (byId("loop").checked && duration > 0) clock.time = t[0] + ((clock.time - t[0]) % duration);
-    else {
-      clock.time = t[last];
-      setPlaying(false);
+  function draw() {
+    waiting = false;
+    try {
+      const state = current();
+      const grip = isLive() && engine.grip;
+      const pull = grip && grip.point ? [grip.point, grip.target] : null;
+      stage.draw(state.t, state.y, state.p, state.u, show, { pull, keep: isLive() });
+      values.show({
+        ...state,
+        energy: energyOf(state),
+        playing: clock.playing,
+        stepCost: isLive() ? engine.cost() : NaN,
+        single: !isLive() && DATA.run.single,
+      });
+      overlay.draw(state.t);
+      plotting.cursor(state.t);
+      if (!isLive()) {
+        slider.value = clock.time;
+        slider.setAttribute("aria-valuetext", `${clock.time.toFixed(2)} s`);
+      }
+      byId("clock").textContent = `${state.t.toFixed(2)} s`;
+    } catch (error) {
+      say(`${error.message}`);
     }
+    clock.frames.push(performance.now());
+    if (clock.frames.length > 60) clock.frames.shift();
   }
-  draw();
-  if (clock.playing) requestAnimationFrame(tick);
-}
 
-function step(direction) {
-  // Several samples may have the same time, as at an impact; each step goes to another time.
-  if (direction > 0) goTo(t.find((time) => time > clock.time) ?? t[last]);
-  else goTo(t.findLast((time) => time < clock.time) ?? t[0]);
-}
+  const redraw = () => {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(draw);
+  };
 
-// ---- Keys and pointers ----
+  // One sentence above the picture; none hides it.
+  function say(text) {
+    byId("message").textContent = text;
+    byId("message").hidden = !text;
+  }
 
-function zoom(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2) {
-  const before = 1 / scaleOfView();
-  view.zoom = Math.min(Math.max(view.zoom * factor, 0.01), 1000);
-  const gained = before - 1 / scaleOfView();
-  // The point under the pointer stays under it.
-  view.x += (x - canvas.clientWidth / 2) * gained;
-  view.y -= (y - canvas.clientHeight / 2) * gained;
-  requestAnimationFrame(draw);
-}
+  // ---- Time ----
 
-function move(dx, dy) {
-  view.x -= dx / scaleOfView();
-  view.y += dy / scaleOfView();
-  requestAnimationFrame(draw);
-}
+  function tick(now) {
+    if (!clock.playing) return;
+    const before = clock.stamp;
+    const passed = Math.min(Math.max((now - before) / 1000, 0), LONGEST) * Number(byId("speed").value);
+    clock.stamp = now;
+    if (isLive()) advance(passed, Math.max(BUDGET, SHARE * (now - before)));
+    else {
+      clock.time += passed;
+      if (clock.time >= replay.end) {
+        const length = replay.end - replay.begin;
+        if (byId("loop").checked && length > 0) clock.time = replay.begin + ((clock.time - replay.begin) % length);
+        else {
+          clock.time = replay.end;
+          setPlaying(false);
+        }
+      }
+    }
+    draw();
+    if (clock.playing) requestAnimationFrame(tick);
+  }
 
-function resetView() {
-  Object.assign(view, HOME);
-  requestAnimationFrame(draw);
-}
+  function advance(seconds, budget) {
+    engine.advance(seconds, Math.min(budget, 1000 * LONGEST));
+    byId("behind").hidden = !engine.behind;
+    afterSteps();
+  }
 
-function scrub(event) {
-  const box = strip.getBoundingClientRect();
-  goTo(t[0] + (duration * (event.clientX - box.left)) / box.width);
-}
+  function afterSteps() {
+    if (engine.remark !== clock.remark) {
+      clock.remark = engine.remark;
+      panels.showMethods(engine);
+      byId("remark").textContent = engine.remark;
+      byId("remark").hidden = !engine.remark;
+    }
+    if (!engine.error) return;
+    say(`The motion stopped at t = ${numbers.text(engine.t, "s")}: ${engine.error}. Reset, or change the step or the method.`);
+    setPlaying(false);
+  }
 
-byId("play").addEventListener("click", () => setPlaying(!clock.playing));
-byId("back").addEventListener("click", () => step(-1));
-byId("forth").addEventListener("click", () => step(1));
-byId("closer").addEventListener("click", () => zoom(1.25));
-byId("farther").addEventListener("click", () => zoom(0.8));
-byId("reset").addEventListener("click", resetView);
-byId("trace").addEventListener("change", () => requestAnimationFrame(draw));
-slider.addEventListener("input", () => goTo(Number(slider.value)));
-strip.addEventListener("pointerdown", (event) => {
-  strip.setPointerCapture(event.pointerId);
-  scrub(event);
-});
-strip.addEventListener("pointermove", (event) => { if (event.buttons) scrub(event); });
-canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
-canvas.addEventListener("pointermove", (event) => {
-  if (!event.buttons) return;
-  const turns = turn && event.buttons === 1 && !event.shiftKey;
-  (turns ? turn : move)(event.movementX, event.movementY);
-});
-if (turn) canvas.addEventListener("contextmenu", (event) => event.preventDefault()); // it moves too
-canvas.addEventListener("wheel", (event) => {
-  event.preventDefault();
-  zoom(Math.exp(-0.0015 * event.deltaY), event.offsetX, event.offsetY);
-}, { passive: false });
+  function setPlaying(playing) {
+    if (playing && !isLive() && clock.time >= replay.end) clock.time = replay.begin;
+    const starts = playing && !clock.playing;
+    if (playing) clock.seen = null;
+    clock.playing = playing;
+    clock.stamp = performance.now();
+    byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
+    if (starts) requestAnimationFrame(tick);
+  }
 
-const keys = {
-  " ": () => setPlaying(!clock.playing),
-  ArrowLeft: () => step(-1),
-  ArrowRight: () => step(1),
-  Home: () => goTo(t[0]),
-  End: () => goTo(t[last]),
-  "+": () => zoom(1.25),
-  "=": () => zoom(1.25),
-  "-": () => zoom(0.8),
-  0: resetView,
-};
-if (turn) {
-  Object.assign(keys, {
-    a: () => move(40, 0),
-    d: () => move(-40, 0),
-    w: () => move(0, 40),
-    s: () => move(0, -40),
-    1: () => lookFrom(-90, 0),
-    2: () => lookFrom(0, 0),
-    3: () => lookFrom(-90, 90),
+  // In a live motion the plots lead back to what was; it goes on from where it is.
+  function seek(time) {
+    if (!isLive()) {
+      goTo(time);
+      return;
+    }
+    setPlaying(false);
+    clock.seen = plotting.rowAt(time);
+    redraw();
+  }
+
+  function goTo(time) {
+    if (isLive()) return;
+    setPlaying(false);
+    clock.time = Math.min(Math.max(time, replay.begin), replay.end);
+    redraw();
+  }
+
+  function step(direction) {
+    setPlaying(false);
+    if (!isLive()) goTo(replay.neighbour(clock.time, direction));
+    else if (direction > 0) {
+      clock.seen = null;
+      engine.step();
+      afterSteps();
+    }
+    redraw();
+  }
+
+  function reset() {
+    if (!isLive()) {
+      goTo(replay.begin);
+      return;
+    }
+    engine.reset();
+    afterSteps();
+    clock.seen = null;
+    say("");
+    values.restart();
+    stage.clearTraces();
+    stage.fit();
+    plotting.restart();
+    redraw();
+  }
+
+  // ---- Replay and live ----
+
+  function loadReplay() {
+    const given = (i) => [replay.t[i], replay.row(i), replay.p, replay.u];
+    stage.loadTraces(replay.t, given);
+    const every = Math.max(1, Math.floor(replay.rows / 60));
+    stage.calibrate(Array.from({ length: Math.ceil(replay.rows / every) }, (_, k) => given(k * every)));
+  }
+
+  function setMode(mode) {
+    if (mode === "replay" && !replay) return;
+    if (mode === "live" && !DATA.live) return;
+    clock.mode = mode;
+    clock.seen = null;
+    document.body.dataset.mode = mode;
+    for (const name of ["replay", "live"]) byId(`mode-${name}`).setAttribute("aria-pressed", String(mode === name));
+    say("");
+    if (mode === "replay") pointer?.letGo();
+    values.restart();
+    stage.clearTraces();
+    if (mode === "replay") loadReplay();
+    plotting.source(mode);
+    redraw();
+  }
+
+  // What is changed by hand is seen in a live motion, which goes on from the picture.
+  function goLive() {
+    if (isLive() || !DATA.live) return isLive();
+    const { t, y } = current();
+    const from = Float64Array.from(y);
+    setMode("live");
+    engine.reset(from, t);
+    if (engine.error) say(engine.error);
+    setPlaying(true);
+    return true;
+  }
+
+  const panels = makePanels({
+    parameter(index, value) {
+      if (!goLive()) return;
+      engine.p[index] = value;
+      recover();
+    },
+    input(index, value) {
+      if (!goLive()) return;
+      engine.u[index] = value;
+      recover();
+    },
+    method(name, dt) {
+      if (!goLive()) return;
+      engine.setMethod(name, dt);
+      recover();
+    },
   });
-}
-const shifted = turn ?? move;
-const shiftKeys = {
-  ArrowLeft: () => shifted(40, 0),
-  ArrowRight: () => shifted(-40, 0),
-  ArrowUp: () => shifted(0, 40),
-  ArrowDown: () => shifted(0, -40),
-};
-document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("select")) return;
-  // On a button, a check box or a summary, space has its usual meaning.
-  if (event.key === " " && event.target.closest("button, summary, input[type=checkbox]")) return;
-  const action = (event.shiftKey && shiftKeys[event.key]) || keys[event.key];
-  if (!action) return;
-  event.preventDefault();
-  action();
-});
 
-new ResizeObserver(draw).observe(canvas);
-if (!matchMedia("(prefers-reduced-motion: reduce)").matches) setPlaying(true);
+  // A change may mend what stopped the motion.
+  function recover() {
+    if (engine.error) {
+      const { t, y } = engine;
+      engine.reset(Float64Array.from(y), t);
+    }
+    say(engine.error ?? "");
+    values.restart();
+    redraw();
+  }
+
+  const pointer = makePointer(canvas, stage, {
+    canPull: () => DATA.live,
+    pull(grip, target) {
+      if (!goLive()) return;
+      engine.pull(grip.body, grip.at, target.slice(0, DATA.dimensions));
+      if (!clock.playing && !engine.error) setPlaying(true);
+    },
+    release() {
+      engine?.release();
+      values.restart();
+      redraw();
+    },
+    redraw,
+  });
+
+  // ---- Wiring ----
+
+  const overlay = makeOverlay(stage, show);
+  const plotting = makePlotting({ mechanism, replay, seek });
+
+  for (const [key, text, on] of SHOWS) {
+    if (offered[key] === false) continue;
+    const box = element("input", { type: "checkbox", id: `show-${key}`, checked: on });
+    box.addEventListener("change", () => {
+      show[key] = box.checked;
+      redraw();
+    });
+    byId("shows").append(element("label", {}, box, text));
+  }
+  byId("theme").addEventListener("click", () => {
+    const { dataset } = document.documentElement;
+    const prefersDark = matchMedia("(prefers-color-scheme: dark)").matches;
+    const isDark = dataset.theme ? dataset.theme === "dark" : prefersDark;
+    dataset.theme = isDark ? "light" : "dark";
+    repaint();
+  });
+  const repaint = () => {
+    stage.setTheme();
+    plotting.repaint();
+    redraw();
+  };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+
+  const zoom = (factor) => {
+    stage.view.zoomBy(factor);
+    redraw();
+  };
+  const view = (action) => () => {
+    action();
+    redraw();
+  };
+  const actions = {
+    play: () => setPlaying(!clock.playing), back: () => step(-1), forth: () => step(1), restart: reset,
+    closer: () => zoom(1.25), farther: () => zoom(0.8), fit: view(stage.fit),
+    "mode-replay": () => setMode("replay"), "mode-live": () => { if (!isLive()) { setMode("live"); setPlaying(true); } },
+  };
+  for (const [id, action] of Object.entries(actions)) byId(id).addEventListener("click", action);
+  slider.addEventListener("input", () => goTo(Number(slider.value)));
+  if (replay) {
+    slider.min = replay.begin;
+    slider.max = replay.end;
+  }
+  listenToKeys({ canvas, stage, setPlaying, step, goTo, reset, zoom, redraw, pointer, clock, replay, isLive });
+  byId("modes").hidden = !DATA.live || !replay;
+  say("");
+  let warmed = 0;
+  // While the run is replayed, the browser compiles the functions for the live motion.
+  const warm = () => {
+    if (isLive() || !window.requestIdleCallback) return;
+    engine.warm(8);
+    warmed += 1;
+    if (warmed < WARM) requestIdleCallback(warm);
+  };
+  if (engine) {
+    if (window.requestIdleCallback) requestIdleCallback(warm);
+    engine.onSample = (t, y) => {
+      stage.appendTraces([t, y, engine.p, engine.u]);
+      plotting.append(engine);
+    };
+    panels.showMethods(engine);
+  }
+  if (stage.failed) {
+    byId("no-picture").textContent = stage.failed;
+    byId("no-picture").hidden = false;
+  }
+  setMode(clock.mode);
+  new ResizeObserver(redraw).observe(canvas);
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches && !location.hash.includes("still")) setPlaying(true);
+  return { stage, clock, current, goTo, plotting, engine };
+})();
+
+// What tests and curious people may read of the page.
+window.eomgen = Object.freeze({
+  get mode() { return player.clock.mode; },
+  get playing() { return player.clock.playing; },
+  get time() { return player.current().t; },
+  get state() { return Array.from(player.current().y); },
+  get parameters() { return Array.from(player.current().p); },
+  get inputs() { return Array.from(player.current().u); },
+  get error() { return player.engine?.error ?? null; },
+  get step() { return player.engine ? { method: player.engine.method, seconds: player.engine.dt, ms: player.engine.cost() } : null; },
+  // World positions of the centres of mass, m, and where they are in the picture, CSS pixels.
+  get centers() { return DATA.bodies.map((_, k) => tools.center(player.stage.poses(), k).slice(0, DATA.dimensions)); },
+  get screen() { return DATA.bodies.map((_, k) => player.stage.toScreen(tools.center(player.stage.poses(), k))); },
+  toScreen: (point) => player.stage.toScreen(point),
+  pick: (x, y) => player.stage.pick(x, y),
+  get view() { const { zoom, x, y, azimuth, elevation, height } = player.stage.view; return { zoom, x, y, azimuth, elevation, height }; },
+  // Pictures a second over the last ones.
+  get rate() {
+    const { frames } = player.clock;
+    return frames.length > 1 ? (1000 * (frames.length - 1)) / (frames[frames.length - 1] - frames[0]) : 0;
+  },
+  picture: player.stage.failed === "",
+  goTo: (time) => player.goTo(time),
+});

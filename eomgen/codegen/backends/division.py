@@ -68,12 +68,12 @@ def in_place(lines: Sequence[Line], given: Sequence[Line]) -> tuple[Line, ...]:
 
 
 def divided(
-    lines: Sequence[Line], given: Sequence[Line], results: Sequence[str]
+    lines: Sequence[Line], given: Sequence[Line], results: Sequence[str], most: int = MOST
 ) -> Division | None:
-    """Lines divided into functions of at most `MOST`; None if there are hardly more."""
-    if len(lines) <= 2 * MOST:
+    """Lines divided into functions of at most `most`; None if there are hardly more."""
+    if len(lines) <= 2 * most:
         return None
-    pieces = [tuple(lines[i : i + MOST]) for i in range(0, len(lines), MOST)]
+    pieces = [tuple(lines[i : i + most]) for i in range(0, len(lines), most)]
     sources = [[source for _, source in piece] for piece in pieces] + [list(results)]
     read = [dict.fromkeys(word for s in source for word in WORD.findall(s)) for source in sources]
     of = {name: number for number, piece in enumerate(pieces) for name, _ in piece}

@@ -1,11 +1,15 @@
 """The JavaScript backend: an ES module of all outputs, and the function that the page animates."""
 
+import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from eomgen.codegen.interface import Interface
+from eomgen.codegen.backends.division import divided
+from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
-from eomgen.program.printing import Dialect, Names, print_block
+from eomgen.program.ordering import ordered
+from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
 from eomgen.scalars.functions import FUNCTIONS
@@ -27,6 +31,19 @@ OWN = {
 }
 """Functions of formulas that JavaScript lacks."""
 DIALECT = Dialect({name: name if name in OWN else f"Math.{name}" for name in FUNCTIONS}, RESERVED)
+
+IN_PAGE = replace(DIALECT, reserved=RESERVED)
+"""The dialect for functions in a page, in which no name of a scene occurs."""
+OF_PAGE = (
+    *("initial_state", "derivative", "kinetic_energy", "potential_energy", "joint_forces"),
+    *("body_poses", "body_velocities", "loads", "geometry", "switching_functions"),
+    *("gaps", "gap_rates", "impact", "held"),
+    *("constraint_residuals", "project_position", "project_velocity", "constraint_margins"),
+)
+"""The outputs that a page uses."""
+MOST = 300
+"""Lines of a part of a function in a page; up to twice as many are one function. V8 does not
+optimise functions whose bytecode is longer than 60 KB; a line takes up to 100 bytes of it."""
 
 
 def files(program: Program, interface: Interface) -> Mapping[str, str]:
@@ -81,44 +98,117 @@ def _given(names: Sequence[str], array: str) -> list[tuple[str, str]]:
     return [(name, f"{array}[{i}]") for i, name in enumerate(names) if name]
 
 
-def body_poses(program: Program, interface: Interface) -> str:
-    """The source of `function bodyPoses(y, p)`, which computes the poses of all bodies from state
-    and parameters; if joints are driven, of `bodyPoses(y, p, t)`. "" for a program without poses.
+def mechanism(
+    program: Program, interface: Interface, contacts: Sequence[Mapping[str, Any]] = ()
+) -> str:
+    """The source of `const mechanism = …` of a page, an object of functions of (t, y, p, u).
 
-    It returns for each body [x, y, angle] in the plane, m and rad; in space the three rows, of four
-    numbers each, of [world_R_body | position], 1 and m.
+    Each returns a Float64Array of the entries of an output in C order, or a number, and may use the
+    same array for its next result. State y, parameters p and inputs u are arrays in the order of
+    the interface. `held` and `impact` take an array of their further inputs last. `contacts` are
+    described by tables, one for each, which the object has as `contacts`.
     """
-    if "body_poses" not in program.outputs:
-        return ""
-    names = Names(program, DIALECT)
-    poses = program.outputs["body_poses"]
-    block = print_block(program, poses.nodes, names, DIALECT, fixed=True)
-    states = [s.name for s in interface.states]
-    parameters = [p.name for p in interface.parameters]
-    used = {names[i] for i in block.constants}
-    given = [
-        *((names.safe(n), f"p[{i}]") for i, n in enumerate(parameters) if names.safe(n) in used),
-        *((names.safe(n), f"y[{i}]") for i, n in enumerate(states) if n in block.inputs),
-    ]
-    rows = _bracketed(block.results, poses.shape[-1], ", ")
-    if len(poses.shape) == 3:  # a matrix for each body
-        rows = _bracketed(rows, poses.shape[-2], ",\n     ")
-    context = {
-        "timed": TIME in block.inputs,
-        "own_functions": [(name, OWN[name]) for name in block.functions if name in OWN],
-        "given": given,
-        "lines": block.lines,
-        "rows": rows,
+    program, interface = _numbered(*_of_page(program, interface))
+    kernels, constants = kernels_of(program, interface, IN_PAGE, sharing=True)
+    called = {f for kernel in kernels for f in kernel.block.functions} | {*constants.functions}
+    names = tuple(dict.fromkeys(name for kernel in kernels for name in kernel.constants))
+    place = {name: f"K[{i}]" for i, name in enumerate(names)}
+    written = [_divided(kernel, place) for kernel in kernels]
+    context: dict[str, Any] = {
+        "own_functions": [(name, OWN[name]) for name in OWN if name in called],
+        "parameters": len(interface.parameters),
+        "between": max(kernel["size"] for kernel in written),
+        "passed": max(len(kernel["passed"]) for kernel in written),
+        "constants": names,
+        "given": [(name, f"p[{i}]") for i, name in enumerate(constants.parameters)],
+        "checked": list(constants.checked),
+        "checks": [
+            (check.about.replace('"', "'"), source, check.relation)
+            for check, source in constants.checks
+        ],
+        "fixed": constants.lines,
+        "kernels": written,
+        "missing": [in_page(name) for name in OF_PAGE if name not in program.outputs],
+        "contacts": json.dumps(list(contacts)),
     }
-    return render(TEMPLATES, "poses.js.jinja", context)
+    return render(TEMPLATES, "mechanism.js.jinja", context)
+
+
+def _of_page(program: Program, interface: Interface) -> tuple[Program, Interface]:
+    """The same with those outputs only that a page uses."""
+    outputs = {name: output for name, output in program.outputs.items() if name in OF_PAGE}
+    functions = tuple(f for f in interface.functions if f.name in OF_PAGE)
+    program = ordered(replace(program, outputs=outputs))
+    return program, replace(interface, functions=functions)
+
+
+def _numbered(program: Program, interface: Interface) -> tuple[Program, Interface]:
+    """The same with short names: y0 for the first state, likewise p0, u0, and x0 for the further
+    inputs; other variables have no names of their own.
+    """
+    extra = dict.fromkeys(name for f in interface.functions for name in f.extra)
+    groups = {
+        "y": [s.name for s in interface.states],
+        "p": [p.name for p in interface.parameters],
+        "u": [i.name for i in interface.inputs],
+        "x": list(extra),
+    }
+    short = {name: f"{letter}{i}" for letter, own in groups.items() for i, name in enumerate(own)}
+    steps = tuple(
+        step._replace(value=short.get(str(step.value), step.value))
+        if step.operation == "input"
+        else step
+        for step in program.steps
+    )
+
+    def renamed(variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+        return tuple(replace(x, name=short[x.name]) for x in variables)
+
+    functions = tuple(
+        replace(f, extra=tuple(short[name] for name in f.extra)) for f in interface.functions
+    )
+    return replace(program, steps=steps, names={}), replace(
+        interface,
+        states=renamed(interface.states),
+        parameters=renamed(interface.parameters),
+        inputs=renamed(interface.inputs),
+        functions=functions,
+    )
+
+
+def in_page(name: str) -> str:
+    """The name of an output in JavaScript: `bodyPoses`."""
+    first, *others = name.split("_")
+    return first + "".join(word.capitalize() for word in others)
+
+
+def _divided(kernel: Kernel, place: Mapping[str, str]) -> dict[str, Any]:
+    """A kernel as values for the template of a page, in parts if it is long."""
+    function, block, base = kernel.function, kernel.block, kernel.base
+    given = [
+        *((name, place[name]) for name in kernel.constants),
+        *_given(kernel.state, "y"),
+        *_given(kernel.inputs, "u"),
+        *_given(kernel.extra, "extra"),
+        *((name, f"passed[{i}]") for i, name in enumerate(kernel.taken) if name != "_"),
+    ]
+    # What is passed on is stored beside the results.
+    results = (*block.results, *kernel.passed)
+    division = divided(block.lines, given, results, MOST)
+    return {
+        "name": in_page(function.name),
+        "about": " ".join(function.about.split()),
+        "number": not function.shape,
+        "base": in_page(base.function.name) if base else "",
+        "parts": division.parts if division else (),
+        "given": list(division.given if division else given),
+        "lines": [] if division else list(block.lines),
+        "results": block.results,
+        "passed": kernel.passed,
+        "size": division.size if division else 0,
+    }
 
 
 def _rest(defaults: Sequence[float]) -> str:
     """The source of the inputs that are not given."""
     return repr(list(defaults)) if any(defaults) else "INPUTS.map(() => 0)"
-
-
-def _bracketed(parts: Sequence[str], width: int, between: str) -> list[str]:
-    """The sources of arrays of `width` parts each."""
-    groups = (parts[i : i + width] for i in range(0, len(parts), width))
-    return [f"[{between.join(group)}]" for group in groups]

@@ -1,0 +1,103 @@
+"""The program of a page: the interactive model's derivative, and what the page draws and plots."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from eomgen.codegen.choice import choose
+from eomgen.codegen.from_recursion import from_recursion
+from eomgen.codegen.recording import Recording
+from eomgen.codegen.system import System, optimised
+from eomgen.language.formula import Formula, evaluate
+from eomgen.model.interactive import Switched, interactive, switches_of
+from eomgen.model.model import Model
+from eomgen.program.passes import optimise
+from eomgen.program.program import Output, Program, cost, finish, interpreter
+from eomgen.program.scalars import TapeScalars
+from eomgen.program.tape import TIME, Node, Stage, Tape
+from eomgen.scene.effects import Gravity
+from eomgen.scene.effects.base import JointLoad
+from eomgen.scene.joints.base import WORLD
+
+
+@dataclass(frozen=True)
+class LiveSystem:
+    """The system of an interactive model, with two further outputs: `loads` and `geometry`.
+
+    loads       for each load of an effect on a body the names of the effect and of the body
+    operations  of one call of `derivative` with all effects on and nothing pulled
+    saved       operations that each effect takes, by name
+    """
+
+    system: System
+    loads: tuple[tuple[str, str], ...]
+    operations: int
+    saved: Mapping[str, int]
+
+
+def live_system(model: Model, geometry: Sequence[Formula] = ()) -> LiveSystem:
+    """The program of a model's page; `geometry` are formulas of parameters and time."""
+    live = interactive(model)
+    derived = choose(live, closed=False).derived
+    record = Recording(live, derived.route, axes=derived.axes)
+    system = from_recursion(record, jacobian=False)
+    loads, nodes = _loads(record)
+    names = {**record.parameters, TIME: record.dynamics.values.time}
+    formulas = [evaluate(formula, names, record.scalars) for formula in geometry]
+    more = {"loads": nodes, "geometry": formulas}
+    outputs = {
+        **system.program.outputs,
+        **{name: Output((len(part),), tuple(n.index for n in part)) for name, part in more.items()},
+    }
+    program = finish(record.tape, outputs, system.program.checks)
+    system = optimised(replace(system, program=program))
+    operations, saved = _operations(model, system.program)
+    return LiveSystem(system, loads, operations, saved)
+
+
+def _loads(record: Recording) -> tuple[tuple[tuple[str, str], ...], list[Node]]:
+    """For each load on a body: the point of application, the force and the torque, world axes."""
+    d, n = record.dynamics, record.model.dimensions
+    found: list[tuple[str, str]] = []
+    nodes: list[Node] = []
+    for effect in record.model.effects:
+        if not isinstance(effect, Switched | Gravity):
+            continue
+        for load in effect.loads(d):
+            if isinstance(load, JointLoad) or load.body == WORLD:
+                continue
+            zero = record.scalars.number(0.0)
+            torque = load.torque or (zero,) * (1 if n == 2 else 3)
+            found.append((effect.name, load.body))
+            nodes += [*d.position(load.body, load.at), *load.force, *torque]
+    return tuple(found), nodes
+
+
+def _operations(model: Model, program: Program) -> tuple[int, dict[str, int]]:
+    """The operations of `derivative` with all effects on, and those that each effect takes.
+
+    Constants in place of switches and pulls fold what does not act.
+    """
+    switches = switches_of(model)
+    live = interactive(model)
+    pulls = {i.name: 0.0 for i in live.inputs[len(model.inputs) :]}
+    all_on = dict.fromkeys(switches.values(), 1.0)
+    whole = pulls | all_on
+    count = _count(program, whole)
+    return count, {
+        name: count - _count(program, whole | {switch: 0.0}) for name, switch in switches.items()
+    }
+
+
+def _count(program: Program, given: Mapping[str, float]) -> int:
+    """The operations of `derivative` with constants in place of some inputs."""
+    tape = Tape()
+    inputs = {
+        str(s.value): tape.constant(given[str(s.value)])
+        if s.value in given
+        else tape.input(str(s.value), Stage(s.stage))
+        for s in program.steps
+        if s.operation == "input"
+    }
+    nodes = interpreter(program, "derivative", TapeScalars(tape))(inputs)
+    outputs = {"derivative": Output((len(nodes),), tuple(node.index for node in nodes))}
+    return cost(optimise(finish(tape, outputs, ())), "derivative")["total"]

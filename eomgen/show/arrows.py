@@ -1,0 +1,56 @@
+"""Arrows that show fields and wind: their formulas at points of the region of a motion."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.language.formula import ZERO, Formula, names_in
+from eomgen.model.model import Model
+from eomgen.show.elements import Field, Vector, Wind
+from eomgen.show.formulas import constant, with_names
+
+Array = NDArray[np.float64]
+ARROWS = {2: (9, 7), 3: (4, 4, 3)}
+"""Number of arrows of a field along each axis, in the plane and in space."""
+AROUND = 0.1
+"""How much larger than that of the centres of mass the region is on each side."""
+
+
+def field_arrows(field: Field, model: Model, low: Array, high: Array) -> Field:
+    """A field of a formula with arrows in a region from `low` to `high`, m, if it can have any."""
+    if field.formula is None:
+        return field
+    counts = ARROWS[model.dimensions]
+    axes = [np.linspace(a, b, k) for a, b, k in zip(low, high, counts, strict=True)]
+    points = tuple(constant(*place) for place in product(*axes))
+    forces = [_at(field.formula, point, model) for point in points]
+    found = tuple(force for force in forces if force is not None)
+    return replace(field, points=points, forces=found) if len(found) == len(points) else field
+
+
+def wind_at(wind: Wind, model: Model, place: Array) -> Wind:
+    """A wind with its velocity at a place of the world, m."""
+    at = constant(*place)
+    return replace(wind, at=at, velocity=_at(wind.formula, at, model))
+
+
+def region_of(places: Array) -> tuple[Array, Array]:
+    """The region around points (n, d), m, at least half as high and deep as it is wide."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    half = np.maximum((high - low) / 2, float((high - low).max()) / 4) * (1 + 2 * AROUND)
+    middle = (low + high) / 2
+    return middle - half, middle + half
+
+
+def _at(formula: Vector | None, point: Vector, model: Model) -> Vector | None:
+    """The formulas at rest at a point; None if they depend on more than parameters and time."""
+    if formula is None:
+        return None
+    names: dict[str, Formula] = dict(zip("xyz", point, strict=False))
+    names |= dict.fromkeys(("vx", "vy", "vz"), ZERO)
+    names.setdefault("z", ZERO)
+    found = tuple(with_names(part, names) for part in formula)
+    known = {"t", *model.defaults}
+    return found if all(name in known for part in found for name in names_in(part)) else None

@@ -1,0 +1,179 @@
+"""What a picture shows beside bodies: springs, contacts, motors, fields and the like.
+
+Each effect of a scene becomes elements, whose numbers are formulas of parameters. Points are from
+the body's centre of mass in body axes, or from the world's origin, m. A body is an index, -1 for
+the world; a joint is the index of its child.
+"""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+from eomgen.language.formula import Formula
+from eomgen.scene.effects.field import Kind
+
+WORLD_INDEX = -1
+
+Vector = tuple[Formula, ...]
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A point of a body."""
+
+    body: int
+    at: Vector
+
+
+@dataclass(frozen=True)
+class Link:
+    """A spring, a damper or both between two points, or a rope, which is slack below `rest`, m."""
+
+    kind: Literal["coil", "damper", "spring_damper", "rope"]
+    effect: str
+    start: Attachment
+    end: Attachment
+    rest: Formula | None
+    radius: Formula
+
+
+@dataclass(frozen=True)
+class AtJoint:
+    """Something at a coordinate of a joint.
+
+    torsion  a spring at the joint with its `rest`
+    motor    a motor, a servo (which has a controller), or a drive that prescribes the coordinate
+    stop     limits `low` and `high`, either of which may be absent
+    brake    friction
+
+    zero  at a revolute joint a unit vector across its axis, in the parent's axes, from which the
+          coordinate is counted: towards the child's centre of mass, if that is beside the axis
+    """
+
+    kind: Literal["torsion", "motor", "servo", "drive", "stop", "brake"]
+    effect: str
+    joint: int
+    coordinate: int
+    radius: Formula
+    rest: Formula | None = None
+    low: Formula | None = None
+    high: Formula | None = None
+    zero: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A sphere, a circle in the plane, at a point of a body.
+
+    ball      that of a contact; of radius 0 it is a point
+    wheel     that of a contact whose body rotates about it: `axis` is its axis in the body's axes;
+              None in the plane
+    obstacle  that of a force field, which acts within `reach` of its surface
+    """
+
+    kind: Literal["ball", "wheel", "obstacle"]
+    effect: str
+    body: int
+    at: Vector
+    radius: Formula
+    reach: Formula | None = None
+    axis: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The plane n·x = `offset` of a contact with unit normal n, in the axes of its body."""
+
+    kind: ClassVar[str] = "plane"
+    effect: str
+    body: int
+    normal: Vector
+    offset: Formula
+
+
+@dataclass(frozen=True)
+class Field:
+    """A force field about a centre, or the force that a formula gives on a point at rest.
+
+    `points` are where pictures show it by arrows, m, world axes, and `forces` what it is there, N.
+    `formula` is that of the scene, with the point's position x, y, z and velocity vx, vy, vz.
+    """
+
+    kind: ClassVar[str] = "field"
+    effect: str
+    form: Kind
+    center: Vector | None = None
+    points: tuple[Vector, ...] = ()
+    forces: tuple[Vector, ...] = ()
+    formula: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Wind:
+    """A fluid's velocity, m/s, world axes, which pictures show at the point `at`, m.
+
+    `formula` is that of the scene, as of a field; `velocity` is its value at that point, None if it
+    depends on more than parameters and time.
+    """
+
+    kind: ClassVar[str] = "wind"
+    effect: str
+    at: Vector
+    velocity: Vector | None = None
+    formula: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Attraction:
+    """A point of the world that attracts bodies."""
+
+    kind: ClassVar[str] = "attraction"
+    effect: str
+    center: Vector
+    bodies: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Pull:
+    """The point at which an external force acts on a body, or the body on which a torque does."""
+
+    kind: Literal["force", "torque"]
+    effect: str
+    body: int
+    at: Vector
+
+
+@dataclass(frozen=True)
+class Weight:
+    """Uniform gravity along a unit vector, world axes."""
+
+    kind: ClassVar[str] = "gravity"
+    effect: str
+    direction: Vector
+
+
+@dataclass(frozen=True)
+class Support:
+    """What a joint with the world or a slider needs to be seen.
+
+    base  a mark at the point of the world that holds a joint; `axis` points to the ground, along
+          which the bodies are on the other side
+    rail  a line on the parent (-1 for the world) through `at` along `axis`, unit, in the parent's
+          axes, from `low` to `high`, m
+    """
+
+    kind: Literal["base", "rail"]
+    joint: int
+    body: int
+    at: Vector
+    radius: Formula
+    axis: Vector | None = None
+    low: Formula | None = None
+    high: Formula | None = None
+
+
+Element = Link | AtJoint | Ball | Plane | Field | Wind | Attraction | Pull | Weight | Support
+
+
+def without_formula(element: Element) -> Element:
+    """An element without the formula of a scene, which may depend on the motion."""
+    return replace(element, formula=None) if isinstance(element, Field | Wind) else element

@@ -1,0 +1,238 @@
+"""Where the camera is: the view that a motion needs, or that its scene asks for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.scene.look import Camera, Shape
+from eomgen.show.outlines import extent_points
+
+Array = NDArray[np.float64]
+
+ASPECT = 4 / 3
+"""Width to height of the picture for which a camera is chosen."""
+MARGIN = 1.1
+"""The view is so much larger than what it must contain."""
+SMALL = 0.36
+"""If at some time the bodies fill less than this part of the height and of the width of a view of
+the whole motion, the camera follows."""
+FEWEST, SOUNDINGS = 60, 300
+"""Number of samples at which the bounds of the bodies are found, with many points and with few."""
+ALONE = 1.6
+"""A view that follows a single body is so much larger than one of a mechanism."""
+GAIN = 1.3
+"""It follows only if bodies are then larger by this factor."""
+FAR = 6.0
+"""What bodies hold to is shown if its distance from them is at most this multiple of the size of
+the region in which they are."""
+WIDEST = 4.0
+"""Greatest width to height of what a camera shows."""
+MOST_POINTS = 2_000_000
+"""About how many points of bodies are looked at."""
+LEAST = 1e-6
+"""Height of a view of nothing, m."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera with nothing left open.
+
+    center      what it looks at, world axes, m; of a camera that follows, from the body's centre of
+                mass
+    height      from the bottom to the top of the picture, m
+    width       that the picture must show too, m; 0 for any
+    follow      the name of the body that it follows
+    background  colour of figures
+    themed      whether a page may use the background of its theme instead
+    """
+
+    mode: Literal["fit", "follow", "fixed"] = "fixed"
+    center: tuple[float, ...] | None = None
+    height: float = 4.0
+    width: float = 0.0
+    follow: str | None = None
+    background: str = "#ffffff"
+    themed: bool = True
+    azimuth_deg: float = -60.0
+    elevation_deg: float = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """The least and the greatest position of all bodies in the picture, right and up, m, at each of
+    some samples, and the position (n, nb, 2) of each body's centre of mass there.
+    """
+
+    low: Array  # (n, 2)
+    high: Array  # (n, 2)
+    centres: Array  # (n, nb, 2)
+
+    def view(self, body: int | None = None, fixed: Array | None = None) -> tuple[Array, Array]:
+        """Centre and size of the least rectangle around all bodies at all times, and the points
+        `fixed` (k, 2); relative to the centre of mass of `body`, if given.
+        """
+        moving = 0.0 if body is None else self.centres[:, body]
+        low, high = (self.low - moving).min(axis=0), (self.high - moving).max(axis=0)
+        if fixed is not None and len(fixed):
+            low, high = np.minimum(low, fixed.min(axis=0)), np.maximum(high, fixed.max(axis=0))
+        return (low + high) / 2, high - low
+
+    def least_share(self, size: Array) -> float:
+        """The least part of the height or the width of a view of this size that bodies fill."""
+        height = max(float(size[1]), float(size[0]) / ASPECT, LEAST) * MARGIN
+        spans = self.high - self.low
+        return float(np.maximum(spans[:, 0] / (ASPECT * height), spans[:, 1] / height).min())
+
+
+def bounds_of(
+    shapes: Sequence[Sequence[Shape]], poses: Array, eye: Array, rows: Sequence[int] | None = None
+) -> Bounds:
+    """The bounds of bodies at poses (n, nb, 3) or (n, nb, 3, 4), seen along the axes `eye`.
+
+    `rows` are the samples; by default up to `SOUNDINGS` of them, evenly spread.
+    """
+    dimensions = poses.ndim - 1
+    points_of = [extent_points(own, dimensions) for own in shapes]
+    if rows is None:
+        most = MOST_POINTS // sum(map(len, points_of))
+        count = min(len(poses), SOUNDINGS, max(most, FEWEST))
+        rows = np.linspace(0, len(poses) - 1, count).round().astype(int).tolist()
+    at = poses[list(rows)]
+    places = []
+    for body, points in enumerate(points_of):
+        pose = at[:, body]
+        if poses.ndim == 3:
+            c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+            x, y = points.T
+            turned = [np.outer(c, x) - np.outer(s, y), np.outer(s, x) + np.outer(c, y)]
+            places.append(np.stack(turned, axis=-1) + pose[:, np.newaxis, :2])
+        else:
+            world = np.einsum("nij,kj->nki", pose[..., :3], points) + pose[:, np.newaxis, :, 3]
+            places.append((world @ eye.T)[..., :2])
+    every = np.concatenate(places, axis=1)
+    centres = at[..., :2] if poses.ndim == 3 else (at[..., 3] @ eye.T)[..., :2]
+    return Bounds(every.min(axis=1), every.max(axis=1), centres)
+
+
+def framed(
+    camera: Camera,
+    bodies: Sequence[str],
+    leading: Sequence[int],
+    shapes: Sequence[Sequence[Shape]],
+    poses: Array,
+    eye: Array,
+    fixed: Array,
+) -> View:
+    """The view of a motion by a camera of a scene.
+
+    `leading` are the bodies that a camera may follow: those that translate in the world. `fixed`
+    are points (k, d) of the world that the view of a whole motion shows too, m, world axes: what
+    springs hold to and the like. With any of them the whole motion is shown unless asked otherwise.
+    """
+    finite = np.isfinite(poses.reshape(len(poses), -1)).all(axis=1)
+    poses = poses[finite]
+    dimensions = poses.ndim - 1
+    given = View(
+        height=camera.height or View.height,
+        background=camera.background or View.background,
+        themed=camera.background is None,
+        azimuth_deg=camera.azimuth_deg,
+        elevation_deg=camera.elevation_deg,
+        center=camera.center,
+    )
+    if not len(poses):
+        return given
+    bounds = bounds_of(shapes, poses, eye)
+    fixed = _near(bounds, fixed if dimensions == 2 else (fixed @ eye.T)[:, :2])
+    middle, size = bounds.view(fixed=fixed)
+    depth = float((poses[..., 3] @ eye[2]).mean()) if dimensions == 3 else 0.0
+    followed = None if camera.follow is None else bodies.index(camera.follow)
+    mode = camera.mode
+    if mode is None and (camera.follow is not None):
+        mode = "follow"
+    elif mode is None and (camera.center is not None or camera.height is not None):
+        mode = "fixed"
+    elif mode is None:
+        followed = None if len(fixed) else _worth_following(bounds, size, leading)
+        mode = "fit" if followed is None else "follow"
+    if mode == "follow":
+        if followed is None:
+            followed = _steadiest(bounds, leading or range(len(bodies)))
+        offset, size = bounds.view(followed)
+        if len(bodies) == 1:
+            size = size * ALONE
+        offset = offset if camera.height is None else np.zeros(2)
+        center = _world(offset, 0.0, eye, dimensions)
+        return _sized(given, camera, mode, center, size, bodies[followed])
+    center = camera.center or _world(middle, depth, eye, dimensions)
+    if camera.center is not None:
+        # The view is centred there, so it reaches as far on the other side.
+        seen = np.array(camera.center) if dimensions == 2 else (eye @ camera.center)[:2]
+        size = size + 2 * np.abs(middle - seen)
+    return _sized(given, camera, mode, center, size, None)
+
+
+def _near(bounds: Bounds, points: Array) -> Array:
+    """Those of some points (k, 2) that are not so far away that bodies would be tiny beside them,
+    or infinitely far.
+    """
+    middle, size = bounds.view()
+    with np.errstate(invalid="ignore"):
+        near = np.abs(points - middle).max(axis=1) <= FAR * size.max()
+    return np.asarray(points[near])
+
+
+def _sized(
+    view: View,
+    camera: Camera,
+    mode: Literal["fit", "follow", "fixed"],
+    center: Sequence[float],
+    size: Array,
+    follow: str | None,
+) -> View:
+    """The view with its centre, and with the size that it needs unless the scene gives one."""
+    center = tuple(map(float, center))
+    if camera.height is not None:
+        return replace(view, mode=mode, center=center, follow=follow)
+    width, height = (max(float(x) * MARGIN, LEAST) for x in size)
+    return replace(
+        view,
+        mode=mode,
+        center=center,
+        follow=follow,
+        height=max(height, width / WIDEST),
+        width=width,
+    )
+
+
+def _worth_following(bounds: Bounds, size: Array, leading: Sequence[int]) -> int | None:
+    """The body to follow, if the bodies are small in a view of the whole motion and larger in one
+    that follows.
+    """
+    share = bounds.least_share(size)
+    if share >= SMALL or not leading:
+        return None
+    body = _steadiest(bounds, leading)
+    _, followed = bounds.view(body)
+    return body if bounds.least_share(followed) > GAIN * share else None
+
+
+def _steadiest(bounds: Bounds, leading: Sequence[int]) -> int:
+    """The body around which all bodies need the smallest view."""
+
+    def height(body: int) -> float:
+        _, size = bounds.view(body)
+        return max(float(size[1]), float(size[0]) / ASPECT)
+
+    return min(leading, key=height)
+
+
+def _world(seen: Array, near: float, eye: Array, dimensions: int) -> tuple[float, ...]:
+    """The point of the world at a place of the picture (right, up), and `near` to the eye, m."""
+    if dimensions == 2:
+        return float(seen[0]), float(seen[1])
+    x, y, z = (np.array([*seen, near]) @ eye).tolist()
+    return x, y, z

@@ -1,0 +1,52 @@
+"""The axes of joints in their parents' axes, for pictures."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.language.formula import Formula
+from eomgen.model.model import Body, Model
+from eomgen.scalars.exact import orientation
+from eomgen.scene.joints import Free, Revolute
+from eomgen.scene.joints.base import spatial
+from eomgen.show.formulas import constant
+
+
+def joint_axis(model: Model, body: Body) -> tuple[Formula, ...] | None:
+    """The unit axis of a joint's first primitive, three components in the parent's axes; None where
+    there is none, or where it is that of the plane.
+    """
+    joint = body.joint
+    primitives = joint.primitives(model.dimensions)
+    if isinstance(joint, Free) or joint.type == "planar" or not primitives:
+        return None
+    first = primitives[0]
+    if first.kind == "spherical" or (model.dimensions == 2 and first.kind == "revolute"):
+        return None
+    axis = np.array(spatial(first.axis)) / np.linalg.norm(first.axis)
+    return constant(*(_fixed_rotation(body) @ axis))
+
+
+def zero_direction(model: Model, body: Body) -> tuple[Formula, ...] | None:
+    """A unit vector across the axis of a revolute joint, in the parent's axes, at coordinate 0.
+
+    It points to the child's centre of mass, if that is beside the axis.
+    """
+    joint = body.joint
+    if not isinstance(joint, Revolute):
+        return None
+    arm = np.array(spatial(tuple(-model.value(r) for r in joint.r_child)))
+    axis = np.array(spatial(joint.primitives(model.dimensions)[0].axis))
+    axis = axis / np.linalg.norm(axis)
+    across = arm - (arm @ axis) * axis
+    if np.linalg.norm(across) <= 1e-9 * np.linalg.norm(arm):
+        one = np.eye(3)[np.argmin(np.abs(axis))]
+        across = one - (one @ axis) * axis
+    across = _fixed_rotation(body) @ (across / np.linalg.norm(across))
+    return constant(*across[: model.dimensions])
+
+
+def _fixed_rotation(body: Body) -> NDArray[np.float64]:
+    """From the child's axes to the parent's at coordinate 0."""
+    assert not isinstance(body.joint, Free)
+    rows = orientation(body.joint.orientation_deg)
+    return np.array([[float(entry) for entry in row] for row in rows])

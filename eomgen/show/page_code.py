@@ -1,0 +1,133 @@
+"""What the page of a run computes with: the functions of its mechanism, in JavaScript."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from eomgen.codegen.backends.javascript import mechanism
+from eomgen.errors import EomgenError
+from eomgen.language.formula import Formula
+from eomgen.model.model import Model
+from eomgen.run.module import load_module
+from eomgen.run.trajectory import Trajectory
+from eomgen.scene.schema import Simulation
+from eomgen.show.drawing_data import drawing_data
+from eomgen.show.live import live_table, velocity_rows
+from eomgen.show.motion import Array, Motion
+from eomgen.show.page import PageCode
+from eomgen.store import LiveCode, interfaced_program_of, live_code
+
+LONGEST = 1_500_000
+"""A page with longer functions than these characters is live only on request."""
+
+
+class Sources(Protocol):
+    """The sources of a module: that of a compiled one is Python in `reference`."""
+
+    @property
+    def source(self) -> str: ...
+    @property
+    def reference(self) -> str: ...
+
+
+class Ran(Protocol):
+    """What a page needs of a `Run`."""
+
+    @property
+    def model(self) -> Model: ...
+    @property
+    def module(self) -> Sources: ...
+    @property
+    def trajectory(self) -> Trajectory: ...
+    @property
+    def motion(self) -> Motion: ...
+    @property
+    def simulation(self) -> Simulation: ...
+    @property
+    def inputs(self) -> Mapping[str, float]: ...
+    @property
+    def varying(self) -> bool: ...
+
+
+def page_code(run: Ran, *, live: bool | None = None) -> PageCode:
+    """The mechanism of the page of a run.
+
+    A live one has functions for everything that the page can change. Otherwise they are those of
+    the generated module. With `live` None it is live unless that fails or would be too large; with
+    true the errors of the derivation are raised.
+    """
+    events = tuple(
+        {"t": event.t, "contact": event.contact, "kind": event.kind}
+        for event in run.trajectory.events
+        if event.kind != "impact"
+    )
+    geometry = drawing_data(run.motion)[1]
+    found, why = _live(run.model, geometry, live)
+    code = _recorded(run, why) if found is None else _going_on(run, found)
+    return replace(code, smooth=not run.varying, events=events)
+
+
+def _live(
+    model: Model, geometry: Sequence[Formula], live: bool | None
+) -> tuple[LiveCode | None, str]:
+    """The functions of a live page; None and why there are none."""
+    if live is False:
+        return None, ""
+    try:
+        code = live_code(model, geometry)
+    except EomgenError as error:
+        if live:
+            raise
+        return None, str(error)
+    if live or len(code.source) <= LONGEST:
+        return code, ""
+    return None, f"its functions would take {len(code.source) / 1e6:.1f} MB"
+
+
+def _going_on(run: Ran, code: LiveCode) -> PageCode:
+    """A mechanism that goes on from a run."""
+    t, steps = run.trajectory.t, run.trajectory.counts["steps"]
+    table = live_table(
+        run.model,
+        code,
+        run.simulation,
+        inputs=run.inputs,
+        mean_step=float(t[-1] - t[0]) / steps if steps else None,
+    )
+    rows = None if run.model.form == "velocity" else _velocity_rows(run)
+    return PageCode(code.source, table, live=True, y=rows)
+
+
+def _velocity_rows(run: Ran) -> Array:
+    """The rows of a run in momenta as [q, v]."""
+    ran = run.trajectory
+    module = load_module(run.module.reference or run.module.source)
+    rates = module.derivative(ran.t, ran.y.T, run.model.defaults, run.inputs or None).T
+    return velocity_rows(run.model, ran.states, ran.y, rates)
+
+
+def _recorded(run: Ran, why: str) -> PageCode:
+    """The functions of the generated module: enough to show a run."""
+    program, interface = interfaced_program_of(run.model)
+    table = {
+        "states": [{"name": s.name, "unit": s.unit, "kind": "other"} for s in interface.states],
+        "quaternions": [],
+        "parameters": [
+            {"name": p.name, "value": p.default, "unit": p.unit, "about": p.about}
+            for p in interface.parameters
+        ],
+        "inputs": [
+            {
+                "name": i.name,
+                "value": run.inputs.get(i.name, i.default),
+                "unit": i.unit,
+                "about": i.about,
+            }
+            for i in interface.inputs
+        ],
+        "effects": [],
+        "loads": [],
+        "operations": 0,
+        "joints": list(run.model.force_joints),
+    }
+    return PageCode(mechanism(program, interface), table, live=False, why=why)

@@ -1,0 +1,431 @@
+// `makeEngine` integrates the mechanism in the page, by steps of equal length as `eomgen simulate`
+// makes them. It needs no document. No function throws: what went wrong is the sentence `error`.
+
+const makeEngine = (mechanism, data) => {
+  const ny = data.states.length;
+  const kinds = data.states.map((state) => state.kind);
+  const positions = [...kinds.keys()].filter((i) => kinds[i] === "position");
+  const others = [...kinds.keys()].filter((i) => kinds[i] !== "position");
+  const quaternions = data.quaternions ?? [];
+  const defaults = (table) => Float64Array.from(table, (x) => x.value);
+  const space = data.dimensions === 3;
+  const PULL = 20; // rate at which a pulled point follows the pointer, rad/s
+  const LIFTED = 0.3; // part of the whole mass that a pull moves at least as quickly
+  const STRONG = 30; // acceleration that the strongest pull gives the whole mass at least, m/s²
+  const MOST_EVENTS = 10000; // at one time
+  const SHARE = 0.02; // part of the mean cost of a step that the last one has
+
+  const all = [...methods, ...adaptive];
+  const engine = {
+    t: 0,
+    y: new Float64Array(ny),
+    p: defaults(data.parameters),
+    u: defaults(data.inputs),
+    methods: all.filter((m) => !m.separable || isSeparable()).map(({ name, about }) => ({ name, about })),
+    method: "",
+    dt: 0.01,
+    events: [],
+    error: null,
+    remark: "", // that another method goes on than the one it began with
+    automatic: false, // whether the engine itself has chosen the method
+    behind: false, // whether the last advance ran out of time
+    grip: null, // what is pulled: {body, at, target, point, force}
+    onSample: null,
+  };
+  let lost = new Float64Array(ny); // rounding errors of the last sums
+  let [start, goal, cost] = [0, 0, NaN];
+  let [regular, closed, repeated] = [true, [], 0];
+  let [law, held, change] = [null, null, null];
+
+  // ---- The problem ----
+
+  const derivative = (t, y) => {
+    if (engine.grip) pullAt(t, y);
+    return mechanism.derivative(t, y, engine.p, engine.u);
+  };
+  const free = { ny, positions, others, f: derivative };
+  let problem = free;
+
+  function unit(y) {
+    for (const four of quaternions) {
+      const [a, b, c, d] = four.map((k) => y[k]);
+      let length = Math.sqrt(a * a + b * b + c * c + d * d);
+      if (!(length > 1e-100 && length < 1e100)) length = Math.hypot(a, b, c, d);
+      if (Number.isFinite(length)) for (const k of four) y[k] /= length;
+    }
+    return y;
+  }
+
+  // Onto the constraints of loops: Newton's method for the coordinates, then the velocities.
+  function projected(t, y) {
+    unit(y);
+    if (!mechanism.projectPosition) return y;
+    const given = (z) => [t, z, engine.p, engine.u];
+    const violation = (z) => Math.max(...mechanism.constraintResiduals(...given(z)).map(Math.abs));
+    let off = violation(y);
+    for (let n = 0; n < 12 && off > 1e-15; n += 1) {
+      const there = y.slice();
+      mechanism.projectPosition(...given(y)).forEach((x, i) => (there[positions[i]] = x));
+      const left = violation(unit(there));
+      if (!(left < off)) break; // rounding, or no way towards the constraints
+      y.set(there);
+      off = left;
+    }
+    if (!(off <= 1e-6)) throw new Error("the loops do not close here: take a smaller step or other lengths");
+    if (Math.min(...mechanism.constraintMargins(...given(y))) < 1e-9) {
+      throw new Error("the mechanism is singular here, as at a dead point: take another start");
+    }
+    mechanism.projectVelocity(...given(y)).forEach((x, i) => (y[others[i]] = x));
+    return y;
+  }
+
+  function makeLaw() {
+    const table = mechanism.contacts ?? [];
+    if (!table.length) return null;
+    const sizes = table.map((c) => (c.unit === "m" ? data.size ?? 1 : 1));
+    const switches = table.map((c) => data.effects.find((e) => e.name === c.effect)?.switch ?? null);
+    const relative = (values) => Array.from(values, (x, k) => x / sizes[k]);
+    const given = (t, y) => [t, y, engine.p, engine.u];
+    return contacts.make({
+      names: table.map((c) => c.name),
+      sizes,
+      ny,
+      active: (k) => switches[k] === null || engine.p[switches[k]] !== 0,
+      gaps: (t, y) => relative(mechanism.gaps(...given(t, y))),
+      rates: (t, y) => relative(mechanism.gapRates(...given(t, y))),
+      impact: (t, y, k, bounce) =>
+        mechanism.impact(...given(t, y), [...table.map((_, i) => (i === k ? 1 : 0)), bounce]),
+      held: (t, y, forces) => {
+        if (engine.grip) pullAt(t, y);
+        return mechanism.held(...given(t, y), forces);
+      },
+      restSpeed: data.restSpeed ?? null,
+      span: data.span ?? 10,
+    });
+  }
+
+  // Whether the rates of velocities depend on positions and time alone, those of positions on velocities.
+  function isSeparable() {
+    if (quaternions.length || mechanism.contacts?.length || !positions.length) return false;
+    try {
+      const p = defaults(data.parameters);
+      const y = Float64Array.from(mechanism.initialState(p), (x, i) => x + 0.1 * Math.sin(i + 1));
+      const slope = (z) => Float64Array.from(mechanism.derivative(0.1, z, p, defaults(data.inputs)));
+      const at = slope(y);
+      const moved = slope(y.map((x, i) => (kinds[i] === "position" ? x : x + 0.3 * Math.cos(i + 1))));
+      const placed = slope(y.map((x, i) => (kinds[i] === "position" ? x + 0.3 * Math.cos(i + 1) : x)));
+      return others.every((i) => at[i] === moved[i]) && positions.every((i) => at[i] === placed[i]);
+    } catch {
+      return false;
+    }
+  }
+
+  // ---- Steps ----
+
+  // The next mark after t: steps end at start + i dt.
+  const mark = () => start + (Math.floor((engine.t - start) / engine.dt + 1e-9) + 1) * engine.dt;
+
+  // Go on from the present state: steps end at the same marks, sums begin anew.
+  function renew() {
+    lost.fill(0);
+    regular = engine.t === start;
+    held = law?.now.held.length ? law.holding(law.now.held, engine.t, engine.y.slice()) : null;
+    problem = held ? { ...free, f: (t, y) => held.solve(t, y).result.subarray(0, ny) } : free;
+  }
+
+  function restart() {
+    start = engine.t;
+    goal = engine.t;
+    repeated = 0;
+    closed = law ? law.begin(engine.t, engine.y) : [];
+    renew();
+  }
+
+  // The chosen method failed: go on by the adaptive one, if it was not the user who chose.
+  function helped(error) {
+    if (!engine.automatic || engine.method === "DOP853") throw error;
+    engine.remark = `${engine.method} fails at ${Number(engine.t.toPrecision(4))} s, DOP853 goes on`;
+    engine.method = "DOP853";
+    change = all.find((m) => m.name === "DOP853").make(ny);
+    engine.dt = Math.max(engine.dt, 0.005);
+    start = engine.t;
+    renew();
+  }
+
+  // One step to the next mark, or to the contact that comes first.
+  function makeStep() {
+    const { t, y } = engine;
+    if (law && law.now.held.some((k) => !law.active(k))) {
+      note(law.release(t, y, law.now.held.filter((k) => !law.active(k))));
+      renew();
+    }
+    if (closed.length) {
+      const after = law.strike(t, y, closed);
+      closed = [];
+      y.set(after.y);
+      note(after.events);
+      renew();
+    }
+    const end = mark();
+    const length = regular ? engine.dt : end - t;
+    const found = change(problem, t, y, length);
+    const next = new Float64Array(ny);
+    const rest = new Float64Array(ny);
+    for (let k = 0; k < ny; k += 1) {
+      // Knuth's two-sum.
+      const add = found[k] + lost[k];
+      const total = y[k] + add;
+      const part = total - y[k];
+      next[k] = total;
+      rest[k] = (y[k] - (total - part)) + (add - part);
+    }
+    projected(end, next);
+    if (!next.every(Number.isFinite)) throw new Error("the state overflows or is not a number: take a smaller step");
+    if (law && cutAtContact(t, y, next, length)) return;
+    engine.t = end;
+    engine.y.set(next);
+    lost = rest;
+    regular = true;
+    repeated = 0;
+    if (law) law.settle(end, next);
+    if (engine.onSample) engine.onSample(engine.t, engine.y);
+  }
+
+  // End a step where a contact closes or opens; whether one does.
+  function cutAtContact(t, y, next, length) {
+    const state = (s) => {
+      if (s <= 0) return y;
+      if (s >= length) return next;
+      const within = change(problem, t, y, s);
+      return projected(t + s, y.map((x, k) => x + within[k]));
+    };
+    const closing = law.closing(t, length, state);
+    const opening = held ? law.opening(held, t, length, state) : null;
+    if (!closing && !opening) return false;
+    const first = closing && !(opening && opening.s < closing.s) ? closing : opening;
+    if (first.s > 0) {
+      const there = Float64Array.from(state(first.s));
+      engine.t = t + first.s;
+      engine.y.set(there);
+      repeated = 0;
+    } else {
+      repeated += 1;
+      if (repeated > MOST_EVENTS) throw new Error("contacts strike or open without end: take another step");
+    }
+    if (first === closing) {
+      law.now.slack.fill(0);
+      closed = closing.which;
+    } else note(law.release(engine.t, engine.y, opening.which));
+    renew();
+    return true;
+  }
+
+  const note = (events) => engine.events.push(...events);
+
+  function guarded(action) {
+    if (engine.error) return 0;
+    try {
+      action();
+      return 1;
+    } catch (error) {
+      engine.error = `${error.message}`;
+      return 0;
+    }
+  }
+
+  function timed(action) {
+    const from = performance.now();
+    action();
+    const took = performance.now() - from;
+    cost = Number.isNaN(cost) ? took : cost + SHARE * (took - cost);
+  }
+
+  function toMark() {
+    const end = mark();
+    try {
+      while (engine.t < end) makeStep();
+    } catch (error) {
+      helped(error);
+    }
+  }
+
+  // Advance by so many seconds, in whole steps; stop after `budget` ms, and then do not catch up.
+  engine.advance = (seconds, budget = Infinity) => {
+    goal = Math.max(goal, engine.t) + seconds;
+    const from = performance.now();
+    let made = 0;
+    engine.behind = false;
+    while (!engine.error && mark() <= goal + 1e-9 * engine.dt) {
+      made += guarded(() => timed(toMark));
+      if (performance.now() - from > budget) {
+        engine.behind = mark() <= goal;
+        goal = engine.t;
+        break;
+      }
+    }
+    return made;
+  };
+  engine.step = () => {
+    const made = guarded(() => timed(toMark));
+    goal = engine.t;
+    return made;
+  };
+
+  engine.setMethod = (name, dt = engine.dt) => {
+    const method = all.find((m) => m.name === name);
+    if (!method || !engine.methods.some((m) => m.name === name)) {
+      engine.error = `the method ${name} does not suit this mechanism`;
+      return;
+    }
+    if (!(dt > 0 && Number.isFinite(dt))) {
+      engine.error = "the step is not a positive number of seconds";
+      return;
+    }
+    engine.error = null;
+    engine.automatic = false;
+    engine.method = name;
+    engine.dt = dt;
+    cost = NaN;
+    change = method.make(ny);
+    start = goal = engine.t;
+    guarded(renew);
+  };
+  // Begin again from a state, by default the initial one.
+  engine.reset = (y = null, t = 0) => {
+    engine.error = null;
+    engine.release();
+    engine.events.length = 0;
+    guarded(() => {
+      engine.t = t;
+      engine.y.set(y ?? data.initial ?? mechanism.initialState(engine.p));
+      change = all.find((m) => m.name === engine.method).make(ny);
+      law = makeLaw();
+      restart();
+    });
+  };
+  engine.cost = () => cost;
+  // Call the derivative for so many ms, so that the browser compiles it; ms of the fastest call.
+  engine.warm = (budget) => {
+    const until = performance.now() + budget;
+    let least = Infinity;
+    guarded(() => {
+      for (let from = performance.now(); from < until; ) {
+        mechanism.derivative(engine.t, engine.y, engine.p, engine.u);
+        const now = performance.now();
+        least = Math.min(least, now - from);
+        from = now;
+      }
+    });
+    return least;
+  };
+  engine.energy = () => {
+    const of = (name) => mechanism[name](engine.t, engine.y, engine.p, engine.u);
+    try {
+      return { kinetic: of("kineticEnergy"), potential: of("potentialEnergy") };
+    } catch {
+      return { kinetic: NaN, potential: NaN };
+    }
+  };
+
+  // ---- The pointer: a critically damped spring to a point of a body ----
+
+  const inputs = data.pointer ?? { first: data.inputs.length, perBody: 0 };
+  const rotated = (pose, at) => (space
+    ? [0, 4, 8].map((row) => pose[row] * at[0] + pose[row + 1] * at[1] + pose[row + 2] * at[2])
+    : [Math.cos(pose[2]) * at[0] - Math.sin(pose[2]) * at[1], Math.sin(pose[2]) * at[0] + Math.cos(pose[2]) * at[1]]);
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+  // The arm from the centre of mass, the point and its velocity, in world axes.
+  function pointOf(body, at, t, y) {
+    const [n, m] = space ? [12, 6] : [3, 3];
+    const pose = mechanism.bodyPoses(t, y, engine.p, engine.u).subarray(n * body, n * body + n);
+    const arm = rotated(pose, at);
+    const center = space ? [pose[3], pose[7], pose[11]] : [pose[0], pose[1]];
+    const speed = mechanism.bodyVelocities(t, y, engine.p, engine.u).subarray(m * body, m * body + m);
+    const turning = space ? cross(speed.subarray(3), arm) : [-speed[2] * arm[1], speed[2] * arm[0]];
+    return {
+      arm,
+      point: center.map((x, i) => x + arm[i]),
+      velocity: center.map((_, i) => speed[i] + turning[i]),
+    };
+  }
+
+  function press(body, arm, force) {
+    const torque = space ? cross(arm, force) : [arm[0] * force[1] - arm[1] * force[0]];
+    [...force, ...torque].forEach((x, i) => (engine.u[inputs.first + inputs.perBody * body + i] = x));
+  }
+
+  function pullAt(t, y) {
+    const { body, at, target, stiffness, damping, strongest } = engine.grip;
+    const { arm, point, velocity } = pointOf(body, at, t, y);
+    const force = point.map((x, i) => stiffness * (target[i] - x) - damping * velocity[i]);
+    const size = Math.hypot(...force);
+    const factor = size > strongest ? strongest / size : 1;
+    engine.grip.point = point;
+    engine.grip.force = force.map((x) => x * factor);
+    press(body, arm, engine.grip.force);
+  }
+
+  // The mass that a point of a body seems to have: how a unit force accelerates it, along all axes.
+  function massAt(body, at) {
+    const { t, y } = engine;
+    const { arm, velocity } = pointOf(body, at, t, y);
+    const rest = Float64Array.from(mechanism.derivative(t, y, engine.p, engine.u));
+    let mobility = 0;
+    for (let axis = 0; axis < data.dimensions; axis += 1) {
+      press(body, arm, velocity.map((_, i) => (i === axis ? 1 : 0)));
+      const slope = mechanism.derivative(t, y, engine.p, engine.u);
+      const faster = y.map((x, k) => (kinds[k] === "position" ? x : x + slope[k] - rest[k]));
+      mobility += pointOf(body, at, t, faster).velocity[axis] - velocity[axis];
+    }
+    press(body, arm, velocity.map(() => 0));
+    return data.dimensions / mobility;
+  }
+
+  // Pull the point `at` of a body, from its centre of mass in its axes, to `target` in the world, m.
+  engine.pull = (body, at, target) => guarded(() => {
+    const { grip } = engine;
+    if (!grip || grip.body !== body || grip.at.some((x, i) => x !== at[i])) {
+      engine.release();
+      const mass = massAt(body, at);
+      if (!(mass > 0 && Number.isFinite(mass))) return;
+      // So strong that what hangs on a light body is lifted, but stable for explicit methods.
+      const moved = Math.max(mass, LIFTED * (data.mass ?? 0));
+      const most = /implicit|gauss/.test(engine.method) ? Infinity : 0.5 * mass / engine.dt;
+      const damping = Math.min(2 * moved * PULL, most);
+      const stiffness = Math.min(moved * PULL ** 2, most * 0.5 / engine.dt);
+      const size = data.drawing?.size ?? data.size ?? 1;
+      const strongest = Math.max(stiffness * size, STRONG * (data.mass ?? 0));
+      engine.grip = { body, at: [...at], stiffness, damping, strongest };
+    }
+    engine.grip.target = [...target];
+    pullAt(engine.t, engine.y);
+  });
+  engine.release = () => {
+    if (!engine.grip) return;
+    const first = inputs.first + inputs.perBody * engine.grip.body;
+    engine.u.fill(0, first, first + inputs.perBody);
+    engine.grip = null;
+  };
+
+  // ---- What it starts with ----
+
+  // The scene's own method, or one that keeps energy; where forces have corners, as of contacts, an
+  // explicit one. The step is a part of that which an adaptive method took.
+  function choice() {
+    const { name, step } = data.integrator ?? {};
+    const own = step && engine.methods.find((m) => m.name === name);
+    if (own) return [name, step];
+    const corners = mechanism.switchingFunctions || mechanism.contacts?.length;
+    const keeping = engine.methods.some((m) => m.name === "leapfrog") ? "leapfrog" : "implicit_midpoint";
+    const most = Math.min(Math.max((data.meanStep ?? 0.01) / (corners ? 2 : 6), 1e-4), 0.01);
+    const power = 10 ** Math.floor(Math.log10(most) + 1e-9);
+    const digit = [5, 2, 1].find((x) => x * power <= most * 1.0001) ?? 1;
+    return [corners ? "rk4" : keeping, Number((digit * power).toPrecision(1))];
+  }
+  const [method, step] = choice();
+  engine.setMethod(data.liveMethod ?? method, data.liveStep ?? step);
+  engine.automatic = !data.liveMethod;
+  engine.reset();
+  return engine;
+};

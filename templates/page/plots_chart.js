@@ -1,0 +1,351 @@
+// `charts` draws curves with uPlot: `charts.time(place)` against time, `charts.phase(place)` one
+// channel against another. What both need of the panel is in `place`:
+//   box      element to draw in, which takes the focus
+//   samples, spec {x, y: [keys]}, channel(key)
+//   color(key), dash(key), paint(css)   colours as the page's theme has them
+//   view()   [from, to] of the time shown      mark()   time of the picture, s
+//   hover(time or null), seek(time), look([from, to] or null), step(n), end(direction)
+// Both return {refresh(), mark(), hover(time), resize(), canvas(), destroy()}.
+
+const charts = (() => {
+  const GAP = 0.06; // free part of a range beyond its curves
+  const FLAT = 1e-6; // a relative change that is drawn as none
+  const GRAB = 7; // CSS pixels around the time mark
+  const NEAR = 10; // CSS pixels within which passes of an orbit are the same to a pointer
+  const FONT = '12px system-ui, "Segoe UI", Roboto, "Liberation Sans", sans-serif';
+  const HEIGHT = { time: 168, phase: 260 };
+
+  // Limits of an axis for values from `low` to `high`.
+  function rangeOf(low, high, scale) {
+    if (!(low <= high) || !Number.isFinite(high - low)) return [-1, 1];
+    const size = Math.max(Math.abs(low), Math.abs(high));
+    if (size === 0 || numbers.isRounding(size, scale)) return [-1, 1];
+    const gap = high - low <= FLAT * size ? 0.1 * size : GAP * (high - low);
+    return [low - gap, high + gap];
+  }
+
+  function limits(values) {
+    let [low, high] = [Infinity, -Infinity];
+    for (const value of values) {
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+    return [low, high];
+  }
+
+  // uPlot leaves a gap where there is no value, but joins over nan.
+  const withGaps = (values) =>
+    (values.every(Number.isFinite) ? values : Array.from(values, (value) => (Number.isFinite(value) ? value : null)));
+
+  const scaleOf = (place, keys) => Math.min(...keys.map((key) => place.samples.scale(key)));
+
+  // An axis; `exponents` receives the power of ten that its marks are in.
+  function axis(place, scale, side, exponents, unit) {
+    const across = side % 2 === 1;
+    return {
+      scale,
+      side,
+      font: FONT,
+      stroke: () => place.paint("var(--faint)"),
+      grid: { show: side !== 1, stroke: () => place.paint("var(--rule)"), width: 1 },
+      ticks: { show: false },
+      gap: 6,
+      space: across ? 34 : 64,
+      size: across ? (_, texts) => 14 + 7 * Math.max(2, ...(texts ?? []).map((text) => text.length)) : 24,
+      values: (_, marks, __, ___, step) => {
+        const { texts, exponent } = numbers.ticks(marks, step);
+        exponents[scale] = exponent;
+        if (!across && unit && texts.length) texts.push(`${texts.pop()}\u00a0${numbers.axisUnit(unit, exponent)}`);
+        return texts;
+      },
+    };
+  }
+
+  // Write a text in the corner above an axis.
+  function corner(u, place, text, onRight) {
+    const { ctx } = u;
+    ctx.save();
+    ctx.font = FONT.replace("12px", `${12 * uPlot.pxRatio}px`);
+    ctx.fillStyle = place.paint("var(--faint)");
+    ctx.textAlign = onRight ? "right" : "left";
+    ctx.textBaseline = "top";
+    ctx.fillText(text, onRight ? ctx.canvas.width - 4 * uPlot.pxRatio : 4 * uPlot.pxRatio, 2 * uPlot.pxRatio);
+    ctx.restore();
+  }
+
+  function child(parent, className) {
+    const element = parent.appendChild(document.createElement("div"));
+    element.className = className;
+    element.hidden = true;
+    return element;
+  }
+
+  const zoomed = ([low, high], factor, around) =>
+    [around - (around - low) / factor, around + (high - around) / factor];
+
+  // ---- Against time ----
+
+  function time(place) {
+    const { samples, spec, box } = place;
+    const units = [...new Set(spec.y.map((key) => place.channel(key).unit))];
+    const scaleName = (key) => `y${units.indexOf(place.channel(key).unit)}`;
+    const exponents = {};
+    let chart = null;
+    const keysOf = (name) => spec.y.filter((key) => scaleName(key) === name);
+    const scales = { x: { time: false, range: () => place.view() } };
+    units.forEach((_, i) => {
+      scales[`y${i}`] = { range: (__, low, high) => rangeOf(low, high, scaleOf(place, keysOf(`y${i}`))) };
+    });
+    const u = new uPlot({
+      width: Math.max(box.clientWidth, 120),
+      height: HEIGHT.time,
+      padding: [20, units.length > 1 ? 0 : 22, 0, 0],
+      legend: { show: false },
+      scales,
+      axes: [
+        axis(place, "x", 2, exponents, "s"),
+        ...units.map((_, i) => axis(place, `y${i}`, i ? 1 : 3, exponents)),
+      ],
+      series: [{}, ...spec.y.map((key) => ({
+        scale: scaleName(key),
+        stroke: () => place.color(key),
+        dash: place.dash(key),
+        width: 1.6,
+        points: { show: false },
+      }))],
+      cursor: {
+        y: false,
+        drag: { x: false, y: false },
+        points: { size: 7 },
+        bind: Object.fromEntries(["mousedown", "mouseup", "click", "dblclick", "mousemove", "mouseleave", "mouseenter"]
+          .map((name) => [name, () => null])),
+      },
+      hooks: {
+        draw: [
+          (self) => units.forEach((unit, i) =>
+            corner(self, place, numbers.axisUnit(unit, exponents[`y${i}`] ?? 0), i > 0)),
+          () => chart?.mark(), // the size of the plot may be another one
+        ],
+      },
+    }, [[], ...spec.y.map(() => [])], box);
+    const mark = child(u.over, "plot-mark");
+
+    const timeAt = (x) => {
+      const [low, high] = place.view();
+      const at = low + ((high - low) * x) / Math.max(u.over.clientWidth, 1);
+      return Math.min(Math.max(at, low), high);
+    };
+    const positionOf = (t) => {
+      const [low, high] = place.view();
+      return high > low ? (u.over.clientWidth * (t - low)) / (high - low) : 0;
+    };
+    chart = {
+      refresh() {
+        u.setData([samples.times(), ...samples.columns(spec.y).map(withGaps)], true);
+        chart.mark();
+      },
+      mark() {
+        const x = positionOf(place.mark());
+        mark.hidden = !(x >= -1 && x <= u.over.clientWidth + 1);
+        mark.style.transform = `translateX(${x}px)`;
+      },
+      hover(t) {
+        u.setCursor(t === null ? { left: -10, top: -10 } : { left: positionOf(t), top: 0 });
+      },
+      resize() {
+        u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT.time });
+      },
+      canvas: () => u.ctx.canvas,
+      destroy: () => u.destroy(),
+    };
+    plotGestures(u.over, box, {
+      isMark: (x) => !mark.hidden && Math.abs(x - positionOf(place.mark())) <= GRAB,
+      hover: (x) => place.hover(timeAt(x)),
+      leave: () => place.hover(null),
+      seek: (x) => place.seek(timeAt(x)),
+      select(x0, _, x1, __, isFinal, finished = true) {
+        const [left, right] = [Math.max(Math.min(x0, x1), 0), Math.min(Math.max(x0, x1), u.over.clientWidth)];
+        if (!isFinal) u.setSelect({ left, top: 0, width: right - left, height: u.over.clientHeight }, false);
+        else {
+          u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+          if (finished && right > left) place.look([timeAt(left), timeAt(right)]);
+        }
+      },
+      zoom: (factor, x) => place.look(zoomed(place.view(), factor, timeAt(x))),
+      pan(dx) {
+        const [low, high] = place.view();
+        const shift = (-dx * (high - low)) / Math.max(u.over.clientWidth, 1);
+        place.look([low + shift, high + shift]);
+      },
+      reset: () => place.look(null),
+      step: place.step,
+      end: place.end,
+    });
+    return chart;
+  }
+
+  // ---- One channel against another ----
+
+  function phase(place) {
+    const { samples, spec, box } = place;
+    const exponents = {};
+    let chart = null;
+    let [xs, ys] = [[], []];
+    let zoom = null; // {x: [low, high], y: [low, high]}
+    const scaleX = () => samples.scale(spec.x);
+    const whole = () => ({
+      x: rangeOf(...limits(xs), scaleX()),
+      y: rangeOf(...ys.reduce(([low, high], column) => {
+        const [a, b] = limits(column);
+        return [Math.min(low, a), Math.max(high, b)];
+      }, [Infinity, -Infinity]), scaleOf(place, spec.y)),
+    });
+    let shown = whole();
+
+    function path(self, series) {
+      const column = ys[series - 1];
+      const line = new Path2D();
+      const { left, top, width, height } = self.bbox;
+      const [kx, ky] = [width / (shown.x[1] - shown.x[0]), height / (shown.y[1] - shown.y[0])];
+      let open = false;
+      for (let i = 0; i < column.length; i += 1) {
+        const x = left + kx * (xs[i] - shown.x[0]);
+        const y = top + height - ky * (column[i] - shown.y[0]);
+        if (!Number.isFinite(x + y)) open = false;
+        else if (open) line.lineTo(x, y);
+        else {
+          line.moveTo(x, y);
+          open = true;
+        }
+      }
+      return { stroke: line, fill: null, clip: null, band: null, gaps: null, flags: 1 };
+    }
+
+    const unit = place.channel(spec.y[0]).unit;
+    const nameOf = (key) => place.channel(key).label;
+    const u = new uPlot({
+      mode: 2,
+      width: Math.max(box.clientWidth, 120),
+      height: HEIGHT.phase,
+      padding: [20, 22, 0, 0],
+      legend: { show: false },
+      scales: { x: { time: false, range: () => shown.x }, y0: { range: () => shown.y } },
+      axes: [
+        { ...axis(place, "x", 2, exponents, place.channel(spec.x).unit), label: nameOf(spec.x), labelSize: 18, labelFont: FONT },
+        axis(place, "y0", 3, exponents),
+      ],
+      series: [{}, ...spec.y.map((key) => ({
+        facets: [{ scale: "x", auto: true }, { scale: "y0", auto: true }],
+        stroke: () => place.color(key),
+        dash: place.dash(key),
+        width: 1.4,
+        paths: path,
+      }))],
+      cursor: { show: false },
+      hooks: {
+        draw: [
+          (self) => corner(self, place,
+            [spec.y.length === 1 ? nameOf(spec.y[0]) : "", numbers.axisUnit(unit, exponents.y0 ?? 0)].filter(Boolean).join(", "), false),
+          () => chart?.mark(),
+        ],
+      },
+    }, [null, ...spec.y.map(() => [[], []])], box);
+    const dots = spec.y.map((key) => ({ key, mark: child(u.over, "plot-dot"), hover: child(u.over, "plot-dot plot-dot-hover") }));
+
+    const across = () => u.over.clientWidth / (shown.x[1] - shown.x[0]);
+    const down = () => u.over.clientHeight / (shown.y[1] - shown.y[0]);
+    const pixel = (x, y) => [(x - shown.x[0]) * across(), (shown.y[1] - y) * down()];
+    const value = (left, top) => [shown.x[0] + left / across(), shown.y[1] - top / down()];
+
+    const current = () => { [xs, ...ys] = samples.columns([spec.x, ...spec.y]); };
+
+    function putDots(name, t) {
+      current(); // a live run goes on between two drawings
+      dots.forEach((dot, k) => {
+        const [left, top] = t === null || !xs.length ? [NaN, NaN]
+          : pixel(samples.valueAt(xs, t), samples.valueAt(ys[k], t));
+        const inside = left >= 0 && top >= 0 && left <= u.over.clientWidth && top <= u.over.clientHeight;
+        dot[name].hidden = !inside;
+        if (inside) dot[name].style.transform = `translate(${left}px, ${top}px)`;
+        dot[name].style.background = place.color(dot.key);
+      });
+    }
+
+    // The time at which the curves come nearest to a place; of several passes the one next to the mark.
+    function nearestTime(left, top) {
+      current();
+      const [times, now] = [samples.times(), place.mark()];
+      const [kx, ky] = [across(), down()];
+      const [x, y] = value(left, top);
+      const far = (i, k) => Math.hypot((xs[i] - x) * kx, (ys[k][i] - y) * ky);
+      let [least, best] = [Infinity, null];
+      for (let i = 0; i < times.length; i += 1) {
+        for (let k = 0; k < ys.length; k += 1) if (far(i, k) < least) least = far(i, k);
+      }
+      for (let i = 0; i < times.length; i += 1) {
+        for (let k = 0; k < ys.length; k += 1) {
+          if (far(i, k) > least + NEAR) continue;
+          if (best === null || Math.abs(times[i] - now) < Math.abs(times[best] - now)) best = i;
+        }
+      }
+      return best === null ? null : times[best];
+    }
+
+    chart = {
+      refresh() {
+        current();
+        shown = zoom ?? whole();
+        u.setData([null, ...ys.map((column) => [xs, column])], true);
+        chart.mark();
+      },
+      mark: () => putDots("mark", place.mark()),
+      hover: (t) => putDots("hover", t),
+      resize() {
+        u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT.phase });
+      },
+      canvas: () => u.ctx.canvas,
+      destroy: () => u.destroy(),
+    };
+    function look(next) {
+      zoom = next;
+      chart.refresh();
+    }
+    const seek = (left, top) => {
+      const t = nearestTime(left, top);
+      if (t !== null) place.seek(t);
+    };
+    plotGestures(u.over, box, {
+      isMark: (x, y) => !dots[0].mark.hidden && dots.some((_, k) => {
+        const [left, top] = pixel(samples.valueAt(xs, place.mark()), samples.valueAt(ys[k], place.mark()));
+        return Math.hypot(x - left, y - top) <= GRAB;
+      }),
+      hover: (x, y) => place.hover(nearestTime(x, y)),
+      leave: () => place.hover(null),
+      seek,
+      select(x0, y0, x1, y1, isFinal, finished = true) {
+        const [left, right] = [Math.min(x0, x1), Math.max(x0, x1)];
+        const [top, bottom] = [Math.min(y0, y1), Math.max(y0, y1)];
+        if (!isFinal) u.setSelect({ left, top, width: right - left, height: bottom - top }, false);
+        else {
+          u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+          const [[a, d], [b, c]] = [value(left, top), value(right, bottom)];
+          if (finished && b > a && d > c) look({ x: [a, b], y: [c, d] });
+        }
+      },
+      zoom(factor, left, top) {
+        const [x, y] = value(left, top);
+        look({ x: zoomed(shown.x, factor, x), y: zoomed(shown.y, factor, y) });
+      },
+      pan(dx, dy) {
+        const [sx, sy] = [-dx / across(), dy / down()];
+        look({ x: shown.x.map((v) => v + sx), y: shown.y.map((v) => v + sy) });
+      },
+      reset: () => look(null),
+      step: place.step,
+      end: place.end,
+    });
+    return chart;
+  }
+
+  return { time, phase, rangeOf };
+})();

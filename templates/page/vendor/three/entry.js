@@ -1,0 +1,34 @@
+// What the page uses of three.js.
+
+export { WebGLRenderer } from "three/src/renderers/WebGLRenderer.js";
+export { Scene } from "three/src/scenes/Scene.js";
+export { OrthographicCamera } from "three/src/cameras/OrthographicCamera.js";
+export { Mesh } from "three/src/objects/Mesh.js";
+export { Group } from "three/src/objects/Group.js";
+export { LineSegments } from "three/src/objects/LineSegments.js";
+export { InstancedMesh } from "three/src/objects/InstancedMesh.js";
+export { InterleavedBuffer } from "three/src/core/InterleavedBuffer.js";
+export { InterleavedBufferAttribute } from "three/src/core/InterleavedBufferAttribute.js";
+export { Object3D } from "three/src/core/Object3D.js";
+export { BufferGeometry } from "three/src/core/BufferGeometry.js";
+export { BufferAttribute, Float32BufferAttribute } from "three/src/core/BufferAttribute.js";
+export { BoxGeometry } from "three/src/geometries/BoxGeometry.js";
+export { SphereGeometry } from "three/src/geometries/SphereGeometry.js";
+export { CylinderGeometry } from "three/src/geometries/CylinderGeometry.js";
+export { ConeGeometry } from "three/src/geometries/ConeGeometry.js";
+export { CapsuleGeometry } from "three/src/geometries/CapsuleGeometry.js";
+export { CircleGeometry } from "three/src/geometries/CircleGeometry.js";
+export { ShapeUtils } from "three/src/extras/ShapeUtils.js";
+export { EdgesGeometry } from "three/src/geometries/EdgesGeometry.js";
+export { MeshLambertMaterial } from "three/src/materials/MeshLambertMaterial.js";
+export { MeshBasicMaterial } from "three/src/materials/MeshBasicMaterial.js";
+export { ShaderMaterial } from "three/src/materials/ShaderMaterial.js";
+export { LineBasicMaterial } from "three/src/materials/LineBasicMaterial.js";
+export { DirectionalLight } from "three/src/lights/DirectionalLight.js";
+export { AmbientLight } from "three/src/lights/AmbientLight.js";
+export { Raycaster } from "three/src/core/Raycaster.js";
+export { Color } from "three/src/math/Color.js";
+export { Matrix4 } from "three/src/math/Matrix4.js";
+export { Vector2 } from "three/src/math/Vector2.js";
+export { Vector3 } from "three/src/math/Vector3.js";
+export { DoubleSide, DynamicDrawUsage } from "three/src/constants.js";
