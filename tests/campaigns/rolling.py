@@ -41,8 +41,7 @@ def long_run(name: str, seconds: float) -> None:
     words = f"energy {drift(energy):.1e}, gap {gap:.1e} m, slip {slip:.1e} m/s"
     if name == "rattleback":
         spins = found.y[:, made.STATES.index("stone_wz")]
-        turns = int((np.diff(np.sign(spins)) != 0).sum())
-        words += f", turned round {turns} times"
+        words += f", spin from {spins.min():.2f} to {spins.max():.2f} rad/s"
     print(f"{name}, {found.t[-1]:g} s: {words}", flush=True)
 
 
