@@ -17,7 +17,7 @@ def joint_axis(model: Model, body: Body) -> tuple[Formula, ...] | None:
     """
     joint = body.joint
     primitives = joint.primitives(model.dimensions)
-    if isinstance(joint, Free) or joint.type == "planar" or not primitives:
+    if isinstance(joint, Free) or joint.type in ("planar", "particle") or not primitives:
         return None
     first = primitives[0]
     if first.kind == "spherical" or (model.dimensions == 2 and first.kind == "revolute"):

@@ -199,7 +199,7 @@ def _supports(model: Model, size: float) -> list[Support]:
     found = []
     for k, (_, body) in enumerate(_holders(model)):
         joint = body.joint
-        if isinstance(joint, Free) or joint.type == "planar":
+        if isinstance(joint, Free) or joint.type in ("planar", "particle"):
             continue
         radius = Constant(SYMBOL * size)
         if joint.type in ("prismatic", "cylindrical"):

@@ -5,7 +5,7 @@ const makeMarks = (scene, paper, mixed) => {
   const { joints, bodies } = DATA.drawing;
   const MANY = 30; // more marks than these are smaller until the view comes closer
   const SIDES = { revolute: 24, spherical: 24, universal: 24, prismatic: 4, cylindrical: 4, fixed: 3 };
-  const shown = joints.map((joint, k) => [joint, k]).filter(([{ type }]) => type !== "free" && type !== "planar");
+  const shown = joints.map((joint, k) => [joint, k]).filter(([{ type }]) => !["free", "planar", "particle"].includes(type));
   const LAYER = 70;
 
   function instances(sides, count, layer) {
