@@ -1,7 +1,7 @@
 """What a picture shows of each effect of a model."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
 
@@ -24,6 +24,7 @@ from eomgen.scene.effects import (
     JointSpring,
     JointStop,
     Motor,
+    Pairwise,
     PointGravity,
     Spring,
 )
@@ -100,6 +101,8 @@ def _of_effect(effect: Effect, names: _Names) -> Iterator[Element]:
     match effect:
         case Spring():
             yield _link(effect, names)
+        case Pairwise():
+            yield from _between_all(effect, names)
         case BodyContact():
             yield from _contact(effect, names)
         case JointSpring() | JointStop() | JointFriction():
@@ -153,6 +156,15 @@ def _link(spring: Spring, names: _Names) -> Link:
         None if kind == "damper" else spring.rest_length,
         Constant(COIL * names.size),
     )
+
+
+def _between_all(effect: Pairwise, names: _Names) -> Iterator[Link]:
+    """A spring between every two bodies; a line, as a rope, for other attractions."""
+    for one, two in effect.pairs(tuple(names.bodies)[1:]):
+        link = _link(effect.spring(names.model.dimensions, one, two), names)
+        if effect.stiffness is None:
+            link = replace(link, kind="rope", rest=ZERO)
+        yield link
 
 
 def _contact(contact: BodyContact, names: _Names) -> Iterator[Element]:

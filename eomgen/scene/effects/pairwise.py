@@ -1,6 +1,6 @@
 """Forces between every two bodies of a group."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -80,7 +80,7 @@ gravitation = 6.7e-11
         """Equal and opposite forces on every two bodies: one load on each."""
         zeros = (mechanism.number(0.0),) * mechanism.dimensions
         totals: dict[str, Vector] = {}
-        for first, second in self._pairs(mechanism):
+        for first, second in self.pairs(mechanism.bodies):
             pull = self._pull(mechanism, first, second)
             for body, force in ((first, pull), (second, negative(pull))):
                 before = totals.get(body)
@@ -95,13 +95,15 @@ gravitation = 6.7e-11
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """The sum over all pairs, J; 0 for a law."""
         total = mechanism.number(0.0)
-        for first, second in self._pairs(mechanism):
+        for first, second in self.pairs(mechanism.bodies):
             if self.gravitation is not None:
                 _, softened = self._apart(mechanism, first, second)
                 strength = self._strength(mechanism, first, second)
                 total = total - strength / mechanism.call("sqrt", softened)
             elif self.stiffness is not None:
-                total = total + self._spring(mechanism, first, second).potential_energy(mechanism)
+                total = total + self.spring(mechanism.dimensions, first, second).potential_energy(
+                    mechanism
+                )
         return total
 
     def keeps_energy(
@@ -110,9 +112,9 @@ gravitation = 6.7e-11
         """True without damping and without a law."""
         return self.law is None and are_zero(values, self.damping)
 
-    def _pairs(self, mechanism: Mechanism) -> Iterator[tuple[str, str]]:
-        group = self.bodies if isinstance(self.bodies, tuple) else mechanism.bodies
-        yield from combinations(group, 2)
+    def pairs(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
+        """Every two of the group, in a mechanism with these bodies."""
+        yield from combinations(self.bodies if isinstance(self.bodies, tuple) else bodies, 2)
 
     def _pull(self, mechanism: Mechanism, first: str, second: str) -> Vector:
         """The force on the first body, world axes, N."""
@@ -120,7 +122,7 @@ gravitation = 6.7e-11
             d, softened = self._apart(mechanism, first, second)
             cubed = softened * mechanism.call("sqrt", softened)
             return scale(self._strength(mechanism, first, second) / cubed, d)
-        spring = self._spring(mechanism, first, second)
+        spring = self.spring(mechanism.dimensions, first, second)
         if self.law is None:
             return next(iter(spring.loads(mechanism))).force
         line = line_of(spring, mechanism)
@@ -140,9 +142,9 @@ gravitation = 6.7e-11
         softening = mechanism.value(self.softening)
         return d, dot(d, d) + softening * softening
 
-    def _spring(self, mechanism: Mechanism, first: str, second: str) -> Spring:
+    def spring(self, dimensions: int, first: str, second: str) -> Spring:
         """The spring between two bodies; of a law its line alone is used."""
-        centre = (ZERO,) * mechanism.dimensions
+        centre = (ZERO,) * dimensions
         return Spring.model_construct(
             type="spring",
             name=self.name,
