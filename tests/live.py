@@ -9,7 +9,7 @@ from shutil import which
 from typing import Any
 
 PAGE = Path(__file__).parent.parent / "templates" / "page"
-ENGINE = ("methods.js", "adaptive.js", "contacts.js", "engine.js")
+ENGINE = ("methods.js", "adaptive.js", "contacts.js", "closure.js", "engine.js")
 NODE = which("node")
 
 

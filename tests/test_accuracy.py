@@ -476,7 +476,7 @@ def test_the_figure_has_a_line_a_method_and_every_run(tmp_path: Path) -> None:
         assert (work.seconds, error) in drawn
     assert main_axes.get_xscale() == main_axes.get_yscale() == "log"
     assert main_axes.get_ylim()[1] == TOP and main_axes.get_ylim()[0] < found.floors[0]
-    assert any("not told apart" in text.get_text() for text in main_axes.texts)
+    assert any("not resolved" in text.get_text() for text in main_axes.texts)
     assert {line.get_label() for line in energy.get_lines()} >= set(methods)
     assert evaluations.get_xlabel() == "derivatives evaluated"
     (legend,) = figure.legends
@@ -485,4 +485,4 @@ def test_the_figure_has_a_line_a_method_and_every_run(tmp_path: Path) -> None:
     redundant = draw(Diagram("x", "about", 1e-20, "", True), works)
     titles = [axes.get_title(loc="left") for axes in redundant.axes]
     assert titles[-1] == "Gap in the joints, m" and len(titles) == 3
-    assert not any("not told apart" in text.get_text() for text in redundant.axes[0].texts)
+    assert not any("not resolved" in text.get_text() for text in redundant.axes[0].texts)

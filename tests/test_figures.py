@@ -342,9 +342,9 @@ def test_the_commands(
     assert main("plot pendulum --t-end 3 --poincare theta_dot --at theta=4 -o p.svg".split()) == 0
     assert main("film out/pendulum.npz --size 60x60 --fps 10 -o out/f.gif".split()) == 0
     assert dict(matplotlib.rcParams) == before
-    told = capsys.readouterr().out
-    assert "a figure of 85 x 64 mm" in told and "6 frames of 60 x 60 pixels" in told
-    assert "crossing" in told and "its error is about" in told
+    printed = capsys.readouterr().out
+    assert "a figure of 85 x 64 mm" in printed and "6 frames of 60 x 60 pixels" in printed
+    assert "crossing" in printed and "its error is about" in printed
     assert Path("out/pendulum_plot.png").exists() and Path("p.svg").exists()
     for line, said in (
         ("plot out/pendulum.npz --t-end 3", "are for a scene"),

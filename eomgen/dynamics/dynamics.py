@@ -12,10 +12,11 @@ accelerations, without gyroscopic torques, and joint forces follow from the same
 energies and poses still use the velocities. Energy is not conserved then.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 from eomgen.dynamics import forces as fc
+from eomgen.dynamics.applied import AppliedLoads
 from eomgen.dynamics.articulated import Pivots, articulate, respond
 from eomgen.dynamics.composite import (
     Entries,
@@ -28,8 +29,7 @@ from eomgen.dynamics.composite import (
 from eomgen.dynamics.embedding import Embedded
 from eomgen.dynamics.kinematics import TreeKinematics
 from eomgen.dynamics.linkage import make_linkage
-from eomgen.dynamics.loads import power_of
-from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.dynamics.mechanism_state import Values
 from eomgen.dynamics.motion import (
     Acceleration,
     Twist,
@@ -41,19 +41,17 @@ from eomgen.dynamics.null_space import NullSpace
 from eomgen.dynamics.orthogonal import Elimination
 from eomgen.dynamics.range_space import Forward, RangeSpace, Response
 from eomgen.dynamics.solids import Solid, centres, ranked, solids
-from eomgen.dynamics.vectors import Vec, no_matrix, sub, torque_in_space, zeros
+from eomgen.dynamics.vectors import no_matrix, sub, zeros
 from eomgen.routes import ROUTES
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar
-from eomgen.scene.effects import Driven, Effect, Gravity
-from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
+from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import WORLD
 
 __all__ = ["Dynamics", "Forward", "Values"]
 
 
-class Dynamics(MechanismState):
+class Dynamics(AppliedLoads):
     """A model at given values. Each property is computed once, when it is first used."""
 
     def accelerating(
@@ -114,47 +112,6 @@ class Dynamics(MechanismState):
         return twists, accelerations(self.in_world, twists, v, whole, base, self.scalars)
 
     # Forces.
-
-    @cached_property
-    def loads(self) -> tuple[tuple[fc.PointForce, ...], tuple[JointLoad, ...]]:
-        """The loads of all effects on bodies and on joints. Uniform gravity is not among them: it
-        is an acceleration of the world.
-        """
-        points, joints = [], []
-        for effect in self.model.effects:
-            if not isinstance(effect, Gravity) or effect.except_bodies:
-                for load in effect.loads(self):
-                    if isinstance(load, JointLoad):
-                        joints.append(load)
-                    elif load.body != WORLD:
-                        points.append(self.point_force(load))
-        return tuple(points), tuple(joints)
-
-    def point_force(self, load: Load) -> fc.PointForce:
-        """A load as a force on a body, in space."""
-
-        def in_space(force: Vector, torque: Vector) -> tuple[Vec, Vec]:
-            return self._in_space(force), torque_in_space(torque, self.scalars)
-
-        at, own = self._in_space(load.at), load.in_body and in_space(*load.in_body)
-        return fc.PointForce(self.index[load.body], at, *in_space(load.force, load.torque), own)
-
-    @cached_property
-    def wrenches(self) -> tuple[fc.Wrench, ...]:
-        """The sum of the loads on each frame, about its origin."""
-        return fc.wrenches(self.linkage, self.kinematics, self.loads[0], self.scalars)
-
-    @cached_property
-    def motors(self) -> list[Scalar]:
-        """The sum of the joint loads on each velocity, driven ones too. Loads on a locked joint do
-        no work.
-        """
-        forces = [self.scalars.number(0.0)] * self.moved
-        for load in self.loads[1]:
-            i = self.joint_indices[load.joint].v[load.coordinate]
-            if i < self.moved:
-                forces[i] = forces[i] + load.force
-        return forces
 
     @cached_property
     def _applied(self) -> list[Scalar]:
@@ -395,31 +352,9 @@ class Dynamics(MechanismState):
         """Kinetic energy of all bodies and rotors, J."""
         return kinetic_energy(self.kinematics, self._solids, self.twists, self.v, self.scalars)
 
-    @cached_property
-    def potential_energy(self) -> Scalar:
-        """Potential energy of all effects, J."""
-        energy = self.scalars.number(0.0)
-        for effect in self.model.effects:
-            energy = energy + effect.potential_energy(self)
-        return energy
-
     def power(self, effect: Effect) -> Scalar:
         """The power of an effect's loads, W, of gravity and springs too."""
         if isinstance(effect, Driven):
             i = [c.by for c in self.model.driven].index(effect.name)
             return self.driving_forces[i] * self.rate(effect.joint)
         return self.power_of(effect.loads(self))
-
-    def power_of(self, loads: Iterable[Load | JointLoad]) -> Scalar:
-        """The power of loads, W; for unit loads it is their speed, m/s or rad/s."""
-        return power_of(self, loads)
-
-    @cached_property
-    def contacts(self) -> tuple[Contact, ...]:
-        """The rigid contacts of all effects, in order."""
-        return tuple(contact for effect in self.model.effects for contact in effect.contacts(self))
-
-    @cached_property
-    def state_rates(self) -> list[Scalar]:
-        """Time derivatives of the extra states, in order."""
-        return [rate for effect in self.model.effects for rate in effect.rates(self)]

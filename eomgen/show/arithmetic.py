@@ -40,7 +40,7 @@ def save_figure(found: Arithmetic, path: Path, *, force: bool = False) -> None:
         panels[0].set_yticks(range(len(solvers)), [_label(solver) for solver in solvers])
         panels[0].set_ylim(len(solvers) - 0.4, -0.6)  # shared: the first solver is on top
         figure.suptitle(
-            f"{plain(found.name)}: how exact the accelerations are, and what they take",
+            f"{plain(found.name)}: accuracy and cost of the accelerations",
             x=0.01,
             ha="left",
         )

@@ -37,8 +37,8 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Draw
     names = reading_names(model)
     found = [
         (start, direction, read(label, names), style)
-        for told in effects
-        for start, direction, label, style in _loads_on(pose, shape, told)
+        for derived in effects
+        for start, direction, label, style in _loads_on(pose, shape, derived)
     ]
     panel = PANEL if len(found) + len(shape.joints) < CROWDED else 1.45 * PANEL
     room = PANEL_BODY + 2 * MARGIN + 0.6 * (panel - PANEL)
@@ -153,32 +153,34 @@ def _unknown(joint: str, sign: int) -> Point:
 
 
 def _loads_on(
-    pose: Pose, shape: Shape, told: DerivedEffect
+    pose: Pose, shape: Shape, derived: DerivedEffect
 ) -> Iterator[tuple[Point, Point | None, Expr, str]]:
     """Start, direction (None for a torque), name and style of each load of an effect on a body."""
     model, body = pose.model, shape.body
-    if isinstance(told.effect, Gravity) and told.kept:
-        weight = next((x for x in told.loads if isinstance(x, Load) and x.body == body.name), None)
+    if isinstance(derived.effect, Gravity) and derived.kept:
+        weight = next(
+            (x for x in derived.loads if isinstance(x, Load) and x.body == body.name), None
+        )
         if weight is not None and any(weight.force):
             size = next(f for f in weight.force if f != 0)
             down = pose.flat((*(0.0,) * (model.dimensions - 1), -1.0))
             brief = len(size.args) <= 3  # -1, mass, g
-            name = sp.Symbol(f"f_{told.effect.name},{body.name}")
+            name = sp.Symbol(f"f_{derived.effect.name},{body.name}")
             yield shape.centre, down, -size if brief else name, "force"
         return
-    for load in told.loads:
+    for load in derived.loads:
         if isinstance(load, Load):
             if load.body == body.name:
-                yield from _one_load(pose, load, told)
+                yield from _one_load(pose, load, derived)
         elif load.joint == body.joint.name and shape.own is not None:
-            yield shape.own, _slide(pose, load), _joint_name(load, told), "force"
+            yield shape.own, _slide(pose, load), _joint_name(load, derived), "force"
         else:
             for name, p in shape.others:
                 if name == load.joint:
                     along = _slide(pose, load)
                     back = None if along is None else (-along[0], -along[1])
-                    yield p, back, -_joint_name(load, told), "force"
-    for contact in told.contacts:
+                    yield p, back, -_joint_name(load, derived), "force"
+    for contact in derived.contacts:
         for side in contact.normal:
             if isinstance(side, Load) and side.body == body.name:
                 start = pose.point(body.name, numbers(model, side.at))
@@ -202,23 +204,23 @@ def _slide(pose: Pose, load: JointLoad) -> Point | None:
 
 
 def _one_load(
-    pose: Pose, load: Load, told: DerivedEffect
+    pose: Pose, load: Load, derived: DerivedEffect
 ) -> Iterator[tuple[Point, Point | None, Expr, str]]:
     start = pose.point(load.body, numbers(pose.model, load.at))
     if any(load.force):
-        name = _vector_name(load.force) or f"f_{told.effect.name},{load.body}"
+        name = _vector_name(load.force) or f"f_{derived.effect.name},{load.body}"
         yield start, _direction(pose, load.force), sp.Symbol(name), "force"
     if any(load.torque):
-        name = _vector_name(load.torque) or f"t_{told.effect.name},{load.body}"
+        name = _vector_name(load.torque) or f"t_{derived.effect.name},{load.body}"
         yield start, None, sp.Symbol(name), "force"
 
 
-def _joint_name(load: JointLoad, told: DerivedEffect) -> Expr:
+def _joint_name(load: JointLoad, derived: DerivedEffect) -> Expr:
     """The name of a load at a joint; the components of a torque at a ball share one."""
-    several = [x for x in told.loads if isinstance(x, JointLoad) and x.joint == load.joint]
+    several = [x for x in derived.loads if isinstance(x, JointLoad) and x.joint == load.joint]
     if load.force.is_Symbol and len(several) == 1:
         return load.force
-    return sp.Symbol(f"tau_{told.effect.name},{load.joint}")
+    return sp.Symbol(f"tau_{derived.effect.name},{load.joint}")
 
 
 def _vector_name(parts: Sequence[Expr]) -> str:

@@ -188,7 +188,7 @@ def thinned(motion: Motion, most: int = MOST_ROWS) -> Motion:
     table = np.column_stack([part.reshape(len(motion.t), -1) for part in numbers])
     rows = np.flatnonzero(np.isfinite(table).all(axis=1))
     if not len(rows):
-        raise RunError(f"{motion.name}: the run holds no finite sample, nothing can be shown")
+        raise RunError(f"{motion.name}: the run holds no finite sample, so nothing can be shown")
     if len(rows) > most:
         rows = rows[np.linspace(0, len(rows) - 1, most).round().astype(int)]
     return replace(

@@ -40,7 +40,7 @@ def outline(shape: Shape) -> Array:
             along = float(np.arctan2(*(end - start)[::-1]))
             cap = number(shape.width) / 2 * _arc(along - np.pi / 2, along + np.pi / 2, 24)
             return np.concatenate([end + cap, start - cap])
-    raise AssertionError(f"{shape.type} is no shape of the plane")
+    raise AssertionError(f"{shape.type} is not a shape of the plane")
 
 
 def _center(shape: Box | Disc) -> Array:

@@ -113,7 +113,7 @@ def _run(motion: Motion, y: Array, smooth: bool) -> dict[str, Any]:
     """The finite rows of a run, fewer if there are many."""
     finite = np.flatnonzero(np.isfinite(y).all(axis=1) & np.isfinite(motion.t))
     if not len(finite):
-        raise RunError(f"{motion.name}: the run holds no finite sample, nothing can be shown")
+        raise RunError(f"{motion.name}: the run holds no finite sample, so nothing can be shown")
     width = max(1, y.shape[1])
     fits = min(MOST_ROWS, MOST_NUMBERS // width)
     single = fits < min(ENOUGH_ROWS, len(finite))

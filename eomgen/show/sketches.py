@@ -105,9 +105,9 @@ class Pose:
 
 def _loads_at(body: str, effects: Sequence[DerivedEffect]) -> Iterator[Load]:
     """The loads on a body, and those of unit impulses of its rigid contacts."""
-    for told in effects:
-        contacts = (load for contact in told.contacts for load in contact.normal)
-        for load in (*told.loads, *contacts):
+    for derived in effects:
+        contacts = (load for contact in derived.contacts for load in contact.normal)
+        for load in (*derived.loads, *contacts):
             if isinstance(load, Load) and load.body == body:
                 yield load
 

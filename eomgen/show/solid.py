@@ -90,7 +90,7 @@ def mesh(shape: Shape, grain: float) -> Mesh:
             return _around(shape, profile, radius, grain)
         case Rod():
             return _rod(shape, grain)
-    raise AssertionError(f"{shape.type} is no shape of space")
+    raise AssertionError(f"{shape.type} is not a shape of space")
 
 
 @dataclass(frozen=True)

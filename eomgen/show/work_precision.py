@@ -90,7 +90,7 @@ def draw(diagram: Diagram, works: Sequence[Work]) -> Figure:
     if diagram.joints:
         panels.append(partial(_draw_drift, works, "Gap in the joints, m", lambda w: w.joint_gap))
     if any(work.quaternion_defect > 0 for work in works):
-        title = "Length of quaternions off 1 before each scaling"
+        title = "Deviation of quaternions from length 1 before scaling"
         panels.append(partial(_draw_drift, works, title, lambda w: w.quaternion_defect))
     with style():
         figure = Figure(figsize=(13.0, 7.2 if len(panels) < 3 else 8.6))
@@ -110,7 +110,7 @@ def draw(diagram: Diagram, works: Sequence[Work]) -> Figure:
         main = figure.add_subplot(grid[:, 0])
         _draw_errors(main, diagram, works, lambda work: work.seconds, spread=True)
         main.set_xlabel("time of a run, s: the least, and beside it to the median of repeated runs")
-        main.set_title("Error over the whole run, in parts of the motion's own scale")
+        main.set_title("Error over the whole run, relative to the motion's own scale")
         for row, panel in enumerate(panels):
             panel(figure.add_subplot(grid[row, 1]))
         _draw_legend(figure, works, top)
@@ -210,7 +210,7 @@ def _draw_errors(
     if diagram.floor > low:
         axes.axhspan(low, diagram.floor, color=FAINT, alpha=0.16, linewidth=0)
     if diagram.floor > low and words:
-        note = "not told apart: below 100 × the reference's error"
+        note = "not resolved: below 100 × the reference's error"
         text = beside(0.01, math.sqrt(low * diagram.floor), note, color=FAINT)
         text.set_in_layout(False)
     axes.set_ylim(low, TOP)

@@ -56,28 +56,7 @@ const makeEngine = (mechanism, data) => {
     return y;
   }
 
-  // Onto the constraints of loops: Newton's method for the coordinates, then the velocities.
-  function projected(t, y) {
-    unit(y);
-    if (!mechanism.projectPosition) return y;
-    const given = (z) => [t, z, engine.p, engine.u];
-    const violation = (z) => Math.max(...mechanism.constraintResiduals(...given(z)).map(Math.abs));
-    let off = violation(y);
-    for (let n = 0; n < 12 && off > 1e-15; n += 1) {
-      const there = y.slice();
-      mechanism.projectPosition(...given(y)).forEach((x, i) => (there[positions[i]] = x));
-      const left = violation(unit(there));
-      if (!(left < off)) break; // rounding, or no way towards the constraints
-      y.set(there);
-      off = left;
-    }
-    if (!(off <= 1e-6)) throw new Error("the loops do not close here: take a smaller step or other lengths");
-    if (Math.min(...mechanism.constraintMargins(...given(y))) < 1e-9) {
-      throw new Error("the mechanism is singular here, as at a dead point: take another start");
-    }
-    mechanism.projectVelocity(...given(y)).forEach((x, i) => (y[others[i]] = x));
-    return y;
-  }
+  const projected = (t, y) => closure.onto(mechanism, { positions, others, unit }, t, y, engine.p, engine.u);
 
   function makeLaw() {
     const table = mechanism.contacts ?? [];

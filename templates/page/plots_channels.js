@@ -3,7 +3,7 @@
 //   label, group, unit   what the reader sees
 //   family  the function of the mechanism whose result it is read from
 //   of      (result) -> value
-//   kin     indices of the entries of the result of the same kind: their size tells what is rounding
+//   kin     indices of the entries of the result of the same kind: their size shows what is rounding
 //   change  whether the value at the start of the run is subtracted
 //   color   a CSS colour, if it has one of its own
 

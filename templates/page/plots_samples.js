@@ -32,7 +32,7 @@ const makeSamples = (channels, { span = Infinity, spacing = 0, most = 2 ** 23 } 
     sizes.clear();
   };
 
-  // A run that is known whole: t (n), y (n ny). `held` tells for each sample whether a contact is held;
+  // A run that is known whole: t (n), y (n ny). `held` says for each sample whether a contact is held;
   // without it one may be wherever there are contacts. `single`: y was rounded to 24 bits.
   samples.set = (t, y, p = [], u = [], held = null, single = false) => {
     samples.clear();

@@ -4,10 +4,10 @@
 const makeRecorder = (data, channels, { megabytes = 64 } = {}) => {
   const samples = makeSamples(channels, { most: megabytes * 131072 });
   const recorder = { recording: false, samples, onChange: null };
-  const TELLING = 200; // ms between calls of onChange while it records
-  let told = 0;
-  function tell() {
-    told = performance.now();
+  const INTERVAL = 200; // ms between calls of onChange while it records
+  let reported = 0;
+  function report() {
+    reported = performance.now();
     recorder.onChange?.(recorder);
   }
 
@@ -21,11 +21,11 @@ const makeRecorder = (data, channels, { megabytes = 64 } = {}) => {
   recorder.start = () => {
     samples.clear();
     recorder.recording = true;
-    tell();
+    report();
   };
   recorder.stop = () => {
     recorder.recording = false;
-    tell();
+    report();
   };
 
   // One step. A run that begins again, or a full memory, ends the record.
@@ -34,7 +34,7 @@ const makeRecorder = (data, channels, { megabytes = 64 } = {}) => {
     const began = samples.end && t < samples.times()[samples.end - 1];
     if (!began) samples.append(t, y, p, u, held);
     if (began || samples.full) recorder.stop();
-    else if (performance.now() - told > TELLING) tell();
+    else if (performance.now() - reported > INTERVAL) report();
   };
 
   const columnName = (key) => (channels.states.includes(key) ? key : key.replaceAll(".", "_"));
