@@ -713,3 +713,18 @@ def test_three_bodies_on_a_triangle() -> None:
         assert found == pytest.approx(expected.derivative(0.0, state), abs=1e-12)
     energies = [made.potential_energy(0.0, state) for made in (expected, others[0])]
     assert energies[0] == pytest.approx(energies[1])
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_particle_joint_that_closes_a_loop_keeps_an_attitude(dimensions: int) -> None:
+    """A free body under a force beside its centre of mass then moves as a point."""
+    inertia, force = (0.3, [1.0, 2.0]) if dimensions == 2 else ("[0.3, 0.4, 0.5]", [1.0, 2.0, 3.0])
+    at = [0.3, 0.4, 0.5][:dimensions]
+    push = table("effects", type='"external_force"', name='"push"', body='"b"', at=at, force=force)
+    held = joint("particle", "b", loop="true").replace('"to_b"', '"level"')
+    made = module(scene(dimensions, body("b", 2.0, inertia), joint("free", "b"), held, push))
+    names = ["level_angle"] if dimensions == 2 else [f"level_angle_{i}" for i in (1, 2, 3)]
+    assert list(made.CONSTRAINTS) == names
+    rates = made.derivative(0.0, made.initial_state())[-3 * (dimensions - 1) :]
+    pull = np.array(force) / 2.0 - 9.81 * np.eye(dimensions)[-1]
+    assert rates == pytest.approx([*pull, *[0.0] * (1 if dimensions == 2 else 3)], abs=1e-13)
