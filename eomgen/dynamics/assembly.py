@@ -128,6 +128,7 @@ def assembled(model: Model) -> Model:
     mechanism = Closure.of(model)
     start = np.array(model.initial_q)
     free = _free(model)
+    _check_defined(mechanism, start)
     q = _closed(mechanism, start, free)
     notices = list[str]()
     if q is None and not free.all():
@@ -153,6 +154,18 @@ def assembled(model: Model) -> Model:
     v, more = _speeds(mechanism, q)
     pivots = _pivots(mechanism.jacobian(q), _free(model))
     return replace(model, initial_v=v, pivots=pivots, notices=(*model.notices, *notices, *more))
+
+
+def _check_defined(mechanism: Closure, start: Array) -> None:
+    """Raise `SceneError` if a constraint has no value at the start."""
+    for constraint in mechanism.model.constraints:
+        try:
+            list(constraint.rows(mechanism.dynamics(start)))
+        except (ArithmeticError, ValueError):
+            raise SceneError(
+                f"initial.q: constraint '{constraint.name}' has no direction at this start, as where "
+                "a disc lies flat; give another"
+            ) from None
 
 
 def _size(model: Model) -> float:
