@@ -163,8 +163,8 @@ def _check_defined(mechanism: Closure, start: Array) -> None:
             list(constraint.rows(mechanism.dynamics(start)))
         except (ArithmeticError, ValueError):
             raise SceneError(
-                f"initial.q: constraint '{constraint.name}' has no direction at this start, as where "
-                "a disc lies flat; give another"
+                f"initial.q: constraint '{constraint.name}' has no direction at this start, as "
+                "where a disc lies flat; give another"
             ) from None
 
 
