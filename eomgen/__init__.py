@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
+    from eomgen.api.exhibiting import gallery
     from eomgen.api.generating import generate, load
     from eomgen.api.given import check, read
     from eomgen.api.linearising import linearise
@@ -18,8 +19,9 @@ if TYPE_CHECKING:
     from eomgen.api.simulating import simulate
     from eomgen.api.sweeping import Ensemble, ensemble, grid, sampled
     from eomgen.api.verifying import horizon, verify
+    from eomgen.equations import Derivation
     from eomgen.errors import EomgenError, RunError, SceneError
-    from eomgen.results import Derivation, Module, Run
+    from eomgen.results import Module, Run
     from eomgen.scene.built_in import built_in_names
     from eomgen.scene.schema import Scene
 
@@ -39,6 +41,7 @@ __all__ = [
     "derive",
     "effects",
     "ensemble",
+    "gallery",
     "generate",
     "grid",
     "horizon",
@@ -54,7 +57,9 @@ __all__ = [
 _PLACES = {
     **dict.fromkeys(("check", "read"), "api.given"),
     **dict.fromkeys(("generate", "load"), "api.generating"),
+    "Derivation": "equations",
     "derive": "api.deriving",
+    "gallery": "api.exhibiting",
     "linearise": "api.linearising",
     "load_run": "api.reopening",
     "simulate": "api.simulating",
@@ -62,9 +67,9 @@ _PLACES = {
     **dict.fromkeys(("horizon", "verify"), "api.verifying"),
     **dict.fromkeys(("accuracy", "arithmetic"), "api.accuracy"),
     "effects": "api.effects",
-    **dict.fromkeys(("Derivation", "Module", "Run"), "results"),
+    **dict.fromkeys(("Module", "Run"), "results"),
     **dict.fromkeys(("EomgenError", "RunError", "SceneError"), "errors"),
-    "Scene": "scene.schema",
+    "Scene": "api.given",
     "built_in_names": "scene.built_in",
 }
 

@@ -14,6 +14,7 @@ from eomgen.options import (
     add_film,
     add_folder,
     add_force,
+    add_gallery,
     add_inputs,
     add_parameters,
     add_plot,
@@ -130,6 +131,13 @@ def _parser(
     )
     check = command("check", commands.check, "validate a scene and print its parts")
     check.add_argument("--long", action="store_true", help="do not shorten long lists")
+    check.add_argument(
+        "--assemble", action="store_true", help="print how the start of a mechanism with loops fits"
+    )
+    check.add_argument(
+        "--picture", metavar="FILE", type=path, help="draw the start (png, pdf, svg)"
+    )
+    add_force(check)
     _form(check)
     derive = command("derive", commands.derive, "print the derivation, step by step")
     derive.add_argument(
@@ -155,6 +163,10 @@ def _parser(
     add_plot(command("plot", commands.plot, about, "run"))
     about = "make a film of a run: GIF, or MP4 with ffmpeg"
     add_film(command("film", commands.film, about, "run"))
+    about = (
+        "write a folder of live pages, and one that shows them all with a picture and a sentence"
+    )
+    add_gallery(command("gallery", commands.gallery, about, None))
     about = "run a scene many times, with other parameters, initial states or inputs"
     _sweep(_route(_form(command("sweep", commands.sweep, about))))
     about = "compare the module with an independent solver and 60 digits"

@@ -13,14 +13,14 @@ def add_force(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_folder(parser: argparse.ArgumentParser) -> None:
+def add_folder(parser: argparse.ArgumentParser, default: Path = Path("out")) -> None:
     """The folder of what is written."""
     parser.add_argument(
         "-o",
         "--output",
         metavar="DIR",
         type=path,
-        default=Path("out"),
+        default=default,
         help="output folder",
     )
 
@@ -47,18 +47,57 @@ def add_inputs(parser: argparse.ArgumentParser, *, constant: bool = False) -> No
     )
 
 
-def add_simulation(parser: argparse.ArgumentParser) -> None:
-    """The options of `simulate` and `view`."""
+def add_gallery(parser: argparse.ArgumentParser) -> None:
+    """The options of `gallery`."""
+    parser.add_argument(
+        "--scene", metavar="SCENE", nargs="+", help="files or built-in names (all built-in ones)"
+    )
+    _add_method(parser)
+    parser.add_argument("--t-end", metavar="S", type=float, help="end time (each scene's)")
+    _add_backend(parser)
+    _add_rows(parser)
+    _add_live(parser)
+    add_folder(parser, Path("gallery"))
+    add_force(parser)
+
+
+def _add_method(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
     parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
+    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
+    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
+    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
+
+
+def _add_backend(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--backend",
+        metavar="NAME",
+        default="auto",
+        help="auto: compute in compiled C code if that pays; numpy: never; c: always",
+    )
+
+
+def _add_rows(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
+
+
+def _add_live(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--live",
+        action=argparse.BooleanOptionalAction,
+        help="a page that integrates by itself, or only replays (live where it can be)",
+    )
+
+
+def add_simulation(parser: argparse.ArgumentParser) -> None:
+    """The options of `simulate` and `view`."""
+    _add_method(parser)
     parser.add_argument(
         "--unstable",
         action="store_true",
         help="allow steps of an explicit method that are too long for stability",
     )
-    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
-    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
-    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
     parser.add_argument(
         "--accuracy",
         metavar="X",
@@ -88,18 +127,13 @@ def add_simulation(parser: argparse.ArgumentParser) -> None:
         type=path,
         help="continue an earlier run as if it had not ended",
     )
-    parser.add_argument(
-        "--backend",
-        metavar="NAME",
-        default="auto",
-        help="auto: compute in compiled C code if that pays; numpy: never; c: always",
-    )
+    _add_backend(parser)
     _add_start(parser)
     _add_results(parser)
 
 
 def _add_results(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
+    _add_rows(parser)
     parser.add_argument(
         "--save",
         metavar="A,B,…",
@@ -115,11 +149,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", metavar="FILE", type=path, help="figure (DIR/NAME.png)")
     parser.add_argument("--no-pictures", action="store_true", help="write no figure and no page")
     parser.add_argument("--view", action="store_true", help="open the page when done")
-    parser.add_argument(
-        "--live",
-        action=argparse.BooleanOptionalAction,
-        help="a page that integrates by itself, or only replays (live where it can be)",
-    )
+    _add_live(parser)
     add_force(parser)
 
 

@@ -67,6 +67,11 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     ),
     "kinetic_energy": OutputSpec((), "Kinetic energy, J."),
     "potential_energy": OutputSpec((), "Potential energy, J."),
+    "kinetic_slopes": OutputSpec(
+        ("nq",),
+        "Derivatives of the kinetic energy by the coordinates, at fixed velocities, (nq,).",
+        needs="constraints",
+    ),
     "effect_powers": OutputSpec(("effects",), "Power of each of `EFFECT_NAMES` on the motion, W."),
     "momentum": OutputSpec(
         (3,),

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eomgen.errors import SceneError
 from eomgen.files import check_writable, write_whole
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
@@ -19,121 +18,15 @@ from eomgen.study.diagnosis import joint_limits, locks
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from eomgen.derivation.matrices import Matrices
-    from eomgen.derivation.steps import Step
-    from eomgen.derivation.symbols import Expr
-    from eomgen.exposition.derivation import Exposition
     from eomgen.program.passes import PassReport
     from eomgen.run.progress import Progress
     from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
+    from eomgen.show.notebook import Cell
     from eomgen.show.page import PageCode
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
     from eomgen.study.between import Direction
-
-
-NUMBERS = (
-    "m = eomgen.load(eomgen.generate(scene, outputs=['mass_matrix', 'velocity_force', "
-    "'gravity_force', 'applied_force'])); y = m.initial_state(); m.mass_matrix(0.0, y), "
-    "m.velocity_force(0.0, y), m.gravity_force(0.0, y), m.applied_force(0.0, y)"
-)
-"""How to compute M, V, G and F of a `scene` where they are not written out."""
-
-
-@dataclass(frozen=True)
-class Derivation:
-    """Equations of motion M v̇ + V + G = F as SymPy expressions, and the steps of their derivation.
-
-    `matrices` has the equations and the symbols of coordinates `q`, velocities `v` and
-    accelerations `a`. A mechanism whose steps are those of an algorithm has none; the functions
-    `mass_matrix`, `velocity_force`, `gravity_force`, `applied_force` of its module give numbers.
-    """
-
-    model: Model
-    exposition: "Exposition"
-
-    @property
-    def name(self) -> str:
-        """Name of the scene."""
-        return self.model.name
-
-    @property
-    def title(self) -> str:
-        """Title of the scene."""
-        return self.model.title
-
-    @property
-    def matrices(self) -> "Matrices":
-        """The equations as matrices. Raises `SceneError` if they are too long to be written out."""
-        if self.exposition.matrices is None:
-            raise SceneError(
-                f"derive: M, V, G and F of {self.name} are too long to be written out as "
-                f"expressions; a module computes their numbers: `{NUMBERS}`"
-            )
-        return self.exposition.matrices
-
-    @property
-    def M(self) -> "Expr":
-        """Mass matrix, (nv, nv), symmetric."""
-        return self.matrices.M
-
-    @property
-    def V(self) -> "Expr":
-        """Velocity-dependent forces (Coriolis and centrifugal), (nv, 1), on the left side."""
-        return self.matrices.V
-
-    @property
-    def G(self) -> "Expr":
-        """Gravity forces, (nv, 1), on the left side."""
-        return self.matrices.G
-
-    @property
-    def F(self) -> "Expr":
-        """All other generalised forces, (nv, 1), on the right side."""
-        return self.matrices.F
-
-    @property
-    def solution(self) -> "dict[Expr, Expr]":
-        """Each acceleration as an expression in q, v, parameters and inputs."""
-        from eomgen.derivation.matrices import written_out
-
-        found = self.matrices
-        return {a: written_out(a, found.definitions) for a in found.a}
-
-    @property
-    def steps(self) -> "tuple[Step, ...]":
-        """The steps of the derivation, with number, title, explanation and equations."""
-        return self.exposition.steps
-
-    def text(self, *, encoding: str = "utf-8") -> str:
-        """All steps as plain text, in ASCII if the encoding lacks Greek letters."""
-        from eomgen.show.derivation import as_text
-
-        return as_text(self.model, self.steps, encoding=encoding)
-
-    def latex(self) -> str:
-        """All steps as one LaTeX document."""
-        from eomgen.show.derivation import as_latex
-
-        return as_latex(self.model, self.steps, self.exposition.effects)
-
-    def html(self) -> str:
-        """All steps as one HTML page."""
-        from eomgen.show.derivation import as_html
-
-        return as_html(self.model, self.steps, self.exposition.effects)
-
-    def _repr_latex_(self) -> str:
-        import sympy as sp
-
-        if self.exposition.matrices is None:
-            steps = f"M v̇ + V + G = F in {len(self.steps)} steps"
-            return f"$\\text{{{steps}}}$"
-        found = self.matrices
-        left = sp.latex(found.M) + sp.latex(sp.Matrix(found.a))
-        rest = " + ".join(sp.latex(m) for m in (found.V, found.G))
-        return f"$\\displaystyle {left} + {rest} = {sp.latex(found.F)}$"
 
 
 @dataclass(frozen=True)
@@ -407,10 +300,15 @@ class Run:
             return (*paths, base.with_suffix(".parquet"))
         return paths
 
+    def view(self, *, height: int = 620, live: bool | None = None) -> "Cell":
+        """The page of this run, for a cell of a notebook: `height` pixels high, and live as `page`
+        says.
+        """
+        from eomgen.show.notebook import page_cell
+
+        return page_cell(self.motion, self.page(live=live), height)
+
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><td>{html.escape(name)}</td><td>{html.escape(str(value))}</td></tr>"
-            for name, value in self.report.items()
-        )
-        notes = "".join(f"<p>{html.escape(line)}</p>" for line in self.warnings)
-        return f"<b>{html.escape(self.model.name)}</b><table>{rows}</table>{notes}"
+        from eomgen.show.notebook import run_html
+
+        return run_html(self.motion, self.report, self.warnings)

@@ -20,6 +20,7 @@ EXAMPLES = {
     "generate": "eomgen generate two_body pendulum -o modules",
     "simulate": "eomgen simulate cart_pole --set l=0.4 --state theta=0.3 --input push=3*sin(t)",
     "view": "eomgen view double_pendulum",
+    "gallery": "eomgen gallery -o course --scene pendulum two_body",
     "plot": "eomgen plot out/cart_pole.npz --of theta,theta_dot,energy,joint_forces.pin -o run.pdf",
     "film": "eomgen film out/cart_pole.npz --speed 0.5 -o cart_pole.gif",
     "sweep": "eomgen sweep cart_pole --vary m_pole=0.1:0.5:20 --of theta",

@@ -14,7 +14,7 @@ from floors import imports, modules
 
 DRAWING = Path(__file__).parent.parent / "docs" / "packages.svg"
 
-BASE = ("text", "errors", "files", "streams", "entries", "loading", "templating")
+BASE = ("text", "displays", "errors", "files", "streams", "entries", "loading", "templating")
 """Small modules that all others may use: drawn as one, without arrows to it."""
 WIDTH, ROW, HIGH, GAP = 1000, 74, 48, 16
 WIDEST = 470

@@ -10,6 +10,7 @@ import pytest
 
 from eomgen.codegen import jacobians
 from eomgen.codegen.system import System
+from eomgen.dynamics.assembly import assembled
 from eomgen.language.formula import names_in
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -124,7 +125,7 @@ def quick(scene: str, route: str = "", *, tangents: bool = False) -> Engine:
 
 @cache
 def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) -> Engine:
-    model = elaborate(read(scene).replaced(outputs="all"))
+    model = assembled(elaborate(read(scene).replaced(outputs="all")))
     outputs = tuple(name for name in model.outputs if name not in leave_out)
     if not route and model.route == "auto" and model.form == "velocity":
         route = "auto" if scene in built_in_names() else "aba"

@@ -12,6 +12,7 @@ PACKAGE = Path(eomgen.__file__).parent
 # package or a module, and does not count what has a line of its own.
 FLOORS = (
     "text",
+    "displays",
     "errors",
     "streams",
     "files",
@@ -39,6 +40,7 @@ FLOORS = (
     "native",
     "precision",
     "linear",
+    "study.closing",
     "study.diagnosis",
     "study.timing",
     "study.accuracy",
@@ -47,6 +49,7 @@ FLOORS = (
     "study",
     "sweep",
     "show",
+    "equations",
     "results",
     "api",
     "commands",

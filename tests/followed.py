@@ -1,12 +1,14 @@
 """What a derivation states, followed in numbers, beside the numeric solver."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.exposition.constraints import DerivedConstraint
 from eomgen.exposition.derivation import used_bodies
 from eomgen.exposition.effects import DerivedEffect, derived_effects
 from eomgen.exposition.evaluate import Numbers, define, follow
@@ -25,8 +27,10 @@ class Instant:
     known: Numbers
 
 
-def instant(model: Model, seed: int = 0, shake: float = 0.3) -> Instant:
-    """A state near the scene's own, random velocities, inputs, extra states; t = 0.4 s."""
+def instant(model: Model, seed: int = 0, shake: float = 0.3, *, closed: bool = False) -> Instant:
+    """A state near the scene's own, random velocities, inputs, extra states; t = 0.4 s. One that is
+    `closed` meets the constraints of a model whose constraints do not depend on time.
+    """
     rng = np.random.default_rng([seed, 77])
     q = np.array(model.initial_q) + shake * rng.normal(size=len(model.initial_q))
     for four in model.quaternions:
@@ -34,8 +38,15 @@ def instant(model: Model, seed: int = 0, shake: float = 0.3) -> Instant:
     v = rng.normal(size=len(model.velocities))
     inputs = {i.name: float(rng.normal()) for i in model.inputs}
     states = {x.name: float(rng.normal()) for x in model.states}
+    if closed:
+        found = newton(Closure.of(model), q, np.ones(len(v), dtype=bool))
+        assert found is not None
+        q = found
     values = Values(model.defaults, inputs, q.tolist(), v.tolist(), states, 0.4)
     solver = Dynamics(model, values, FloatScalars())
+    if closed:
+        v = np.array(solver.constrained("ldl").velocity())
+        solver = Dynamics(model, replace(values, v=v.tolist()), FloatScalars())
     known: Numbers = {"t": 0.4, **model.defaults, **inputs, **states}
     known |= {c.name: float(x) for c, x in zip(model.coordinates, q, strict=True)}
     known |= {c.name: float(x) for c, x in zip(model.velocities, v, strict=True)}
@@ -57,9 +68,14 @@ def follow_effects(model: Model, effects: Sequence[DerivedEffect], known: Number
         define(t.rates, known)
 
 
-def follow_recursion(model: Model, known: Numbers) -> tuple[list[float], list[float]]:
-    """v̇ and F by the steps of the algorithm, in the order of v."""
-    effects, frames = derived_effects(model), frames_of(model)
+def follow_recursion(
+    model: Model, known: Numbers, constraints: Sequence[DerivedConstraint] = ()
+) -> tuple[list[float], list[float]]:
+    """v̇ and F by the steps of the algorithm, in the order of v, with the forces of constraints
+    whose multipliers are known.
+    """
+    frames = frames_of(model)
+    effects = (*derived_effects(model), *(c.force for c in constraints))
     follow_effects(model, effects, known)
     for step in recursive_steps(model, frames, effects):
         follow(step.equations, known)

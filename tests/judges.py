@@ -204,10 +204,51 @@ def _pinocchio_model(tree: SpatialTree) -> Any:
     return model, model.createData(), held
 
 
+def _depth_first(tree: SpatialTree) -> bool:
+    """Whether each body hangs on the one before it, or on one that carries that."""
+    path: list[int] = []
+    for k, body in enumerate(tree.bodies):
+        while path and path[-1] != body.joint.parent:
+            path.pop()
+        if not path and body.joint.parent >= 0:
+            return False
+        path.append(k)
+    return True
+
+
+def _pinocchio_loops(tree: SpatialTree) -> Any:
+    """The loops, if they are all balls or welds, or hinges of the plane."""
+    import pinocchio as pin
+
+    model, _, held = _pinocchio_model(tree)
+    found = pin.StdVec_RigidConstraintModel()
+    for loop in tree.loops:
+        joint = loop.joint
+        turned = pin.rpy.rpyToMatrix(*np.radians(joint.orientation_deg))
+        ends = []
+        for k, place, axes in (
+            (joint.parent, joint.r_parent, turned),
+            (loop.child, joint.r_child, np.eye(3)),
+        ):
+            at, frame = (0, pin.SE3.Identity()) if k < 0 else held[k]
+            ends.append((at, frame * pin.SE3(axes, np.array(place))))
+        ball = joint.kind == "ball" or (joint.kind == "revolute" and tree.dimensions == PLANE)
+        if not ball and joint.kind != "weld":
+            raise Unsuitable(f"it has no {joint.kind} joint that closes a loop")
+        kind = pin.ContactType.CONTACT_3D if ball else pin.ContactType.CONTACT_6D
+        (one, frame), (other, end) = ends
+        found.append(
+            pin.RigidConstraintModel(kind, model, one, frame, other, end, pin.ReferenceFrame.LOCAL)
+        )
+    return found
+
+
 def pinocchio_accelerations(
     tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs = None
 ) -> np.ndarray:
-    """Rates of the velocities `v`, in their order, by the articulated-body algorithm."""
+    """Rates of the velocities `v`, in their order, by the articulated-body algorithm; with loops by
+    `constraintDynamics` (Carpentier, Budhiraja and Mansard 2021).
+    """
     import pinocchio as pin
 
     model, data, held = _pinocchio_model(tree)
@@ -229,7 +270,22 @@ def pinocchio_accelerations(
         at, frame = held[k]
         force = data.oMi[at].rotation.T @ tree.push_force(u)
         forces[at] = pin.Force(force, np.cross(frame.act(np.array(place)), force))
-    found = pin.aba(model, data, q, v, tree.torques(u), forces).copy()
+    if tree.loops:
+        if not _depth_first(tree):
+            raise Unsuitable("its Cholesky factors take subtrees to be numbered without gaps")
+        pin.computeJointJacobians(model, data, q)
+        tau = tree.torques(u)
+        for at, force in enumerate(forces):
+            jacobian = pin.getJointJacobian(model, data, at, pin.ReferenceFrame.LOCAL)
+            tau = tau + jacobian.T @ force.vector
+        loops = _pinocchio_loops(tree)
+        made = pin.StdVec_RigidConstraintData()
+        made.extend(loop.createData() for loop in loops)
+        pin.initConstraintDynamics(model, data, loops, made)
+        iterations = pin.ProximalSettings(1e-14, 1e-14, 1e-6, 500)
+        found = pin.constraintDynamics(model, data, q, v, tau, loops, made, iterations).copy()
+    else:
+        found = pin.aba(model, data, q, v, tree.torques(u), forces).copy()
     for linear, angular, rotation in free:
         found[linear] = rotation @ (found[linear] + np.cross(v[angular], v[linear]))
     return found

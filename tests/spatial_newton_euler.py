@@ -7,7 +7,9 @@ blocked by one of two kinds of equation, n fixed in the parent and m in the chil
 
     n · (joint's point on the child - joint's point on the parent) = 0        n · m = constant
 
-Nothing is eliminated and no mass matrix is formed. The plane is motion in space with z = 0.
+Nothing is eliminated and no mass matrix is formed. The plane is motion in space with z = 0. A joint
+that closes a loop blocks directions between two bodies as any other does; in the plane only those
+that the tree leaves free.
 """
 
 from collections.abc import Mapping
@@ -15,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from spatial_trees import PLANE, SpatialTree, TreeJoint
+from spatial_trees import PLANE, SpatialTree, TreeJoint, Z
 
 CHILD, PARENT = slice(0, 6), slice(6, 12)
 """Where a row has the accelerations (linear, angular) of the child and of the parent."""
@@ -31,8 +33,9 @@ class SpatialMotion:
     then angular, world axes; `momentum` (3,) | (6,) about the world's origin, of the bodies alone;
     `centre_of_mass`, `point_positions`, `point_velocities` with 2 | 3 components.
 
-    `joint_forces` (nj, 3) | (nj, 6), one for each of the tree's `joints`: force and moment of the
-    whole wrench that the joint puts on its parent, at the joint's point on the child, world axes.
+    `joint_forces` (nj, 3) | (nj, 6), one for each of the tree's `joints`, loops too: force and
+    moment of the whole wrench that the joint puts on its parent, at the joint's point on the child,
+    world axes.
     It is what the child and all it carries need to move as they do, turned round: reactions of
     blocked directions, the motor's torque and the rotor's inertia torque (-armature q̈ on the child)
     included. Along a free direction the wrench on the child is hence torque - armature q̈.
@@ -60,7 +63,7 @@ class SpatialMotion:
 
 
 @dataclass
-class _Body:
+class BodyMotion:
     """Where a body is and how it moves, in world axes; `angle` has a meaning in the plane alone."""
 
     place: np.ndarray
@@ -70,25 +73,28 @@ class _Body:
     angle: float = 0.0
 
 
+STILL = BodyMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+"""The world."""
+
+
 def solve(
     tree: SpatialTree,
     q: np.ndarray,
     v: np.ndarray,
     u: Mapping[str, float] | None = None,
     prescribed: Mapping[str, float] | None = None,
+    *,
+    redundant: bool = False,
 ) -> SpatialMotion:
     """Everything about the tree at coordinates `q`, velocities `v` and inputs `u` by name.
 
     Velocities in `prescribed` change at the rates given there: one more blocked direction each.
+    Loops are closed at `q` and `v`. If they block directions twice (`redundant`), the joint forces
+    are the least of those that are possible.
     """
     n = len(tree.bodies)
-    still = _Body(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-    moving: list[_Body] = []
-    pairs: list[_Pair] = []
-    for body, at, rate in zip(tree.bodies, tree.q_slices(), tree.v_slices(), strict=True):
-        base = still if body.joint.parent < 0 else moving[body.joint.parent]
-        pairs.append(_Pair(tree, body.joint, base, q[at], v[rate]))
-        moving.append(pairs[-1].child)
+    pairs = _pairs(tree, q, v)
+    moving = [pair.child for pair in pairs]
 
     blocked = [pair.blocked() for pair in pairs]
     free = [pair.free() for pair in pairs]
@@ -100,6 +106,8 @@ def solve(
                 driven[name] = (k, len(rows))
                 rest = np.append(rest, lack - (prescribed or {})[name])
                 blocked[k] = np.vstack([rows.reshape(-1, 12), way]), rest
+    closing = _closing(tree, moving)
+    blocked += [loop.blocked() for loop in closing]
     ends = 6 * n + np.cumsum([0] + [len(rows) for rows, _ in blocked])
     matrix, right = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
     inertias: list[np.ndarray] = []
@@ -120,24 +128,27 @@ def solve(
         right[6 * k : 6 * k + 6] += [*force, *_cross(arm, force)]
         power += float(force @ (moving[k].velocity + _cross(moving[k].spin, arm)))
         outside += [*force, *_cross(moving[k].place + arm, force)]
+    held = [(k, body.joint.parent) for k, body in enumerate(tree.bodies)]
+    held += [(loop.child, loop.joint.parent) for loop in tree.loops]
+    for i, (k, parent) in enumerate(held):
+        places, columns = _touched(k, parent)
+        rows, own = blocked[i][0][:, columns], np.arange(ends[i], ends[i + 1])
+        matrix[np.ix_(own, places)], matrix[np.ix_(places, own)] = rows, -rows.T
+        right[own] = -blocked[i][1]
     for k, (body, rate) in enumerate(zip(tree.bodies, tree.v_slices(), strict=True)):
-        parent = body.joint.parent
-        touched = [*range(6 * k, 6 * k + 6), *range(6 * parent, 6 * parent + 6)]
-        if parent < 0:
-            del touched[6:]
-        rows, lack = blocked[k][0][:, : len(touched)], blocked[k][1]
-        own = np.arange(ends[k], ends[k + 1])
-        matrix[np.ix_(own, touched)], matrix[np.ix_(touched, own)] = rows, -rows.T
-        right[own] = -lack
-        rows, lack = free[k][0][:, : len(touched)], free[k][1]
+        touched, columns = _touched(k, body.joint.parent)
+        rows, lack = free[k][0][:, columns], free[k][1]
         matrix[np.ix_(touched, touched)] += body.joint.armature * rows.T @ rows
         right[touched] += rows.T @ (torques[rate] - body.joint.armature * lack)
 
-    found = np.linalg.solve(matrix, right)
+    if redundant:
+        found = np.linalg.lstsq(matrix, right, rcond=1e-12)[0]
+    else:
+        found = np.linalg.solve(matrix, right)
 
     changes = found[: 6 * n].reshape(n, 6)
     accelerations = np.zeros(len(v))
-    wrenches = np.zeros((n, 6))
+    wrenches = np.zeros((len(held), 6))
     for k, (body, rate) in enumerate(zip(tree.bodies, tree.v_slices(), strict=True)):
         rows, lack = free[k]
         accelerations[rate] = rows[:, CHILD] @ changes[k] + lack
@@ -149,17 +160,84 @@ def solve(
         wrenches[k] = [*-force, *(_cross(arm, force) - wrench[3:])]
         if body.joint.parent < 0:
             outside += [*force, *(_cross(moving[k].place, force) + wrench[3:])]
+    for i, (loop, pair) in enumerate(zip(tree.loops, closing, strict=True), n):
+        wrench = found[ends[i] : ends[i + 1]] @ blocked[i][0][:, CHILD]
+        force, arm = wrench[:3], pair.arm_child
+        wrenches[i] = [*-force, *(_cross(arm, force) - wrench[3:])]
+        whole = np.array([*force, *(_cross(pair.child.place, force) + wrench[3:])])
+        outside += whole * ((loop.joint.parent < 0) - (loop.child < 0))
     report = _report(tree, v, pairs, inertias, changes, accelerations, wrenches, power, outside)
     return replace(
         report, driving={name: float(found[ends[k] + i]) for name, (k, i) in driven.items()}
     )
 
 
+def _pairs(tree: SpatialTree, q: np.ndarray, v: np.ndarray) -> list["_Pair"]:
+    """The joints of the tree, with the bodies that they carry."""
+    pairs: list[_Pair] = []
+    for body, at, rate in zip(tree.bodies, tree.q_slices(), tree.v_slices(), strict=True):
+        base = STILL if body.joint.parent < 0 else pairs[body.joint.parent].child
+        pairs.append(_Pair(tree, body.joint, base, q[at], v[rate]))
+    return pairs
+
+
+def _closing(tree: SpatialTree, moving: list[BodyMotion]) -> list["_Closing"]:
+    """The joints that close loops."""
+    bodies = [*moving, STILL]  # the last is the world
+    return [
+        _Closing(tree, loop.joint, bodies[loop.joint.parent], bodies[loop.child])
+        for loop in tree.loops
+    ]
+
+
+def _touched(child: int, parent: int) -> tuple[list[int], list[int]]:
+    """The places of the accelerations of two bodies, and their columns in a row; the world has
+    none.
+    """
+    sides = [(k, at) for k, at in ((child, CHILD), (parent, PARENT)) if k >= 0]
+    return (
+        [i for k, _ in sides for i in range(6 * k, 6 * k + 6)],
+        [i for _, at in sides for i in range(at.start, at.stop)],
+    )
+
+
+def at_rest(tree: SpatialTree, q: np.ndarray) -> list[BodyMotion]:
+    """The bodies at coordinates q."""
+    return [pair.child for pair in _pairs(tree, q, np.zeros(len(tree.velocities)))]
+
+
+def velocities_of(tree: SpatialTree, q: np.ndarray) -> np.ndarray:
+    """Velocities of all bodies, linear and angular, (6 nb, nv), for each velocity of the tree."""
+    found = [[pair.child for pair in _pairs(tree, q, v)] for v in np.eye(len(tree.velocities))]
+    return np.array([[x for b in bodies for x in (*b.velocity, *b.spin)] for bodies in found]).T
+
+
+def mass_matrix(tree: SpatialTree, q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+    """Twice the kinetic energy by the velocities of the tree, (nv, nv); see `velocities_of`."""
+    found = np.diag([body.joint.armature for body in tree.bodies for _ in body.joint.velocities])
+    for k, (body, there) in enumerate(zip(tree.bodies, at_rest(tree, q), strict=True)):
+        linear, angular = velocities[6 * k : 6 * k + 3], velocities[6 * k + 3 : 6 * k + 6]
+        inertia = there.axes @ body.inertia_matrix @ there.axes.T
+        found = found + body.mass * linear.T @ linear + angular.T @ inertia @ angular
+    return np.asarray(found)
+
+
+def loop_rows(tree: SpatialTree, bodies: list[BodyMotion], velocities: np.ndarray) -> np.ndarray:
+    """The rates of the directions that the loops block, for each velocity of the tree; `velocities`
+    are those of its bodies, see `velocities_of`.
+    """
+    found = [np.zeros((0, velocities.shape[1]))]
+    for loop, pair in zip(tree.loops, _closing(tree, bodies), strict=True):
+        places, used = _touched(loop.child, loop.joint.parent)
+        found.append(pair.blocked()[0][:, used] @ velocities[places])
+    return np.vstack(found)
+
+
 class _Pair:
     """A joint with its two bodies: how the child moves, and what is blocked."""
 
     def __init__(
-        self, tree: SpatialTree, joint: TreeJoint, base: _Body, q: np.ndarray, v: np.ndarray
+        self, tree: SpatialTree, joint: TreeJoint, base: BodyMotion, q: np.ndarray, v: np.ndarray
     ) -> None:
         self.joint, self.base, self.q, self.v = joint, base, q, v
         plane = tree.dimensions == PLANE
@@ -199,7 +277,7 @@ class _Pair:
         place = base.place + self.arm_parent + slide - self.arm_child
         velocity = base.velocity + _cross(base.spin, self.arm_parent) + self.gap_rate
         velocity = velocity - _cross(self.spin, self.arm_child)
-        self.child = _Body(place, axes, velocity, self.spin, base.angle + about_z + angle)
+        self.child = BodyMotion(place, axes, velocity, self.spin, base.angle + about_z + angle)
 
     def along(self, n: np.ndarray) -> tuple[np.ndarray, float]:
         """Second time derivative of n · gap, n fixed in the parent: a row and what it lacks."""
@@ -276,6 +354,33 @@ class _Pair:
         return row, 0.0 if rest is None else -float(n @ rest)
 
 
+class _Closing(_Pair):
+    """A joint between two bodies whose motions are known."""
+
+    def __init__(
+        self, tree: SpatialTree, joint: TreeJoint, base: BodyMotion, child: BodyMotion
+    ) -> None:
+        self.joint, self.base, self.child, self.spin = joint, base, child, child.spin
+        self.plane = tree.dimensions == PLANE
+        self.flat = joint.kind == "planar"
+        turns = zip((Z, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)), joint.orientation_deg[::-1], strict=True)
+        about_z, about_y, about_x = (_turn(axis, np.radians(angle)) for axis, angle in turns)
+        self.frame = base.axes @ about_z @ about_y @ about_x
+        self.axis = self.frame @ joint.axes[0]
+        self.arm_parent, self.arm_child = base.axes @ joint.r_parent, child.axes @ joint.r_child
+        self.gap = child.place + self.arm_child - base.place - self.arm_parent
+        at_child = child.velocity + _cross(child.spin, self.arm_child)
+        self.gap_rate = at_child - base.velocity - _cross(base.spin, self.arm_parent)
+
+    def blocked(self) -> tuple[np.ndarray, np.ndarray]:
+        """In the plane without the directions that everything in it blocks."""
+        rows, lack = super().blocked()
+        if self.plane:
+            inside = np.abs(rows[:, [0, 1, 5, 6, 7, 11]]).max(axis=1, initial=0.0) > 1e-9
+            rows, lack = rows[inside], lack[inside]
+        return rows, lack
+
+
 def _report(
     tree: SpatialTree,
     v: np.ndarray,
@@ -310,6 +415,7 @@ def _report(
         poses = np.array([[*body.place[:2], body.angle] for body in moving])
     arms = [(moving[k], moving[k].axes @ at) for _, k, at in tree.points]
     held = [k for k, body in enumerate(tree.bodies) if body.joint.kind != "free"]
+    held += range(len(tree.bodies), len(wrenches))
     shown = np.array([body.place + arm for body, arm in arms]).reshape(-1, 3)
     shown_rate = [body.velocity + _cross(body.spin, arm) for body, arm in arms]
     return SpatialMotion(

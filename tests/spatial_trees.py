@@ -67,6 +67,14 @@ class TreeBody:
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
+@dataclass(frozen=True)
+class Loop:
+    """A joint that closes a loop; its `child` is the index of a body, or -1, as its parent is."""
+
+    joint: TreeJoint
+    child: int
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SpatialTree:
     """A mechanism in plain numbers, parents before children.
@@ -75,6 +83,7 @@ class SpatialTree:
     driven by the input `drive` (-1: none), `push` the body and the point on it (body axes, from the
     centre of mass) that the inputs push_x, push_y, push_z act on in world axes (None: none), and
     `points` are (name, body, place on it). `parameters` are the values that eomgen knows by name.
+    `loops` hold bodies that the joints of the tree carry.
     """
 
     name: str
@@ -85,6 +94,7 @@ class SpatialTree:
     push: tuple[int, Vector] | None
     points: tuple[tuple[str, int, Vector], ...]
     parameters: Mapping[str, float]
+    loops: tuple[Loop, ...] = ()
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -98,8 +108,9 @@ class SpatialTree:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of all joints but the free ones, in the order of bodies."""
-        return tuple(b.joint.name for b in self.bodies if b.joint.kind != "free")
+        """Names of all joints but the free ones, in the order of bodies; then those of loops."""
+        own = tuple(b.joint.name for b in self.bodies if b.joint.kind != "free")
+        return own + tuple(loop.joint.name for loop in self.loops)
 
     @property
     def inputs(self) -> tuple[str, ...]:

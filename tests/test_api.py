@@ -158,7 +158,7 @@ def test_a_run_is_that_of_the_command(tmp_path: Path) -> None:
     again = pickle.loads(pickle.dumps(run))
     assert np.array_equal(again.y, run.y) and again.model == run.model
     assert {path.suffix for path in run.save(tmp_path / "kept")} == {".py", ".csv", ".npz", ".html"}
-    assert "<td>steps</td>" in run._repr_html_()
+    assert ">steps</td>" in run._repr_html_()
     with pytest.raises(KeyError, match="no state 'thta'; known: x, theta"):
         run["thta"]
 

@@ -21,7 +21,10 @@ from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene
 from eomgen.store import generated_code
 
 ROOT = Path(__file__).parent.parent
-LARGE = "chain hanging_figure human_figure quadruped ragdoll stiff_beam walker_motors".split()
+LARGE = (
+    "car_suspension chain hanging_figure human_figure peaucellier quadruped ragdoll stiff_beam "
+    "stewart_platform walker_motors"
+).split()
 pytestmark = pytest.mark.usefixtures("blank_figures")
 
 

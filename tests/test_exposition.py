@@ -19,6 +19,7 @@ import eomgen
 from eomgen.cli import main
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.equations import Derivation
 from eomgen.exposition.derivation import exposition_of, prescribed_motion
 from eomgen.exposition.effects import derived_effects
 from eomgen.exposition.evaluate import array, define, number
@@ -26,7 +27,6 @@ from eomgen.exposition.impacts import impact_steps
 from eomgen.exposition.reading import dotted
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.results import Derivation
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
 from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.derivation import as_html, as_latex, as_text

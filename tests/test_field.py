@@ -202,7 +202,9 @@ def test_the_particles_pass_every_obstacle() -> None:
         max_step=0.1,
     )
     assert found.success
-    radii = [body.shapes[0].radius for body in scene.bodies if body.name.startswith("obstacle")]
+    radii = [
+        body.shapes[0].radius.value for body in scene.bodies if body.name.startswith("obstacle")
+    ]
     centres = [e.center for e in scene.effects if e.type == "field"]
     for disc in range(7):
         x, y = found.y[3 * disc : 3 * disc + 2]

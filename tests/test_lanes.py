@@ -120,7 +120,10 @@ def test_sine_and_cosine_are_within_an_ulp() -> None:
 
 
 FEW = ("two_body", "tumbling_body", "cart_pole", "double_pendulum")
-LARGE = "hanging_figure human_figure quadruped ragdoll stiff_beam walker_motors".split()
+LARGE = (
+    "hanging_figure human_figure quadruped ragdoll stiff_beam walker_motors car_suspension "
+    "peaucellier stewart_platform"
+).split()
 
 
 @cache

@@ -35,6 +35,7 @@ RUNS = [
     ("furuta_pendulum", "gauss_4", 0.01),
     ("two_body_forced", "gauss_6", 0.02),
     ("bouncing_two_body", "rk4", 0.01),
+    ("four_bar", "rk4", 0.005),
 ]
 """Scene, method, step in s; these motions are not chaotic within the time."""
 TOLERANCE = 1e-9

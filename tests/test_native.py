@@ -34,7 +34,10 @@ from eomgen.study.verification.states import random_state
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 pytestmark = pytest.mark.skipif(CC is None, reason="there is no C compiler")
 FEW = ("tumbling_body", "bouncing_two_body", "cart_pole")
-LARGE = "hanging_figure human_figure puma560 quadruped ragdoll stiff_beam walker_motors".split()
+LARGE = (
+    "hanging_figure human_figure puma560 quadruped ragdoll stiff_beam walker_motors "
+    "car_suspension peaucellier stewart_platform"
+).split()
 SOME = [name for name in built_in_names() if name not in LARGE[1:]][::2] + LARGE[:1]
 NOT_IN_FLOAT = ("babyboot", "ragdoll")
 """Of the first a condition that holds with equality is missed by rounding; the second has weights

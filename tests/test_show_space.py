@@ -441,7 +441,9 @@ KINDS: dict[str, tuple[Any, ...]] = {
 
 def joint(kind: str, parent: str, r_parent: Any = (), r_child: Any = ()) -> Any:
     primitives = tuple(Primitive(primitive) for primitive in KINDS[kind])
-    held = SimpleNamespace(name=kind, parent=parent, primitives=lambda _: primitives)
+    held = SimpleNamespace(
+        name=kind, parent=parent, child=f"{kind}_body", primitives=lambda _: primitives
+    )
     if kind != "free":
         held.r_parent, held.r_child = r_parent, r_child
     return SimpleNamespace(name=f"{kind}_body", joint=held)
@@ -454,7 +456,7 @@ def test_gaps_of_joints_that_hold_a_point() -> None:
         joint("prismatic", "ball_body"),
         joint("weld", "world", (0.0, 0.0, 1.0)),
     )
-    model: Any = SimpleNamespace(bodies=bodies, value=float, dimensions=3)
+    model: Any = SimpleNamespace(bodies=bodies, loops=(), value=float, dimensions=3)
     poses = np.zeros((5, 4, 3, 4))
     poses[..., :3] = rotation((0, 0, 90))  # x of each body is the world's y
     poses[:, 1, :, 3] = [2.0, 1.0, 0.0]  # its point at y = 2 of its own: where the ball is
@@ -467,6 +469,7 @@ def test_gaps_of_joints_that_hold_a_point() -> None:
 
     planar: Any = SimpleNamespace(
         bodies=(joint("revolute", "world", (1.0, 2.0), (0.0, 1.0)), joint("planar", "world")),
+        loops=(),
         value=float,
         dimensions=2,
     )

@@ -39,6 +39,7 @@ COMMANDS = {
     "generate": "generate pendulum -o {out}",
     "simulate": "simulate pendulum --t-end 0.1 -o {out}",
     "view": "view pendulum --t-end 0.1 -o {out}",
+    "gallery": "gallery --scene pendulum --t-end 0.1 -o {out}",
     "verify": "verify pendulum --states 1",
     "accuracy": f"accuracy pendulum {QUICK} -o {{out}}",
     "effects": "effects pendulum --no-motion -o {out}",
@@ -58,6 +59,7 @@ WRITES = {
     "plot": 1,
     "film": 1,
     "sweep": 3,
+    "gallery": 2,
     "effects": 1,
 }
 FAULTS = {

@@ -14,13 +14,14 @@ from engine import MP, read
 from gmpy2 import mpfr
 
 from eomgen.cli import main
+from eomgen.dynamics.assembly import assembled
 from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
 from eomgen.precision.extended import doubles, extended, extended_digits
 from eomgen.run.module import load_module
-from eomgen.scene.reader import find_scene
+from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.scene.schema import Simulation
 from eomgen.study.verification import drift as drifting
 from eomgen.study.verification import horizon as horizons
@@ -381,6 +382,64 @@ def test_a_fault_in_a_module_is_caught(fault: str) -> None:
     seeded, places = re.subn(*FAULTS[fault], source, count=1, flags=re.DOTALL)
     assert places == 1 and seeded != source
     assert verify(*scene, states=1, module=load_module(seeded)).missed
+
+
+LOOP_OUTPUTS = (*OUTPUTS, "constraint_forces")
+DRIVEN_LOOP = """
+name = "driven_loop"
+simulation = { t_end = 0.3 }
+bodies = [
+    { name = "cart", mass = 1.5, inertia_com = 0 },
+    { name = "arm", mass = 1.2, inertia_com = 0.1 },
+    { name = "bob", mass = 0.7, inertia_com = 0.02 },
+]
+joints = [
+    { name = "rail", type = "prismatic", parent = "world", child = "cart", axis = [1, 0] },
+    { name = "pin", type = "revolute", parent = "world", child = "arm", \
+r_parent = [0.8, 0], r_child = [0, 0.4] },
+    { name = "hook", type = "revolute", parent = "arm", child = "bob", \
+r_parent = [0, -0.4], r_child = [0, 0.3] },
+]
+constraints = [
+    { type = "distance", name = "rod", body_1 = "cart", body_2 = "arm", length = 0.9 },
+]
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "driven", name = "shaker", joint = "rail", coordinate = "0.1*sin(3*t)" },
+]
+"""
+LOOP_FAULTS = {
+    "v̇": (r"(def _derivative\(.*?\n.*?) - ", r"\1 + "),
+    "ġ": (r"(def _constraint_rates\(.*?\n.*?)cos\(", r"\1 1.0000001*cos("),
+    "λ": (r"(def _constraint_forces\(.*?\n.*?) - ", r"\1 + "),
+}
+
+
+@pytest.mark.parametrize("fault", some(["", "λ"], ["", *LOOP_FAULTS]))
+def test_loops_are_verified_by_their_own_rows(fault: str) -> None:
+    """A slider-crank, against virtual work with multipliers: sound, and with a fault."""
+    module, (model, wanted) = None, scene_of("slider_crank")
+    model = assembled(replace(model, route="independent", outputs=in_order(LOOP_OUTPUTS)))
+    source = python_module(compile_program(model).system)
+    if fault:
+        seeded, places = re.subn(*LOOP_FAULTS[fault], source, count=1, flags=re.DOTALL)
+        assert places == 1 and seeded != source
+        module = load_module(seeded)
+    found = verify(model, wanted, states=1, module=module)
+    assert bool([x for x in found.missed if "(taken)" in x.what or "forward" not in x.what]) == (
+        fault != ""
+    )
+    if not fault:
+        agreed = check(found, "virtual work against articulated bodies")
+        assert agreed.value < 1e-24
+
+
+def test_driving_forces_count_what_constraints_load() -> None:
+    """A drive beside a loop: its power explains the energy, by the laws and in a short run."""
+    scene = parse_scene(DRIVEN_LOOP)
+    found = verify(assembled(elaborate(scene)), scene.simulation, states=1)
+    lines = ("energy law", "effect_powers", "energy less works", "constraint_forces")
+    assert not [line for line in lines if check(found, line).missed]
 
 
 def test_a_module_that_gives_no_number_misses_its_bound() -> None:

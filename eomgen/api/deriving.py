@@ -2,8 +2,8 @@
 
 from eomgen.api.given import Source, checked, modelled, read
 from eomgen.api.reporter import SILENT, Reporter
+from eomgen.equations import Derivation
 from eomgen.model.model import Model
-from eomgen.results import Derivation
 from eomgen.scene.schema import Form
 
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from eomgen.api.reporter import SILENT, Reporter
+from eomgen.displays import DISPLAYS
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import RunError, SceneError, nearest
@@ -54,6 +55,21 @@ def check(source: Source) -> Model:
     Raises `SceneError` if the scene describes no mechanism or its mass matrix is singular.
     """
     return model_of(read(source), source)
+
+
+def _show_scene(scene: Scene) -> str:
+    from eomgen.show.notebook import model_html, scene_html
+
+    return scene_html(scene.name, scene.title, scene.about) + model_html(elaborate(scene))
+
+
+def _show_model(model: Model) -> str:
+    from eomgen.show.notebook import model_html, scene_html
+
+    return scene_html(model.name, model.title) + model_html(model)
+
+
+DISPLAYS.update({"Scene": _show_scene, "Model": _show_model})
 
 
 def model_of(scene: Scene, source: Source) -> Model:

@@ -104,7 +104,7 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
     _, module = compiled(model, reporter=reporter)
     with reporter.located():
         problem = problem_of(module, parameters or None, inputs or None, model)
-        y = start = _start(model, problem.initial, point, reporter)
+        y = start = _start(model, problem.initial, point, reporter, parameters)
         u: Mapping[str, float] | FloatArray = inputs
         if at != "initial":
             settle = at == "rest"
@@ -122,7 +122,9 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
     return Linearised(module, start, found, steady)
 
 
-def _start(model: Model, initial: FloatArray, point: Point, reporter: Reporter) -> FloatArray:
+def _start(
+    model: Model, initial: FloatArray, point: Point, reporter: Reporter, parameters: Values
+) -> FloatArray:
     """The initial state with the given values."""
     given = values_by_index(model, point.state, reporter)
     nq, nv = len(model.coordinates), len(model.velocities)
@@ -132,4 +134,4 @@ def _start(model: Model, initial: FloatArray, point: Point, reporter: Reporter) 
                 f"{reporter.argument('state')} {state_names(model)[index]}: an equilibrium is at "
                 f"rest; leave it out, or give {reporter.argument('at')} initial"
             )
-    return initial_with(model, initial, given, reporter)
+    return initial_with(model, initial, given, reporter, parameters)

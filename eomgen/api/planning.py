@@ -122,7 +122,8 @@ def plan_run(
         _check_unstable(setting, reporter)
     works = works or "works" in save
     saved = wanted_outputs(save, model, reporter)
-    needed = (*model.outputs, *SHOWN, *saved, *(("effect_powers",) if works else ()))
+    more = (*(("effect_powers",) if works else ()), *_of_method(setting, model))
+    needed = (*model.outputs, *SHOWN, *saved, *more)
     return Plan(
         scene,
         replace(model, outputs=in_order(needed)),
@@ -186,6 +187,13 @@ def _check_aims(
             f"{reporter.argument('resume')}: continues with a given method; leave out "
             f"{reporter.argument('accuracy')} and {reporter.argument('budget')}"
         )
+
+
+def _of_method(setting: "Setting | None", model: Model) -> tuple[str, ...]:
+    """The outputs that a method needs."""
+    if setting and setting.integrator == "leapfrog" and model.constraints:
+        return ("mass_matrix", "kinetic_slopes")
+    return ()
 
 
 def _takes_series(integrator: str) -> bool:

@@ -230,7 +230,8 @@ def _problem(
     else:
         with reporter.located():
             problem = problem_of(
-                module, *values, model, lambda y: initial_with(model, y, plan.state, reporter)
+                *(module, *values, model),
+                lambda y: initial_with(model, y, plan.state, reporter, values[0]),
             )
         problem = replace(problem, origin=origin_from(problem.origin, problem.initial))
         q, v, x = split(model, problem.initial)

@@ -12,6 +12,7 @@ from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.origin import START, Origin
 from eomgen.run.problem import FloatArray
+from eomgen.study.closing import closed
 
 UNIT_TOLERANCE = 1e-9
 """Deviation of a quaternion's length from 1 that is not reported."""
@@ -47,11 +48,16 @@ def values_by_index(model: Model, given: Values | None, reporter: Reporter) -> d
 
 
 def initial_with(
-    model: Model, initial: FloatArray, given: Mapping[int, float], reporter: Reporter
+    model: Model,
+    initial: FloatArray,
+    given: Mapping[int, float],
+    reporter: Reporter,
+    parameters: Values | None = None,
 ) -> FloatArray:
-    """An initial state with given values; quaternions are scaled to length 1, with a note.
+    """An initial state with given values; quaternions are scaled to length 1, with a note. Other
+    values meet the constraints at these parameters, with a note.
 
-    Raises `RunError` for a quaternion without length.
+    Raises `RunError` for a quaternion without length, `SceneError` if constraints cannot be met.
     """
     option, names = reporter.argument("state"), state_names(model)
     y = initial.copy()
@@ -70,7 +76,15 @@ def initial_with(
                 "scaled to 1"
             )
         y[indices] /= length
-    return y
+    found = closed(model, parameters, y, [names[index] for index in given])
+    changed = [
+        f"{name} = {value:.6g}"
+        for i, (name, value) in enumerate(zip(names, found.tolist(), strict=False))
+        if i not in given and value != initial[i]
+    ]
+    if given and changed:
+        reporter.note_scene(f"{option}: to meet the constraints, {', '.join(changed)}")
+    return found
 
 
 def split(model: Model, y: FloatArray) -> tuple[tuple[float, ...], ...]:

@@ -325,11 +325,11 @@ def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] |
 
 
 def _run_together(integrator: str, functions: Any) -> bool:
-    """Whether members run together: by a method that can do that, of a module without contacts,
-    and for adaptive methods without other one-sided forces.
+    """Whether members run together: by a method that can do that, of a module without contacts
+    and constraints, and for adaptive methods without other one-sided forces.
     """
-    contacts = bool(getattr(functions, "CONTACTS", False))
-    if integrator not in METHODS or not functions.STATES or contacts:
+    alone = any(getattr(functions, name, ()) for name in ("CONTACTS", "CONSTRAINTS"))
+    if integrator not in METHODS or not functions.STATES or alone:
         return False
     switching = ("switching_functions", "_switching_functions_of_time")
     return integrator == "rk4" or not any(hasattr(functions, name) for name in switching)

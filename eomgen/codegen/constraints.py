@@ -3,9 +3,12 @@
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes
 from eomgen.dynamics import constraints
-from eomgen.dynamics.loads import scaled
+from eomgen.dynamics.clusters import jacobian_of
 from eomgen.program.tape import Node
 from eomgen.scene.effects.base import Load
+
+LARGEST_JACOBIAN = 2000
+"""A larger matrix of constraints is not written out: runs compute it from the rates."""
 
 
 def constraint_outputs(record: Recording) -> OutputNodes:
@@ -19,7 +22,11 @@ def constraint_outputs(record: Recording) -> OutputNodes:
         "project_velocity": held.velocity(),
         "constraint_margins": held.margins(),
     }
-    return {name: ((len(part),), part) for name, part in nodes.items()}
+    found: OutputNodes = {name: ((len(part),), part) for name, part in nodes.items()}
+    shape = len(record.model.rows), d.nv
+    if shape[0] * shape[1] <= LARGEST_JACOBIAN:
+        found["constraint_jacobian"] = (shape, [x for row in jacobian_of(d) for x in row])
+    return found
 
 
 def constraint_forces(record: Recording) -> list[Node]:
@@ -31,13 +38,4 @@ def constraint_forces(record: Recording) -> list[Node]:
 
 def constraint_loads(record: Recording) -> list[list[Load]]:
     """The loads on bodies of each constraint of the model, under the effects."""
-    found: list[list[Load]] = []
-    forces = dict(
-        zip((name for name, _ in record.model.rows), constraint_forces(record), strict=True)
-    )
-    for constraint in record.model.constraints:
-        names = (name for name, _ in constraint.row_names(record.model.dimensions))
-        rows = zip(names, constraint.rows(record.dynamics), strict=True)
-        loads = (x for name, row in rows if name in forces for x in scaled(row.loads, forces[name]))
-        found.append([x for x in loads if isinstance(x, Load)])
-    return found
+    return constraints.loads_of(record.dynamics, constraint_forces(record))

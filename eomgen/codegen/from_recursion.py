@@ -25,6 +25,7 @@ from eomgen.dynamics.vectors import Vec, in_space, zeros
 from eomgen.model.model import is_zero
 from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES
+from eomgen.program import differentiate
 from eomgen.program.program import Check
 from eomgen.program.tape import Node
 
@@ -91,6 +92,10 @@ def _mass_matrix(record: Recording) -> list[Node]:
 
 def _powers(record: Recording) -> list[Node]:
     return [record.dynamics.power(effect) for effect in record.model.effects]
+
+
+def _kinetic_slopes(record: Recording) -> list[Node]:
+    return differentiate.jacobian([record.dynamics.kinetic_energy], record.q)[0]
 
 
 def _momentum(record: Recording) -> list[Node]:
@@ -183,6 +188,7 @@ OF_DYNAMICS: Mapping[str, Callable[[Dynamics], list[Node]]] = {
 """Outputs that are results of `Dynamics`."""
 OBSERVED: Mapping[str, Callable[[Recording], list[Node]]] = {
     "mass_matrix": _mass_matrix,
+    "kinetic_slopes": _kinetic_slopes,
     "effect_powers": _powers,
     "momentum": _momentum,
     "centre_of_mass": _centre_of_mass,

@@ -18,6 +18,7 @@ ABOUT = {
     "gap_rates": "Time derivative of each of `gaps`, m/s or rad/s.",
     "constraint_residuals": "Each of `CONSTRAINTS`: how far it is from being met, m or rad.",
     "constraint_rates": "Rate of each of `CONSTRAINTS`, m/s or rad/s.",
+    "constraint_jacobian": "Derivatives of `constraint_rates` by the velocities, (nc, nv).",
     "constraint_margins": "How far each of `CONSTRAINTS` is from following from others.",
     "project_position": "Coordinates (nq,) after one Newton step towards the constraints.",
     "project_velocity": "Velocities (nv,) that meet the constraints, the nearest.",

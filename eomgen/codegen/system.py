@@ -56,6 +56,7 @@ def output_shape(name: str, model: Model) -> tuple[int, ...]:
     """The shape of an output of a model; for all outputs except matrices of derivatives."""
     sizes = {
         "nv": len(model.velocities),
+        "nq": len(model.coordinates),
         "bodies": len(model.bodies),
         "joints": len(model.force_joints),
         "effects": len(model.effects),

@@ -89,6 +89,13 @@ def view(given: Arguments) -> int:
     return running.view(given)
 
 
+def gallery(given: Arguments) -> int:
+    """Write the pages of many scenes."""
+    from eomgen.commands import exhibiting
+
+    return exhibiting.gallery(given)
+
+
 def plot(given: Arguments) -> int:
     """Draw a figure of a run."""
     from eomgen.commands import picturing

@@ -4,6 +4,7 @@ import shlex
 import sys
 
 from eomgen.api.given import checked
+from eomgen.commands.assembling import draw_assembly, print_assembly
 from eomgen.commands.shared import (
     FEW,
     Arguments,
@@ -40,9 +41,11 @@ def check(given: Arguments) -> int:
     model, _ = read_model(given.scene, given)
     checked(model, reporter_of(given, given.scene))
     most = sys.maxsize if given.long else FEW
-    nq, nv = len(model.coordinates), len(model.velocities)
+    nq, nv = len(model.coordinates), len(model.velocities) - len(model.rows)
     freedom = f"{nv} degree{'s' if nv != 1 else ''} of freedom"
-    if nq != nv:
+    if model.rows:
+        freedom += f", {nq} coordinates with {len(model.rows)} constraints"
+    elif nq != nv:
         balls = len(model.quaternions)
         freedom += f", {nq} coordinates with {balls} unit quaternion{'s' if balls > 1 else ''}"
     print(f"{model.name}: {model.title}")
@@ -63,6 +66,8 @@ def check(given: Arguments) -> int:
         for name in dict.fromkeys(effects)
     ]
     print_listed("effects     ", counted)
+    if model.constraints:
+        print_listed("constraints ", shortened([name for name, _ in model.rows], most))
     for line in shortened(overlap_lines(model), most):
         print_wrapped("at start    ", line)
     inputs = [f"{i.name} = {i.default:g}" if i.default else i.name for i in model.inputs]
@@ -71,6 +76,10 @@ def check(given: Arguments) -> int:
     print_listed("parameters  ", shortened(values, most))
     if max(len(values), len(model.bodies), len(model.points), len(model.inputs)) > most:
         print(f"            eomgen check {shlex.quote(given.scene)} --long lists all")
+    if given.assemble:
+        print_assembly(model)
+    if given.picture is not None:
+        draw_assembly(given.scene, given.picture, force=given.force)
     return 0
 
 

@@ -124,10 +124,23 @@ def _report(given: Arguments, run: Run) -> str:
     _print_events(trajectory)
     if run.motion.joints:
         print(f"    largest gap in a joint {run.motion.joint_drift.max(initial=0.0):.2g} m")
+    _print_violations(run)
     _print_excursions(run)
     for line in run.locks:
         print(f"    {line}")
     return missed
+
+
+def _print_violations(run: Run) -> None:
+    """Print the largest residuals of constraints, m and rad."""
+    units = {name: "m" if unit == "N" else "rad" for name, unit in run.model.rows}
+    for unit in dict.fromkeys(units[name] for name in run.trajectory.violations):
+        found = [pair for name, pair in run.trajectory.violations.items() if units[name] == unit]
+        before, after = (max(part) for part in zip(*found, strict=True))
+        print(
+            f"    largest residual of a constraint {after:.2g} {unit}, {before:.2g} {unit} before "
+            "projection"
+        )
 
 
 def _step_limit_lines(given: Arguments, trajectory: Trajectory) -> list[str]:

@@ -7,29 +7,19 @@ Rows that depend on others are found where the constraints are met, at several p
 motion: a linkage such as Bennett's moves only because its rows depend on each other there.
 """
 
-import math
 import random
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.dynamics import constraints
+from eomgen.dynamics.closure import CLOSED, Array, Closure, newton
 from eomgen.dynamics.clusters import jacobian_of
-from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.mechanism_state import Values
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
-from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.joints import Free
 
-Array = NDArray[np.float64]
-
-STEPS = 60
-"""Most steps of Newton's method from one start."""
-CLOSED = 1e-12
-"""A residual relative to the mechanism's size that is rounding."""
 STARTS = (0.0, *(0.1,) * 6, *(0.5,) * 10, *(2.0,) * 30)
 """How far the starts are from the scene's values, rad, or in sizes."""
 ENOUGH = 6
@@ -44,78 +34,6 @@ MOVED = 1e-9
 """A change of a given value that is not reported."""
 
 
-@dataclass(frozen=True)
-class Closure:
-    """A model's constraints as functions of the coordinates. Residuals and steps are in sizes."""
-
-    model: Model
-    size: float
-
-    @classmethod
-    def of(cls, model: Model) -> "Closure":
-        """Those of a model, in its own size."""
-        return cls(model, _size(model))
-
-    def dynamics(self, q: Array, v: Sequence[float] | None = None) -> Dynamics:
-        """The mechanism at q, at rest unless v is given."""
-        model = self.model
-        inputs = {i.name: i.default for i in model.inputs}
-        states = {x.name: x.initial for x in model.states}
-        speeds = [0.0] * len(model.velocities) if v is None else list(v)
-        values = Values(model.defaults, inputs, q.tolist(), speeds, states, 0.0)
-        return Dynamics(model, values, FloatScalars())
-
-    def residuals(self, q: Array) -> Array:
-        """g of each row, (nc,)."""
-        found = np.array(constraints.residuals(self.dynamics(q)))
-        return np.asarray(found / self._units)
-
-    def both(self, q: Array) -> tuple[Array, Array]:
-        """`residuals` and `jacobian`."""
-        d = self.dynamics(q)
-        found = np.array(constraints.residuals(d), dtype=np.float64)
-        return np.asarray(found / self._units), self._in_sizes(jacobian_of(d))
-
-    def jacobian(self, q: Array) -> Array:
-        """J (nc, nv) in sizes."""
-        return self._in_sizes(jacobian_of(self.dynamics(q)))
-
-    def _in_sizes(self, rows: Sequence[Sequence[float]]) -> Array:
-        matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.model.velocities))
-        scaled: Array = matrix * self.lengths / self._units[:, np.newaxis]
-        return scaled
-
-    def holding(self, q: Array) -> Array:
-        """J (nc, nv) in sizes, 0 in the rows that restrict velocities alone: what positions can be
-        closed by. A wheel is put on the ground without rolling there.
-        """
-        rows = constraints.rows_of(self.dynamics(q))
-        held = np.array([[row.residual is not None] for row in rows], dtype=bool)
-        return np.where(held.reshape(len(rows), 1), self.jacobian(q), 0.0)
-
-    def moved(self, q: Array, step: Array) -> Array:
-        """q after a step (nv,) of the velocities' directions, in sizes; quaternions stay unit."""
-        rates = constraints.position_rates(self.dynamics(q), (step * self.lengths).tolist())
-        found: Array = q + np.array(rates, dtype=np.float64)
-        for indices in map(list, self.model.quaternions):
-            found[indices] /= np.linalg.norm(found[indices])
-        return found
-
-    def upright(self, q: Array) -> bool:
-        """Whether no loop is closed with a part turned by half a turn."""
-        d = self.dynamics(q)
-        return all(cosine > 0 for loop in self.model.loops for cosine in loop.upright(d))
-
-    @property
-    def lengths(self) -> Array:
-        """The size of each velocity's coordinate: 1 for an angle."""
-        return np.array([self.size if c.unit == "m/s" else 1.0 for c in self.model.velocities])
-
-    @property
-    def _units(self) -> Array:
-        return np.array([self.size if unit == "N" else 1.0 for _, unit in self.model.rows])
-
-
 def assembled(model: Model) -> Model:
     """The model with an initial state that meets its constraints, without rows that follow from
     others, and with a notice of what was changed.
@@ -126,20 +44,16 @@ def assembled(model: Model) -> Model:
     if not model.constraints:
         return model
     mechanism = Closure.of(model)
-    start = np.array(model.initial_q)
-    free = _free(model)
-    _check_defined(mechanism, start)
-    q = _closed(mechanism, start, free)
-    notices = list[str]()
-    if q is None and not free.all():
-        q = _closed(mechanism, start, np.ones(len(free), dtype=bool))
-        if q is None or not _complete(model):
-            raise SceneError(_open(mechanism, start, free))
-        notices += _changes(model, start, q)
-    if q is None:
-        raise SceneError(_open(mechanism, start, free))
+    _check_linear(mechanism, np.array(model.initial_q))
+    q, notices = _position(mechanism)
     dropped = _dependent(mechanism, q)
     model = replace(model, initial_q=tuple(q.tolist()), dropped=dropped)
+    if not model.rows:
+        raise SceneError(
+            f"joints: {', '.join(c.name for c in model.constraints)} "
+            f"restrict{'s' * (len(model.constraints) == 1)} nothing that the other joints do not "
+            "restrict already; leave it out"
+        )
     if len(model.rows) >= len(model.velocities):
         raise SceneError(
             f"joints: the loops hold everything: {len(model.rows)} independent constraints on "
@@ -156,28 +70,58 @@ def assembled(model: Model) -> Model:
     return replace(model, initial_v=v, pivots=pivots, notices=(*model.notices, *notices, *more))
 
 
-def _check_defined(mechanism: Closure, start: Array) -> None:
-    """Raise `SceneError` if a constraint has no value at the start."""
-    for constraint in mechanism.model.constraints:
-        try:
-            list(constraint.rows(mechanism.dynamics(start)))
-        except (ArithmeticError, ValueError):
-            raise SceneError(
-                f"initial.q: constraint '{constraint.name}' has no direction at this start, as "
-                "where a disc lies flat; give another"
-            ) from None
+def _check_linear(mechanism: Closure, q: Array) -> None:
+    """Raise `SceneError` for a row that is not linear in the velocities."""
+    rng, model = random.Random(5), mechanism.model
+    slopes = []
+    for _ in range(2):
+        d = mechanism.dynamics(q, [rng.uniform(0.5, 2.0) for _ in model.velocities])
+        slopes.append(jacobian_of(d))
+    for (name, _), row, other in zip(model.rows, *slopes, strict=True):
+        if not np.allclose(row, other, rtol=1e-9, atol=0.0, equal_nan=True):
+            raise SceneError(f"constraints: {name} is not linear in the velocities; write it so")
 
 
-def _size(model: Model) -> float:
-    """A typical length of the mechanism, m."""
-    joints = [*(body.joint for body in model.bodies), *(loop.joint for loop in model.loops)]
-    parts = [
-        part
-        for joint in joints
-        if not isinstance(joint, Free)
-        for part in (*joint.r_parent, *joint.r_child)
+def closed_start(
+    model: Model, q: Sequence[float], v: Sequence[float], given: Collection[str] = ()
+) -> tuple[tuple[float, ...], tuple[float, ...], tuple[str, ...]]:
+    """The start q, v of an assembled model at its parameters, as near as it can be, and notices.
+
+    Coordinates and velocities that are `given` are kept; without given coordinates those that the
+    scene gives, and without given velocities likewise. Raises `SceneError` if that cannot be.
+    """
+    positions, velocities = (
+        [c.name for c in each] for each in (model.coordinates, model.velocities)
+    )
+    held = [
+        name
+        for names in (positions, velocities)
+        for name in names
+        if name in (given if set(given) & set(names) else model.held)
     ]
-    return max((abs(model.value(part)) for part in parts), default=0.0) or 1.0
+    model = replace(model, initial_q=tuple(q), initial_v=tuple(v), held=tuple(held))
+    mechanism = Closure.of(model)
+    if mechanism.met(np.array(q), v):
+        return model.initial_q, model.initial_v, ()
+    found, notices = _position(mechanism)
+    speeds, more = _speeds(mechanism, found)
+    return tuple(found.tolist()), speeds, (*notices, *more)
+
+
+def _position(mechanism: Closure) -> tuple[Array, list[str]]:
+    """The closed position nearest to a model's initial one, with notices; what it holds is kept,
+    unless it holds all. Raises `SceneError` if there is none.
+    """
+    model = mechanism.model
+    start, free = np.array(model.initial_q), _free(model)
+    q = _closed(mechanism, start, free)
+    if q is None and not free.any():  # they may be rounded
+        q = _closed(mechanism, start, ~free)
+        if q is not None:
+            return q, _changes(model, start, q)
+    if q is None:
+        raise SceneError(_open(mechanism, start, free))
+    return q, []
 
 
 def _free(model: Model) -> NDArray[np.bool_]:
@@ -192,11 +136,6 @@ def _free(model: Model) -> NDArray[np.bool_]:
         if held & set(names[index.body.plain :]):
             found[list(index.spin)] = False
     return found
-
-
-def _complete(model: Model) -> bool:
-    """Whether the scene gives every coordinate, so that its values may be rounded."""
-    return not _free(model).any()
 
 
 def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array | None:
@@ -214,32 +153,6 @@ def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array 
     return min(found, key=lambda q: float(np.abs(q - start).max())) if found else None
 
 
-def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | None:
-    """The end of Newton's method with damped least-squares steps; None if it does not converge."""
-    g = mechanism.residuals(q)
-    damping, last = 0.0, math.inf
-    for _ in range(STEPS):
-        size = float(np.abs(g).max())
-        if size <= CLOSED and size >= 0.5 * last:
-            return q
-        last = size
-        matrix = np.where(free, mechanism.holding(q), 0.0)
-        normal = matrix @ matrix.T + damping * np.eye(len(g))
-        step = -matrix.T @ np.linalg.lstsq(normal, g, rcond=1e-14)[0]
-        length = float(np.abs(step).max())
-        step *= min(1.0, 0.5 / length) if length else 1.0
-        there = mechanism.moved(q, step)
-        after = mechanism.residuals(there)
-        if float(after @ after) > float(g @ g) and size > CLOSED:
-            damping = max(10 * damping, 1e-6)
-            last = math.inf
-            if damping > 1e6:
-                return None
-            continue
-        q, g, damping = there, after, damping / 10 if damping > 1e-12 else 0.0
-    return q if float(np.abs(g).max()) <= 10 * CLOSED else None
-
-
 def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     """What cannot close, and by how much at least."""
     q, g = start, mechanism.residuals(start)
@@ -255,7 +168,7 @@ def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     worst = int(np.abs(g).argmax())
     name, unit = model.rows[worst]
     gap = abs(float(g[worst])) * (mechanism.size if unit == "N" else 1.0)
-    held = ", ".join(model.held)
+    held = ", ".join(c.name for c in model.coordinates if c.name in model.held)
     given = f" with {held} as given" if held else ""
     return (
         f"initial.q: the constraints cannot be met{given}: {name} stays open by "
@@ -353,6 +266,7 @@ def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]
     rate = rate / np.array([mechanism.size if unit == "N" else 1.0 for _, unit in model.rows])
     for free in (~held, np.ones(len(held), dtype=bool)):
         change = -np.linalg.lstsq(np.where(free, matrix, 0.0), rate, rcond=1e-10)[0]
+        change = np.where(free, change, 0.0)
         left = float(np.abs(matrix @ change + rate).max())
         if left <= 1e-9 * max(1.0, float(np.abs(rate).max())):
             moved = float(np.abs(change[held]).max(initial=0.0))

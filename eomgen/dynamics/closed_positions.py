@@ -3,14 +3,15 @@
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
-from eomgen.dynamics.assembly import Array, Closure
+from eomgen.dynamics.closure import Array, Closure
 from eomgen.dynamics.clusters import clusters_of, span
 from eomgen.dynamics.constraints import rows_of
+from eomgen.language.formula import Formula, names_in
 from eomgen.model.model import Model
+from eomgen.scene.constraints import ConstraintTable
 
 STEP = 0.15
 """The distance of positions, rad, or in sizes of the mechanism."""
@@ -20,14 +21,30 @@ LONGEST, SHORTEST, ALL = 60, 6, 600
 """Most and fewest positions of a walk; fewer for more velocities, whose product is bounded."""
 MET = 1e-8
 """A residual, in sizes, that is small enough here."""
+REGULAR = 0.05
+"""The least regularity of a position that is not near a singular one."""
 SAFE = 0.02
 """The least pivot, relative to its row, with which dependent velocities may be solved for."""
 
 
-@lru_cache(maxsize=8)
 def closed_positions(model: Model) -> tuple[Array, ...]:
     """Closed positions (nq,): walks along the freedoms."""
     return tuple(q for walk in range(WALKS) for q, _ in _walk(model, walk))
+
+
+def regular_positions(model: Model) -> tuple[Array, ...]:
+    """The same without those near singular positions, where any elimination loses digits."""
+    found = [part for walk in range(WALKS) for part in _walk(model, walk)]
+    return tuple(q for q, matrix in found if _regularity(matrix) >= REGULAR)
+
+
+def _regularity(matrix: Array) -> float:
+    """The least singular value of J relative to the greatest, its rows of length 1."""
+    lengths = np.linalg.norm(matrix, axis=1, keepdims=True)
+    if not lengths.all():
+        return 0.0
+    sizes = np.linalg.svd(matrix / lengths, compute_uv=False)
+    return float(sizes[-1] / sizes[0])
 
 
 def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
@@ -58,9 +75,12 @@ def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
 
 def with_safe_pivots(model: Model) -> Model:
     """The model with only those `pivots` whose dependent velocities follow from the others, with
-    large pivots, in all closed positions; all pivots of a cluster or none.
+    large pivots, in all closed positions; all pivots of a cluster or none. None where something is
+    driven: the walks know the positions at t = 0 only.
     """
     closure = Closure.of(model)
+    if model.driven or _timed(model):
+        return replace(model, pivots=())
     start = _pivots(closure.jacobian(np.array(model.initial_q)), model.pivots)
     safe = np.abs(start) >= SAFE
     for walk in range(WALKS):
@@ -71,6 +91,19 @@ def with_safe_pivots(model: Model) -> Model:
     kept = [rows for rows in _rows_by_cluster(model) if rows <= fit]
     pivots = tuple(pair for pair in model.pivots if any(pair[0] in rows for rows in kept))
     return replace(model, pivots=pivots)
+
+
+def safely_dependent(model: Model) -> bool:
+    """Whether that is so of all rows."""
+    return len(with_safe_pivots(model).pivots) == len(model.rows)
+
+
+def _timed(model: Model) -> bool:
+    """Whether a constraint depends on time."""
+    tables = [c for c in model.constraints if isinstance(c, ConstraintTable)]
+    values = (getattr(c, field) for c in tables for field in type(c).model_fields)
+    formulas = (f for x in values for f in (x if isinstance(x, tuple) else (x,)))
+    return any("t" in names_in(f) for f in formulas if isinstance(f, Formula))
 
 
 def _rows_by_cluster(model: Model) -> list[set[int]]:

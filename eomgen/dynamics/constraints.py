@@ -8,11 +8,12 @@ J is the matrix of the constraints' rates by the velocities: ġ = J v + drift an
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.dynamics.loads import power_of
+from eomgen.dynamics.loads import generalised, power_of, scaled
 from eomgen.dynamics.mechanism_state import MechanismState, Values
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.constraints.base import Row
+from eomgen.scene.effects.base import Load
 
 
 def rows_of(d: MechanismState) -> list[Row]:
@@ -36,6 +37,12 @@ def rates(d: MechanismState) -> list[Scalar]:
         rate = power_of(d, row.loads)
         found.append(rate if row.drift is None else rate + row.drift)
     return found
+
+
+def held(d: MechanismState, multipliers: Sequence[Scalar]) -> list[Scalar]:
+    """Jᵀ λ: the generalised forces of the constraints, with the rows of driven velocities."""
+    pairs = zip(rows_of(d), multipliers, strict=True)
+    return generalised(d, [x for row, force in pairs for x in scaled(row.loads, force)])
 
 
 def accelerations_at_rest(d: MechanismState) -> list[Scalar]:
@@ -72,6 +79,18 @@ def position_rates(d: MechanismState, v: Sequence[Scalar] | None = None) -> list
                 w * c + x * b - y * a,
             ]
     return rates
+
+
+def loads_of(d: MechanismState, multipliers: Sequence[Scalar]) -> list[list[Load]]:
+    """The loads on bodies of each constraint of the model; `multipliers` are those of its rows."""
+    found: list[list[Load]] = []
+    forces = dict(zip((name for name, _ in d.model.rows), multipliers, strict=True))
+    for constraint in d.model.constraints:
+        names = (name for name, _ in constraint.row_names(d.model.dimensions))
+        rows = zip(names, constraint.rows(d), strict=True)
+        loads = (x for name, row in rows if name in forces for x in scaled(row.loads, forces[name]))
+        found.append([x for x in loads if isinstance(x, Load)])
+    return found
 
 
 def relative(d: MechanismState, pivots: Sequence[Scalar], sizes: Sequence[Scalar]) -> list[Scalar]:

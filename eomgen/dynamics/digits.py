@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.dynamics.closed_positions import closed_positions
+from eomgen.dynamics.closed_positions import regular_positions
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.frames import Linkage
 from eomgen.dynamics.kinematics import Axes
@@ -86,7 +86,7 @@ def digits_lost(
     """
     rng = random.Random(6)
     if model.constraints:
-        closed = closed_positions(model) or (np.array(model.initial_q),)
+        closed = regular_positions(model) or (np.array(model.initial_q),)
         q = [
             closed[n * len(closed) // (EACH * len(KINDS))].tolist()
             for n in range(EACH * len(KINDS))

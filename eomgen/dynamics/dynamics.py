@@ -15,6 +15,7 @@ energies and poses still use the velocities. Energy is not conserved then.
 from collections.abc import Sequence
 from functools import cached_property
 
+from eomgen.dynamics import constraints
 from eomgen.dynamics import forces as fc
 from eomgen.dynamics.applied import AppliedLoads
 from eomgen.dynamics.articulated import Pivots, articulate, respond
@@ -162,7 +163,11 @@ class Dynamics(AppliedLoads):
     def _driving(self, vd: Sequence[Scalar]) -> list[Scalar]:
         """`driving_forces` at other v̇."""
         pairs = zip(self._needed(vd)[self.nv :], self._applied[self.nv :], strict=True)
-        return [needed - applied for needed, applied in pairs]
+        found = [needed - applied for needed, applied in pairs]
+        if not (found and self.model.constraints):
+            return found
+        held = constraints.held(self, self.constrained("aba").multipliers())
+        return [force - by for force, by in zip(found, held[self.nv :], strict=True)]
 
     def driving_powers(self, vd: Sequence[Scalar], beside: Sequence[Scalar]) -> list[Scalar]:
         """The power of each driven effect at v̇, W, in the order of the effects. `beside` are

@@ -20,7 +20,7 @@ from eomgen.dynamics.vectors import Vec, in_space, times, zeros
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import JointIndex, Model, dofs_of
-from eomgen.scalars.duals import Dual, Duals
+from eomgen.model.partials import gradient_of, partials_of
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.constraints.base import Partials
@@ -142,47 +142,14 @@ class MechanismState:
 
     def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
         """A formula with its derivatives, by dual numbers along one coordinate at a time."""
-        duals, one = Duals(self.scalars), self.scalars.number(1.0)
-        still = {name: duals.still(x) for name, x in self.names.items()}
-        used = set(names_in(formula))
-
-        def slope(name: str) -> Scalar:
-            along = {**still, name: Dual(self.names[name], one)}
-            return evaluate(formula, along, duals).rate
-
-        slopes = []
-        for index in self.model.joint_indices:
-            own = index.body.positions if by == "positions" else index.body.velocities
-            slopes += [
-                (index.body.joint.name, i, slope(c.name))
-                for i, c in enumerate(own)
-                if c.name in used
-            ]
-        zero = self.scalars.number(0.0)
-        rates = {c.name: zero for body in self.model.bodies for c in body.velocities}
-        return Partials(
-            self.value(formula),
-            tuple(slopes),
-            slope("t") if "t" in used else zero,
-            self.value(formula, **rates),
-        )
+        return partials_of(formula, by, self.model, self.names, self.scalars)
 
     def gradient(
         self, formula: Formula, names: Mapping[str, Scalar]
     ) -> tuple[Scalar, Vector, Scalar]:
         """A formula of `names`, t and parameters with its derivatives by the names and by t."""
-        duals, one = Duals(self.scalars), self.scalars.number(1.0)
-        values = {**self.values.parameters, **names, "t": self.values.time}
-        used = set(names_in(formula))
-        still = {name: duals.still(values[name]) for name in used}
-
-        def slope(name: str) -> Scalar:
-            if name not in used:
-                return self.scalars.number(0.0)
-            along = {**still, name: Dual(values[name], one)}
-            return evaluate(formula, along, duals).rate
-
-        return evaluate(formula, values, self.scalars), tuple(map(slope, names)), slope("t")
+        given = {**self.values.parameters, "t": self.values.time}
+        return gradient_of(formula, names, given, self.scalars)
 
     def input(self, name: str) -> Scalar:
         """An input."""

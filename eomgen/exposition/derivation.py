@@ -6,7 +6,7 @@ what depends on the motion enters the derivation as forces with names, and each 
 forces are.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -22,9 +22,15 @@ from eomgen.derivation.supported import MOST_REPORTED, why_not_closed, why_not_p
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
 from eomgen.errors import SceneError
+from eomgen.exposition.constraints import (
+    DerivedConstraint,
+    derived_constraints,
+    with_multipliers,
+)
 from eomgen.exposition.effects import DerivedEffect, derived_effects, equations_of, with_symbols
 from eomgen.exposition.frames import frames_of
 from eomgen.exposition.impacts import impact_steps
+from eomgen.exposition.loops import constraint_steps, solution_steps
 from eomgen.exposition.mechanism import NamingMechanism, Notes
 from eomgen.exposition.poses import poses
 from eomgen.exposition.reading import numbered, read_all, reading_names
@@ -83,6 +89,19 @@ ALREADY = (
 
 
 @dataclass(frozen=True)
+class Parts:
+    """What acts on a mechanism: its effects, and the constraints with their forces."""
+
+    effects: tuple[DerivedEffect, ...]
+    constraints: tuple[DerivedConstraint, ...]
+
+    @property
+    def loads(self) -> tuple[DerivedEffect, ...]:
+        """All that has loads."""
+        return (*self.effects, *(c.force for c in self.constraints))
+
+
+@dataclass(frozen=True)
 class Exposition:
     """The steps of a derivation, and its equations as matrices unless they are too long."""
 
@@ -97,8 +116,12 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
     Raises `SceneError` for a form that the mechanism does not have.
     """
     form = form or model.form
-    effects = derived_effects(model)
-    bare = replace(with_symbols(model, effects), form=form)
+    effects, constraints = derived_effects(model), derived_constraints(model)
+    if form != "velocity" and constraints:
+        raise SceneError(f"form: no derivation in the form '{form}': {why_not_pins(model)}")
+    bare = with_multipliers(with_symbols(model, effects), constraints)
+    bare = replace(bare, form=form)
+    parts = Parts(effects, constraints)
     small = len(model.bodies) <= MOST_REPORTED
     long = f"it is written out for up to {MOST_REPORTED} bodies, and there are {len(model.bodies)}"
     why_not = why_not_pins(bare) or ("" if small else long)
@@ -108,15 +131,13 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
             f"form: no derivation in the form '{form}': {why_not}; use velocity{module}"
         )
     if not why_not:
-        return _of_pins(model, bare, effects, form)
+        return _of_pins(model, bare, parts, form)
     if small and not why_not_closed(bare):
-        return _of_any(model, bare, effects)
-    return _recursive(model, effects)
+        return _of_any(model, bare, parts)
+    return _recursive(model, parts)
 
 
-def _of_pins(
-    model: Model, bare: Model, effects: tuple[DerivedEffect, ...], form: Form
-) -> Exposition:
+def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
     equations = derive(bare)
     names = _names(model, readable(equations))
     names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
@@ -126,9 +147,10 @@ def _of_pins(
     ]
     place = next(i for i, step in enumerate(steps) if step.number == "(37)")
     written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
-    last = form_step(model, form, written, effects)
-    ends = [_symmetry(equations), *impact_steps(model, effects), last]
-    inner = _numbered_within(_effect_steps(model, effects), "36")
+    last = form_step(model, form, written, parts.effects)
+    solved = solution_steps(model, parts.constraints, recursive=False)
+    ends = [_symmetry(equations), *solved, *impact_steps(model, parts.effects), last]
+    inner = _numbered_within(_effect_steps(model, parts), "36")
     steps = [
         Step("", "The handout", HANDOUT, ()),
         *steps[:place],
@@ -136,10 +158,10 @@ def _of_pins(
         *steps[place:],
         *(_renamed(step, names) for step in numbered(ends, 39)),
     ]
-    return Exposition(tuple(steps), _whole(of_pins(equations), model, effects), effects)
+    return Exposition(tuple(steps), _whole(of_pins(equations), model, parts), parts.loads)
 
 
-def _of_any(model: Model, bare: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
+def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
     equations = derive_projected(bare)
     names = reading_names(model)
     found = [_renamed(step, names) for step in projected_steps(equations)]
@@ -147,7 +169,11 @@ def _of_any(model: Model, bare: Model, effects: tuple[DerivedEffect, ...]) -> Ex
     solved = {line.left.name: line.right for line in found[place].equations}
     rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
     form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
-    ends = [*impact_steps(model, effects), form_step(model, "velocity", form, effects)]
+    ends = [
+        *solution_steps(model, parts.constraints, recursive=False),
+        *impact_steps(model, parts.effects),
+        form_step(model, "velocity", form, parts.effects),
+    ]
     words = (
         "Each body by itself, with its weight, the forces of the effects, and those of its joints."
     )
@@ -156,16 +182,17 @@ def _of_any(model: Model, bare: Model, effects: tuple[DerivedEffect, ...]) -> Ex
         state,
         Step("", "Free bodies", words, (), "bodies"),
         *found[1:place],
-        *(_renamed(step, names) for step in _effect_steps(model, effects)),
+        *(_renamed(step, names) for step in _effect_steps(model, parts)),
         *found[place:],
         *(_renamed(step, names) for step in ends),
     ]
     whole = numbered([replace(step, number="") for step in steps])
     intro = Step("", "Compared with the handout", PROJECTED, ())
-    return Exposition((intro, *whole), _whole(of_projected(equations), model, effects), effects)
+    matrices = _whole(of_projected(equations), model, parts)
+    return Exposition((intro, *whole), matrices, parts.loads)
 
 
-def _recursive(model: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
+def _recursive(model: Model, parts: Parts) -> Exposition:
     names = reading_names(model)
     frames = frames_of(model)
     state = [
@@ -179,24 +206,25 @@ def _recursive(model: Model, effects: tuple[DerivedEffect, ...]) -> Exposition:
     steps = [
         Step("", "State", words, tuple(state), "mechanism"),
         Step("", "Free bodies", _free_words(model), (), "bodies"),
-        *_effect_steps(model, effects, every=True),
-        *recursive_steps(model, frames, effects),
-        *impact_steps(model, effects),
-        form_step(model, "velocity", form, effects),
+        *_effect_steps(model, parts, every=True),
+        *recursive_steps(model, frames, parts.loads),
+        *solution_steps(model, parts.constraints, recursive=True),
+        *impact_steps(model, parts.effects),
+        form_step(model, "velocity", form, parts.effects),
     ]
     renamed = [_renamed(step, names) for step in steps]
     intro = Step("", "Compared with the handout", RECURSIVE, ())
-    return Exposition((intro, *numbered(renamed)), None, effects)
+    return Exposition((intro, *numbered(renamed)), None, parts.loads)
 
 
-def _effect_steps(
-    model: Model, effects: Sequence[DerivedEffect], *, every: bool = False
-) -> Iterator[Step]:
-    """Poses and motions that the effects use, and each effect with its forces.
+def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterator[Step]:
+    """Poses and motions that effects and constraints use, and each of them with its forces.
 
     The recursion needs the poses of bodies with forces that no motion changes as well (`every`).
     """
-    needed = dict.fromkeys(body for t in effects if every or not t.kept for body in used_bodies(t))
+    needed = dict.fromkeys(
+        body for t in parts.loads if every or not t.kept for body in used_bodies(t)
+    )
     if needed:
         words = (
             "The forces below depend on where bodies are in the world and how they move. o is the "
@@ -213,7 +241,7 @@ def _effect_steps(
         )
         _, equations = poses(model, frames_of(model), needed)
         yield Step("", "Where the bodies are, and how they move", words, tuple(equations))
-    for derived in effects:
+    for derived in parts.effects:
         lines = equations_of(derived.definitions)
         if derived.kept:
             lines = _loads_as_they_are(derived)
@@ -224,6 +252,7 @@ def _effect_steps(
             derived.words,
             tuple(lines),
         )
+    yield from constraint_steps(model, parts.constraints)
 
 
 def used_bodies(derived: DerivedEffect) -> Iterator[str]:
@@ -305,11 +334,13 @@ def _numbered_within(steps: Iterator[Step], number: str) -> list[Step]:
     return [replace(step, number=f"({number}.{i})") for i, step in enumerate(steps, 1)]
 
 
-def _whole(found: Matrices, model: Model, effects: Sequence[DerivedEffect]) -> Matrices:
-    """The matrices with the forces of the effects written out."""
-    needed = dict.fromkeys(body for derived in effects for body in used_bodies(derived))
+def _whole(found: Matrices, model: Model, parts: Parts) -> Matrices:
+    """The matrices with the forces of effects and constraints written out."""
+    needed = dict.fromkeys(body for derived in parts.loads for body in used_bodies(derived))
     more, _ = poses(model, frames_of(model), needed)
-    more += [pair for derived in effects for pair in derived.definitions]
+    more += [pair for derived in parts.effects for pair in derived.definitions]
+    for constraint in parts.constraints:
+        more += (*constraint.definitions, *constraint.force.definitions)
     if not more:
         return found
     known = {s.name: s for e in (found.M, found.V, found.G, found.F) for s in e.free_symbols}

@@ -73,7 +73,7 @@ def _derived(model: Model, effect: Effect) -> DerivedEffect:
     kept = effect.is_plain(model.defaults) and not moving and not contacts
     definitions = list(notes.definitions)
     if not kept:
-        loads = _named(model, effect.name, loads, definitions)
+        loads = named_loads(model, effect.name, loads, definitions)
     rates = tuple(
         (real(dotted(state.name, "dot")), rate)
         for state, rate in zip(effect.states(model.dimensions), states, strict=True)
@@ -101,7 +101,7 @@ def _moves(model: Model) -> Any:
     return lambda force: bool(getattr(force, "free_symbols", set()) - still)
 
 
-def _named(
+def named_loads(
     model: Model, name: str, loads: Sequence[AnyLoad], definitions: list[Definition]
 ) -> list[AnyLoad]:
     """The loads with a symbol for each component, which joins the definitions."""

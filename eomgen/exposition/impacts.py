@@ -68,10 +68,10 @@ def impact_steps(model: Model, effects: Sequence[DerivedEffect]) -> Iterator[Ste
 def _contact_step(model: Model, contact: Contact) -> Step:
     name = contact.name
     lines = [Equation(real(f"g_{name}"), contact.gap)]
-    lines.append(Equation(real(f"u_{name},n"), _power(model, contact.normal)))
+    lines.append(Equation(real(f"u_{name},n"), power(model, contact.normal)))
     for i, tangent in enumerate(contact.tangents):
         letter = "t" if len(contact.tangents) == 1 else f"t{i + 1}"
-        lines.append(Equation(real(f"u_{name},{letter}"), _power(model, tangent)))
+        lines.append(Equation(real(f"u_{name},{letter}"), power(model, tangent)))
     lines.append(Equation(real(f"e_{name}"), contact.restitution))
     if contact.tangents and contact.friction != 0:
         lines.append(Equation(real(f"mu_{name}"), contact.friction))
@@ -84,7 +84,7 @@ def _contact_step(model: Model, contact: Contact) -> Step:
     return Step("", f"Contact `{name}`", words, kept)
 
 
-def _power(model: Model, loads: Sequence[Load | JointLoad]) -> Expr:
+def power(model: Model, loads: Sequence[Load | JointLoad]) -> Expr:
     """The power of unit loads: a speed."""
     total: Expr = sp.Integer(0)
     size = model.dimensions

@@ -5,8 +5,9 @@ definitions are noted in the order in which they are made.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import sympy as sp
 
@@ -16,7 +17,9 @@ from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import Model, dofs_of
+from eomgen.model.partials import gradient_of, partials_of
 from eomgen.scalars.exact import Real
+from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
 
@@ -147,6 +150,16 @@ class NamingMechanism:
     def value(self, formula: Formula, **names: Expr) -> Expr:
         """A quantity over the names of the scene."""
         return evaluate(formula, {**self.names, **names}, SCALARS)
+
+    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
+        """A formula with its derivatives."""
+        return partials_of(formula, by, self.model, self.names, SCALARS)
+
+    def gradient(
+        self, formula: Formula, names: Mapping[str, Expr]
+    ) -> tuple[Expr, tuple[Expr, ...], Expr]:
+        """A formula of `names`, t and parameters with its derivatives."""
+        return gradient_of(formula, names, self.names, SCALARS)
 
     def input(self, name: str) -> Expr:
         """An input."""

@@ -1,6 +1,6 @@
 """The state that a form names, and its time derivative written out."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -65,7 +65,7 @@ def momentum_form(equations: Equations) -> WrittenForm:
     definitions = [
         (symbol, _in_state(e, given)) for symbol, e in needed if symbol not in coordinates
     ]
-    return WrittenForm(form.symbols, rates, tuple(_used(rates, definitions)))
+    return WrittenForm(form.symbols, rates, needed_by(rates, definitions))
 
 
 def velocity_form(equations: Equations) -> WrittenForm:
@@ -82,7 +82,7 @@ def velocity_form(equations: Equations) -> WrittenForm:
         (symbol, _in_state(e.xreplace(still), given))
         for symbol, e in equations.solution.definitions
     ]
-    return WrittenForm(form.symbols, form.rates, tuple(_used(form.rates, definitions)))
+    return WrittenForm(form.symbols, form.rates, needed_by(form.rates, definitions))
 
 
 def _in_state(expression: Expr, given: Mapping[Expr, Expr]) -> Expr:
@@ -94,17 +94,17 @@ def _in_state(expression: Expr, given: Mapping[Expr, Expr]) -> Expr:
         expression = inner
 
 
-def _used(
-    rates: Sequence[Expr], definitions: Sequence[tuple[Expr, Expr]]
-) -> Iterator[tuple[Expr, Expr]]:
-    """The definitions that the rates need, directly or by others."""
-    needed = {s for rate in rates for s in rate.free_symbols}
+def needed_by(
+    expressions: Sequence[Expr], definitions: Sequence[tuple[Expr, Expr]]
+) -> tuple[tuple[Expr, Expr], ...]:
+    """The definitions that expressions need, directly or by others."""
+    needed = {s for e in expressions for s in e.free_symbols}
     kept = []
     for symbol, e in reversed(definitions):
         if symbol in needed:
             needed |= e.free_symbols
             kept.append((symbol, e))
-    yield from reversed(kept)
+    return tuple(reversed(kept))
 
 
 def form_step(

@@ -13,10 +13,11 @@ from eomgen.linear.linearise import (
     input_jacobian,
     input_values,
     rate_unit,
-    tangents,
 )
+from eomgen.linear.manifold import directions, returned
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
+from eomgen.run.tangents import tangents
 
 MOST_STEPS = 60
 """Greatest number of steps to the nearest equilibrium; a near one takes few."""
@@ -117,6 +118,8 @@ class _Search:
         held = np.append(held, np.zeros(self._nx, dtype=np.bool_))
         self.free = np.flatnonzero(np.concatenate([~held, trimmed]))
         self.moving = np.flatnonzero(~held)
+        self._displaced = self.moving[self.moving < self._nv]
+        self._constrained = bool(getattr(module, "CONSTRAINTS", ()))
 
     def point(self, y: FloatArray, u: FloatArray) -> _Point:
         """The point at the positions of `y`, with velocities 0 and quaternions normalised."""
@@ -126,10 +129,22 @@ class _Search:
         y[self._nq : self._nq + self._nv] = 0.0
         for indices in self._module.QUATERNIONS:
             y[list(indices)] /= np.linalg.norm(y[list(indices)])
+        if self._constrained:
+            y = returned(self._module, y, self._p, u, self._displaced)
         return _Point(y, u, self._evaluated(self._module.derivative, y, u)[self._nq :])
 
     def slopes(self, point: _Point) -> FloatArray:
-        """Derivatives of the changes with respect to the free unknowns, (nv + nx, nf)."""
+        """Derivatives of the changes with respect to the free unknowns, (nv + nx, nf), along
+        displacements that keep the constraints.
+        """
+        found = self._slopes(point)
+        if self._constrained:
+            count = len(self._displaced)
+            along = directions(self._module, point.y, self._p, point.u, self._displaced)
+            found[:, :count] = found[:, :count] @ along
+        return found
+
+    def _slopes(self, point: _Point) -> FloatArray:
         by_state = self._evaluated(self._module.jacobian, point.y, point.u)[self._nq :]
         by_position = by_state[:, : self._nq] @ self._tangents(point)
         by_displacement = np.hstack([by_position, by_state[:, self._nq + self._nv :]])

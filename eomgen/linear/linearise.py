@@ -2,7 +2,7 @@
 
 import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,11 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.files import write_whole
+from eomgen.linear.manifold import Manifold, manifold
 from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
+from eomgen.run.tangents import tangents
 
 FORMAT = "linearisation 1"
 BOUND = 1e100
@@ -33,6 +35,8 @@ class Linearisation:
     y (ny,), u (nu,)     the state and the constant inputs, SI units
     rates (ny,)          ẏ there, zero at an equilibrium
     quaternions          indices into the deviations of each unit quaternion among them
+    manifold             of the deviations, three for a quaternion, that keep the constraints; None
+                         without constraints
     """
 
     A: FloatArray
@@ -43,6 +47,7 @@ class Linearisation:
     u: FloatArray
     rates: FloatArray
     quaternions: tuple[tuple[int, int, int, int], ...]
+    manifold: Manifold | None = None
 
     def reduced(self) -> "Linearisation":
         """The same system with as many states as twice the degrees of freedom.
@@ -51,7 +56,18 @@ class Linearisation:
         named `<prefix>_rx`, …: q + δq = q (1, δr/2). With δy = T δx the system is
         ẋ = T⁺ (A T - Ṫ) x + T⁺ B u, where Ṫ follows the motion and is zero at rest. Without
         quaternions nothing changes.
+
+        With constraints only the independent deviations are left; the others follow from them.
         """
+        if self.manifold:
+            free = replace(self, manifold=None).reduced()
+            T, kept = self.manifold
+            return replace(
+                free,
+                A=(free.A @ T)[kept],
+                B=free.B[kept],
+                state_names=tuple(free.state_names[i] for i in kept),
+            )
         if not self.quaternions:
             return self
         basis = tangents(self.y, self.quaternions)
@@ -121,6 +137,7 @@ def linearise(
         u=inputs,
         rates=rates,
         quaternions=module.QUATERNIONS,
+        manifold=manifold(module, y, p, inputs) if getattr(module, "CONSTRAINTS", ()) else None,
     )
 
 
@@ -195,26 +212,6 @@ def input_values(module: GeneratedModule, u: Any) -> FloatArray:
     if values.shape != (len(module.INPUTS),):
         raise RunError(f"inputs: have shape {values.shape}, not ({len(module.INPUTS)},)")
     return values
-
-
-def tangents(
-    y: FloatArray, quaternions: tuple[tuple[int, int, int, int], ...], plain: float = 1.0
-) -> FloatArray:
-    """T (ny, n) of δy = T δx: `plain` for each scalar state, q (0, δr)/2 for each quaternion."""
-    firsts = {indices[0]: indices for indices in quaternions}
-    rest = {i for indices in quaternions for i in indices}
-    result = np.zeros((len(y), len(y) - len(quaternions)))
-    column = 0
-    for i in range(len(y)):
-        if i in firsts:
-            a, b, c, d = (0.5 * y[list(firsts[i])]).tolist()
-            block = [[-b, -c, -d], [a, -d, c], [d, a, -b], [-c, b, a]]
-            result[list(firsts[i]), column : column + 3] = block
-            column += 3
-        elif i not in rest:
-            result[i, column] = plain
-            column += 1
-    return result
 
 
 def _deviations(

@@ -6,14 +6,14 @@ from typing import TypeVar
 
 from eomgen.errors import SceneError, check_known
 from eomgen.language.conditions import require
-from eomgen.language.formula import ZERO
+from eomgen.language.formula import ZERO, names_in
 from eomgen.language.quantity import about_slides, of_joint, with_components
 from eomgen.model.frames import effect_from_centres
 from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, dofs_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
-from eomgen.scene.constraints import ConstraintTable
+from eomgen.scene.constraints import ConstraintTable, Coupling
 from eomgen.scene.effects import Driven, Effect, Gravity
 from eomgen.scene.effects.base import EffectTable, ExtraState, Input
 from eomgen.scene.joints import Prismatic, Revolute
@@ -87,7 +87,27 @@ def constraints_in_force(
     check_names([(c.name, location.format(i)) for i, c in enumerate(scene.constraints)])
     resolver = _Resolver(scene, bodies, scope)
     pairs = [resolver.resolved(c, location.format(i), ()) for i, c in enumerate(scene.constraints)]
+    for i, (constraint, _) in enumerate(pairs):
+        _check_formulas(constraint, location.format(i), bodies, scope)
     return tuple(c for c, _ in pairs), joined(bindings for _, bindings in pairs)
+
+
+def _check_formulas(
+    constraint: ConstraintTable, location: str, bodies: Sequence[Body], scope: Scope
+) -> None:
+    """Check that the formulas of a constraint are of what they restrict, t and parameters."""
+    coordinates = [c.name for body in bodies for c in body.positions]
+    velocities = [c.name for body in bodies for c in body.velocities]
+    if isinstance(constraint, Coupling):
+        check_known(constraint.coordinate, f"{location}.coordinate", coordinates, "coordinate")
+    for key, also in (("equals", []), ("position", []), ("velocity", velocities)):
+        formula = getattr(constraint, key, None)
+        for name in [] if formula is None else names_in(formula):
+            if name in scope.moving and name not in ("t", *coordinates, *also):
+                raise SceneError(
+                    f"{location}.{key}: '{name}' is no coordinate{' or velocity' if also else ''}; "
+                    "a constraint takes these, t and parameters"
+                )
 
 
 AnyEffect = TypeVar("AnyEffect", bound=EffectTable)

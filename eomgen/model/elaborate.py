@@ -63,6 +63,10 @@ def elaborate(scene: Scene) -> Model:
             "scene: every coordinate is driven or locked, so there is no motion to find; "
             "leave one free"
         )
+    if scene.initial.guess and not constraints:
+        raise SceneError(
+            "initial.guess: is for mechanisms with loops, and this scene has none; give initial.q"
+        )
     start = initial_state(scene.initial, bodies, prescribed)
     lengths = (line for link in links for line in axis_notices(link.joint, link.joint_location))
     model = Model(
@@ -279,7 +283,8 @@ def _loops(
         loops.append(closing(joint_from_centres(joint, centres), location, scene.dimensions))
         found += [bindings, Bindings(conditions=kept)]
     others, of_others = constraints_in_force(scene, bodies, scope)
-    check_names([(c.name, "constraints") for c in (*loops, *others)])
+    joints = [(joint.name, location) for joint, location in closing_joints(scene)]
+    check_names([*joints, *((c.name, f"constraints[{i}]") for i, c in enumerate(others))])
     return (*loops, *others), joined([*found, of_others])
 
 

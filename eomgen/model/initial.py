@@ -36,6 +36,7 @@ def initial_state(
     q = _values(given.q, coordinates, "initial.q", prescribed)
     v = _values(given.v, velocities_of(bodies, prescribed), "initial.v", prescribed)
     values = {c.name: x for c, x in zip(coordinates, q, strict=True)}
+    values |= _guesses(given, coordinates, prescribed)
     notices = []
     for body in bodies:
         if names := [c.name for c in body.positions[body.plain :]]:
@@ -55,6 +56,22 @@ def _given(
     if not isinstance(given, dict):
         return names
     return [name for name in names if name in given or f"{name}_deg" in given]
+
+
+def _guesses(
+    given: Initial, coordinates: Sequence[Coordinate], prescribed: Sequence[Prescribed]
+) -> dict[str, float]:
+    """The start values of coordinates that are to be found. Raises `SceneError` for one given."""
+    names, kept = _given(given.guess, coordinates), set(_given(given.q, coordinates))
+    both = [name for name in names if name in kept]
+    if both:
+        raise SceneError(
+            f"initial.guess.{both[0]}: initial.q gives it, so that it is not to be found; leave "
+            "one out"
+        )
+    values = _values(given.guess, coordinates, "initial.guess", prescribed)
+    pairs = zip((c.name for c in coordinates), values, strict=True)
+    return {name: value for name, value in pairs if name in names}
 
 
 def _unit(parts: Sequence[float], first: str, is_given: bool) -> list[float]:

@@ -7,6 +7,7 @@ from functools import cached_property
 from itertools import accumulate
 from typing import TypeGuard
 
+from eomgen.displays import Displayed
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import Constant, Formula, evaluate
 from eomgen.language.quantity import Parameter
@@ -164,7 +165,7 @@ class JointIndex:
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(Displayed):
     """A mechanism and the effects that act on it, without drawing and integration settings.
 
     conditions  conditions on the values of parameters

@@ -10,6 +10,9 @@ from eomgen.scene.joints import Free, Joint
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import BodyTable, Scene
 
+OF_COORDINATES = ("coordinate", "coordinates", "motor_inertia", "gear_ratio", "limits")
+"""Keys of joints that are about their coordinates."""
+
 
 @dataclass(frozen=True)
 class Link:
@@ -62,6 +65,12 @@ def closing_joints(scene: Scene) -> list[tuple[Joint, str]]:
             continue
         for key, name in (("parent", joint.parent), ("child", joint.child)):
             check_known(name, f"{location}.{key}", anchors, "body")
+        for key in OF_COORDINATES:
+            if key in joint.model_fields_set:
+                raise SceneError(
+                    f"{location}.{key}: a joint with loop = true has no coordinates, so this has "
+                    "no effect; leave it out, or close the loop with another joint"
+                )
         if joint.parent == joint.child:
             raise SceneError(
                 f"{location}.child: '{joint.child}' is also the parent; a loop joint holds two "

@@ -21,6 +21,17 @@ from eomgen.native.module import Kernels, outputs_of, usual_constants
 from eomgen.program.program import Program
 from eomgen.run.problem import FloatArray, Problem
 
+PROJECTION = {
+    "residuals": "constraint_residuals",
+    "rates": "constraint_rates",
+    "jacobian": "constraint_jacobian",
+    "position": "project_position",
+    "velocity": "project_velocity",
+    "margins": "constraint_margins",
+    "inertia": "mass_matrix",
+    "kinetic_slopes": "kinetic_slopes",
+}
+"""The functions of a module by the fields of its `Projection`."""
 Value = Callable[..., FloatArray]
 """A function of time, state and further arguments, such as the derivative."""
 Look = Callable[[float], ctypes.CDLL | None]
@@ -126,6 +137,14 @@ class Compilable:
         if switching is not None and switching.of_state is not None:
             of_state = self.function("switching_functions", switching.of_state)
             switching = replace(switching, of_state=of_state)
+        projection = problem.projection
+        if projection is not None:
+            made: dict[str, Any] = {
+                field: self.function(name, getattr(projection, field))
+                for field, name in PROJECTION.items()
+                if hasattr(self.module, name)
+            }
+            projection = replace(projection, **made)
         jacobian = problem.jacobian
         if hasattr(self.module, "jacobian"):
             jacobian = self.function("jacobian", jacobian)
@@ -135,6 +154,7 @@ class Compilable:
             jacobian=jacobian,
             contacts=contacts,
             switching=switching,
+            projection=projection,
         )
 
     def function(

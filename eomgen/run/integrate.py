@@ -16,7 +16,7 @@ from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_i
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
-from eomgen.run.projection import watched
+from eomgen.run.projection import Violations, watched
 from eomgen.run.stepping import (
     ANEW,
     Asked,
@@ -113,13 +113,17 @@ def integrate(
         derivative=calls.derivatives.of(monitor.derivative if monitor else problem.derivative),
         jacobian=calls.jacobians.of(problem.jacobian),
     )
+    violations = None
+    if problem.projection:
+        violations = Violations(len(problem.projection.names))
+        counted = replace(counted, projection=replace(problem.projection, violations=violations))
     if tally:
         counted = tally.counting(counted)
     remarks: list[str] = []
     if isinstance(method, FixedStep):
         # Evaluations to check stability do not count. They need a Jacobian with all digits, which
         # doubles do not give where the derivative is repaired.
-        checked = None if unstable or not method.explicit or repairs else problem
+        checked = None if unstable or repairs or not method.steps_explicitly(problem) else problem
         plain = not (monitor or powers or problem.contacts)
         compiled = compiled_steps(problem) if plain else None
         begin, settings = equal_steps(
@@ -146,7 +150,11 @@ def integrate(
     kept = _kept(run, problem, {**settings, **numbers(rest_speed=rest_speed)})
     notes = (trouble, monitor.words() if monitor else "", *dict.fromkeys(remarks))
     message = " ".join("; ".join(filter(None, notes)).split())
-    return _trajectory(run, problem, integrator, calls, outcome, message, kept)
+    found = _trajectory(run, problem, integrator, calls, outcome, message, kept)
+    if problem.projection is None or violations is None:
+        return found
+    largest = zip(violations.before.tolist(), violations.after.tolist(), strict=True)
+    return replace(found, violations=dict(zip(problem.projection.names, largest, strict=True)))
 
 
 def _trajectory(

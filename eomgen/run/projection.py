@@ -6,14 +6,15 @@ of the mass matrix (Hairer and Wanner II, VII.2; Eich 1993). The order of the me
 error of the constraints adds up.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.run.failure import StepFailure
+from eomgen.run.tangents import tangents
 
 FloatArray = NDArray[np.float64]
 
@@ -25,8 +26,37 @@ SINGULAR, NEAR = 1e-9, 0.05
 """A margin that counts as 0; and one below which the least margin is searched between steps."""
 SEARCH = 60
 """Evaluations of that search."""
+REMEDY = (
+    "take another start, lengths that do not line up, or --route aba at a dead point of the "
+    "coordinates that were taken as independent"
+)
 CLOSE = 1e-9
 """The largest residual that is left where Newton's method ends, in sizes."""
+
+
+class Violations:
+    """The largest residual of each of `nc` rows over a run, m or rad, as they are added.
+
+    before  of the states that were projected: ends of steps, and rows within them
+    after   of these after projection
+    """
+
+    def __init__(self, count: int) -> None:
+        self.before, self.after = np.zeros((2, count))
+
+    def add(self, before: FloatArray, after: FloatArray) -> None:
+        """Take account of a projection."""
+        np.maximum(self.before, np.abs(before), out=self.before)
+        np.maximum(self.after, np.abs(after), out=self.after)
+
+
+Value = Callable[[float, FloatArray], FloatArray]
+"""A function of time and state."""
+
+
+def without(t: float, y: FloatArray) -> FloatArray:
+    """A `Value` that a module lacks."""
+    raise AssertionError("the module lacks this function")
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,19 +66,32 @@ class Projection:
     names       of its rows
     sizes       size of each residual
     residuals   (t, y) -> (nc,), m or rad
+    rates       (t, y) -> (nc,), their rates
+    jacobian    (t, y) -> (nc, nv), the derivatives of the rates by the velocities
     position    (t, y) -> (nq,), the coordinates after a step of Newton's method
     velocity    (t, y) -> (nv,), the velocities that meet the constraints
     margins     (t, y) -> (nc,), how far each row is from following from others, at most 1; 0 in a
                 singular position
+    quaternions indices of the components of each unit quaternion among the coordinates
+    violations  to which each projection is added, if given
+    inertia, kinetic_slopes
+                (t, y) -> the mass matrix (nv, nv), and the derivatives (nq,) of the kinetic energy
+                by the coordinates; `without` if the module has none
     """
 
     names: tuple[str, ...]
     sizes: FloatArray
-    residuals: Callable[[float, FloatArray], FloatArray]
-    position: Callable[[float, FloatArray], FloatArray]
-    velocity: Callable[[float, FloatArray], FloatArray]
-    margins: Callable[[float, FloatArray], FloatArray]
+    residuals: Value
+    rates: Value
+    jacobian: Value
+    position: Value
+    velocity: Value
+    margins: Value
     coordinates: int
+    quaternions: Sequence[tuple[int, int, int, int]] = ()
+    violations: Violations | None = None
+    inertia: Value = without
+    kinetic_slopes: Value = without
 
     def onto(self, t: float, y: FloatArray, unit: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """The state on the constraints; `unit` normalises quaternions.
@@ -56,29 +99,77 @@ class Projection:
         Raises `StepFailure` if the constraints cannot be met near the state.
         """
         y, nq = y.copy(), self.coordinates
-        off = self._largest(t, y)
+        first = left = self.residuals(t, y)
+        off = self._relative(left)
         for _ in range(MOST):
             if off <= MET:
                 break
             there = y.copy()
             there[:nq] = self.position(t, y)
             there = unit(there)
-            left = self._largest(t, there)
-            if not left < off:  # rounding, or no way towards the constraints
+            after = self.residuals(t, there)
+            if not self._relative(after) < off:  # rounding, or no way towards the constraints
                 break
-            y, off = there, left
+            y, left, off = there, after, self._relative(after)
         if not off <= CLOSE:
-            worst = int(np.argmax(np.abs(self.residuals(t, y)) / self.sizes))
+            worst = int(np.argmax(np.abs(left) / self.sizes))
             raise StepFailure(
                 f"constraint {self.names[worst]} cannot be met near t = {t:.6g} s",
                 "take shorter steps, or a start farther from a singular position",
             )
         v = self.velocity(t, y)
         y[nq : nq + len(v)] = v
+        if self.violations:
+            self.violations.add(first, left)
         return y
 
-    def _largest(self, t: float, y: FloatArray) -> float:
-        return float(np.abs(self.residuals(t, y) / self.sizes).max(initial=0.0))
+    def normals(self, t: float, y: FloatArray) -> FloatArray:
+        """Directions (ny, 2 nc) that lead off the constraints: of positions, then of velocities."""
+        nq, jacobian = self.coordinates, self._scaled(t, y)
+        nc, nv = jacobian.shape
+        found = np.zeros((len(y), 2 * nc))
+        found[:nq, :nc] = tangents(y[:nq], self.quaternions) @ jacobian.T
+        found[nq : nq + nv, nc:] = jacobian.T
+        return found
+
+    def multipliers(self, t: float, y: FloatArray, ways: FloatArray) -> FloatArray:
+        """How far a state is off the constraints, in directions `ways` (ny, 2 nc), to first order,
+        (2 nc,).
+        """
+        jacobian, nq = self._scaled(t, y), self.coordinates
+        nv = jacobian.shape[1]
+        moved = ways[:nq]
+        if self.quaternions:
+            basis = tangents(y[:nq], self.quaternions)  # its columns are orthogonal
+            moved = basis.T @ moved / np.sum(basis**2, axis=0)[:, np.newaxis]
+        matrix = np.vstack((jacobian @ moved, jacobian @ ways[nq : nq + nv]))
+        off = np.concatenate((self.residuals(t, y) / self.sizes, self.rates(t, y) / self.sizes))
+        return np.asarray(np.linalg.solve(matrix, off), dtype=np.float64)
+
+    def _scaled(self, t: float, y: FloatArray) -> FloatArray:
+        return self.jacobian(t, y) / self.sizes[:, None]
+
+    def _relative(self, residuals: FloatArray) -> float:
+        """The largest residual, in sizes."""
+        return float(np.abs(residuals / self.sizes).max())
+
+
+def jacobian_of(module: Any) -> Callable[..., FloatArray]:
+    """The derivatives (nc, nv) of a module's constraint rates by the velocities, as a function of
+    time, state, parameters and inputs.
+    """
+    if hasattr(module, "constraint_jacobian"):
+        return cast(Callable[..., FloatArray], module.constraint_jacobian)
+
+    def by_columns(t: float, y: FloatArray, p: Any = None, u: Any = None) -> FloatArray:
+        nq, nc = len(module.POSITIONS), len(module.CONSTRAINTS)
+        nv = len(module.project_velocity(t, y, p, u))
+        columns = np.repeat(y[:, np.newaxis], nv + 1, axis=1)
+        columns[nq : nq + nv] = np.eye(nv, nv + 1)
+        rates = module.constraint_rates(t, columns, p, u).reshape(nc, nv + 1)
+        return np.asarray(rates[:, :nv] - rates[:, nv:])
+
+    return by_columns
 
 
 def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Projection | None:
@@ -86,14 +177,24 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
     names = getattr(module, "CONSTRAINTS", None)
     if not names:
         return None
+
+    def of(name: str) -> Value:
+        function = getattr(module, name, None)
+        return (lambda t, y: function(t, y, parameters, inputs)) if function else without
+
     return Projection(
         tuple(names),
         np.array([size if module.UNITS[name] == "N" else 1.0 for name in names]),
-        residuals=lambda t, y: module.constraint_residuals(t, y, parameters, inputs),
-        position=lambda t, y: module.project_position(t, y, parameters, inputs),
-        velocity=lambda t, y: module.project_velocity(t, y, parameters, inputs),
-        margins=lambda t, y: module.constraint_margins(t, y, parameters, inputs),
+        residuals=of("constraint_residuals"),
+        rates=of("constraint_rates"),
+        jacobian=lambda t, y: jacobian_of(module)(t, y, parameters, inputs),
+        position=of("project_position"),
+        velocity=of("project_velocity"),
+        margins=of("constraint_margins"),
         coordinates=len(module.POSITIONS),
+        quaternions=module.QUATERNIONS,
+        inertia=of("mass_matrix"),
+        kinetic_slopes=of("kinetic_slopes"),
     )
 
 
@@ -126,17 +227,23 @@ def watched(
     there.
     """
     start, margin, before, last = t, _least(projection, t, y), float("inf"), None
-    for advance in advances:
-        here = _least(projection, advance.t, advance.y)
-        if advance.t > start:
-            if margin < before and margin < here and margin < NEAR and last is not None:
-                _search(projection, last, advance)
-            before, margin, last = margin, here, (start, advance)
-            start = advance.t
-        else:  # a strike
-            before, margin, last = float("inf"), here, None
-        _check(projection, advance.t, advance.y)
-        yield advance
+    try:
+        for advance in advances:
+            here = _least(projection, advance.t, advance.y)
+            if advance.t > start:
+                if margin < before and margin < here and margin < NEAR and last is not None:
+                    _search(projection, last, advance)
+                before, margin, last = margin, here, (start, advance)
+                start = advance.t
+            else:  # a strike
+                before, margin, last = float("inf"), here, None
+            _check(projection, advance.t, advance.y)
+            yield advance
+    except StepFailure as failure:
+        if margin < NEAR and "singular at" not in failure.reason:
+            reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
+            raise StepFailure(reason, REMEDY) from None
+        raise
 
 
 def _search(projection: Projection, last: tuple[float, Part], advance: Part) -> None:
@@ -172,7 +279,7 @@ def _check(projection: Projection, t: float, y: FloatArray) -> None:
         raise StepFailure(
             f"the mechanism is singular at t = {t:.6g} s: constraint {projection.names[worst]} "
             "follows from the others there, as at a dead point or a change point",
-            "take another start, or lengths that do not line up",
+            REMEDY,
         )
 
 

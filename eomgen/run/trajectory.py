@@ -97,6 +97,8 @@ class Trajectory:
     outcome       how it ended
     saved         further outputs at each row, by name
     setup         what other outputs can be computed from; None if not known
+    violations    the largest residuals of each constraint's rows, m or rad, before and after
+                  projection, by name; empty without constraints. They are not in files
 
     Raises `ValueError` if the values are inconsistent.
     """
@@ -117,6 +119,7 @@ class Trajectory:
     outcome: Outcome = Outcome()
     saved: Mapping[str, Saved] = field(default_factory=dict)
     setup: Setup | None = None
+    violations: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.finished and self.outcome.kind == "finished":

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
 
+from eomgen.displays import Displayed
 from eomgen.integrators import INTEGRATORS
 from eomgen.language.base import (
     AngleOrNumber,
@@ -194,6 +195,11 @@ v = { elbow_angle_dot = -2.0 }
     v: tuple[Number, ...] | ByName = Field(
         default={}, union_mode="left_to_right", description="velocities"
     )
+    guess: ByName = Field(
+        default={},
+        description="with loops, where the search begins for coordinates that are not given: it "
+        "chooses the branch",
+    )
 
 
 class Simulation(Table):
@@ -229,11 +235,12 @@ def _all(value: Any) -> Any:
     return "all" if value == ["all"] else value
 
 
-class Scene(Table):
+class Scene(Table, Displayed):
     """A whole scene."""
 
     name: ModuleName
     title: Text = Field(default="", description="one line of text")
+    about: Text = Field(default="", description="a sentence on what it shows, for the gallery")
     outputs: Annotated[Literal["all"] | tuple[Output, ...], BeforeValidator(_all)] = Field(
         default=(),
         union_mode="left_to_right",

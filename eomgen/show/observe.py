@@ -26,6 +26,7 @@ class _Joint(Protocol):
 
     name: str
     parent: str
+    child: str
     r_parent: tuple[Formula, ...]
     r_child: tuple[Formula, ...]
 
@@ -92,19 +93,21 @@ def observe(
 def joint_drift(model: Model, poses: FloatArray) -> FloatArray:
     """Distance between each joint's points on its parent and child, (n, nj), m.
 
-    It covers joints that hold a point, in the order of their bodies. `poses` (n, nb, 3) or
-    (n, nb, 3, 4) are as from `body_poses`. Only poses are used, so that it also shows joints that
-    come apart in forms that integrate each body's position.
+    It covers joints that hold a point, in the order of their bodies, then those of loops. `poses`
+    (n, nb, 3) or (n, nb, 3, 4) are as from `body_poses`. Only poses are used, so that it also shows
+    joints that come apart in forms that integrate each body's position.
     """
     names = {body.name: k for k, body in enumerate(model.bodies)}
     dimensions = poses.ndim - 1
+
+    def point(body: str, r: Sequence[Formula]) -> FloatArray:
+        at = _values(model, r, dimensions)
+        return at if body == WORLD else _point(poses[:, names[body]], at)
+
     gaps = []
-    for k, joint in _joints(model, _holds_a_point):
-        on_parent = _values(model, joint.r_parent, dimensions)
-        if joint.parent != WORLD:
-            on_parent = _point(poses[:, names[joint.parent]], on_parent)
-        on_child = _point(poses[:, k], _values(model, joint.r_child, dimensions))
-        gap = on_parent - on_child
+    for _, joint in _joints(model, _holds_a_point):
+        gap = point(joint.parent, joint.r_parent) - point(joint.child, joint.r_child)
+        gap = np.broadcast_to(gap, (len(poses), dimensions))
         gaps.append(np.hypot(np.hypot(gap[..., 0], gap[..., 1]), gap[..., -1] * (dimensions == 3)))
     return np.array(gaps).reshape(len(gaps), len(poses)).T
 
@@ -112,11 +115,15 @@ def joint_drift(model: Model, poses: FloatArray) -> FloatArray:
 def _joints(
     model: Model, chosen: Callable[[Sequence[Primitive]], bool]
 ) -> list[tuple[int, _Joint]]:
-    """Joints `chosen` by their moves, except free ones, each with the index of its child body."""
+    """Joints `chosen` by their moves, except free ones, each with the index of its child body:
+    those of the tree, then those that close loops.
+    """
+    names = {body.name: k for k, body in enumerate(model.bodies)}
+    every = [*(body.joint for body in model.bodies), *(loop.joint for loop in model.loops)]
     return [
-        (k, cast(_Joint, body.joint))
-        for k, body in enumerate(model.bodies)
-        if chosen(body.joint.primitives(model.dimensions))
+        (names.get(joint.child, -1), cast(_Joint, joint))
+        for joint in every
+        if chosen(joint.primitives(model.dimensions))
     ]
 
 
@@ -133,6 +140,8 @@ def _is_marked(primitives: Sequence[Primitive]) -> bool:
 def _anchors(model: Model, dimensions: int) -> tuple[Anchor, ...]:
     anchors: list[Anchor] = []
     for k, joint in _joints(model, _is_marked):
+        if k < 0:  # a loop joint whose child is the world
+            continue
         x, y, *z = _values(model, joint.r_child, dimensions).tolist()
         anchors.append((k, x, y, z[0]) if z else (k, x, y))
     return tuple(anchors)

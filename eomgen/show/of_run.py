@@ -15,8 +15,9 @@ from eomgen.show.picture import Picture
 
 Array = NDArray[np.float64]
 
-BEYOND = 0.35
-"""How much longer than the way of its slider a rail is at each end, relative to the size."""
+BEYOND, ON_BODY = 0.35, 0.08
+"""How much longer than the way of its slider a rail in the world, or on a body, is at each end,
+relative to the size."""
 
 
 def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
@@ -39,7 +40,7 @@ def with_run(picture: Picture, model: Model, poses: Array) -> Picture:
         if element.kind == "base":
             return replace(element, axis=_ground(picture, model, poses[finite], element))
         way = _way(picture, model, poses[finite], element)
-        beyond = BEYOND * picture.size
+        beyond = (BEYOND if element.body < 0 else ON_BODY) * picture.size
         low, high = float(way.min()) - beyond, float(way.max()) + beyond
         return replace(element, low=Constant(low), high=Constant(high))
 

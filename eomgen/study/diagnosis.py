@@ -17,6 +17,7 @@ from eomgen.run.problem import Explain, Explanation, FloatArray, Problem, unexpl
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.effects import JointStop
 from eomgen.scene.joints.base import Geared
+from eomgen.study.closing import closed
 
 GROWN = 1e9
 """Growth of an effect, relative to its size at the start, that is reported."""
@@ -37,7 +38,8 @@ def problem_of(
     start: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Problem:
     """The initial-value problem of a module, as from `as_problem`. With the `model` of the module,
-    its messages name the part of the model that has no finite value. `start` is as there.
+    its messages name the part of the model that has no finite value, and its initial state meets
+    the constraints at these parameters. `start` is as there.
 
     Raises `RunError` if the module refuses parameters or inputs, or has no derivative at its
     initial state.
@@ -45,13 +47,14 @@ def problem_of(
     if model is None:
         return as_problem(module, parameters, inputs, start=start)
     given = given_values(module, parameters, inputs)
+    first = start or (lambda y: y)
     return as_problem(
         module,
         parameters,
         inputs,
         explain=explained(model, *given),
         origin=origin_of(model, *given),
-        start=start,
+        start=lambda y: closed(model, given[0], first(y)),
     )
 
 

@@ -117,6 +117,8 @@ def labels_of(
         "effects": module.EFFECT_NAMES,
         "driven": getattr(module, "DRIVEN", ()),
         "nv": [c.name for c in model.velocities],
+        "nq": [c.name for c in model.coordinates],
+        "constraints": [name for name, _ in model.rows],
         "dimensions": "xyz"[: model.dimensions],
     }
     return known[axis]

@@ -21,6 +21,7 @@ from eomgen.run.module import as_problem, given_values, load_module
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Trajectory
 from eomgen.store import key_of
+from eomgen.study.closing import closed
 from eomgen.study.diagnosis import explained
 from eomgen.sweep.counter import Counter
 
@@ -187,13 +188,21 @@ class _Prepared:
         self, module: Any, states: Mapping[str, float], values: Values, own: Accelerator | None
     ) -> Problem:
         explain = explained(self.task.model, *given_values(module, *values))
-        problem = as_problem(module, *values, explain=explain)
-        if states:
-            initial = problem.initial.copy()
+
+        def start(y: FloatArray) -> FloatArray:
             for name, value in states.items():
-                initial[self.module.STATES.index(name)] = value
-            problem = replace(problem, initial=initial)
-            problem = replace(problem, initial=problem.projected(0.0, initial))
+                y[self.module.STATES.index(name)] = value
+            return y
+
+        def assembled(y: FloatArray) -> FloatArray:
+            return closed(self.task.model, values[0], start(y), states)
+
+        loops = bool(self.task.model.constraints)
+        problem = as_problem(module, *values, explain=explain, start=assembled if loops else None)
+        if states and not loops:
+            problem = replace(problem, initial=start(problem.initial.copy()))
+        if states:
+            problem = replace(problem, initial=problem.unit(problem.initial))
         return own.of(problem) if own else problem
 
     def _run(self, problem: Problem) -> Trajectory:

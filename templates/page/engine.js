@@ -122,6 +122,15 @@ const makeEngine = (mechanism, data) => {
 
   // The chosen method failed: go on by the adaptive one, if it was not the user who chose.
   function helped(error) {
+    if (engine.grip && mechanism.projectPosition) {
+      // Pulled to where the loops do not move on: let go there, at rest.
+      engine.release();
+      engine.remark = `let go at ${Number(engine.t.toPrecision(4))} s, where the loops do not move on`;
+      for (const i of others) if (kinds[i] === "velocity") engine.y[i] = 0;
+      start = engine.t;
+      renew();
+      return;
+    }
     if (!engine.automatic || engine.method === "DOP853") throw error;
     engine.remark = `${engine.method} fails at ${Number(engine.t.toPrecision(4))} s, DOP853 goes on`;
     engine.method = "DOP853";
@@ -389,13 +398,13 @@ const makeEngine = (mechanism, data) => {
 
   // ---- What it starts with ----
 
-  // The scene's own method, or one that keeps energy; where forces have corners, as of contacts, an
-  // explicit one. The step is a part of that which an adaptive method took.
+  // The scene's own method, or one that keeps energy; where forces have corners, as of contacts, and
+  // where loops are kept closed, an explicit one. The step is a part of that which an adaptive method took.
   function choice() {
     const { name, step } = data.integrator ?? {};
     const own = step && engine.methods.find((m) => m.name === name);
     if (own) return [name, step];
-    const corners = mechanism.switchingFunctions || mechanism.contacts?.length;
+    const corners = mechanism.switchingFunctions || mechanism.contacts?.length || mechanism.projectPosition;
     const keeping = engine.methods.some((m) => m.name === "leapfrog") ? "leapfrog" : "implicit_midpoint";
     const most = Math.min(Math.max((data.meanStep ?? 0.01) / (corners ? 2 : 6), 1e-4), 0.01);
     const power = 10 ** Math.floor(Math.log10(most) + 1e-9);

@@ -1,11 +1,16 @@
-// `makeMarks`: joints, by type, and centres of mass, of a constant size on the screen.
+// `makeMarks`: joints, by type, ends of springs and ropes, and centres of mass, of a constant size on
+// the screen.
 
 const makeMarks = (scene, paper, mixed) => {
   const { center, place, vector } = tools;
-  const { joints, bodies } = DATA.drawing;
+  const { joints, bodies, elements } = DATA.drawing;
   const MANY = 30; // more marks than these are smaller until the view comes closer
   const SIDES = { revolute: 24, spherical: 24, universal: 24, prismatic: 4, cylindrical: 4, fixed: 3 };
-  const shown = joints.map((joint, k) => [joint, k]).filter(([{ type }]) => !["free", "planar", "particle"].includes(type));
+  const ends = elements.filter(({ from, to }) => from && to).flatMap(({ from, to }) => [from, to]);
+  const shown = [
+    ...joints.filter(({ type }) => !["free", "planar", "particle"].includes(type)),
+    ...ends.map(({ body, at }) => ({ type: "end", child: body, at_child: at })),
+  ];
   const LAYER = 70;
 
   function instances(sides, count, layer) {
@@ -20,8 +25,8 @@ const makeMarks = (scene, paper, mixed) => {
   }
 
   // A mark is a disc of ink and a smaller one of the background's colour on it; a ball joint is full.
-  const groups = [...new Set(shown.map(([{ type }]) => SIDES[type] ?? 24))].map((sides) => {
-    const own = shown.filter(([{ type }]) => (SIDES[type] ?? 24) === sides);
+  const groups = [...new Set(shown.map(({ type }) => SIDES[type] ?? 24))].map((sides) => {
+    const own = shown.filter(({ type }) => (SIDES[type] ?? 24) === sides);
     return { own, outer: instances(sides, own.length, LAYER), inner: instances(sides, own.length, LAYER + 1) };
   });
   const dots = instances(16, bodies.length, LAYER + 2);
@@ -47,7 +52,7 @@ const makeMarks = (scene, paper, mixed) => {
       for (const { own, outer, inner } of groups) {
         outer.visible = inner.visible = show.joints;
         if (!show.joints) continue;
-        own.forEach(([joint], k) => {
+        own.forEach((joint, k) => {
           const at = place(poses, joint.child, vector(joint.at_child, geometry));
           put(outer, k, at, size * pixel, axes);
           put(inner, k, at, (joint.type === "spherical" ? 0.3 : 0.62) * size * pixel, axes);

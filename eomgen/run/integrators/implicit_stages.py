@@ -22,8 +22,10 @@ from eomgen.run.integrators.elimination import factored
 from eomgen.run.integrators.interface import FixedStep
 from eomgen.run.integrators.tableau import ButcherTableau
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.projection import Projection
 
-MAX_ITERATIONS = 20
+MAX_ITERATIONS, MAX_PROJECTED = 20, 60
+"""Most iterations, and those of a step with symmetric projection, which converge linearly."""
 REMEDY = "take a smaller --dt or an adaptive method (--integrator Radau)"
 
 ROUNDOFF = 4 * float(np.finfo(np.float64).eps)
@@ -80,38 +82,108 @@ class ImplicitMethod:
         Newton's method starts at d = 0; an explicit predictor would be far off on stiff problems.
         Raises `StepFailure` if the iteration does not converge.
         """
-        shares, b = self._arrays
-        stages, states = len(b), len(y)
-        times = [t + node * h for node in self.c]
-        lengths = h * b
-        coupling = lengths[:, None] * shares
-        changes = np.zeros((stages, states))
-        slopes = np.empty((stages, states))
-        matrix = np.empty((stages, states, stages, states))
-        square = matrix.reshape(stages * states, stages * states)
-        positions = problem.leading_positions
-        order = _positions_first(stages, states, positions)
-        across, update = order[:, None], np.empty_like(changes)
+        newton = _Newton(self, problem, t, h, len(y))
+        if problem.projection:
+            return newton.projected(y, problem.projection)
+        changes = np.zeros(newton.shape)
         previous = 0.0
         for _ in range(MAX_ITERATIONS):
-            at_stages = y + _last(shares[:, :, None] * changes, axis=1)
-            for i, time in enumerate(times):
-                slopes[i] = problem.derivative(time, at_stages[i])
-                jacobian = problem.jacobian(time, at_stages[i])
-                np.multiply(coupling[i][:, None], jacobian[:, None, :], out=matrix[i])
-            missing = lengths[:, None] * slopes - changes
-            factors = factored(square[across, order], 1.0, stages * positions)
-            if factors is None:
-                raise StepFailure("Newton's matrix is singular", REMEDY)
-            update.ravel()[order] = factors.solve(missing.ravel()[order])
+            update = newton.update(y, changes)
             changes += update
-            size = float(np.abs(update).max())
-            if not isfinite(size):
-                raise StepFailure("Newton's iteration diverges", REMEDY)
+            size = _finite(update)
             if size == 0 or (previous and _is_solved(y, changes, update, size, previous)):
                 return _last(changes, axis=0)
             previous = size
-        raise StepFailure(f"Newton did not converge in {MAX_ITERATIONS} iterations", REMEDY)
+        raise _unsolved()
+
+
+class _Newton:
+    """Newton's method for the stages of a step."""
+
+    def __init__(
+        self, method: ImplicitMethod, problem: Problem, t: float, h: float, states: int
+    ) -> None:
+        shares, b = method._arrays
+        self._problem, self._shares, self._end, self._step = problem, shares, t + h, h
+        self._times = [t + node * h for node in method.c]
+        self._lengths = h * b
+        self._coupling = self._lengths[:, None] * shares
+        self.shape = stages, states = len(b), states
+        self._positions = stages * problem.leading_positions
+        self._order = _positions_first(stages, states, problem.leading_positions)
+        self._slopes = np.empty(self.shape)
+        self._matrix = np.empty((stages, states, stages, states))
+        self._update = np.empty(self.shape)
+
+    def update(self, start: FloatArray, changes: FloatArray) -> FloatArray:
+        """The update of the stages' changes d in a step from `start`; valid until the next one.
+
+        Raises `StepFailure` if its matrix is singular.
+        """
+        problem, order, slopes = self._problem, self._order, self._slopes
+        unknowns = len(order)
+        square = self._matrix.reshape(unknowns, unknowns)
+        at_stages = start + _last(self._shares[:, :, None] * changes, axis=1)
+        for i, time in enumerate(self._times):
+            slopes[i] = problem.derivative(time, at_stages[i])
+            jacobian = self._last = problem.jacobian(time, at_stages[i])
+            np.multiply(self._coupling[i][:, None], jacobian[:, None, :], out=self._matrix[i])
+        missing = self._lengths[:, None] * slopes - changes
+        factors = factored(square[order[:, None], order], 1.0, self._positions)
+        if factors is None:
+            raise StepFailure("Newton's matrix is singular", REMEDY)
+        self._update.ravel()[order] = factors.solve(missing.ravel()[order])
+        return self._update
+
+    def projected(self, y: FloatArray, projection: Projection) -> FloatArray:
+        """The change of the state by a step with symmetric projection.
+
+        The step starts from y + N(y) μ and ends at z + N(y') μ = y', z the end of the method's own
+        step, with the μ for which y' meets the constraints. N are the constraints' normals. With a
+        symmetric method the step is symmetric, and so keeps energy in the long run as the method
+        does, which projection at the end alone does not (Hairer, Lubich, Wanner, V.4.1).
+
+        Raises `StepFailure` if the iteration does not converge.
+        """
+        normals, end = projection.normals(self._end, y), y
+        beyond, changes = normals, np.zeros(self.shape)
+        multipliers, previous = np.zeros(normals.shape[1]), 0.0
+        for _ in range(MAX_PROJECTED):
+            start = y + normals @ multipliers
+            update = self.update(start, changes)
+            changes += update
+            step = normals @ multipliers + _last(changes, axis=0)
+            end = y + step + beyond @ multipliers
+            beyond = projection.normals(self._end, end)
+            ways = self._carried(normals) + beyond
+            more = -projection.multipliers(self._end, end, ways)
+            multipliers += more
+            updates = np.vstack((update, beyond @ more))
+            size = _finite(updates)
+            if size == 0 or (previous and _is_solved(y, changes, updates, size, previous)):
+                return np.asarray(step + (normals + beyond) @ more + beyond @ (multipliers - more))
+            previous = size
+        raise _unsolved(MAX_PROJECTED)
+
+    def _carried(self, normals: FloatArray) -> FloatArray:
+        """Changes (ny, k) of the start at the end of the step, about: by the implicit midpoint rule
+        with the Jacobian of the last stage.
+        """
+        half = 0.5 * self._step * self._last
+        one = np.eye(len(normals))
+        return np.asarray(np.linalg.solve(one - half, (one + half) @ normals))
+
+
+def _finite(update: FloatArray) -> float:
+    """The size of an update. Raises `StepFailure` if it is not finite."""
+    size = float(np.abs(update).max())
+    if not isfinite(size):
+        raise StepFailure("Newton's iteration diverges", REMEDY)
+    return size
+
+
+def _unsolved(most: int = MAX_ITERATIONS) -> StepFailure:
+    return StepFailure(f"Newton did not converge in {most} iterations", REMEDY)
 
 
 def _is_solved(

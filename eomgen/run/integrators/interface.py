@@ -53,6 +53,7 @@ class FixedStep:
     explicit   whether a step may be too long for stability
     stability  its stability function, if that is a function of hλ alone
     compiled   name of its compiled steps, "" if there are none
+    solves     whether steps with constraints are solved for, so that they are not explicit
     """
 
     prepare: Callable[[Problem], Change]
@@ -61,6 +62,11 @@ class FixedStep:
     explicit: bool = True
     stability: Stability | None = None
     compiled: str = ""
+    solves: bool = False
+
+    def steps_explicitly(self, problem: Problem) -> bool:
+        """Whether steps of a problem may be too long for stability."""
+        return self.explicit and not (self.solves and problem.projection is not None)
 
 
 @dataclass(frozen=True)

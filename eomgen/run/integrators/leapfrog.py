@@ -3,7 +3,7 @@
 Hairer, Lubich, Wanner, Geometric Numerical Integration, section I.1.4, variant B. It evaluates one
 derivative per step. It requires v' to depend on positions and time only, and q' to be v times a
 constant matrix: particles, a single pendulum, a chain of masses and springs, but no mass matrix
-that depends on positions and no damping.
+that depends on positions and no damping. With constraints the step is that of `rattle`.
 """
 
 from collections.abc import Iterator
@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from eomgen.errors import RunError
+from eomgen.run.integrators import rattle
 from eomgen.run.integrators.interface import Change, FixedStep
 from eomgen.run.problem import FloatArray, Problem
 
@@ -26,6 +27,8 @@ def prepare(problem: Problem) -> Change:
     Raises `RunError` if the Jacobian at the initial state, or at a few seeded random states, shows
     that the problem does not separate into drift and kick.
     """
+    if problem.projection is not None:
+        return rattle.prepare(problem)
     positions = list(problem.positions)
     others = [i for i in range(len(problem.states)) if i not in problem.positions]
     _check(problem, positions, others)
@@ -44,7 +47,7 @@ def prepare(problem: Problem) -> Change:
     return change
 
 
-INTEGRATOR = FixedStep(prepare, order=2, compiled="leapfrog")
+INTEGRATOR = FixedStep(prepare, order=2, compiled="leapfrog", solves=True)
 
 
 def rates_of(problem: Problem) -> FloatArray:

@@ -57,9 +57,10 @@ length = 0.5
     def rows(self, mechanism: Linkage) -> Iterator[Row]:
         """|x_1 - x_2| - length, along the line between the points."""
         at_1, at_2 = (tuple(map(mechanism.value, at)) for at in (self.at_1, self.at_2))
-        d = sub(mechanism.position(self.body_1, at_1), mechanism.position(self.body_2, at_2))
-        far = mechanism.call("sqrt", dot(d, d))
-        u = tuple(x / far for x in d)
+        ends = mechanism.position(self.body_1, at_1), mechanism.position(self.body_2, at_2)
+        d = mechanism.called("d", *sub(*ends))
+        (far,) = mechanism.called("s", mechanism.call("sqrt", dot(d, d)))
+        u = mechanism.called("u", *(x / far for x in d))
         loads = (
             Load(self.body_1, u, at_1, "applied"),
             Load(self.body_2, negative(u), at_2, "applied"),

@@ -27,9 +27,9 @@ class PointOn(OnOther):
       from `other_at`, of `t` and of parameters. In the plane one formula is a curve; in space one
       is a surface and two are a curve.
 
-    All are fixed to `other`, in its axes. The residual of a formula f is f/|∇f|, so its multiplier
-    is the force on the point along the gradient ∇f, N. Where ∇f is 0, as at the apex of a cone, the
-    constraint is singular.
+    All are fixed to `other`, in its axes. The residual of a formula f is f/|grad f|, so its
+    multiplier is the force on the point along the gradient, N. Where the gradient is 0, as at the
+    apex of a cone, the constraint is singular.
     """
 
     example: ClassVar[str] = """
@@ -89,7 +89,7 @@ equations = ["(x - 0.5)**2 + (y + 1.2)**2 - 0.7**2"]
         return [(f"{self.name}_{i + 1}", "N") for i in range(count)]
 
     def rows(self, mechanism: Linkage) -> Iterator[Row]:
-        """The distances from the line or plane; f/|∇f| of each equation."""
+        """The distances from the line or plane; f/|grad f| of each equation."""
         one, d = mechanism.number(1.0), self.apart(mechanism)
         if self.equations:
             yield from self._formula_rows(mechanism, d)

@@ -21,8 +21,8 @@ KINDS = ("gravitation", "stiffness", "law")
 class Pairwise(EffectTable):
     """A force along the line between the centres of mass of every two of `bodies`:
 
-    - `gravitation` G: the attraction G m₁ m₂ r/(r² + ε²)^1.5 at the distance r, with the
-      `softening` ε. It has the potential energy -G m₁ m₂/sqrt(r² + ε²). Without softening it is
+    - `gravitation` G: the attraction G m_1 m_2 r/(r² + ε²)^1.5 at the distance r, with the
+      `softening` ε. It has the potential energy -G m_1 m_2/sqrt(r² + ε²). Without softening it is
       infinite where two bodies meet;
     - `stiffness` k: springs of this `rest_length`, with `damping`; see `spring`. The potential
       energy is that of the springs;
@@ -130,7 +130,7 @@ gravitation = 6.7e-11
         return scale(law / line.length, line.d)
 
     def _strength(self, mechanism: Mechanism, first: str, second: str) -> Scalar:
-        """G m₁ m₂."""
+        """G m_1 m_2."""
         assert self.gravitation is not None
         masses = mechanism.mass(first) * mechanism.mass(second)
         return mechanism.value(self.gravitation) * masses

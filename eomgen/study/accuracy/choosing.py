@@ -154,11 +154,11 @@ def _candidates(search: Search) -> list[str]:
 
     DOP853 comes first, whose steps are made in compiled code where that is possible. For stiff
     motion implicit methods come before it: stability would force explicit ones to take thousands
-    of steps. With contacts, a multistep method restarts at each impact, so one-step methods replace
-    it.
+    of steps. With contacts, a multistep method restarts at each impact, and it leaves the
+    constraints of loops, so one-step methods replace it.
     """
     if search.fast.stiff:
-        beside = "LSODA" if search.case.problem.contacts is None else "RK45"
+        beside = "LSODA" if _takes_multistep(search.case.problem) else "RK45"
         return [*_stiff(search.case), beside, "DOP853"]
     return ["DOP853"]
 
@@ -168,12 +168,17 @@ def _stiff(case: Case) -> list[str]:
     return list(STIFF if _is_compiled(case.problem) else STIFF[1:])
 
 
+def _takes_multistep(problem: Problem) -> bool:
+    """Whether multistep methods suit: there are no rigid contacts and no constraints."""
+    return problem.contacts is None and problem.projection is None
+
+
 def _is_compiled(problem: Problem) -> bool:
     """Whether compiled code can make the steps of a stiff method: forces switch at given times, at
-    most, and there are no rigid contacts.
+    most, and there are no rigid contacts and no constraints.
     """
     in_time_only = problem.switching is not None and problem.switching.of_state is None
-    return problem.contacts is None and (in_time_only or not problem.corners)
+    return _takes_multistep(problem) and (in_time_only or not problem.corners)
 
 
 def _slowed(search: Search) -> bool:
@@ -199,7 +204,7 @@ def race(search: Search, asked: str | None, loose: bool) -> list[str]:
         _first(search, method_of(name))
     if asked is not None:
         return names
-    if "LSODA" not in names and search.case.problem.contacts is None and _slowed(search):
+    if "LSODA" not in names and _takes_multistep(search.case.problem) and _slowed(search):
         names.append("LSODA")
         _first(search, method_of("LSODA"))
     more = []

@@ -236,8 +236,9 @@ def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> FloatA
     Raises `RunError` if the run does not reach the end.
     """
     tally = Tally()
+    method = "LSODA" if problem.projection is None else "Rodas5P"
     run = integrate(
-        problem, "LSODA", t_end, rtol=1e-6, atol=1e-8, samples=2, rest_speed=rest_speed, tally=tally
+        problem, method, t_end, rtol=1e-6, atol=1e-8, samples=2, rest_speed=rest_speed, tally=tally
     )
     if not run.finished:
         raise RunError(f"reference: {run.message}")

@@ -5,17 +5,18 @@ Joints are composed of their primitives. Driving formulas are differentiated by 
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import gmpy2
 from gmpy2 import mpfr
 
-from eomgen.language.formula import Formula, evaluate
+from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.model.model import JointIndex, Model, dofs_of
 from eomgen.model.orientation import rows_of
 from eomgen.precision.extended import Array, along, extended, zeros
 from eomgen.precision.precise import Extended
 from eomgen.scalars.extended import Bits
+from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD, Primitive
@@ -31,6 +32,8 @@ from eomgen.study.verification.poses import (
 
 _INSTANT, _BITS = mpfr(2) ** -600, 4096
 """Step of the differences, s, and the precision, in bits, in which they are computed."""
+_BESIDE = mpfr(2) ** -80
+"""Step of the differences of a formula by its names."""
 _LEAST = mpfr(2) ** -500
 """A smaller rate counts as 0: it is an error of the differences."""
 _JUMP = 1e-30
@@ -164,6 +167,42 @@ class EvaluatedModel:
     def called(self, letter: str, *values: Extended) -> Vector:
         """The values themselves."""
         return values
+
+    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
+        """A formula with its derivatives, by central differences."""
+        names, used = self._names, set(names_in(formula))
+
+        def slope(name: str) -> Extended:
+            x = names[name]
+            ahead, behind = (
+                evaluate(formula, {**names, name: x + h}, self.scalars) for h in (_BESIDE, -_BESIDE)
+            )
+            return (ahead - behind) / (2 * _BESIDE)
+
+        slopes = [
+            (body.joint.name, i, slope(c.name))
+            for body in self.model.bodies
+            for i, c in enumerate(body.positions if by == "positions" else body.velocities)
+            if c.name in used
+        ]
+        still = {c.name: mpfr(0) for body in self.model.bodies for c in body.velocities}
+        by_time = slope("t") if "t" in used else mpfr(0)
+        return Partials(self.value(formula), tuple(slopes), by_time, self.value(formula, **still))
+
+    def gradient(
+        self, formula: Formula, names: Mapping[str, Extended]
+    ) -> tuple[Extended, tuple[Extended, ...], Extended]:
+        """A formula of `names`, t and parameters with its derivatives, by central differences."""
+        values = {**self._parameters, "t": self._time, **names}
+
+        def slope(name: str) -> Extended:
+            ahead, behind = (
+                evaluate(formula, {**values, name: values[name] + h}, self.scalars)
+                for h in (_BESIDE, -_BESIDE)
+            )
+            return (ahead - behind) / (2 * _BESIDE)
+
+        return evaluate(formula, values, self.scalars), tuple(map(slope, names)), slope("t")
 
     @cached_property
     def _names(self) -> dict[str, Extended]:

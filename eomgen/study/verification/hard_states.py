@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eomgen.run.module import GeneratedModule
+from eomgen.dynamics.closed_positions import closed_positions
+from eomgen.model.model import Model
+from eomgen.run.failure import StepFailure
+from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import FloatArray
 from eomgen.study.verification.states import random_state
 
@@ -45,6 +48,14 @@ class State:
         return f"{self.kind} {self.number}"
 
 
+FAR = 0.01
+"""The least margin of states with constraints: nearer to a singular position digits are lost by any
+elimination.
+"""
+CLOSED = ("fast", "still", "random")
+"""Kinds for mechanisms with constraints, at positions that meet these."""
+
+
 def hard_states(
     module: GeneratedModule, nv: int, count: int, seed: int, t_end: float
 ) -> list[State]:
@@ -61,6 +72,30 @@ def hard_states(
             if kind == "zero":
                 t, u = 0.0, dict.fromkeys(u, 0.0)
             found.append(State(kind, number, t, _made(kind, module, nv, y, rng), u))
+    return found
+
+
+def closed_states(
+    model: Model, module: GeneratedModule, count: int, seed: int, t_end: float
+) -> list[State]:
+    """`count` states of each kind of `CLOSED` that meet the constraints of a model, at positions
+    along its motion, without those near singular positions.
+    """
+    problem, found, nq = as_problem(module), [], len(module.POSITIONS)
+    positions = closed_positions(model) or (np.array(model.initial_q),)
+    for index, kind in enumerate(CLOSED):
+        for number in range(count):
+            rng = np.random.default_rng([seed, index, number])
+            y, t = random_state(module, rng), float(rng.uniform(0.0, t_end))
+            y[:nq] = positions[int(rng.integers(len(positions)))]
+            u = {name: float(rng.uniform(-1.0, 1.0)) for name in module.INPUTS}
+            y = _made(kind, module, len(model.velocities), y, rng)
+            try:
+                y = problem.projected(t, y)
+            except StepFailure:
+                continue  # too far from where the constraints are met at this time
+            if problem.projection is None or problem.projection.margins(t, y).min() >= FAR:
+                found.append(State(kind, number, t, y, u))
     return found
 
 

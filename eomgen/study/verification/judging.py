@@ -48,9 +48,10 @@ class Judged:
     errors     by route, the error of its v̇ (nv,), nan where it is not finite
     data       change of v̇ (nv,) by one ulp in the data
     agreed     digits to which articulated bodies and virtual work agree, in 60 digits
-    condition  2-norm condition number of the mass matrix scaled to a diagonal of ones
-    pivot      smallest pivot of that matrix, eliminated from the last row up as in LᵀDL
-    residuals  the errors of M v̇ + h - F at the v̇ of each route
+    condition  2-norm condition number of the mass matrix scaled to a diagonal of ones, or that of
+               J M⁻¹ Jᵀ of the constraints, if it is greater
+    pivot      smallest pivot of these matrices, eliminated from the last row up as in LᵀDL
+    residuals  the errors of M v̇ + h - F - Jᵀ λ at the v̇ of each route
     losses     errors of everything else that the module computes
     """
 
@@ -110,7 +111,7 @@ def judged(
             errors,
             doubles(data),
             agreed,
-            *_condition(free.mass_matrix),
+            *_conditions(free),
             residuals,
             losses,
         )
@@ -137,7 +138,7 @@ def _agreed(free: FreeBodies, vd: Array) -> float:
     """
     root = extended([_root(x) for x in np.diag(free.mass_matrix)])
     errors = abs(_needed(free, vd)) / root
-    terms = (abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes) / root
+    terms = (abs(free.mass_matrix) @ abs(vd) + _load_sizes(free)) / root
     terms = np.maximum(terms, LEAST_SCALE * np.max(terms))
     worst = max((a / b for a, b in zip(errors, terms, strict=True) if a), default=0)
     return -_log10(worst) if worst else 60.0
@@ -166,15 +167,25 @@ def _residuals(
         }
         sizes = extended([largest[u] for u in units])
         v = extended(given)
-        scale = abs(free.mass_matrix) @ sizes + free.bias_sizes + free.applied_sizes
+        scale = abs(free.mass_matrix) @ sizes + _load_sizes(free)
         true, *changed = (_needed(f, v) for f in (free, *near))
         found[route] = _loss(0.0 * given, true, changed, scale)
     return found
 
 
 def _needed(free: FreeBodies, vd: Array) -> Array:
+    """M v̇ + h - F - Jᵀ λ, at the λ of the free bodies."""
+    return _on_tree(free, vd) - free.constraint_push[0][: free.nv]
+
+
+def _on_tree(free: FreeBodies, vd: Array) -> Array:
     """M v̇ + h - F."""
     return free.mass_matrix @ vd + free.bias_force - free.applied_force
+
+
+def _load_sizes(free: FreeBodies) -> Array:
+    """The sizes of the terms of h, F and Jᵀ λ, (nv,)."""
+    return free.bias_sizes + free.applied_sizes + free.constraint_push[1][: free.nv]
 
 
 def _outputs(
@@ -204,7 +215,7 @@ def _outputs(
         given = asked(name) if name != "body_poses" else _matrices(asked(name), free.dimensions)
         found[name] = _loss(given, true, changes, scale)
     at = doubles(free.vd)
-    true, *changes = (_needed(f, extended(at)) for f in (free, *near))
+    true, *changes = (_on_tree(f, extended(at)) for f in (free, *near))
     scale = abs(free.mass_matrix) @ abs(extended(at)) + free.bias_sizes + free.applied_sizes
     found["inverse_dynamics"] = _loss(asked("inverse_dynamics", at), true, changes, scale)
     rest = [*range(nq), *range(nq + nv, len(state.y))]
@@ -238,6 +249,7 @@ def _quantities(
     }
     if not free.model.effects:
         del scales["effect_powers"]
+    scales |= _constraint_scales(free)
     found = {}
     for name, scale in scales.items():
         values = []
@@ -252,6 +264,22 @@ def _quantities(
             values, scale = [x[[0, 1, 5]] for x in values], scale[[0, 1, 5]]
         found[name] = (values[0], values[1:], extended(scale))
     return found
+
+
+def _constraint_scales(free: FreeBodies) -> dict[str, Array]:
+    """The scales of what the module computes of constraints, by row."""
+    units = np.array([unit for _, unit in free.model.rows])
+    if not len(units):
+        return {}
+    lengths = np.where(units == "N", free.reach, mpfr(1))
+    speeds = abs(free.constraint_jacobian) @ abs(free.rates)
+    found = abs(free.constraint_forces)
+    sizes = extended([max(found[units == unit]) for unit in units])
+    return {
+        "constraint_residuals": lengths,
+        "constraint_rates": speeds + lengths * max(map(abs, free.rates)),
+        "constraint_forces": sizes,
+    }
 
 
 def _matrices(poses: Any, dimensions: int) -> Any:
@@ -285,6 +313,16 @@ def ulps(error: Array, scale: Array) -> float:
         if x
     ]
     return float(np.max(parts, initial=0.0))  # Python's own max could lose a nan
+
+
+def _conditions(free: FreeBodies) -> tuple[float, float]:
+    """The greater condition number, and the smaller of the smallest pivots, of M and J M⁻¹ Jᵀ."""
+    found = [_condition(free.mass_matrix)]
+    if free.model.rows:
+        J = free.constraint_jacobian[:, : free.nv]
+        found.append(_condition(J @ solved(free.mass_matrix, J.T)))
+    conditions, pivots = zip(*found, strict=True)
+    return max(conditions), min(pivots)
 
 
 def _condition(matrix: Array) -> tuple[float, float]:

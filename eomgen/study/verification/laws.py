@@ -15,6 +15,7 @@ from eomgen.model.model import Model
 from eomgen.precision.extended import NOTHING, Array, extended, extended_digits, zeros
 from eomgen.precision.precise import Extended
 from eomgen.run.module import GeneratedModule
+from eomgen.scene.constraints import Constraint, Distance, LoopJoint
 from eomgen.scene.effects import Driven
 from eomgen.scene.effects.base import JointLoad
 from eomgen.scene.joints import Free
@@ -63,7 +64,15 @@ def why_no_momentum_law(model: Model) -> str:
         for b in model.bodies
         if b.parent < 0 and any(c.name in given for c in b.positions)
     ]
+    held += [c.name for c in model.constraints if not _between_bodies(c)]
     return f"the world holds {', '.join(dict.fromkeys(held))}" if held else ""
+
+
+def _between_bodies(constraint: Constraint) -> bool:
+    """Whether a constraint acts between two bodies, whose momenta it leaves unchanged in sum."""
+    if isinstance(constraint, LoopJoint):
+        return WORLD not in (constraint.joint.parent, constraint.joint.child)
+    return isinstance(constraint, Distance) and WORLD not in (constraint.body_1, constraint.body_2)
 
 
 def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
@@ -81,8 +90,10 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
         if not why_no_energy_law(model):
             change = (ahead.kinetic_energy - behind.kinetic_energy) / step
             powers, sizes = free.powers
-            power = np.sum(powers, initial=mpfr(0))
+            held, held_sizes = free.constraint_push
+            power = np.sum(powers, initial=mpfr(0)) + held @ free.rates
             needed = abs(free.mass_matrix) @ abs(vd) + free.bias_sizes + free.applied_sizes
+            needed = needed + held_sizes[:nv]
             # At both ends of the difference, bodies that are at rest here move.
             scale = (abs(free.rates[:nv]) + step * abs(vd)) @ needed
             scale += np.sum(sizes, initial=mpfr(0))

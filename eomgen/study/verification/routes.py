@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-from eomgen.codegen.choice import why_not_compared
+from eomgen.codegen.choice import why_not_compared, why_not_loops
 from eomgen.codegen.system import System
+from eomgen.dynamics.closed_positions import with_safe_pivots
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
@@ -27,6 +28,8 @@ def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
         if route == but:
             continue
         words = why_not_compared(model, route)
+        if model.constraints and not words:
+            words = why_not_loops(with_safe_pivots(model), route)
         try:
             if not words:
                 made[route] = loaded(

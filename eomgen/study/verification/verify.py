@@ -31,7 +31,7 @@ from eomgen.study.verification.bounds import (
     matrix_checks,
 )
 from eomgen.study.verification.drift import Drift, drift
-from eomgen.study.verification.hard_states import State, hard_states
+from eomgen.study.verification.hard_states import State, closed_states, hard_states
 from eomgen.study.verification.judging import Judged, judged
 from eomgen.study.verification.laws import broken, why_no_energy_law, why_no_momentum_law
 from eomgen.study.verification.routes import compiled
@@ -120,7 +120,10 @@ def verify(
     module = modules[taken]
     bare = replace(model, outputs=())
     truth, count = Truth(bare), states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
-    asked = hard_states(module, len(model.velocities), count, seed, wanted.t_end)
+    if model.constraints:
+        asked = closed_states(model, module, count, seed, wanted.t_end)
+    else:
+        asked = hard_states(module, len(model.velocities), count, seed, wanted.t_end)
     run = sampled(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
     asked += _states(run, module)
     found: list[Judged | None] = []
@@ -191,8 +194,9 @@ def _modules(
     module = module or load_module(code.module, model.name)
     progress(0.05)
     full = module
-    if not all(hasattr(module, name) for name in OUTPUTS):
-        more = replace(model, outputs=in_order(OUTPUTS))
+    outputs = (*OUTPUTS, "constraint_forces") if model.constraints else OUTPUTS
+    if not all(hasattr(module, name) for name in outputs):
+        more = replace(model, outputs=in_order(outputs))
         full = load_module(generated_code(more).module, model.name)
     progress(0.1)
     others, missing = compiled(replace(model, outputs=()), but=taken)

@@ -12,6 +12,14 @@ Unlike the recursions, it passes no velocity from body to body, shifts no inerti
 and carries no force inwards. Dense elimination with partial pivoting solves for v̇. Joints are
 composed of their primitives; effects state loads and energies.
 
+Constraints J v̇ + β = 0 join as further rows, and their multipliers λ as further unknowns:
+
+    [M  -Jᵀ] [v̇]   [F - h]
+    [J   0 ] [λ] = [ -β  ]
+
+J is the virtual work of unit multipliers; ġ and β are first and second differences of the residuals
+g along the motion at constant velocities.
+
 Numbers are MPFR's, with 60 digits. Driving formulas are differentiated by central differences.
 """
 
@@ -20,13 +28,18 @@ from functools import cached_property
 
 import numpy as np
 from gmpy2 import mpfr
+from numpy.typing import NDArray
 
 from eomgen.precision.extended import NOTHING, Array, along, extended, solved, zeros
 from eomgen.precision.precise import Extended
+from eomgen.scene.constraints.base import Row
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD, Geared
 from eomgen.study.verification.evaluated import EvaluatedModel
 from eomgen.study.verification.poses import composed
+
+_MOMENT = mpfr(2) ** -50
+"""Step of the differences of constraints, s, for rates of order 1."""
 
 
 class FreeBodies(EvaluatedModel):
@@ -171,20 +184,115 @@ class FreeBodies(EvaluatedModel):
 
     @cached_property
     def vd(self) -> Array:
-        """v̇ (nv,). Raises `ZeroDivisionError` if M is singular."""
-        return solved(self.mass_matrix, self.applied_force - self.bias_force)
+        """v̇ (nv,). Raises `ZeroDivisionError` if M is singular, or J M⁻¹ Jᵀ."""
+        return self._solution[: self.nv]
 
     @cached_property
-    def state_rates(self) -> Array:
-        """ẏ (ny,): the rates of coordinates, velocities and extra states."""
+    def constraint_forces(self) -> Array:
+        """λ (nc,), N or N m."""
+        return self._solution[self.nv :]
+
+    @cached_property
+    def _solution(self) -> Array:
+        right, nc = self.applied_force - self.bias_force, len(self.model.rows)
+        if not nc:
+            return solved(self.mass_matrix, right)
+        J = self.constraint_jacobian[:, : self.nv]
+        matrix = np.block([[self.mass_matrix, -J.T], [J, zeros(nc, nc)]])
+        return solved(matrix, np.concatenate([right, -self.bend]))
+
+    # Constraints.
+
+    @cached_property
+    def constraint_rows(self) -> list[Row]:
+        """The rows of all constraints, without those that follow from others."""
+        found = [row for constraint in self.model.constraints for row in constraint.rows(self)]
+        names = [name for name, _ in self.model.every_row]
+        kept = zip(names, found, strict=True)
+        return [row for name, row in kept if name not in self.model.dropped]
+
+    @cached_property
+    def constraint_jacobian(self) -> Array:
+        """J by all velocities that move, (nc, m)."""
+        rows = [self.pushed(row.loads)[0] for row in self.constraint_rows]
+        return np.array(rows, dtype=object).reshape(len(rows), self.moved)
+
+    @cached_property
+    def constraint_push(self) -> tuple[Array, Array]:
+        """Jᵀ λ (m,), and the sizes of its terms."""
+        J, found = self.constraint_jacobian, self.constraint_forces
+        if not len(found):
+            return zeros(self.moved), zeros(self.moved)
+        return J.T @ found, abs(J).T @ abs(found)
+
+    @cached_property
+    def constraint_residuals(self) -> Array:
+        """g (nc,); 0 for rows of velocities alone."""
+        rows = self.constraint_rows
+        return extended([mpfr(0) if row.residual is None else row.residual for row in rows])
+
+    @cached_property
+    def constraint_rates(self) -> Array:
+        """ġ (nc,) by differences of g, or J v where only the rate is constrained."""
+        ahead, behind, step = self._around
+        change = (ahead.constraint_residuals - behind.constraint_residuals) / (2 * step)
+        return np.where(self._holonomic, change, self._restricted_rates)
+
+    @cached_property
+    def bend(self) -> Array:
+        """β (nc,): g̈ at v̇ = 0."""
+        ahead, behind, step = self._around
+        here = self.constraint_residuals
+        second = (ahead.constraint_residuals - 2 * here + behind.constraint_residuals) / step**2
+        first = (ahead._restricted_rates - behind._restricted_rates) / (2 * step)
+        return np.where(self._holonomic, second, first)
+
+    @cached_property
+    def _holonomic(self) -> NDArray[np.bool_]:
+        return np.array([row.residual is not None for row in self.constraint_rows])
+
+    @cached_property
+    def _restricted_rates(self) -> Array:
+        drift = [mpfr(0) if row.drift is None else row.drift for row in self.constraint_rows]
+        return self.constraint_jacobian @ self.rates + extended(drift)
+
+    @cached_property
+    def _around(self) -> tuple["FreeBodies", "FreeBodies", Extended]:
+        """The model a moment later and earlier if its velocities did not change."""
+        step = _MOMENT / (1 + max(map(abs, self.rates)))
+        return self._later(step), self._later(-step), step
+
+    def _later(self, step: Extended) -> "FreeBodies":
+        nq = len(self.model.coordinates)
+        q = extended(self.q[:nq])
+        q = q + step * self._position_rates(q) + step**2 / 2 * self._bends(q)
+        y = [*q, *self.v[: self.nv], *self._states.values()]
+        return FreeBodies(self.model, self._time + step, y, self._inputs, self._parameters)
+
+    def _bends(self, q: Array) -> Array:
+        """q̈ at constant velocities: of quaternions alone."""
+        found = self._position_rates(self._position_rates(q))
+        for index in self.model.joint_indices:
+            for i, j in index.plain:
+                if j < self.nv:
+                    found[i] = mpfr(0)
+        return found
+
+    def _position_rates(self, q: Array) -> Array:
+        """q̇ (nq,)."""
         found: list[Extended] = []
         for index in self.model.joint_indices:
             found += [self.v[j] for _, j in index.plain if j < self.nv]
             if index.quaternion:
                 spin = extended([self.v[j] for j in index.spin])
-                found += list(composed(extended([self.q[i] for i in index.quaternion]), spin) / 2)
+                found += list(composed(extended([q[i] for i in index.quaternion]), spin) / 2)
+        return extended(found)
+
+    @cached_property
+    def state_rates(self) -> Array:
+        """ẏ (ny,): the rates of coordinates, velocities and extra states."""
         extra = [rate for effect in self.model.effects for rate in effect.rates(self)]
-        return extended([*found, *self.vd, *extra])
+        return extended([*self._position_rates(extended(self.q)), *self.vd, *extra])
 
     # Energy and momentum.
 
@@ -282,13 +390,15 @@ class FreeBodies(EvaluatedModel):
         """Force or torque on each driven velocity at the v̇ of the others, N or N m."""
         whole = np.concatenate([vd, self.driven_rates])
         needed = self._whole_matrix @ whole + self._resisting[0]
-        return (needed - self._loads["gravity"][0] - self._loads["applied"][0])[self.nv :]
+        loads = self._loads["gravity"][0] + self._loads["applied"][0] + self.constraint_push[0]
+        return (needed - loads)[self.nv :]
 
     def driving_sizes(self, vd: Array) -> Array:
         """Sum of the sizes of the terms of these forces."""
         whole = abs(np.concatenate([vd, self.driven_rates]))
         sizes = abs(self._whole_matrix) @ whole + self._resisting[1]
-        return (sizes + self._loads["gravity"][1] + self._loads["applied"][1])[self.nv :]
+        loads = self._loads["gravity"][1] + self._loads["applied"][1] + self.constraint_push[1]
+        return (sizes + loads)[self.nv :]
 
 
 def _reach(slopes: Array, force: Array | Extended) -> Array:

@@ -1,0 +1,154 @@
+"""The constraints of a mechanism as functions of its coordinates, and Newton's method on them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.dynamics import constraints
+from eomgen.dynamics.clusters import jacobian_of
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.frames import Linkage
+from eomgen.dynamics.linkage import make_linkage
+from eomgen.dynamics.mechanism_state import Values
+from eomgen.model.model import Model
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scene.joints import Free
+
+Array = NDArray[np.float64]
+
+STEPS = 60
+"""Most steps of Newton's method from one start."""
+PATIENCE = 12
+"""Steps that must reduce the sum of the residuals' squares by 30 %, or no position is near."""
+CLOSED = 1e-12
+"""A residual relative to the mechanism's size that is rounding."""
+
+
+@dataclass(frozen=True)
+class Closure:
+    """A model's constraints as functions of the coordinates. Residuals and steps are in sizes."""
+
+    model: Model
+    size: float
+
+    @classmethod
+    def of(cls, model: Model) -> "Closure":
+        """Those of a model, in its own size."""
+        return cls(model, _size(model))
+
+    def dynamics(self, q: Array, v: Sequence[float] | None = None) -> Dynamics:
+        """The mechanism at q, at rest unless v is given."""
+        model = self.model
+        inputs = {i.name: i.default for i in model.inputs}
+        states = {x.name: x.initial for x in model.states}
+        speeds = [0.0] * len(model.velocities) if v is None else list(v)
+        values = Values(model.defaults, inputs, q.tolist(), speeds, states, 0.0)
+        return Dynamics(model, values, FloatScalars(), linkage=self._linkage)
+
+    @cached_property
+    def _linkage(self) -> Linkage:
+        """Frames and mounts, the same at all coordinates."""
+        return make_linkage(self.model, self.model.defaults, FloatScalars())
+
+    def residuals(self, q: Array) -> Array:
+        """g of each row, (nc,)."""
+        found = np.array(constraints.residuals(self.dynamics(q)))
+        return np.asarray(found / self._units)
+
+    def met(self, q: Array, v: Sequence[float]) -> bool:
+        """Whether a state meets the constraints, except for rounding."""
+        rates = np.array(constraints.rates(self.dynamics(q, v))) / self._units
+        speed = max(1.0, float(np.abs(np.array(v) / self.lengths).max(initial=0.0)))
+        near = np.abs(self.residuals(q)).max(initial=0.0) <= CLOSED
+        return bool(near and np.abs(rates).max(initial=0.0) <= CLOSED * speed)
+
+    def both(self, q: Array) -> tuple[Array, Array]:
+        """`residuals` and `jacobian`."""
+        d = self.dynamics(q)
+        found = np.array(constraints.residuals(d), dtype=np.float64)
+        return np.asarray(found / self._units), self._in_sizes(jacobian_of(d))
+
+    def jacobian(self, q: Array) -> Array:
+        """J (nc, nv) in sizes."""
+        return self._in_sizes(jacobian_of(self.dynamics(q)))
+
+    def _in_sizes(self, rows: Sequence[Sequence[float]]) -> Array:
+        matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.model.velocities))
+        scaled: Array = matrix * self.lengths / self._units[:, np.newaxis]
+        return scaled
+
+    def holding(self, q: Array) -> Array:
+        """J (nc, nv) in sizes, 0 in the rows that restrict velocities alone: what positions can be
+        closed by. A wheel is put on the ground without rolling there.
+        """
+        rows = constraints.rows_of(self.dynamics(q))
+        held = np.array([[row.residual is not None] for row in rows], dtype=bool)
+        return np.where(held.reshape(len(rows), 1), self.jacobian(q), 0.0)
+
+    def moved(self, q: Array, step: Array) -> Array:
+        """q after a step (nv,) of the velocities' directions, in sizes; quaternions stay unit."""
+        rates = constraints.position_rates(self.dynamics(q), (step * self.lengths).tolist())
+        found: Array = q + np.array(rates, dtype=np.float64)
+        for indices in map(list, self.model.quaternions):
+            found[indices] /= np.linalg.norm(found[indices])
+        return found
+
+    def upright(self, q: Array) -> bool:
+        """Whether no loop is closed with a part turned by half a turn."""
+        d = self.dynamics(q)
+        return all(cosine > 0 for loop in self.model.loops for cosine in loop.upright(d))
+
+    @property
+    def lengths(self) -> Array:
+        """The size of each velocity's coordinate: 1 for an angle."""
+        return np.array([self.size if c.unit == "m/s" else 1.0 for c in self.model.velocities])
+
+    @property
+    def _units(self) -> Array:
+        return np.array([self.size if unit == "N" else 1.0 for _, unit in self.model.rows])
+
+
+def _size(model: Model) -> float:
+    """A typical length of the mechanism, m."""
+    joints = [*(body.joint for body in model.bodies), *(loop.joint for loop in model.loops)]
+    parts = [
+        part
+        for joint in joints
+        if not isinstance(joint, Free)
+        for part in (*joint.r_parent, *joint.r_child)
+    ]
+    return max((abs(model.value(part)) for part in parts), default=0.0) or 1.0
+
+
+def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | None:
+    """The end of Newton's method with damped least-squares steps; None if it does not converge."""
+    g = mechanism.residuals(q)
+    damping, last, before = 0.0, math.inf, math.inf
+    for step_number in range(STEPS):
+        size = float(np.abs(g).max())
+        if step_number % PATIENCE == 0:
+            if size > CLOSED and float(g @ g) > 0.7 * before:
+                return None
+            before = float(g @ g)
+        if size <= CLOSED and size >= 0.5 * last:
+            return q
+        last = size
+        matrix = np.where(free, mechanism.holding(q), 0.0)
+        normal = matrix @ matrix.T + damping * np.eye(len(g))
+        step = -matrix.T @ np.linalg.lstsq(normal, g, rcond=1e-14)[0]
+        length = float(np.abs(step).max())
+        step *= min(1.0, 0.5 / length) if length else 1.0
+        there = mechanism.moved(q, step)
+        after = mechanism.residuals(there)
+        if float(after @ after) > float(g @ g) and size > CLOSED:
+            damping = max(10 * damping, 1e-6)
+            last = math.inf
+            if damping > 1e6:
+                return None
+            continue
+        q, g, damping = there, after, damping / 10 if damping > 1e-12 else 0.0
+    return q if float(np.abs(g).max()) <= 10 * CLOSED else None

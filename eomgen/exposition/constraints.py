@@ -1,0 +1,295 @@
+"""The constraints of a mechanism, over symbols: their equations, differentiated, and their forces.
+
+A multiplier is a symbol. The forces of a constraint are loads with these symbols, so that the
+derivation of the tree takes them as it takes the forces of effects.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import sympy as sp
+
+from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.steps import Definition
+from eomgen.derivation.symbols import Expr
+from eomgen.exposition.effects import AnyLoad, DerivedEffect, StandIn, named_loads
+from eomgen.exposition.frames import Frame, frames_of
+from eomgen.exposition.impacts import power
+from eomgen.exposition.mechanism import (
+    AXES,
+    NamingMechanism,
+    Notes,
+    crossed,
+    omega_symbols,
+    position_symbols,
+    rotation_symbols,
+    velocity_symbols,
+)
+from eomgen.exposition.poses import frame_name, poses
+from eomgen.exposition.reading import dotted
+from eomgen.exposition.state_forms import needed_by
+from eomgen.model.model import Model
+from eomgen.scene.constraints.base import Constraint, Row
+from eomgen.scene.effects.base import JointLoad, Load
+from eomgen.scene.joints.base import WORLD
+
+
+@dataclass(frozen=True)
+class DerivedRow:
+    """One row of a constraint.
+
+    position  g; None if only velocities are restricted
+    speed     ġ over the motion of the bodies
+    slopes    the entries of J that are not 0: a velocity's name, and the derivative of ġ by it
+    bend      β, what g̈ is where v̇ = 0
+    """
+
+    name: str
+    position: Expr | None
+    speed: Expr
+    slopes: tuple[tuple[str, Expr], ...]
+    bend: Expr
+
+    @property
+    def multiplier(self) -> Expr:
+        """λ."""
+        return multiplier(self.name)
+
+
+@dataclass(frozen=True)
+class DerivedConstraint:
+    """A constraint by its formulas.
+
+    definitions  the points that its rows use
+    speeds       their time derivatives, as far as the rows use them
+    bodies       the bodies whose pose and motion it uses
+    force        its loads by the multipliers
+    """
+
+    constraint: Constraint
+    definitions: tuple[Definition, ...]
+    speeds: tuple[Definition, ...]
+    bodies: tuple[str, ...]
+    rows: tuple[DerivedRow, ...]
+    force: DerivedEffect
+
+
+def multiplier(row: str) -> Expr:
+    """The multiplier of a row."""
+    return real(f"lambda_{row}")
+
+
+def derived_constraints(model: Model) -> tuple[DerivedConstraint, ...]:
+    """All constraints of a model, in order, without rows that follow from others."""
+    frames, found = frames_of(model), []
+    for constraint in model.constraints:
+        notes = Notes(constraint.name)
+        list(constraint.rows(_mechanism(model, notes)))
+        notes = Notes(constraint.name, totals=notes.counts)
+        rows = list(constraint.rows(_mechanism(model, notes)))
+        names = [name for name, _ in constraint.row_names(model.dimensions)]
+        kept = [(n, row) for n, row in zip(names, rows, strict=True) if n not in model.dropped]
+        touched = [x.body for _, row in kept for x in row.loads if isinstance(x, Load)]
+        bodies = tuple(dict.fromkeys(b for b in (*notes.bodies, *touched) if b != WORLD))
+        motion, moving = _Motion.of(model, frames, bodies).with_points(notes.definitions)
+        derived = tuple(_row(name, row, motion) for name, row in kept)
+        speeds = needed_by([row.bend for row in derived], moving)
+        force = _force(model, constraint, kept, bodies)
+        points = tuple(notes.definitions)
+        found.append(DerivedConstraint(constraint, points, speeds, bodies, derived, force))
+    return tuple(found)
+
+
+def with_multipliers(model: Model, constraints: Sequence[DerivedConstraint]) -> Model:
+    """The tree alone, with the forces of the constraints as inputs."""
+    stand_ins: list[Any] = [StandIn(name=c.force.effect.name, derived=c.force) for c in constraints]
+    inputs = [x for s in stand_ins for x in s.inputs(model.dimensions)]
+    return replace(
+        model,
+        constraints=(),
+        dropped=(),
+        effects=(*model.effects, *stand_ins),
+        inputs=(*model.inputs, *inputs),
+    )
+
+
+def _mechanism(model: Model, notes: Notes) -> Any:
+    return NamingMechanism(model, notes)
+
+
+def _force(
+    model: Model,
+    constraint: Constraint,
+    rows: Sequence[tuple[str, Row]],
+    bodies: tuple[str, ...],
+) -> DerivedEffect:
+    loads = _joined([_times(x, multiplier(name)) for name, row in rows for x in row.loads])
+    definitions: list[Definition] = []
+    loads = named_loads(model, constraint.name, loads, definitions)
+    effect: Any = constraint
+    return DerivedEffect(effect, tuple(definitions), tuple(loads), False, (), (), bodies)
+
+
+def _times(load: AnyLoad, size: Expr) -> AnyLoad:
+    if isinstance(load, JointLoad):
+        return replace(load, force=load.force * size)
+    force, torque = (tuple(x * size for x in part) for part in (load.force, load.torque))
+    return replace(load, force=force, torque=torque)
+
+
+def _joined(loads: Sequence[AnyLoad]) -> list[AnyLoad]:
+    """Loads on bodies, those at one point of a body as their sum; nothing acts on the world."""
+    found: dict[object, AnyLoad] = {}
+    for load in loads:
+        if isinstance(load, JointLoad):
+            key: object = (load.joint, load.coordinate)
+            before = found.get(key)
+            both = load.force if before is None else before.force + load.force
+            found[key] = replace(load, force=both)
+        elif load.body != WORLD:
+            key = (load.body, load.at)
+            other = found.get(key)
+            if not isinstance(other, Load):
+                found[key] = load
+                continue
+            force = tuple(a + b for a, b in zip(other.force, load.force, strict=True))
+            torque = _sum(other.torque, load.torque)
+            found[key] = replace(other, force=force, torque=torque)
+    return list(found.values())
+
+
+def _sum(a: Sequence[Expr], b: Sequence[Expr]) -> tuple[Expr, ...]:
+    if not a or not b:
+        return tuple(a or b)
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+def _row(name: str, row: Row, motion: "_Motion") -> DerivedRow:
+    drift = sp.S.Zero if row.drift is None else row.drift
+    speed = power(motion.model, row.loads) + drift
+    whole = motion.over_velocities(speed)
+    slopes, bend = [], motion.rate(drift)
+    still = dict.fromkeys(motion.velocities, sp.S.Zero)
+    there = whole.xreplace(still)
+    for v, a in motion.velocities.items():  # the speed is linear in the velocities
+        slope = whole.xreplace({**still, v: sp.S.One}) - there
+        if slope == 0:
+            continue
+        bend += v * motion.rate(slope)
+        if a is None:
+            slopes.append((v.name, slope))
+        else:
+            bend += slope * a
+    return DerivedRow(name, row.residual, speed, tuple(slopes), bend)
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """How what constraints depend on moves.
+
+    speeds      the motion of bodies and frames over that of their parents, in order
+    velocities  of all coordinates, each with its derivative if that is prescribed
+    rates       the time derivative of each symbol of a pose
+    """
+
+    model: Model
+    speeds: tuple[Definition, ...]
+    velocities: Mapping[Expr, Expr | None]
+    rates: Mapping[Expr, Expr]
+
+    @classmethod
+    def of(cls, model: Model, frames: Sequence[Frame], bodies: Sequence[str]) -> "_Motion":
+        definitions, _ = poses(model, frames, bodies)
+        size = model.dimensions
+        bodied = {b.name for b in model.bodies}
+        moving: set[Expr] = set()
+        rates: dict[Expr, Expr] = {real("t"): sp.S.One}
+        rates |= _coordinate_rates(model)
+        known = {symbol for symbol, _ in definitions}
+        for frame in frames:
+            name = frame_name(model, frame)
+            moving |= {real(f"odot_{frame.name},{axis}") for axis in AXES[:size]}
+            moving |= {*omega_symbols(name, size), *velocity_symbols(name, size)}
+            for axis in AXES[:size]:
+                pair = real(f"o_{frame.name},{axis}"), real(f"odot_{frame.name},{axis}")
+                rates |= [pair] if pair[1] in known else []
+            if name in bodied:
+                rates |= zip(position_symbols(name, size), velocity_symbols(name, size),
+                             strict=True)  # fmt: skip
+                rates |= _rotation_rates(name, size)
+        for symbol, value in definitions:
+            if symbol not in moving and symbol not in rates:
+                rates[symbol] = rate(value, rates)
+        velocities: dict[Expr, Expr | None] = {real(c.name): None for c in model.velocities}
+        for c in model.prescribed:
+            if not c.locked:
+                velocities[real(c.velocity.name)] = real(c.velocity.acceleration)
+        speeds = tuple(pair for pair in definitions if pair[0] in moving)
+        return cls(model, speeds, velocities, rates)
+
+    def with_points(self, points: Sequence[Definition]) -> tuple["_Motion", list[Definition]]:
+        """The same with symbols for the time derivatives of further symbols, and what these are."""
+        rates, found = dict(self.rates), list[Definition]()
+        for symbol, value in points:
+            speed = real(dotted(symbol.name, "dot"))
+            found.append((speed, rate(value, rates)))
+            rates[symbol] = speed
+        return replace(self, rates=rates), found
+
+    def over_velocities(self, speed: Expr) -> Expr:
+        """A speed over the velocities of the coordinates."""
+        for symbol, value in reversed(self.speeds):
+            speed = speed.xreplace({symbol: value})
+        return speed
+
+    def rate(self, expression: Expr) -> Expr:
+        """The time derivative of what depends on poses and time."""
+        return rate(expression, self.rates)
+
+
+def rate(e: Expr, rates: Mapping[Expr, Expr]) -> Expr:
+    """The time derivative of an expression in one pass; symbols without a rate are constant."""
+    if not rates.keys() & e.free_symbols:
+        return sp.S.Zero
+    if e.is_Symbol:
+        return rates[e]
+    if e.is_Add:
+        return sp.Add(*(rate(x, rates) for x in e.args))
+    if e.is_Mul:
+        factors = list(e.args)
+        terms = [(i, rate(x, rates)) for i, x in enumerate(factors)]
+        products = (sp.Mul(*factors[:i], x, *factors[i + 1 :]) for i, x in terms if x != 0)
+        return sp.Add(*products)
+    return sp.Add(
+        *(sp.diff(e, s) * rates[s] for s in sorted(e.free_symbols, key=str) if s in rates)
+    )
+
+
+def _coordinate_rates(model: Model) -> Iterator[tuple[Expr, Expr]]:
+    """Each coordinate and its time derivative: ½ q ∘ ω for a quaternion q."""
+    for body in model.bodies:
+        count = body.plain
+        yield from (
+            (real(x.name), real(v.name))
+            for x, v in zip(body.positions[:count], body.velocities[:count], strict=True)
+        )
+        if len(body.positions) > count:
+            w, x, y, z = (real(c.name) for c in body.positions[count:])
+            a, b, c = (real(v.name) / 2 for v in body.velocities[count:])
+            yield w, -(x * a + y * b + z * c)
+            yield x, w * a + y * c - z * b
+            yield y, w * b + z * a - x * c
+            yield z, w * c + x * b - y * a
+
+
+def _rotation_rates(body: str, size: int) -> Iterator[tuple[Expr, Expr]]:
+    """ψ̇ = ω in the plane, Ẇ = Ω × W in space."""
+    omega = omega_symbols(body, size)
+    if size == 2:
+        yield real(f"psi_{body}"), omega[0]
+        return
+    entries = rotation_symbols(body, size)
+    for j in range(3):
+        column = tuple(entries[:, j])
+        yield from zip(column, crossed(omega, column), strict=True)

@@ -1,0 +1,129 @@
+"""Small displacements that keep the constraints of a mechanism."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.errors import RunError
+from eomgen.run.problem import FloatArray
+from eomgen.run.projection import jacobian_of
+from eomgen.run.tangents import tangents
+
+NEWTON, MET = 30, 1e-14
+"""Most steps of Newton's method, and the residual that is rounding."""
+LEAST = 1e-9
+"""A pivot relative to the largest that is 0."""
+STEP = 1e-3
+"""Step of differences of sixth order, rad or m."""
+
+
+class Manifold(NamedTuple):
+    """Deviations that keep the constraints: all follow from the independent ones, T (n, k).
+
+    independent  indices (k,) of these; rows `independent` of T are the unit matrix
+    """
+
+    T: FloatArray
+    independent: NDArray[np.intp]
+
+
+def directions(module: Any, y: FloatArray, p: Any, u: Any, free: NDArray[np.intp]) -> FloatArray:
+    """The projection (nf, nf) of the `free` displacements, three for a quaternion, onto those that
+    keep the constraints.
+    """
+    jacobian = jacobian_of(module)(0.0, y, p, u)[:, free]
+    return np.asarray(np.eye(len(free)) - np.linalg.pinv(jacobian, rcond=LEAST) @ jacobian)
+
+
+def returned(module: Any, y: FloatArray, p: Any, u: Any, free: NDArray[np.intp]) -> FloatArray:
+    """The state moved onto the constraints by its `free` displacements, the nearest by least
+    squares. Raises `RunError` if they cannot be met.
+    """
+    nq = len(module.POSITIONS)
+    for _ in range(NEWTON):
+        off = module.constraint_residuals(0.0, y, p, u)
+        if np.abs(off).max() <= MET:
+            return y
+        jacobian = jacobian_of(module)(0.0, y, p, u)
+        step = np.zeros(jacobian.shape[1])
+        step[free] = -np.linalg.lstsq(jacobian[:, free], off, rcond=LEAST)[0]
+        y = y.copy()
+        y[:nq] += tangents(y[:nq], module.QUATERNIONS) @ step
+        for indices in map(list, module.QUATERNIONS):
+            y[indices] /= np.linalg.norm(y[indices])
+    if np.abs(off).max() <= 1e3 * MET:
+        return y
+    raise RunError(
+        "equilibrium: the constraints cannot be met there; start elsewhere, or hold fewer "
+        "coordinates"
+    )
+
+
+def manifold(module: Any, y: FloatArray, p: Any, u: Any) -> Manifold:
+    """The deviations of the state, three for a quaternion, that keep the constraints at `y`.
+
+    Raises `RunError` in a singular position.
+    """
+    jacobian = jacobian_of(module)(0.0, y, p, u)
+    nv, nx = jacobian.shape[1], len(y) - len(module.POSITIONS) - jacobian.shape[1]
+    dependent = _pivots(jacobian)
+    independent = [j for j in range(nv) if j not in dependent]
+    inverse = np.linalg.inv(jacobian[:, dependent])
+    basis = np.zeros((nv, len(independent)))
+    basis[independent] = np.eye(len(independent))
+    basis[dependent] = -inverse @ jacobian[:, independent]
+    bent = np.zeros_like(basis)  # velocities that follow from displacements of a motion
+    bent[dependent] = -inverse @ (_slopes(module, y, p, u) @ basis)
+    zero, one = np.zeros, np.eye(nx)
+    k = basis.shape[1]
+    T = np.block(
+        [
+            [basis, zero((nv, k)), zero((nv, nx))],
+            [bent, basis, zero((nv, nx))],
+            [zero((nx, k)), zero((nx, k)), one],
+        ]
+    )
+    kept = [*independent, *(nv + j for j in independent), *range(2 * nv, 2 * nv + nx)]
+    return Manifold(T, np.array(kept, dtype=np.intp))
+
+
+def _pivots(jacobian: FloatArray) -> list[int]:
+    """The columns of complete pivoting, those of the dependent velocities."""
+    work, rows, found = jacobian.copy(), list(range(len(jacobian))), list[int]()
+    largest = float(np.abs(work).max())
+    while rows:
+        sizes = np.abs(work[rows])
+        a, j = np.unravel_index(int(sizes.argmax()), sizes.shape)
+        if sizes[a, j] <= LEAST * largest:
+            raise RunError(
+                "linearise: the constraints depend on each other at this state, as at a dead "
+                "point; take another"
+            )
+        i = rows.pop(int(a))
+        found.append(int(j))
+        for k in rows:
+            work[k] -= work[k, j] / work[i, j] * work[i]
+    return found
+
+
+def _slopes(module: Any, y: FloatArray, p: Any, u: Any) -> FloatArray:
+    """Derivatives of the rates of the constraints by displacements, (nc, nv); 0 at rest."""
+    nq = len(module.POSITIONS)
+    basis = tangents(y[:nq], module.QUATERNIONS)
+
+    def rates(step: FloatArray) -> FloatArray:
+        there = y.copy()
+        there[:nq] += step
+        return np.asarray(module.constraint_rates(0.0, there, p, u))
+
+    columns = [
+        sum(c * (rates(n * STEP * way) - rates(-n * STEP * way)) for n, c in enumerate(_SIXTH, 1))
+        / STEP
+        for way in basis.T
+    ]
+    return np.array(columns).T
+
+
+_SIXTH = (3 / 4, -3 / 20, 1 / 60)
+"""Central differences of order 6."""

@@ -1,0 +1,29 @@
+"""Initial states on the constraints of a mechanism, at the parameters of a run."""
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from eomgen.dynamics.assembly import closed_start
+from eomgen.model.model import Model
+from eomgen.run.problem import FloatArray
+
+
+def closed(
+    model: Model,
+    parameters: Mapping[str, float] | None,
+    y: FloatArray,
+    given: Collection[str] = (),
+) -> FloatArray:
+    """The state `y` (ny,) of a model of form 'velocity', moved onto its constraints at these
+    parameters; states named in `given` are kept. Without constraints it is `y` itself.
+
+    Raises `SceneError` if they cannot be met.
+    """
+    if not model.constraints:
+        return y
+    nq, nv = len(model.coordinates), len(model.velocities)
+    values = y.tolist()
+    moved = model.with_parameters(parameters or {})
+    q, v, _ = closed_start(moved, values[:nq], values[nq : nq + nv], given)
+    return np.array([*q, *v, *values[nq + nv :]])

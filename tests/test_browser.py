@@ -1,0 +1,84 @@
+"""Pages in headless Chromium; tests/campaigns/browser.py tries those of all built-in scenes."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser import check_page, chromium, missing, opened
+
+import eomgen
+from eomgen.results import Run
+from eomgen.show.gallery import Exhibit, gallery_page, thumbnail
+from eomgen.show.page import render_page, save_page
+
+pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+
+NASTY = "</script><img src=x onerror=alert(1)><b id=hacked>{{ 7*7 }}\u2028"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    return eomgen.simulate("double_pendulum", t_end=2.0, samples=201)
+
+
+def test_a_page_does_what_it_must(browser: Any, run: Run, tmp_path: Path) -> None:
+    save_page(run.motion, run.page(), tmp_path / "page.html")
+    assert "bodies fill" in check_page(browser, tmp_path / "page.html", run)
+
+
+def test_hostile_texts_do_nothing(browser: Any, run: Run, tmp_path: Path) -> None:
+    code = run.page()
+    table = {
+        **code.table,
+        "states": [{**s, "name": NASTY + s["name"], "unit": NASTY} for s in code.table["states"]],
+        "parameters": [{**p, "about": NASTY, "unit": NASTY} for p in code.table["parameters"]],
+        "effects": [{**e, "name": NASTY} for e in code.table["effects"]],
+    }
+    motion = replace(run.motion, title=NASTY, integrator=NASTY, message=NASTY, finished=False)
+    path = tmp_path / "hostile.html"
+    path.write_text(render_page(motion, replace(code, table=table)), "utf-8")
+    exhibit = Exhibit(NASTY, NASTY, NASTY, "a.html", 1, thumbnail(run.motion), True, NASTY)
+    (tmp_path / "index.html").write_text(gallery_page([exhibit]), "utf-8")
+    for name in ("hostile.html", "index.html"):
+        with opened(browser, tmp_path / name) as page:
+            if name == "hostile.html":
+                page.page.click("#mode-live")
+                page.until("() => window.eomgen.time > 0.05")
+            page.page.wait_for_timeout(100)
+            assert page.page.locator("#hacked, img[src=x]").count() == 0
+            assert page.page.locator("h1, h2").filter(has_text="<img src=x").count() == 1
+
+
+SENT = """() => new Promise((done) => {
+  const refused = [];
+  document.addEventListener("securitypolicyviolation", (event) => {
+    refused.push(event.effectiveDirective);
+    if (refused.length === 3) done(refused.sort());
+  });
+  fetch("https://example.invalid/").catch(() => null);
+  new Image().src = "https://example.invalid/a.png";
+  const script = document.createElement("script");
+  script.src = "https://example.invalid/a.js";
+  document.head.append(script);
+})"""
+
+
+def test_nothing_can_be_sent(browser: Any, run: Run, tmp_path: Path) -> None:
+    """The content security policy is closed, whatever a script in the page would try."""
+    path = tmp_path / "page.html"
+    save_page(run.motion, run.page(), path)
+    page = browser.new_page()
+    asked: list[str] = []
+    page.on("requestfinished", lambda request: asked.append(request.url))
+    page.goto(f"{path.as_uri()}#still")
+    assert page.evaluate(SENT) == ["connect-src", "img-src", "script-src-elem"]
+    assert asked == [path.as_uri()]
+    page.close()

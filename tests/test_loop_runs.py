@@ -1,0 +1,266 @@
+"""Runs of mechanisms with loops: no drift, energy, given starts, impacts, singular positions."""
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import eomgen
+from eomgen.api.given import check
+from eomgen.cli import main
+from eomgen.dynamics.assembly import closed_start
+from eomgen.errors import RunError, SceneError
+from eomgen.run.projection import jacobian_of
+
+A, B, C, D = 0.3, 0.8, 0.6, 0.7
+"""Lengths of a crank-rocker: crank, coupler, rocker and ground, m."""
+
+
+def four_bar(
+    lengths: tuple[float, float, float, float] = (A, B, C, D),
+    initial: str = "q = { theta = 0.3 }",
+    effects: str = "",
+    route: str = "auto",
+) -> str:
+    """A four-bar of uniform rods under gravity."""
+    bars = [("crank", 1.0, "a"), ("coupler", 2.0, "b"), ("rocker", 1.5, "c")]
+    named = zip("abcd", lengths, strict=True)
+    text = f'name = "four_bar"\nroute = "{route}"\n[parameters]\n'
+    text += "".join(f'{name} = {{ value = {x}, unit = "m" }}\n' for name, x in named)
+    for name, mass, length in bars:
+        text += f'[[bodies]]\nname = "{name}"\nmass = {mass}\n'
+        text += f'inertia_com = "{mass}*{length}**2/12"\n'
+    pins = [
+        ("A", "world", "crank", "[0, 0]", '["-a/2", 0]', 'coordinate = "theta"'),
+        ("B", "crank", "coupler", '["a/2", 0]', '["-b/2", 0]', 'coordinate = "phi"'),
+        ("D", "world", "rocker", '["d", 0]', '["-c/2", 0]', 'coordinate = "psi"'),
+        ("C", "coupler", "rocker", '["b/2", 0]', '["c/2", 0]', "loop = true"),
+    ]
+    for name, parent, child, at_parent, at_child, more in pins:
+        text += f'[[joints]]\nname = "{name}"\ntype = "revolute"\nparent = "{parent}"\n'
+        text += f'child = "{child}"\nr_parent = {at_parent}\nr_child = {at_child}\n{more}\n'
+    text += '[[effects]]\ntype = "gravity"\ng = 9.81\n'
+    return text + f"{effects}[initial]\n{initial}\n"
+
+
+def gap(y: Mapping[str, Any], a: float = A) -> NDArray[np.float64]:
+    """The distance of the ends of coupler and rocker, m."""
+    theta, phi, psi = (np.asarray(y[name]) for name in ("theta", "phi", "psi"))
+    x = a * np.cos(theta) + B * np.cos(theta + phi) - D - C * np.cos(psi)
+    z = a * np.sin(theta) + B * np.sin(theta + phi) - C * np.sin(psi)
+    return np.hypot(x, z)
+
+
+def test_violations_are_reported() -> None:
+    """The residuals after projection are those of the rows, and of the loop's gap in the figure;
+    before it they are those of the method's steps.
+    """
+    run = eomgen.simulate(four_bar(), t_end=2.0, backend="numpy", rtol=1e-7)
+    before, after = np.array([*run.trajectory.violations.values()]).T
+    assert tuple(run.trajectory.violations) == ("C_x", "C_y")
+    loop = run.motion.joints.index("C")
+    gaps = gap({name: run[name] for name in run.states})
+    np.testing.assert_allclose(run.motion.joint_drift[:, loop], gaps, atol=1e-15)
+    assert gaps.max() <= 1.5 * after.max() <= 1e-14
+    assert 1e-10 < before.max() < 1e-5
+
+
+def test_c_and_python_agree() -> None:
+    """Functions in C give the bits of Python, constraints included; no compiled step leaves them
+    out.
+    """
+    runs = [
+        eomgen.simulate(four_bar(), t_end=0.5, integrator="rk4", dt=0.01, backend=backend)
+        for backend in ("numpy", "c")
+    ]
+    assert runs[1].compiled
+    assert np.array_equal(runs[0].y, runs[1].y)
+    assert runs[0].trajectory.violations == runs[1].trajectory.violations
+
+
+def test_matrix_of_large_mechanisms() -> None:
+    """Where a module has no `constraint_jacobian`, it is computed from the rates."""
+    module: Any = eomgen.load(eomgen.generate(four_bar()))
+    y = module.initial_state()
+    rates = SimpleNamespace(**{n: x for n, x in vars(module).items() if n != "constraint_jacobian"})
+    np.testing.assert_allclose(
+        jacobian_of(rates)(0.0, y), module.constraint_jacobian(0.0, y), atol=1e-15
+    )
+
+
+@pytest.mark.parametrize("route", ["independent", "aba"])
+def test_symmetric_projection_keeps_energy(route: str) -> None:
+    """The implicit midpoint rule keeps the energy of a swinging four-bar in a band, and a run back
+    ends where it began.
+    """
+    settings: dict[str, Any] = {"integrator": "implicit_midpoint", "dt": 0.02, "backend": "numpy"}
+    run = eomgen.simulate(four_bar(route=route), t_end=16.0, **settings)
+    first, last = np.array_split(run.energy - run.energy[0], 2)
+    assert np.ptp(first) > 1e-3  # the method's own error, of which the band is made
+    assert abs(last.mean() - first.mean()) < 0.02 * np.ptp(first)
+    assert np.ptp(last) < 1.02 * np.ptp(first)
+    assert gap({name: run[name] for name in run.states}).max() < 1e-12
+
+    there = eomgen.simulate(four_bar(route=route), t_end=0.5, **settings)
+    end = {name: float(there[name][-1]) for name in there.states}
+    turned = {name: -x if name.endswith("_dot") else x for name, x in end.items()}
+    back = eomgen.simulate(four_bar(route=route), t_end=0.5, state=turned, **settings)
+    np.testing.assert_allclose(back.y[-1] * [1, 1, 1, -1, -1, -1], there.y[0], atol=1e-11)
+
+
+def test_rattle_keeps_energy_where_symmetry_does_not() -> None:
+    """A crank that goes round in one direction: the energy of RATTLE has no trend, and its error is
+    of order 2. Forces that depend on velocities are refused.
+    """
+    swings = "q = { theta = 1.0 }\nv = { theta_dot = 6.0 }"
+    bands = []
+    for dt in (0.01, 0.005):
+        settings: dict[str, Any] = {"integrator": "leapfrog", "dt": dt, "backend": "numpy"}
+        run = eomgen.simulate(four_bar(initial=swings), t_end=400 * dt, **settings)
+        assert run.finished and run["theta"][-1] > 6.0
+        first, last = np.array_split(run.energy - run.energy[0], 2)
+        bands.append(np.ptp(first))
+        assert np.ptp(last) < 1.1 * np.ptp(first) and last.max() < first.max() + 0.1 * bands[-1]
+        assert gap({name: run[name] for name in run.states}).max() < 1e-13
+    assert 3.5 < bands[0] / bands[1] < 4.7
+    rubs = '[[effects]]\ntype = "joint_friction"\nname = "rub"\njoint = "A"\nviscous = 0.1\n'
+    with pytest.raises(RunError, match=r"depends on velocities.*gauss_4"):
+        eomgen.simulate(four_bar(effects=rubs), t_end=0.1, **settings)
+
+
+def test_given_states_are_kept_and_the_others_found() -> None:
+    """Coordinates and velocities that are given stay; other parameters are assembled too."""
+    run = eomgen.simulate(four_bar(), state={"psi_deg": -90, "theta_dot": 2.0}, t_end=0.01)
+    first = {name: run[name][0] for name in run.states}
+    assert first["psi"] == np.radians(-90) and first["theta_dot"] == 2.0
+    assert gap(first) < 1e-14
+    later = {name: first[name] + 1e-4 * first[f"{name}_dot"] for name in ("theta", "phi", "psi")}
+    assert gap(later) < 1e-6  # the velocities keep the loop closed
+
+    longer = eomgen.simulate(four_bar(), parameters={"a": 0.25}, t_end=0.01)
+    first = {name: longer[name][0] for name in longer.states}
+    assert first["theta"] == 0.3 and gap(first, 0.25) < 1e-14
+
+    with pytest.raises(SceneError, match=r"with theta, psi as given.*open by .* m"):
+        eomgen.simulate(four_bar(), state={"theta": 0.3, "psi": 0.2}, t_end=0.01)
+
+
+def test_guess_chooses_the_branch(capsys: pytest.CaptureFixture[str], tmp_path: Any) -> None:
+    """The two ways to close a four-bar, by start values; `check --assemble` tells them apart."""
+    signs = []
+    for guess in (1.3, -2.0):
+        text = four_bar(initial=f"q = {{ theta = 1.0 }}\nguess = {{ psi = {guess} }}")
+        path = tmp_path / "four_bar.toml"
+        path.write_text(text)
+        assert main(["check", str(path), "--assemble"]) == 0
+        said = capsys.readouterr().out
+        assert "given: theta = 1 rad" in said and "1 degree of freedom" in said
+        signs.append(said.partition("branch      ")[2][0])
+        psi = check(text).initial_q[1]
+        assert abs(psi - guess) < 0.5
+    assert set(signs) == {"+", "-"}
+    with pytest.raises(SceneError, match=r"initial\.guess\.theta: initial\.q gives it"):
+        check(four_bar(initial="q = { theta = 1.0 }\nguess = { theta = 0.1 }"))
+
+
+def test_linearised_on_the_constraints() -> None:
+    """A and B are those of the motion as a function of the crank's angle and rate alone; at an
+    equilibrium no small change of the angle changes the potential energy.
+    """
+    push = '[[effects]]\ntype = "motor"\nname = "push"\njoint = "A"\ntorque = "input"\n'
+    text = four_bar(initial="q = { theta = 1.0 }\nv = { theta_dot = 3.0 }", effects=push)
+    found = eomgen.linearise(text, at="initial").reduced()
+    assert found.state_names == ("theta", "theta_dot")
+    model, module = check(text), eomgen.load(eomgen.generate(text))
+
+    def acceleration(theta: float, rate: float, torque: float = 0.0) -> float:
+        q, v = (theta, *model.initial_q[1:]), (rate, *model.initial_v[1:])
+        q, v, _ = closed_start(model, q, v, ("theta", "theta_dot"))
+        return float(module.derivative(0.0, np.array([*q, *v]), None, [torque])[3])
+
+    h = 1e-4
+    expected = [
+        (acceleration(1.0 + h, 3.0) - acceleration(1.0 - h, 3.0)) / (2 * h),
+        (acceleration(1.0, 3.0 + h) - acceleration(1.0, 3.0 - h)) / (2 * h),
+    ]
+    np.testing.assert_allclose(found.A, [[0.0, 1.0], expected], rtol=1e-6, atol=1e-9)
+    torque = (acceleration(1.0, 3.0, h) - acceleration(1.0, 3.0, -h)) / (2 * h)
+    np.testing.assert_allclose(found.B, [[0.0], [torque]], rtol=1e-6, atol=1e-12)
+
+    rest = eomgen.linearise(text, at="rest")
+    assert gap(dict(zip(rest.state_names, rest.y, strict=True))) < 1e-13
+    assert np.abs(rest.rates).max() < 1e-9
+    assert rest.stability == "marginal" and rest.modes[0].angular_frequency > 1.0
+
+
+def test_impacts_keep_energy_and_constraints() -> None:
+    """A rigid stop with restitution 1 reverses the crank's rate, and nothing opens the loop; a
+    plastic one takes energy.
+    """
+    stop = '[[effects]]\ntype = "joint_stop"\nname = "stop"\njoint = "A"\nlow = 0.0\n'
+    text = four_bar(effects=f"{stop}restitution = 1.0\n")
+    for restitution in (1.0, 0.0):
+        bounce = {"stop_restitution": restitution}
+        run = eomgen.simulate(text, t_end=1.0, rtol=1e-11, parameters=bounce, backend="numpy")
+        assert run.finished and run.trajectory.counts["impacts"] >= 1
+        assert gap({name: run[name] for name in run.states}).max() < 1e-13
+        hit = int(np.flatnonzero(run.trajectory.struck)[0])
+        before, after = run["theta_dot"][hit - 1], run["theta_dot"][hit]
+        assert before < -0.5
+        np.testing.assert_allclose(after, -restitution * before, atol=1e-9)
+        change = run.energy[hit - 1] - run.energy[hit]
+        assert abs(change) < 1e-9 if restitution else change > 0.1
+        assert abs(run.energy[hit - 1] - run.energy[0]) < 1e-8
+
+
+def test_a_driven_crank_moves_the_loop() -> None:
+    """With a driven crank a four-bar has no freedom left, which is refused in one line; with a rod
+    in place of the last pin it has one, and the rod keeps its length.
+    """
+    drive = '[[effects]]\ntype = "driven"\nname = "motor"\njoint = "A"\ncoordinate = "1 + 2*t"\n'
+    with pytest.raises(SceneError, match="the loops hold everything"):
+        check(four_bar(initial="q = {}", effects=drive))
+    slack = '[[constraints]]\ntype = "distance"\nname = "rod"\nbody_1 = "coupler"\n'
+    slack += 'at_1 = ["b/2", 0]\nbody_2 = "rocker"\nat_2 = ["c/2", 0]\nlength = 0.2\n'
+    text = four_bar(initial="q = {}", effects=drive + slack)
+    pin = text.index('[[joints]]\nname = "C"')
+    text = text[:pin] + text[text.index("[[effects]]") :]
+    run = eomgen.simulate(text, t_end=1.0)
+    assert run.finished
+    y = {name: run[name] for name in run.states} | {"theta": 1 + 2 * run.t}
+    assert np.abs(gap(y) - 0.2).max() < 1e-13
+
+
+@pytest.mark.parametrize("route", ["independent", "aba"])
+@pytest.mark.parametrize("settings", [{"integrator": "DOP853"}, {"integrator": "rk4", "dt": 0.01}])
+def test_singular_positions_stop_the_run(route: str, settings: dict[str, Any]) -> None:
+    """At the change point of a parallelogram every route stops, where all bars are in line. At the
+    dead point of a crank the route that takes it as independent does, and others go through.
+    """
+    lined = four_bar((0.5, 0.7, 0.5, 0.7), START, route=route)
+    run = eomgen.simulate(lined, t_end=3.0, **settings)
+    assert not run.finished and "singular" in run.outcome.reason
+    assert "change point" in run.outcome.reason and "another start" in run.outcome.remedy
+    assert abs(run["theta"][-1] - np.pi) < 0.15 and run["theta"].max() < np.pi
+    dead = four_bar((0.5, 0.3, 0.3, 0.7), DEAD, route=route)
+    run = eomgen.simulate(dead, t_end=1.0, **settings)
+    assert run.finished == (route == "aba")
+    assert run.finished or "singular" in run.outcome.reason
+
+
+START = "q = { theta = 1.0, psi = 1.0, phi = -1.0 }\nv = { theta_dot = 6.0 }"
+DEAD = "q = { theta = 0.2 }\nv = { theta_dot = 3.0 }"
+
+
+def test_sweeps_close_each_member() -> None:
+    """Members with other parameters are assembled; multistep methods are refused."""
+    lengths = [0.25, 0.3]
+    found = eomgen.ensemble(four_bar(), {"a": lengths}, t_end=0.2, backend="numpy")
+    assert [*found.status] == ["finished"] * 2
+    for y, a in zip(found.final, lengths, strict=True):
+        assert gap(dict(zip(found.states, y, strict=True)), a) < 1e-13
+    with pytest.raises(RunError, match="continues from earlier steps"):
+        eomgen.simulate(four_bar(), integrator="BDF", t_end=0.1)
