@@ -728,3 +728,10 @@ def test_a_particle_joint_that_closes_a_loop_keeps_an_attitude(dimensions: int) 
     rates = made.derivative(0.0, made.initial_state())[-3 * (dimensions - 1) :]
     pull = np.array(force) / 2.0 - 9.81 * np.eye(dimensions)[-1]
     assert rates == pytest.approx([*pull, *[0.0] * (1 if dimensions == 2 else 3)], abs=1e-13)
+
+
+def test_a_disc_that_lies_flat_is_refused() -> None:
+    """It has no lowest point."""
+    flat = disc(0.0, (0.0, 0.0, 1.0))
+    with pytest.raises(SceneError, match=r"^initial.q: constraint 'held' has no direction at this"):
+        assembled(elaborate(parse_scene(flat)))

@@ -44,6 +44,7 @@ def assembled(model: Model) -> Model:
     if not model.constraints:
         return model
     mechanism = Closure.of(model)
+    _check_defined(mechanism, np.array(model.initial_q))
     _check_linear(mechanism, np.array(model.initial_q))
     q, notices = _position(mechanism)
     dropped = _dependent(mechanism, q)
@@ -68,6 +69,18 @@ def assembled(model: Model) -> Model:
     v, more = _speeds(mechanism, q)
     pivots = _pivots(mechanism.jacobian(q), _free(model))
     return replace(model, initial_v=v, pivots=pivots, notices=(*model.notices, *notices, *more))
+
+
+def _check_defined(mechanism: Closure, start: Array) -> None:
+    """Raise `SceneError` if a constraint has no value at the start."""
+    for constraint in mechanism.model.constraints:
+        try:
+            list(constraint.rows(mechanism.dynamics(start)))
+        except (ArithmeticError, ValueError):
+            raise SceneError(
+                f"initial.q: constraint '{constraint.name}' has no direction at this start, as "
+                "where a disc lies flat; give another"
+            ) from None
 
 
 def _check_linear(mechanism: Closure, q: Array) -> None:
