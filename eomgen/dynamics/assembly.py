@@ -1,10 +1,11 @@
 """Assembly: an initial state that meets the constraints, and which rows follow from others.
 
-Coordinates that the scene gives are kept and the others found; if it gives all, or what it gives
-cannot be kept, none is. Newton's method with least-squares steps starts from the scene's values and
-then from seeded states around them; of the positions found the one nearest to the scene's is taken.
-Rows that depend on others are found where the constraints are met, at several positions along the
-motion: a linkage such as Bennett's moves only because its rows depend on each other there.
+Coordinates that the scene gives are kept and the others found; if it gives all, which may be
+rounded, all are changed a little where they do not fit. Newton's method with least-squares steps
+starts from the scene's values and then from seeded states around them; of the positions found the
+one nearest to the scene's is taken. Rows that depend on others are found where the constraints are
+met, at several positions along the motion: a linkage such as Bennett's moves only because its rows
+depend on each other there.
 """
 
 import random

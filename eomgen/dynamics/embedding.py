@@ -7,7 +7,7 @@ are kept by multipliers, within their cluster.
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
-from eomgen.dynamics.cluster_joint import Equation, Held, Independent
+from eomgen.dynamics.cluster_joint import Equation, Held, Independent, Joint
 from eomgen.dynamics.clusters import Cluster, clusters_of, span
 from eomgen.dynamics.constraints import (
     Symmetric,
@@ -71,11 +71,6 @@ class Embedded(NullSpace):
         pairs = zip(self._rows, accelerations_at_rest(self._d), strict=True)
         return [b + inner(row, self._fall, self._scalars) for row, b in pairs]
 
-    @cached_property
-    def _held(self) -> dict[Cluster, tuple[tuple[int, ...], Held]]:
-        """The equations with multipliers, and their velocities; filled by `_joints`."""
-        return {}
-
     def _equation(
         self, cluster: Cluster, velocities: Sequence[int], factors: Symmetric
     ) -> Equation:
@@ -84,9 +79,7 @@ class Embedded(NullSpace):
             return Independent(factors)
         jacobian = [[self._rows[i][j] for j in velocities] for i in rows]
         names = [self._names[i] for i in rows]
-        found = Held(factors, jacobian, [self._rest[i] for i in rows], names, self._scalars)
-        self._held[cluster] = tuple(velocities), found
-        return found
+        return Held(factors, jacobian, [self._rest[i] for i in rows], names, self._scalars)
 
     @cached_property
     def _joints(self) -> Articulated:
@@ -96,6 +89,12 @@ class Embedded(NullSpace):
         return articulate(
             d.kinematics, clusters, self._columns, self._equation, names, self._scalars
         )
+
+    @property
+    def _held(self) -> list[tuple[Joint, Held]]:
+        """The clusters that multipliers keep, with their equations."""
+        joints = self._joints.joints.values()
+        return [(joint, joint.equation) for joint in joints if isinstance(joint.equation, Held)]
 
     @cached_property
     def _under_effects(self) -> Response:
@@ -143,22 +142,20 @@ class Embedded(NullSpace):
             solved = self._factors.solved_transposed([over[j] for j in self._dependent])
             found |= zip(self._order, solved, strict=True)
         rights = self._under_effects.rights
-        for first, joint in self._joints.joints.items():
-            if joint.cluster in self._held:
-                _, equation = self._held[joint.cluster]
-                rows = self._rows_by_cluster[joint.cluster]
-                found |= zip(rows, equation.multipliers(rights[first]), strict=True)
+        for joint, equation in self._held:
+            rows = self._rows_by_cluster[joint.cluster]
+            right = rights[joint.cluster.frames[0]]
+            found |= zip(rows, equation.multipliers(right), strict=True)
         return [found[i] for i in range(len(self._names))]
 
     def _towards(self, along: Sequence[Scalar]) -> list[Scalar]:
         """Velocities v, the least in each cluster, with J v = -`along`."""
         found = self.dependents(along)
-        assert self._joints is not None  # fills `_held`
-        for cluster, (velocities, equation) in self._held.items():
-            rows = self._rows_by_cluster[cluster]
-            still = [self._zero] * len(velocities)
+        for joint, equation in self._held:
+            rows = self._rows_by_cluster[joint.cluster]
+            still = [self._zero] * len(joint.velocities)
             change = equation.changed(still, equation.impulses([along[i] for i in rows]))
-            for j, x in zip(velocities, change, strict=True):
+            for j, x in zip(joint.velocities, change, strict=True):
                 found[j] = x
         return found
 
@@ -178,8 +175,7 @@ class Embedded(NullSpace):
         sizes = dict(pivots)
         for i, pivot, row in zip(self._order, self._factors.pivots, self._jacobian, strict=True):
             pivots[i], sizes[i] = pivot * pivot, inner(row, row, self._scalars)
-        assert self._joints is not None  # fills `_held`
-        for cluster, (_, equation) in self._held.items():
-            for n, i in enumerate(self._rows_by_cluster[cluster]):
+        for joint, equation in self._held:
+            for n, i in enumerate(self._rows_by_cluster[joint.cluster]):
                 pivots[i], sizes[i] = equation.small.d[n], equation.matrix[n][-1]
         return relative(self._d, list(pivots.values()), list(sizes.values()))

@@ -178,6 +178,8 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
     if not names:
         return None
 
+    jacobian = jacobian_of(module)
+
     def of(name: str) -> Value:
         function = getattr(module, name, None)
         return (lambda t, y: function(t, y, parameters, inputs)) if function else without
@@ -187,7 +189,7 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
         np.array([size if module.UNITS[name] == "N" else 1.0 for name in names]),
         residuals=of("constraint_residuals"),
         rates=of("constraint_rates"),
-        jacobian=lambda t, y: jacobian_of(module)(t, y, parameters, inputs),
+        jacobian=lambda t, y: jacobian(t, y, parameters, inputs),
         position=of("project_position"),
         velocity=of("project_velocity"),
         margins=of("constraint_margins"),
@@ -196,6 +198,21 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
         inertia=of("mass_matrix"),
         kinetic_slopes=of("kinetic_slopes"),
     )
+
+
+class SingularPositionError(StepFailure):
+    """The mechanism is singular at a time."""
+
+    def __init__(self, projection: Projection, t: float, margins: FloatArray) -> None:
+        name = projection.names[int(np.argmin(margins))]
+        super().__init__(
+            f"the mechanism is singular at t = {t:.6g} s: constraint {name} follows from the "
+            "others there, as at a dead point or a change point",
+            REMEDY,
+        )
+
+    def __reduce__(self) -> tuple[type, tuple[str, ...]]:
+        return StepFailure, (self.reason, self.remedy)
 
 
 class Part(Protocol):
@@ -229,7 +246,7 @@ def watched(
     start, margin, before, last = t, _least(projection, t, y), float("inf"), None
     try:
         for advance in advances:
-            here = _least(projection, advance.t, advance.y)
+            here = _checked(projection, advance.t, advance.y)
             if advance.t > start:
                 if margin < before and margin < here and margin < NEAR and last is not None:
                     _search(projection, last, advance)
@@ -237,10 +254,11 @@ def watched(
                 start = advance.t
             else:  # a strike
                 before, margin, last = float("inf"), here, None
-            _check(projection, advance.t, advance.y)
             yield advance
+    except SingularPositionError:
+        raise
     except StepFailure as failure:
-        if margin < NEAR and "singular at" not in failure.reason:
+        if margin < NEAR:
             reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
             raise StepFailure(reason, REMEDY) from None
         raise
@@ -269,18 +287,16 @@ def _search(projection: Projection, last: tuple[float, Part], advance: Part) -> 
         if min(at_c, at_d) < SINGULAR:
             break
     best = c if at_c < at_d else d
-    _check(projection, best, state(best))
+    _checked(projection, best, state(best))
 
 
-def _check(projection: Projection, t: float, y: FloatArray) -> None:
+def _checked(projection: Projection, t: float, y: FloatArray) -> float:
+    """The least margin. Raises `SingularPositionError` if it counts as 0."""
     margins = projection.margins(t, y)
-    worst = int(np.argmin(margins))
-    if margins[worst] < SINGULAR:
-        raise StepFailure(
-            f"the mechanism is singular at t = {t:.6g} s: constraint {projection.names[worst]} "
-            "follows from the others there, as at a dead point or a change point",
-            REMEDY,
-        )
+    least = float(margins.min())
+    if least < SINGULAR:
+        raise SingularPositionError(projection, t, margins)
+    return least
 
 
 def _least(projection: Projection, t: float, y: FloatArray) -> float:
