@@ -15,7 +15,7 @@ from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Model
 from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.drawing import Drawing, svg, tikz, tikz_colours
-from eomgen.show.layout import entries, is_wide, row_lines, size_of
+from eomgen.show.layout import entries, in_parts, is_wide, row_lines, size_of
 from eomgen.show.mathml import mathml, negative, symbol, terms_of, written
 from eomgen.show.plain import PlainPrinter, minus_signs, printer
 from eomgen.show.prose import blocks, joined, pieces, signs
@@ -26,6 +26,8 @@ from eomgen.templating import render
 WIDTH = 100
 PAGE, PAPER = 124.0, 112.0
 """The width of a formula's line on the page and on paper, as `size_of` counts it."""
+MOST_LINES = 6
+"""A term on paper that would take more lines than these is multiplied out."""
 Figures = dict[str, tuple[Drawing, ...]]
 
 
@@ -211,9 +213,12 @@ def _aligned_groups(equations: Sequence[Equation]) -> list[list[str]]:
 
 
 def _broken(e: Any, indent: float) -> Iterator[str]:
-    """A sum in lines of a bearable length; what is too long by itself is made smaller."""
+    """A sum in lines of a bearable length; what is too long by itself is made smaller, or multiplied
+    out if it would be too small to read.
+    """
     line, length = "", 0.0
-    for i, term in enumerate(terms_of(e)):
+    parts = (part for term in terms_of(e) for part in in_parts(term, MOST_LINES * PAPER))
+    for i, term in enumerate(parts):
         size, minus = size_of(term) + 2, negative(term)
         if length and indent + length + size > PAPER:
             yield line

@@ -38,6 +38,18 @@ def row_lines(matrix: Any, line: float) -> list[list[Any]] | None:
     return found
 
 
+def in_parts(term: Any, most: float) -> Iterator[Any]:
+    """A term, or if it is wider than `most` the products of its widest sum's terms with the rest."""
+    sums = [x for x in sp.Mul.make_args(term) if isinstance(x, sp.Add)]
+    if not sums or size_of(term) <= most:
+        yield term
+        return
+    widest = max(sums, key=size_of)
+    rest = [x for x in sp.Mul.make_args(term) if x is not widest]
+    for part in widest.args:
+        yield from in_parts(sp.Mul(*rest, part), most)
+
+
 def is_wide(matrix: Any, line: float) -> bool:
     """Whether a matrix is wider than a line."""
     if not isinstance(matrix, sp.MatrixBase):
