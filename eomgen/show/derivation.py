@@ -213,8 +213,8 @@ def _aligned_groups(equations: Sequence[Equation]) -> list[list[str]]:
 
 
 def _broken(e: Any, indent: float) -> Iterator[str]:
-    """A sum in lines of a bearable length; what is too long by itself is made smaller, or multiplied
-    out if it would be too small to read.
+    """A sum in lines of a bearable length; what is too long by itself is made smaller, or
+    multiplied out if it would be too small to read.
     """
     line, length = "", 0.0
     parts = (part for term in terms_of(e) for part in in_parts(term, MOST_LINES * PAPER))

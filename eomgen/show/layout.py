@@ -39,7 +39,7 @@ def row_lines(matrix: Any, line: float) -> list[list[Any]] | None:
 
 
 def in_parts(term: Any, most: float) -> Iterator[Any]:
-    """A term, or if it is wider than `most` the products of its widest sum's terms with the rest."""
+    """A term; one wider than `most` as the products of its widest sum's terms with the rest."""
     sums = [x for x in sp.Mul.make_args(term) if isinstance(x, sp.Add)]
     if not sums or size_of(term) <= most:
         yield term
