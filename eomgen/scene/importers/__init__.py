@@ -29,7 +29,7 @@ class Importer:
     module: str
 
 
-IMPORTERS: Mapping[str, Importer] = {}
+IMPORTERS: Mapping[str, Importer] = {"robot": Importer("URDF", "urdf.robot")}
 """By the name of the root element."""
 SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro")
 

@@ -29,12 +29,13 @@ class Element:
     tag         its name, without its namespace
     namespace   the address of its namespace; "" without one
     attributes  their texts, by name
-    line        of the file, where it begins
+    file, line  where it begins
     """
 
     tag: str
     namespace: str
     attributes: Mapping[str, str]
+    file: str
     line: int
     children: list["Element"] = field(default_factory=list)
 
@@ -45,6 +46,10 @@ class Element:
     def first(self, tag: str) -> "Element | None":
         """The first child of this name."""
         return next((child for child in self.children if child.tag == tag), None)
+
+    def error(self, text: str) -> SceneError:
+        """An error of this element, to be raised."""
+        return SceneError(f"{self.file}:{self.line}: {text}")
 
     def walk(self) -> Iterator["Element"]:
         """This element and all within it, in the order of the file."""
@@ -71,7 +76,7 @@ class _Tree:
         if len(self.open) >= DEEPEST:
             raise SceneError(f"{self.name}:{line}: has elements more than {DEEPEST} deep")
         namespace, _, local = tag.rpartition("}")
-        found = Element(local, namespace.removeprefix("{"), attributes, line)
+        found = Element(local, namespace.removeprefix("{"), attributes, self.name, line)
         if self.open:
             self.open[-1].children.append(found)
         else:
