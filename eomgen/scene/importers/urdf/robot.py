@@ -16,7 +16,7 @@ from eomgen.scene.importers.urdf.joints import (
     fixed_base,
     floating_base,
 )
-from eomgen.scene.importers.urdf.links import body_table
+from eomgen.scene.importers.urdf.links import Changes, Inertial, read_inertials
 from eomgen.scene.importers.urdf.shapes import Meshes, colours_of, shapes_of
 from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved, read_tree
 from eomgen.scene.importers.xml_elements import Element
@@ -44,15 +44,16 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     names = _names(tree)
     made, remarks = Mechanism(), list[str]()
     meshes = Meshes((path.parent, *wishes.allowed))
-    strange = _add_bodies(tree, names, made, meshes, colours_of(robot))
+    inertials, changes = read_inertials(tree)
+    _add_bodies(tree, inertials, names, made, meshes, colours_of(robot))
     if names.bodies[tree.root] != WORLD:
         base = floating_base if wishes.floating else fixed_base
         made.joints.append(base(tree.root, names))
-    add_joints(tree, names, made)
+    add_joints(tree, names, made, _without_mass(tree, inertials))
     if not wishes.floating and all(joint.kind == "fixed" for joint in moved(tree)):
         raise robot.error("nothing can move; let the root move freely with --floating")
     remarks += _remarks(robot, tree, names, made)
-    remarks += _remarks_on_bodies(tree, meshes, strange)
+    remarks += _remarks_on_bodies(tree, meshes, changes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
     return Imported(_tables(name, path.name, made), tuple(remarks))
 
@@ -79,21 +80,33 @@ def _names(tree: Tree) -> Names:
     return Names(bodies, identifiers((joint.name for joint in moved(tree)), "joint"))
 
 
+def _without_mass(tree: Tree, inertials: Mapping[str, Inertial]) -> set[str]:
+    """The links that neither have nor carry any mass."""
+    heavy = set[str]()
+    for name in reversed(list(tree.links)):
+        if inertials[name].mass:
+            heavy.add(name)
+        if name in heavy and name in tree.carried:
+            heavy.add(tree.carried[name].parent)
+    return set(tree.links) - heavy
+
+
 def _add_bodies(
-    tree: Tree, names: Names, made: Mechanism, meshes: Meshes, colours: Mapping[str, str]
-) -> list[str]:
-    """The bodies of the links; returns the links whose inertia no body can have."""
-    strange = []
+    tree: Tree,
+    inertials: Mapping[str, Inertial],
+    names: Names,
+    made: Mechanism,
+    meshes: Meshes,
+    colours: Mapping[str, str],
+) -> None:
+    """The bodies of the links, with their shapes."""
     for name, element in tree.links.items():
-        what = f"link '{brief(name)}'"
-        table, odd = body_table(element, names.bodies[name], what)
         if names.bodies[name] == WORLD:
             continue
-        strange += [name] * odd
-        if shapes := shapes_of(element, what, colours, meshes):
+        table = inertials[name].table(names.bodies[name])
+        if shapes := shapes_of(element, f"link '{brief(name)}'", colours, meshes):
             table["shapes"] = shapes
         made.bodies.append(table)
-    return strange
 
 
 def _tables(name: str, file: str, made: Mechanism) -> dict[str, Any]:
@@ -126,10 +139,11 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
         yield f"left out: {listed(f'{count} {tag}' for tag, count in left.items())}"
     joints = moved(tree)
     single = [joint for joint in joints if joint.kind in SINGLE]
-    if any(_has(joint, "effort") for joint in single):
-        yield "left out: bounds of efforts of joints; each motor is an input without bounds"
-    if any(_has(joint, "velocity") for joint in single):
-        yield "left out: bounds of velocities of joints"
+    if any(_has(joint, key) for joint in single for key in ("effort", "velocity")):
+        yield (
+            "left out: bounds of efforts and velocities of joints; each motor is an input without "
+            "bounds"
+        )
     if any(joint.limits for joint in single):
         yield (
             "a coordinate beyond the limits of its joint is reported, not prevented; an effect "
@@ -144,6 +158,8 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
         yield f"0 is beyond the limits of {_listed(made.clipped)}, which start at the nearest limit"
     if any("coulomb" in effect for effect in made.effects):
         yield f"friction of joints is smoothed within {SPEED:g} rad/s or m/s: {SLIDING_SPEED}"
+    if made.held:
+        yield f"held, because nothing resists joints that carry no mass: {_listed(made.held)}"
     lost = [joint for joint in joints if joint.mimic and joint.kind not in SINGLE]
     if lost:
         yield f"left out: mimic of joints that are no hinge or slide: {_names_of(lost)}"
@@ -152,13 +168,15 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
         yield f"renamed: {listed(changed)}"
 
 
-def _remarks_on_bodies(tree: Tree, meshes: Meshes, strange: list[str]) -> Iterator[str]:
+def _remarks_on_bodies(tree: Tree, meshes: Meshes, changes: Changes) -> Iterator[str]:
     """The same of links."""
-    if strange:
-        yield (
-            "one principal moment is larger than the other two together, which no body has; taken "
-            f"as it is: {_listed(strange)}"
-        )
+    if changes.strange:
+        yield f"no body has the inertia of {_listed(changes.strange)}; taken as it is"
+    if changes.rounded:
+        yield f"inertias that are rounding errors count as 0: {_listed(changes.rounded)}"
+    if changes.lent:
+        lent = _listed(changes.lent)
+        yield f"inertias of links without mass count with what carries them: {lent}"
     if tree.root == WORLD and tree.links[WORLD].first("inertial"):
         yield f"left out: the inertia of the root link '{WORLD}', which cannot move"
     if any(link.first("collision") for link in tree.links.values()):
