@@ -8,6 +8,7 @@ from eomgen.scene.importers.attributes import Vector
 from eomgen.scene.importers.rotations import (
     EYE,
     angles_of,
+    cleaned,
     rotation,
     squared,
     times,
@@ -134,8 +135,8 @@ def _table(joint: Joint, name: str, kind: str, names: Names) -> dict[str, Any]:
         "parent": names.of_parent(joint),
         "child": names.bodies[joint.child],
     }
-    if any(joint.at):
-        table["r_parent"] = list(joint.at)
+    if any(at := cleaned(joint.at)):
+        table["r_parent"] = at
     if any(joint.angles):
         table["orientation"] = [squared(angle) for angle in joint.angles]
     return table

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from eomgen.scene.importers.attributes import ORIGIN, Vector, child, number, vector
-from eomgen.scene.importers.rotations import rotated_inertia, rotation
+from eomgen.scene.importers.rotations import cleaned, is_slight, rotated_inertia, rotation
 from eomgen.scene.importers.urdf.tree import Tree
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.text import brief
@@ -87,15 +87,18 @@ def _read(element: Element, name: str, changes: Changes) -> Inertial:
         raise inertial.error(f"{what}: its mass {mass:g} is negative; give a number >= 0")
     given = child(inertial, "inertia", what)
     entries = [number(given, key, what, 0.0 if key[1] != key[2] else None) for key in ENTRIES]
-    if mass and 0 < max(map(abs, entries)) < ROUNDING * mass:
-        entries = [0.0] * 6
+    given_com = vector(inertial.first("origin"), "xyz", what)
+    whole = [0.0 if abs(x) < ROUNDING * mass else x for x in entries]
+    if whole != entries or any(map(is_slight, given_com)):
         changes.rounded.append(name)
+    entries = whole
     for key, moment in zip(ENTRIES[:3], entries, strict=False):
         if moment < 0:
             raise given.error(f"{what}: {key} {moment:g} is negative; give a number >= 0")
     origin = inertial.first("origin")
     turned = rotated_inertia(entries, rotation(vector(origin, "rpy", what)))
-    return _with(Inertial(mass, vector(origin, "xyz", what)), turned)
+    x, y, z = cleaned(given_com)
+    return _with(Inertial(mass, (x, y, z)), turned)
 
 
 def _with(inertial: Inertial, entries: Sequence[float]) -> Inertial:

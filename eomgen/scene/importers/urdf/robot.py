@@ -7,7 +7,8 @@ from typing import Any
 
 from eomgen.errors import listed
 from eomgen.scene.importers.imported import Imported, Wishes
-from eomgen.scene.importers.names import identifiers, renamed, scene_name
+from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
+from eomgen.scene.importers.rotations import is_slight
 from eomgen.scene.importers.urdf.joints import (
     SLIDING_SPEED,
     Mechanism,
@@ -16,7 +17,7 @@ from eomgen.scene.importers.urdf.joints import (
     fixed_base,
     floating_base,
 )
-from eomgen.scene.importers.urdf.links import Changes, Inertial, read_inertials
+from eomgen.scene.importers.urdf.links import ENTRIES, Changes, Inertial, read_inertials
 from eomgen.scene.importers.urdf.shapes import Meshes, colours_of, shapes_of
 from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved, read_tree
 from eomgen.scene.importers.xml_elements import Element
@@ -26,6 +27,10 @@ from eomgen.text import brief
 GRAVITY = 9.81
 SPEED = 0.01
 """Speed at which Coulomb friction is smoothed, rad/s or m/s."""
+OF_JOINTS = ("_dot", "_ddot", "_motor")
+"""Endings of names that are made from those of joints."""
+OF_BODIES = ("mass", *(f"com_{axis}" for axis in "xyz"), *(f"inertia_com_{e[1:]}" for e in ENTRIES))
+"""The same of parameters of bodies."""
 KNOWN = {
     "robot": ("link", "joint", "material"),
     "link": ("inertial", "visual", "collision"),
@@ -50,7 +55,9 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
         base = floating_base if wishes.floating else fixed_base
         made.joints.append(base(tree.root, names))
     add_joints(tree, names, made, _without_mass(tree, inertials))
-    if not wishes.floating and all(joint.kind == "fixed" for joint in moved(tree)):
+    driven = any(effect["type"] == "motor" for effect in made.effects)
+    loose = any(joint.kind in ("planar", "floating") for joint in moved(tree))
+    if not (driven or loose or wishes.floating):
         raise robot.error("nothing can move; let the root move freely with --floating")
     remarks += _remarks(robot, tree, names, made)
     remarks += _remarks_on_bodies(tree, meshes, changes)
@@ -77,7 +84,9 @@ def _names(tree: Tree) -> Names:
     """Names of bodies and joints. A root link named world is the world of the scene."""
     bodies = {WORLD: WORLD} if tree.root == WORLD else {}
     bodies |= identifiers((name for name in tree.links if name not in bodies), "link")
-    return Names(bodies, identifiers((joint.name for joint in moved(tree)), "joint"))
+    taken = TAKEN | {f"{body}_{ending}" for body in bodies.values() for ending in OF_BODIES}
+    joints = identifiers((joint.name for joint in moved(tree)), "joint", taken, OF_JOINTS)
+    return Names(bodies, joints)
 
 
 def _without_mass(tree: Tree, inertials: Mapping[str, Inertial]) -> set[str]:
@@ -149,6 +158,8 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
             "a coordinate beyond the limits of its joint is reported, not prevented; an effect "
             "joint_stop prevents it"
         )
+    if slight := [joint for joint in joints if any(map(is_slight, joint.at))]:
+        yield f"rounding errors in origins count as 0: {_names_of(slight)}"
     if made.unlimited:
         yield (
             "left out: limits whose lower bound is not below the upper, of "
@@ -173,7 +184,8 @@ def _remarks_on_bodies(tree: Tree, meshes: Meshes, changes: Changes) -> Iterator
     if changes.strange:
         yield f"no body has the inertia of {_listed(changes.strange)}; taken as it is"
     if changes.rounded:
-        yield f"inertias that are rounding errors count as 0: {_listed(changes.rounded)}"
+        rounded = _listed(changes.rounded)
+        yield f"rounding errors in inertias or centres of mass count as 0: {rounded}"
     if changes.lent:
         lent = _listed(changes.lent)
         yield f"inertias of links without mass count with what carries them: {lent}"
