@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
     from eomgen.api.exhibiting import gallery
+    from eomgen.api.exporting import export
     from eomgen.api.generating import generate, load
     from eomgen.api.given import check, read
     from eomgen.api.linearising import linearise
@@ -41,6 +42,7 @@ __all__ = [
     "derive",
     "effects",
     "ensemble",
+    "export",
     "gallery",
     "generate",
     "grid",
@@ -59,6 +61,7 @@ _PLACES = {
     **dict.fromkeys(("generate", "load"), "api.generating"),
     "Derivation": "equations",
     "derive": "api.deriving",
+    "export": "api.exporting",
     "gallery": "api.exhibiting",
     "linearise": "api.linearising",
     "load_run": "api.reopening",
