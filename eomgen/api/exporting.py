@@ -38,9 +38,11 @@ def export(
     Raises `SceneError` or `RunError` if the scene has something that the format cannot hold, or a
     file cannot be written; then none of them is written.
     """
-    model = modelled(read(source), form=form, route=route, outputs=outputs)
+    scene = read(source)
+    model = modelled(scene, form=form, route=route, outputs=outputs)
     target = None if path is None else Path(path)
-    return exported(model, format, target, Options(number=number), force=force)
+    options = Options(number=number, simulation=scene.simulation)
+    return exported(model, format, target, options, force=force)
 
 
 def exported(

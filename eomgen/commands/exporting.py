@@ -1,18 +1,19 @@
 """The command `export`."""
 
 from eomgen.api.exporting import exported
-from eomgen.commands.shared import Arguments, note, read_model, reporter_of
-from eomgen.exports import Options
+from eomgen.commands.shared import Arguments, note, read_whole, reporter_of
+from eomgen.exports import Number, Options
 
 
 def export(given: Arguments) -> int:
     """Write a scene's equations in the format of another tool."""
-    model, name = read_model(given.scene, given)
+    scene, model, name = read_whole(given.scene, given)
+    number: Number = "float" if given.float else "double"
     paths = exported(
         model,
         given.format,
         given.output,
-        Options(number="float" if given.float else "double"),
+        Options(number=number, simulation=scene.simulation),
         name=name,
         force=given.force,
         reporter=reporter_of(given, given.scene),

@@ -5,7 +5,7 @@ To add a format, write its module here, with a function `files(model, options)`,
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Literal, Protocol, cast
 
@@ -13,6 +13,7 @@ from eomgen.errors import RunError, nearest
 
 if TYPE_CHECKING:
     from eomgen.model.model import Model
+    from eomgen.scene.schema import Simulation
 
 Number = Literal["double", "float"]
 
@@ -21,10 +22,12 @@ Number = Literal["double", "float"]
 class Options:
     """What a user chooses beside the scene; a format takes those that its entry names.
 
-    number  type of numbers in C
+    number      type of numbers in C
+    simulation  the scene's settings of a run, which every format may use
     """
 
     number: Number = "double"
+    simulation: "Simulation | None" = None
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,10 @@ class Format:
     options: tuple[str, ...] = ()
 
 
+CHOICES = ("number",)
+"""The options that only some formats take."""
 FORMATS: dict[str, Format] = {
+    "fmu": Format("an FMI 3.0 unit for model exchange and co-simulation", ".fmu"),
     "firmware": Format("a folder with C99 for firmware", options=("number",)),
 }
 
@@ -79,8 +85,8 @@ def find_format(name: str, options: Options) -> tuple[Format, Exporter]:
         known = ", ".join(FORMATS)
         raise RunError(f"format: unknown name '{name}'{nearest(name, FORMATS)}; known: {known}")
     found = FORMATS[name]
-    for option in fields(Options):
-        if getattr(options, option.name) != option.default and option.name not in found.options:
-            takers = ", ".join(n for n, each in FORMATS.items() if option.name in each.options)
-            raise RunError(f"{option.name}: not an option of {name}; only of {takers or 'none'}")
+    for option in CHOICES:
+        if getattr(options, option) != getattr(Options(), option) and option not in found.options:
+            takers = ", ".join(n for n, each in FORMATS.items() if option in each.options)
+            raise RunError(f"{option}: not an option of {name}; only of {takers or 'none'}")
     return found, cast(Exporter, import_module(f"{__name__}.{name}"))
