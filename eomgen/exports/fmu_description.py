@@ -20,7 +20,7 @@ ATTRIBUTES: Mapping[str, Mapping[str, str]] = {
 }
 """What each kind of variable is to an importer."""
 Structure = Iterator[tuple[str, int, Sequence[int] | None]]
-"""Elements of the model structure: kind, value reference, and those that it depends on, if known."""
+"""Elements of the model structure: kind, value reference, and what it depends on, if known."""
 
 
 @dataclass(frozen=True)
