@@ -1,6 +1,6 @@
 """Firmware of scenes: its size, and how far float is from double.
 
-    python tests/campaigns/firmware.py [SCENE …]
+    python tests/campaigns/firmware_sizes.py [SCENE …]
 
 Size: bytes of code and constants of the functions that a model needs, linked alone by the compiler
 that the project finds, with -Os: constants, derivative and step; then with the observer of the
@@ -11,7 +11,6 @@ the start; and the greatest difference of the coordinates after 1, 2 and 5 s in 
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parent.parent))
@@ -48,8 +47,7 @@ def main() -> None:
     for scene in sys.argv[1:] or ("pendulum", "cart_pole", "two_body", "puma560", "tumbling_body"):
         made = {number: Firmware(scene, number) for number in ("double", "float")}
         sizes = [
-            f"{number}: {size(each, STEP)} B, with observer {size(each, OBSERVER)} B, "
-            f"a step {step_time(each):.2f} µs"
+            f"{number}: {size(each, STEP)} B, with observer {size(each, OBSERVER)} B"
             for number, each in made.items()
         ]
         print(f"{scene}: {'; '.join(sizes)}; float: {accuracy(made)}", flush=True)
@@ -74,24 +72,6 @@ def filled(text: str, made: Firmware) -> str:
     for part in ("STATES", "INPUTS", "PARAMETERS", "CONSTANTS"):
         text = text.replace(f"NAME_{part}", f"{made.name.upper()}_{part}")
     return text.replace("NAME", made.name)
-
-
-def step_time(made: Firmware) -> float:
-    """Time of a step on this machine, µs, less the call from Python."""
-    y, u = state(made), made.array(np.zeros(100))
-    times = []
-    for function in ("step", "defaults"):
-        least = np.inf
-        for _ in range(5):
-            begin = time.perf_counter()
-            for _ in range(200):
-                if function == "step":
-                    made.call("step", 0.0, 1e-6, y, made.k, u)
-                else:
-                    made.call("defaults", u)
-            least = min(least, (time.perf_counter() - begin) / 200)
-        times.append(least)
-    return 1e6 * (times[0] - times[1])
 
 
 def state(made: Firmware) -> np.ndarray:
