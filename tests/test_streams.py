@@ -37,6 +37,7 @@ COMMANDS = {
     "check": "check two_body",
     "derive": "derive two_body",
     "generate": "generate pendulum -o {out}",
+    "export": "export pendulum --firmware -o {out}",
     "simulate": "simulate pendulum --t-end 0.1 -o {out}",
     "view": "view pendulum --t-end 0.1 -o {out}",
     "gallery": "gallery --scene pendulum --t-end 0.1 -o {out}",
