@@ -54,6 +54,7 @@ WRITES = {
     "new": 1,
     "copy": 1,
     "generate": 1,
+    "export": 3,
     "simulate": 5,
     "view": 5,
     "accuracy": 3,
