@@ -21,6 +21,7 @@ from eomgen.native import compiler
 
 BALL = """
 name = "thrown_ball"
+title = "Ball & <floor>, \\"--> é"
 initial = { q = { ball_y = 0.3 }, v = { ball_x_dot = 1.0, ball_angle_dot = -3.0 } }
 simulation = { t_end = 1.6 }
 bodies = [{ name = "ball", mass = 0.2, inertia_com = 2e-4 }]

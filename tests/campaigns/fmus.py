@@ -6,8 +6,8 @@ For each: what FMPy's validation finds; the greatest difference of the last stat
 relative to the state where that is above 1, in co-simulation by FMPy, in model exchange by FMPy's
 functions with SciPy's DOP853, and in model exchange by FMPy's own CVode (BDF, order 5 at most); and
 the greatest difference of directional derivatives along states from the generated Jacobian, at the
-start, relative to the largest entry. CVode is limited by its own global error at a tolerance of
-1e-12: the bound of 1e-8 is for the others.
+start, relative to the largest entry. CVode needs a tolerance of 1e-14 for it: at 1e-12 its error
+at the end is up to 1e-7.
 """
 
 import sys
@@ -54,8 +54,8 @@ def main() -> None:
             f"exported in {took:.1f} s",
             flush=True,
         )
-        worst = max(worst, stepped, by_order_8, np.inf if problems else 0.0)
-    print(f"greatest difference, without CVode: {worst:.1e}")
+        worst = max(worst, stepped, by_order_8, by_order_5, np.inf if problems else 0.0)
+    print(f"greatest difference: {worst:.1e}")
     sys.exit(not worst <= BOUND)
 
 
@@ -67,7 +67,7 @@ def by_fmpy(path: Path, run: Any, kind: str) -> np.ndarray:
             fmi_type=kind,
             stop_time=run.t[-1],
             output_interval=run.t[-1] / (10 if kind == "CoSimulation" else 1000),
-            relative_tolerance=1e-12,
+            relative_tolerance=1e-12 if kind == "CoSimulation" else 1e-14,
             output=list(run.states),
         )
     except RuntimeError:
