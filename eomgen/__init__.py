@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
     from eomgen.api.exhibiting import gallery
+    from eomgen.api.exporting import export
     from eomgen.api.generating import generate, load
     from eomgen.api.given import check, read
     from eomgen.api.importing import import_robot
@@ -42,6 +43,7 @@ __all__ = [
     "derive",
     "effects",
     "ensemble",
+    "export",
     "gallery",
     "generate",
     "grid",
@@ -61,6 +63,7 @@ _PLACES = {
     **dict.fromkeys(("generate", "load"), "api.generating"),
     "Derivation": "equations",
     "derive": "api.deriving",
+    "export": "api.exporting",
     "gallery": "api.exhibiting",
     "import_robot": "api.importing",
     "linearise": "api.linearising",

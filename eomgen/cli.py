@@ -11,6 +11,7 @@ from pathlib import Path
 from eomgen import commands
 from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
 from eomgen.options import (
+    add_export,
     add_film,
     add_folder,
     add_force,
@@ -20,6 +21,7 @@ from eomgen.options import (
     add_parameters,
     add_plot,
     add_simulation,
+    add_sweep,
 )
 from eomgen.routes import ROUTES
 from eomgen.streams import steady_streams
@@ -155,6 +157,8 @@ def _parser(
     derive.add_argument("-o", "--output", metavar="FILE", type=path, help="write it to a file")
     add_force(derive)
     _generation(command("generate", commands.generate, "write the module of a scene", "scenes"))
+    about = "write the equations of a scene in the format of another tool"
+    add_export(_code(_form(command("export", commands.export, about))))
     for name, run, about in (
         ("simulate", commands.simulate, "integrate, and write trajectory, figure and page"),
         ("view", commands.view, "integrate, and open the animated page"),
@@ -169,7 +173,7 @@ def _parser(
     )
     add_gallery(command("gallery", commands.gallery, about, None))
     about = "run a scene many times, with other parameters, initial states or inputs"
-    _sweep(_route(_form(command("sweep", commands.sweep, about))))
+    add_sweep(_route(_form(command("sweep", commands.sweep, about))))
     about = "compare the module with an independent solver and 60 digits"
     _verification(_route(command("verify", commands.verify, about)))
     about = "measure time against error of all methods, and rounding errors of all routes"
@@ -259,56 +263,6 @@ def _code(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
         "--outputs", metavar="A,B,…", help="functions of the module, or all (the scene's)"
     )
     return parser
-
-
-def _sweep(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--vary",
-        metavar="NAME=…",
-        action="append",
-        default=[],
-        help="a parameter, state or input, or NAME_deg, an angle in degrees: LOW:HIGH:COUNT, "
-        "LOW:HIGH:COUNT:log or A,B,…; with --sample uniform:LOW:HIGH, loguniform:LOW:HIGH or "
-        "normal:MEAN:DEVIATION",
-    )
-    parser.add_argument("--sample", metavar="N", type=int, help="draw N members, instead of a grid")
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of the sample")
-    parser.add_argument("--of", metavar="NAME", help="state or output in the figure (the first)")
-    parser.add_argument(
-        "--statistics",
-        action="store_true",
-        help="also write mean, deviation and quantiles over the members, at each kept time",
-    )
-    parser.add_argument("--outputs", metavar="A,B,…", help="functions of the module to compute")
-    parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
-    parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
-    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
-    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
-    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
-    parser.add_argument("--t-end", metavar="S", type=float, help="end time")
-    parser.add_argument(
-        "--samples",
-        metavar="N",
-        type=int,
-        default=2,
-        help="rows to keep; 2 keeps only the first and the last",
-    )
-    parser.add_argument(
-        "--backend",
-        metavar="NAME",
-        default="auto",
-        help="auto: compute in compiled C code if that pays; numpy: never; c: always",
-    )
-    parser.add_argument(
-        "--workers", metavar="N", type=int, help="number of processes (one per core)"
-    )
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", default="", help="run on the workers of a Dask scheduler"
-    )
-    add_parameters(parser)
-    add_inputs(parser)
-    add_folder(parser)
-    add_force(parser)
 
 
 def _accuracy(parser: argparse.ArgumentParser) -> None:

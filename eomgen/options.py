@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from eomgen.exports import FORMATS
 from eomgen.usage import path
 
 
@@ -45,6 +46,75 @@ def add_inputs(parser: argparse.ArgumentParser, *, constant: bool = False) -> No
         default=[],
         help="constant value of an input" if constant else varying,
     )
+
+
+def add_export(parser: argparse.ArgumentParser) -> None:
+    """The formats of `export`, and their options."""
+    group = parser.add_mutually_exclusive_group(required=True)
+    for name, found in FORMATS.items():
+        group.add_argument(
+            f"--{name}", dest="format", action="store_const", const=name, help=found.about
+        )
+    parser.add_argument("--float", action="store_true", help="numbers in C are float, not double")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="PATH",
+        type=path,
+        help="the file, or the folder of several files (the scene's name)",
+    )
+    add_force(parser)
+
+
+def add_sweep(parser: argparse.ArgumentParser) -> None:
+    """The options of `sweep`."""
+    parser.add_argument(
+        "--vary",
+        metavar="NAME=…",
+        action="append",
+        default=[],
+        help="a parameter, state or input, or NAME_deg, an angle in degrees: LOW:HIGH:COUNT, "
+        "LOW:HIGH:COUNT:log or A,B,…; with --sample uniform:LOW:HIGH, loguniform:LOW:HIGH or "
+        "normal:MEAN:DEVIATION",
+    )
+    parser.add_argument("--sample", metavar="N", type=int, help="draw N members, instead of a grid")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of the sample")
+    parser.add_argument("--of", metavar="NAME", help="state or output in the figure (the first)")
+    parser.add_argument(
+        "--statistics",
+        action="store_true",
+        help="also write mean, deviation and quantiles over the members, at each kept time",
+    )
+    parser.add_argument("--outputs", metavar="A,B,…", help="functions of the module to compute")
+    parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
+    parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
+    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
+    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
+    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
+    parser.add_argument("--t-end", metavar="S", type=float, help="end time")
+    parser.add_argument(
+        "--samples",
+        metavar="N",
+        type=int,
+        default=2,
+        help="rows to keep; 2 keeps only the first and the last",
+    )
+    parser.add_argument(
+        "--backend",
+        metavar="NAME",
+        default="auto",
+        help="auto: compute in compiled C code if that pays; numpy: never; c: always",
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="number of processes (one per core)"
+    )
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", default="", help="run on the workers of a Dask scheduler"
+    )
+    add_parameters(parser)
+    add_inputs(parser)
+    add_folder(parser)
+    add_force(parser)
 
 
 def add_gallery(parser: argparse.ArgumentParser) -> None:

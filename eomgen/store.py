@@ -45,6 +45,7 @@ AFTER = (
         "study",
         "sweep",
         "show",
+        "exports",
         "results.py",
     ),
     *("api", "commands", "cli.py", "__main__.py", "__init__.py"),

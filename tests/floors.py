@@ -49,6 +49,7 @@ FLOORS = (
     "study",
     "sweep",
     "show",
+    "exports",
     "equations",
     "results",
     "api",

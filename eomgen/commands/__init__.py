@@ -82,6 +82,13 @@ def generate(given: Arguments) -> int:
     return generating.generate(given)
 
 
+def export(given: Arguments) -> int:
+    """Write the equations of a scene in the format of another tool."""
+    from eomgen.commands import exporting
+
+    return exporting.export(given)
+
+
 def simulate(given: Arguments) -> int:
     """Integrate, and write what happened."""
     from eomgen.commands import running

@@ -95,6 +95,20 @@ class Tape:
         """For each step its operand if it is a negation, else None."""
         self._known: dict[tuple[Any, ...], int] = {}
 
+    @classmethod
+    def continued(cls, steps: Sequence[Step]) -> "Tape":
+        """A tape on which these steps are recorded, each at its place."""
+        tape = cls()
+        for step in steps:
+            operation, operands, _, value = step
+            number = float(value) if isinstance(value, float) else None
+            key = (operation, operands if operands else value)
+            known = tape._known.get(key)
+            index = tape._add(key, step, number)
+            if known is not None:
+                tape._known[key] = min(known, index)
+        return tape
+
     def _add(self, key: tuple[Any, ...], step: Step, number: float | None = None) -> int:
         """Append a new step and return its index."""
         index = self._known[key] = len(self.steps)
