@@ -45,7 +45,7 @@ body_2 = "box"
 at_2 = [0.1, 0.2, 0.3]
 length = 0.8
 [initial]
-v = { floats_wx = 3.0, floats_wy = 1.0 }
+v = { box_wx = 3.0, box_wy = 1.0 }
 """
 OTHERS = ("rattleback", "car_suspension", "differential", "bicycle", "stewart_platform")
 METHODS: tuple[dict[str, Any], ...] = (
