@@ -19,7 +19,7 @@ from eomgen.run.integrators.strides import Strides
 pytestmark = compiler
 TREE = "embedded"
 """A route on which a four-bar keeps all of its coordinates, so that it needs projection."""
-SWINGS = "q = { theta = 1.0 }\nv = { theta_dot = 6.0 }"
+SWINGS = "q = { theta = 629.3 }\nv = { theta_dot = 6.0 }"
 BAR = four_bar(initial=SWINGS, route=TREE)
 TETHERED = """
 name = "tethered"
