@@ -74,8 +74,8 @@ void columns(long count, const double *q, const double *v, double *out) {
 
 @dataclass(frozen=True)
 class Body:
-    """A body whose joint slides along x or turns about z, at a place of its parent, 0 the world; its
-    centre of mass and its end lie along x.
+    """A body whose joint slides along x or turns about z, at a place of its parent (0: the world).
+    Its centre of mass and its end lie along x.
     """
 
     slides: bool
@@ -190,7 +190,7 @@ def by_pinocchio(of: Linkage, q: np.ndarray, v: np.ndarray, folder: Path) -> Cal
 def for_mujoco(of: Linkage) -> str:
     """The mechanism as MuJoCo reads it."""
     inside: dict[int, str] = {0: ""}
-    pins = {body: place for body, place in of.pin}
+    pins = dict(of.pin)
     for i in range(len(of.bodies), 0, -1):
         b = of.bodies[i - 1]
         kind = "slide" if b.slides else "hinge"
