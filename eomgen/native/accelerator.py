@@ -130,9 +130,10 @@ class Accelerator:
         """
         origin, module = module and self._module, module or self._module
         made: dict[tuple[str, ...], runs.CompiledSteps] = {}
-        stiff: list[implicit.CompiledImplicit] = []
+        stiff: dict[tuple[str, ...], implicit.CompiledImplicit] = {}
         by_rattle: list[EqualSteps | None] = []
         projects = PROJECTS if problem.projection else ()
+        symmetric = implicit.SYMMETRIC if problem.projection else ()
         problem = self._compilable(module, origin).problem(problem)
 
         def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
@@ -148,11 +149,12 @@ class Accelerator:
         def series() -> taylor.CompiledTaylor | None:
             return self._taylor(module)
 
-        def implicit_steps() -> implicit.CompiledImplicit | None:
-            if not stiff and (libraries := self._implicit((*implicit.NEEDED, *projects))):
+        def implicit_steps(more: tuple[str, ...] = ()) -> implicit.CompiledImplicit | None:
+            needed = (*implicit.NEEDED, *projects, *more)
+            if needed not in stiff and (libraries := self._implicit(needed)):
                 given = (module, libraries, *self._values, origin)
-                stiff.append(implicit.CompiledImplicit(problem, *given))
-            return stiff[0] if stiff else None
+                stiff[needed] = implicit.CompiledImplicit(problem, *given)
+            return stiff.get(needed)
 
         def rattle_steps() -> EqualSteps | None:
             if not by_rattle and (libraries := self._implicit(rattle.NEEDED)):
@@ -173,10 +175,8 @@ class Accelerator:
         def equal(name: str) -> EqualSteps | None:
             if problem.projection and name == "leapfrog":
                 found = rattle_steps()
-            elif problem.projection and name not in runs.PROJECTED:
-                found = None
             elif name in implicit.GAUSS:
-                found = other.equal(name) if (other := implicit_steps()) else None
+                found = other.equal(name) if (other := implicit_steps(symmetric)) else None
             else:
                 found = held.equal(name, problem) if (held := compiled(projects)) else None
             self.used = self.used or found is not None

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
 from eomgen.native import checked, equal_steps
-from eomgen.native.checked import Function
+from eomgen.native.checked import Function, FunctionStructure
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import constants_of
@@ -38,6 +38,8 @@ from eomgen.templating import render
 MAIN = "implicit.c"
 NEEDED = ("derivative", "jacobian")
 """The functions that the methods call."""
+SYMMETRIC = ("constraint_jacobian", "constraint_rates")
+"""Further functions for symmetric projection."""
 METHODS = ("rodas_5p",)
 GAUSS: Mapping[str, ImplicitMethod] = {
     method.METHOD.compiled: method.METHOD for method in (implicit_midpoint, gauss_4, gauss_6)
@@ -45,7 +47,7 @@ GAUSS: Mapping[str, ImplicitMethod] = {
 """The methods of adaptive and of equal steps, by the names of their compiled steps."""
 METHODS_LIBRARY = "methods"
 """The name of the library of the methods among the others."""
-OPERATIONS = 4500
+OPERATIONS = 5500
 """The methods take as long to compile as a function of about this many operations."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _UNUSUAL = 2
@@ -77,6 +79,7 @@ def sources() -> Mapping[str, str]:
         "rattle_roundoff": repr(rattle.ROUNDOFF),
         "rattle_noise": repr(rattle.NOISE),
         "max_iterations": implicit_stages.MAX_ITERATIONS,
+        "max_projected": implicit_stages.MAX_PROJECTED,
         "roundoff": repr(implicit_stages.ROUNDOFF),
         "noise": repr(implicit_stages.NOISE),
         "nothing": repr(implicit_stages.NOTHING),
@@ -130,7 +133,11 @@ class _Records(ctypes.Structure):
 class Iteration(ctypes.Structure):
     """`iteration` of `templates/c/implicit.c.jinja`."""
 
-    _fields_ = tuple((name, _POINTER) for name in ("system", "reals", "wholes"))
+    _fields_ = (
+        *((name, _POINTER) for name in ("system", "reals", "wholes")),
+        *((name, FunctionStructure) for name in ("rows", "rates")),
+    )
+    kept: Any
 
 
 class CompiledImplicit:
@@ -154,7 +161,7 @@ class CompiledImplicit:
         others = constants_of(Kernels(module, libraries["jacobian"]), "jacobian", p, origin)
         inputs = kernels.given(u)
         self._methods, self._system = libraries[METHODS_LIBRARY], None
-        beside = {name: libraries[name] for name in (PROJECTS if problem.projection else ())}
+        beside = {name: libraries[name] for name in libraries.keys() & {*PROJECTS, *SYMMETRIC}}
         self._functions, self._inputs = checked.functions(module, beside, p), inputs
         if constants is None or others is None or inputs is None:
             return
@@ -189,16 +196,25 @@ class CompiledImplicit:
             return None
         stages = len(GAUSS[name].b)
         reals, wholes = _space(stages * self._system.states)
-        with_them = Iteration(ctypes.addressof(self._system), reals.ctypes.data, wholes.ctypes.data)
+        functions = self._functions
+        with_them = Iteration(
+            ctypes.addressof(self._system),
+            reals.ctypes.data,
+            wholes.ctypes.data,
+            *(FunctionStructure(*functions[name]) for name in SYMMETRIC if name in functions),
+        )
         with_them.kept = self, reals, wholes
         call = self._methods[f"steps_{name}"]
-        return partial(equal_steps.made, call, stages, None, None, with_them, {}, iterates=True)
+        held = self._inputs, with_them, functions
+        return partial(equal_steps.made, call, stages, None, *held, iterates=True)
 
 
 def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:
-    """Space for numbers and for whole numbers in which methods solve for `unknowns` unknowns."""
+    """Space for numbers and for whole numbers in which methods solve for `unknowns` unknowns, with
+    symmetric projection or without.
+    """
     square = unknowns * unknowns
-    return np.empty(5 * square + 24 * unknowns), np.empty(square + 2 * unknowns, np.int64)
+    return np.empty(18 * square + 24 * unknowns), np.empty(2 * square + 4 * unknowns, np.int64)
 
 
 def _rodas_5p(

@@ -29,7 +29,7 @@ class _Iteration(ctypes.Structure):
 
     _fields_ = (
         ("iteration", Iteration),
-        *((name, FunctionStructure) for name in ("derivative", "mass", "slopes", "rows")),
+        *((name, FunctionStructure) for name in ("derivative", "mass", "slopes")),
     )
     kept: Any
 
@@ -49,8 +49,8 @@ def steps(
     square = coordinates * coordinates
     reals = np.empty(13 * square + 10 * coordinates)
     wholes = np.empty(2 * square + 4 * coordinates, np.int64)
-    called = (FunctionStructure(*functions[name]) for name in NEEDED[:4])
-    iteration = Iteration(ctypes.addressof(system), reals.ctypes.data, wholes.ctypes.data)
+    *called, rows = (FunctionStructure(*functions[name]) for name in NEEDED[:4])
+    iteration = Iteration(ctypes.addressof(system), reals.ctypes.data, wholes.ctypes.data, rows)
     more = _Iteration(iteration, *called)
     more.kept = system, reals, wholes, inputs, libraries
     call = libraries[METHODS_LIBRARY].steps_rattle

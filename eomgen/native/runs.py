@@ -25,8 +25,6 @@ from eomgen.templating import render
 MAIN = "runs.c"
 METHODS = ("dop853", *equal_steps.METHODS)
 """The methods whose steps this library makes."""
-PROJECTED = ("dop853", "euler", "semi_implicit_euler", "runge_kutta_4")
-"""Those that keep constraints."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _UNUSUAL = 2
 """What C returns before a step that Python must make."""

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from eomgen.run.compiled import Constrained, Margins
 from eomgen.run.failure import StepFailure
-from eomgen.run.tangents import tangents
 
 FloatArray = NDArray[np.float64]
 
@@ -158,30 +157,8 @@ class Projection:
             self.violations.add(first, left)
         return y
 
-    def normals(self, t: float, y: FloatArray) -> FloatArray:
-        """Directions (ny, 2 nc) that lead off the constraints: of positions, then of velocities."""
-        nq, jacobian = self.coordinates, self._scaled(t, y)
-        nc, nv = jacobian.shape
-        found = np.zeros((len(y), 2 * nc))
-        found[:nq, :nc] = tangents(y[:nq], self.quaternions) @ jacobian.T
-        found[nq : nq + nv, nc:] = jacobian.T
-        return found
-
-    def multipliers(self, t: float, y: FloatArray, ways: FloatArray) -> FloatArray:
-        """How far a state is off the constraints, in directions `ways` (ny, 2 nc), to first order,
-        (2 nc,).
-        """
-        jacobian, nq = self._scaled(t, y), self.coordinates
-        nv = jacobian.shape[1]
-        moved = ways[:nq]
-        if self.quaternions:
-            basis = tangents(y[:nq], self.quaternions)  # its columns are orthogonal
-            moved = basis.T @ moved / np.sum(basis**2, axis=0)[:, np.newaxis]
-        matrix = np.vstack((jacobian @ moved, jacobian @ ways[nq : nq + nv]))
-        off = np.concatenate((self.residuals(t, y) / self.sizes, self.rates(t, y) / self.sizes))
-        return np.asarray(np.linalg.solve(matrix, off), dtype=np.float64)
-
-    def _scaled(self, t: float, y: FloatArray) -> FloatArray:
+    def scaled_jacobian(self, t: float, y: FloatArray) -> FloatArray:
+        """The derivatives (nc, nv) of the rates, in sizes, by the velocities."""
         return self.jacobian(t, y) / self.sizes[:, None]
 
     def _relative(self, residuals: FloatArray) -> float:

@@ -14,7 +14,7 @@ import argparse
 import sys
 import time
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,15 +23,19 @@ sys.path.append(str(Path(__file__).parent.parent))
 
 import judges
 import planar_linkages
-from conserved import conserved
 from engine import apart, engine
 from loop_routes import ROUTES, apart_by_route, model_of, solved
 from spatial_loops import random_loops
 from test_loop_runs import four_bar
 from test_loops import CLOSE, CONDITION, WELL, left_out
 
+from eomgen.dynamics.assembly import assembled
+from eomgen.model.elaborate import elaborate
+from eomgen.native.accelerator import Accelerator
 from eomgen.run.integrate import integrate
-from eomgen.run.module import as_problem
+from eomgen.run.module import as_problem, load_module
+from eomgen.scene.reader import parse_scene
+from eomgen.store import generated_code
 
 
 def random(count: int) -> int:
@@ -98,6 +102,48 @@ def peaucellier(steps: int) -> int:
     off = float(np.abs(x - planar_linkages.LINE).max() / np.ptp(y))
     print(f"{len(run.t) - 1} steps: off by {off:.1e} of its length, {np.ptp(y):.3f} m")
     return int(off > WELL or not run.finished)
+
+
+OUTPUTS = ("kinetic_energy", "potential_energy", "mass_matrix", "kinetic_slopes")
+
+
+@dataclass(frozen=True)
+class Conserved:
+    """What a run conserved.
+
+    residual  the largest residual of the constraints at the end of any step, m
+    band      the width of the band of energies over the whole run, J
+    early     that over its first tenth
+    trend     the change of energy over the run by a straight line through its rows, J
+    """
+
+    residual: float
+    band: float
+    early: float
+    trend: float
+
+
+def conserved(text: str, integrator: str, dt: float, steps: int, rows: int = 100_000) -> Conserved:
+    """The run of a scene, whose state needs projection, in compiled code from the first step on."""
+    model = assembled(elaborate(parse_scene(text)))
+    model = replace(model, outputs=OUTPUTS)
+    module = load_module(generated_code(model).module, model.name)
+    problem = as_problem(module)
+    assert problem.projection is not None, "the state of this scene needs no projection"
+    accelerator = Accelerator(model, module, None, None)
+    accelerator.compile()
+    run = integrate(accelerator.of(problem), integrator, dt * steps, dt=dt, samples=rows)
+    assert run.finished and accelerator.used, run.message
+    y = run.y.T
+    energy = np.asarray(module.kinetic_energy(0.0, y) + module.potential_energy(0.0, y))
+    slope = np.polynomial.Polynomial.fit(run.t, energy, 1).convert().coef[1]
+    early = energy[: len(energy) // 10]
+    return Conserved(
+        max(after for _, after in run.violations.values()),
+        float(np.ptp(energy)),
+        float(np.ptp(early)),
+        float(slope * run.t[-1]),
+    )
 
 
 def symplectic(steps: int) -> int:

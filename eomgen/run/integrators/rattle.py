@@ -60,10 +60,7 @@ def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     def slopes(at: FloatArray, speed: FloatArray) -> FloatArray:
         return held.kinetic_slopes(t, np.concatenate((at, speed)))
 
-    def rows(at: FloatArray) -> FloatArray:
-        return held.jacobian(t, at) / held.sizes[:, None]
-
-    here, columns = held.inertia(t, y), rows(y).T
+    here, columns = held.inertia(t, y), held.scaled_jacobian(t, y).T
     mass = _factored(here)
     ways = _solved(mass, columns)
     begun = product(here, v) + half * force(here, q)
@@ -72,7 +69,7 @@ def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     for _ in range(MOST):
         there = np.concatenate((r, b))
         middle = begun + half * slopes(q, a) + product(columns, multipliers)
-        after, last_mass = rows(there), held.inertia(t, there)
+        after, last_mass = held.scaled_jacobian(t, there), held.inertia(t, there)
         a, b = mass.solve(middle), _factored(last_mass).solve(middle)
         new = q + half * (a + b)
         off = held.residuals(t, np.concatenate((new, b))) / held.sizes
