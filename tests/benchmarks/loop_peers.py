@@ -3,11 +3,12 @@
     pip install -e '.[bench]' && python tests/benchmarks/loop_peers.py [--rounds N]
 
 One derivative, of 2000 closed states one after another: the checked kernel of `eomgen.native`;
-Pinocchio's `constraintDynamics` in C++, compiled here against its wheel; MuJoCo's `mj_forward` with
-an equality constraint, called from C; and C code that CasADi makes of Lagrange's equations with
-multipliers, solved with its own symbolic elimination. The mechanism is the same for all, and all
-accelerations are compared with closed formulas. Pinocchio's pin has three rows, of which one is
-redundant in the plane, so it iterates; MuJoCo's constraints are soft.
+Pinocchio's `constraintDynamics` in C++, compiled here against its wheel and the headers of Eigen
+that CasADi's wheel has; MuJoCo's `mj_forward` with an equality constraint, called from C; and C
+code that CasADi makes of Lagrange's equations with multipliers, solved with its own symbolic
+elimination. The mechanism is the same for all, and all accelerations are compared with closed
+formulas. Pinocchio's pin has three rows, of which one is redundant in the plane, so it iterates;
+MuJoCo's constraints are soft.
 
 One step of the classical Runge-Kutta method: ours projects on positions and velocities; MuJoCo's
 does not. Printed are least times, and their ratios with the quartiles of those of paired rounds.
