@@ -13,7 +13,7 @@ from eomgen.api.given import check
 from eomgen.cli import main
 from eomgen.dynamics.assembly import closed_start
 from eomgen.errors import RunError, SceneError
-from eomgen.run.projection import jacobian_of
+from eomgen.run.projection import jacobian_of, stays_away
 
 A, B, C, D = 0.3, 0.8, 0.6, 0.7
 """Lengths of a crank-rocker: crank, coupler, rocker and ground, m."""
@@ -249,6 +249,20 @@ def test_singular_positions_stop_the_run(route: str, settings: dict[str, Any]) -
     run = eomgen.simulate(dead, t_end=1.0, **settings)
     assert run.finished == (route == "aba")
     assert run.finished or "singular" in run.outcome.reason
+
+
+def test_margins_that_stay_away_from_0() -> None:
+    """A margin that comes to 0 does so with a slope, wherever it lies between the samples; one with
+    a smooth minimum above 0 is told from it once samples are near.
+    """
+    times = np.linspace(0.0, 1.0, 5)
+    for zero in np.linspace(0.26, 0.74, 20):
+        margins = np.abs(times - zero) * (1.0 + 0.3 * times)
+        assert not stays_away(float(margins.min()), times, margins)
+    for width, away in ((2.0, False), (0.05, True)):
+        near = width * (times - 0.4)
+        smooth = 0.01 + near**2
+        assert stays_away(float(smooth.min()), near, smooth) == away
 
 
 START = "q = { theta = 1.0, psi = 1.0, phi = -1.0 }\nv = { theta_dot = 6.0 }"

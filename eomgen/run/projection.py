@@ -13,8 +13,8 @@ from typing import Any, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.run.compiled import Constrained, Margins
 from eomgen.run.failure import StepFailure
-from eomgen.run.tangents import tangents
 
 FloatArray = NDArray[np.float64]
 
@@ -32,6 +32,8 @@ REMEDY = (
 )
 CLOSE = 1e-9
 """The largest residual that is left where Newton's method ends, in sizes."""
+PROJECTS = ("constraint_residuals", "project_position", "project_velocity", "constraint_margins")
+"""The functions of a module that a step onto the constraints needs."""
 
 
 class Violations:
@@ -48,6 +50,36 @@ class Violations:
         """Take account of a projection."""
         np.maximum(self.before, np.abs(before), out=self.before)
         np.maximum(self.after, np.abs(after), out=self.after)
+
+
+@dataclass
+class Seen:
+    """The least margins of a run: `here` at the last time t, and `before` at `start`, the time
+    before it; -inf if there is none.
+    """
+
+    start: float = 0.0
+    t: float = 0.0
+    before: float = float("-inf")
+    here: float = float("inf")
+
+    def begin(self, t: float, margin: float) -> None:
+        """Begin with a state at t that ends no step."""
+        self.start = self.t = t
+        self.before, self.here = float("-inf"), margin
+
+    def add(self, t: float, margin: float) -> None:
+        """Take account of the end of a step."""
+        self.start, self.t, self.before, self.here = self.t, t, self.here, margin
+
+    def turns(self, t: float, now: float) -> bool:
+        """Whether with a step to t the margins have passed a small minimum, and may be 0 in one of
+        the last two steps.
+        """
+        before, here = self.before, self.here
+        if not (here < before and here < now and here < NEAR):
+            return False
+        return not stays_away(here, (self.start, self.t, t), (before, here, now))
 
 
 Value = Callable[[float, FloatArray], FloatArray]
@@ -74,6 +106,7 @@ class Projection:
                 singular position
     quaternions indices of the components of each unit quaternion among the coordinates
     violations  to which each projection is added, if given
+    seen        the margins of the run, if they are watched
     inertia, kinetic_slopes
                 (t, y) -> the mass matrix (nv, nv), and the derivatives (nq,) of the kinetic energy
                 by the coordinates; `without` if the module has none
@@ -90,6 +123,7 @@ class Projection:
     coordinates: int
     quaternions: Sequence[tuple[int, int, int, int]] = ()
     violations: Violations | None = None
+    seen: Seen | None = None
     inertia: Value = without
     kinetic_slopes: Value = without
 
@@ -123,35 +157,24 @@ class Projection:
             self.violations.add(first, left)
         return y
 
-    def normals(self, t: float, y: FloatArray) -> FloatArray:
-        """Directions (ny, 2 nc) that lead off the constraints: of positions, then of velocities."""
-        nq, jacobian = self.coordinates, self._scaled(t, y)
-        nc, nv = jacobian.shape
-        found = np.zeros((len(y), 2 * nc))
-        found[:nq, :nc] = tangents(y[:nq], self.quaternions) @ jacobian.T
-        found[nq : nq + nv, nc:] = jacobian.T
-        return found
-
-    def multipliers(self, t: float, y: FloatArray, ways: FloatArray) -> FloatArray:
-        """How far a state is off the constraints, in directions `ways` (ny, 2 nc), to first order,
-        (2 nc,).
-        """
-        jacobian, nq = self._scaled(t, y), self.coordinates
-        nv = jacobian.shape[1]
-        moved = ways[:nq]
-        if self.quaternions:
-            basis = tangents(y[:nq], self.quaternions)  # its columns are orthogonal
-            moved = basis.T @ moved / np.sum(basis**2, axis=0)[:, np.newaxis]
-        matrix = np.vstack((jacobian @ moved, jacobian @ ways[nq : nq + nv]))
-        off = np.concatenate((self.residuals(t, y) / self.sizes, self.rates(t, y) / self.sizes))
-        return np.asarray(np.linalg.solve(matrix, off), dtype=np.float64)
-
-    def _scaled(self, t: float, y: FloatArray) -> FloatArray:
+    def scaled_jacobian(self, t: float, y: FloatArray) -> FloatArray:
+        """The derivatives (nc, nv) of the rates, in sizes, by the velocities."""
         return self.jacobian(t, y) / self.sizes[:, None]
 
     def _relative(self, residuals: FloatArray) -> float:
         """The largest residual, in sizes."""
         return float(np.abs(residuals / self.sizes).max())
+
+
+def constrained_by(projection: Projection | None) -> Constrained | None:
+    """What compiled steps of a run are given of its constraints."""
+    if projection is None:
+        return None
+    largest, seen = projection.violations, projection.seen
+    assert largest and seen
+    margins = (seen.start, seen.before), (seen.t, seen.here)
+    given = projection.sizes, projection.quaternions
+    return Constrained(*given, largest.before, largest.after, margins)
 
 
 def jacobian_of(module: Any) -> Callable[..., FloatArray]:
@@ -230,6 +253,10 @@ class Part(Protocol):
     def within(self) -> Callable[[float], FloatArray]:
         """The state at a time within it."""
 
+    @property
+    def margins(self) -> Margins | None:
+        """Of several steps that have been watched, those of the last one."""
+
 
 Steps = TypeVar("Steps", bound=Part)
 
@@ -243,51 +270,76 @@ def watched(
     within the steps around it, so that no singular position is passed over. Raises `StepFailure`
     there.
     """
-    start, margin, before, last = t, _least(projection, t, y), float("inf"), None
+    seen = projection.seen or Seen()
+    seen.begin(t, _least(projection, t, y))
+    last: Steps | None = None
     try:
         for advance in advances:
+            if advance.margins:
+                seen.begin(advance.margins.start, advance.margins.before)
+                seen.add(advance.t, advance.margins.here)
+                last = advance
+                yield advance
+                continue
             here = _checked(projection, advance.t, advance.y)
-            if advance.t > start:
-                if margin < before and margin < here and margin < NEAR and last is not None:
-                    _search(projection, last, advance)
-                before, margin, last = margin, here, (start, advance)
-                start = advance.t
+            if advance.t > seen.t:
+                if last is not None and seen.turns(advance.t, here):
+                    _search(projection, seen.start, last, advance)
+                seen.add(advance.t, here)
+                last = advance
             else:  # a strike
-                before, margin, last = float("inf"), here, None
+                seen.begin(advance.t, here)
+                last = None
             yield advance
     except SingularPositionError:
         raise
     except StepFailure as failure:
-        if margin < NEAR:
+        if seen.here < NEAR:
             reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
             raise StepFailure(reason, REMEDY) from None
         raise
 
 
-def _search(projection: Projection, last: tuple[float, Part], advance: Part) -> None:
-    """Look for a singular position in two steps, by golden section."""
-    begin, first = last
+def _search(projection: Projection, start: float, last: Part, advance: Part) -> None:
+    """Look for a singular position in two steps, of which the first begins at `start`, by golden
+    section. It ends where none can be.
+    """
 
-    def state(t: float) -> FloatArray:
-        return (first if t < first.t else advance).within(t)
+    def margin(t: float) -> float:
+        return _least(projection, t, (last if t < last.t else advance).within(t))
 
-    a, b = begin, advance.t
+    a, b = start, advance.t
+    at_a, at_b = margin(a), margin(b)
     ratio = (5**0.5 - 1) / 2
     c, d = b - ratio * (b - a), a + ratio * (b - a)
-    at_c, at_d = _least(projection, c, state(c)), _least(projection, d, state(d))
+    at_c, at_d = margin(c), margin(d)
     for _ in range(SEARCH):
-        if at_c < at_d:
-            b, d, at_d = d, c, at_c
-            c = b - ratio * (b - a)
-            at_c = _least(projection, c, state(c))
-        else:
-            a, c, at_c = c, d, at_d
-            d = a + ratio * (b - a)
-            at_d = _least(projection, d, state(d))
-        if min(at_c, at_d) < SINGULAR:
+        least, times = min(at_c, at_d), (a, c, d, b)
+        if least < SINGULAR or stays_away(least, times, (at_a, at_c, at_d, at_b)):
             break
+        if at_c < at_d:
+            b, at_b, d, at_d = d, at_d, c, at_c
+            c = b - ratio * (b - a)
+            at_c = margin(c)
+        else:
+            a, at_a, c, at_c = c, at_c, d, at_d
+            d = a + ratio * (b - a)
+            at_d = margin(d)
     best = c if at_c < at_d else d
-    _checked(projection, best, state(best))
+    _checked(projection, best, (last if best < last.t else advance).within(best))
+
+
+def stays_away(least: float, times: Sequence[float], margins: Sequence[float]) -> bool:
+    """Whether a margin with these values at ascending times, the least of them `least`, cannot come
+    to 0 between them: it would have to change more than twice as fast as it does from one to the
+    next. Where it comes to 0, it does so with a slope, on both sides.
+    """
+    steepest = 0.0
+    for i in range(1, len(times)):
+        if not times[i - 1] < times[i]:
+            return False
+        steepest = max(steepest, abs(margins[i] - margins[i - 1]) / (times[i] - times[i - 1]))
+    return least > 2 * steepest * (times[-1] - times[0])
 
 
 def _checked(projection: Projection, t: float, y: FloatArray) -> float:

@@ -1,19 +1,20 @@
 """Mechanisms with loops: 300 random ones by every route, and other engines; see the parts.
 
-    python tests/campaigns/loops.py [random | pinocchio | peaucellier] [--count N]
+    python tests/campaigns/loops.py [random | pinocchio | peaucellier | symplectic] [--count N]
 
 random       accelerations and wrenches of all joints by every route against the solver in maximal
              coordinates; 1 to 6 loops, all joint types, in the plane and in space by turns
 pinocchio    accelerations against Pinocchio's constraint dynamics, of mechanisms in space that
              balls and welds close
 peaucellier  how straight the line of Peaucellier's cell is over 1e5 steps
+symplectic   constraints and energy of a four-bar that swings, over 1e6 steps of RATTLE
 """
 
 import argparse
 import sys
 import time
 from collections import Counter
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +26,16 @@ import planar_linkages
 from engine import apart, engine
 from loop_routes import ROUTES, apart_by_route, model_of, solved
 from spatial_loops import random_loops
+from test_loop_runs import four_bar
 from test_loops import CLOSE, CONDITION, WELL, left_out
 
+from eomgen.dynamics.assembly import assembled
+from eomgen.model.elaborate import elaborate
+from eomgen.native.accelerator import Accelerator
 from eomgen.run.integrate import integrate
-from eomgen.run.module import as_problem
+from eomgen.run.module import as_problem, load_module
+from eomgen.scene.reader import parse_scene
+from eomgen.store import generated_code
 
 
 def random(count: int) -> int:
@@ -97,10 +104,65 @@ def peaucellier(steps: int) -> int:
     return int(off > WELL or not run.finished)
 
 
+OUTPUTS = ("kinetic_energy", "potential_energy", "mass_matrix", "kinetic_slopes")
+
+
+@dataclass(frozen=True)
+class Conserved:
+    """What a run conserved.
+
+    residual  the largest residual of the constraints at the end of any step, m
+    band      the width of the band of energies over the whole run, J
+    early     that over its first tenth
+    trend     the change of energy over the run by a straight line through its rows, J
+    """
+
+    residual: float
+    band: float
+    early: float
+    trend: float
+
+
+def conserved(text: str, integrator: str, dt: float, steps: int, rows: int = 100_000) -> Conserved:
+    """The run of a scene, whose state needs projection, in compiled code from the first step on."""
+    model = assembled(elaborate(parse_scene(text)))
+    model = replace(model, outputs=OUTPUTS)
+    module = load_module(generated_code(model).module, model.name)
+    problem = as_problem(module)
+    assert problem.projection is not None, "the state of this scene needs no projection"
+    accelerator = Accelerator(model, module, None, None)
+    accelerator.compile()
+    run = integrate(accelerator.of(problem), integrator, dt * steps, dt=dt, samples=rows)
+    assert run.finished and accelerator.used, run.message
+    y = run.y.T
+    energy = np.asarray(module.kinetic_energy(0.0, y) + module.potential_energy(0.0, y))
+    slope = np.polynomial.Polynomial.fit(run.t, energy, 1).convert().coef[1]
+    early = energy[: len(energy) // 10]
+    return Conserved(
+        max(after for _, after in run.violations.values()),
+        float(np.ptp(energy)),
+        float(np.ptp(early)),
+        float(slope * run.t[-1]),
+    )
+
+
+def symplectic(steps: int) -> int:
+    """Whether constraints open by more than 1e-12 m, or energy leaves its band or has a trend."""
+    text = four_bar(initial="q = { theta = 0.3 }", route="embedded")
+    start = time.perf_counter()
+    found = conserved(text, "leapfrog", 2e-3, steps)
+    print(f"{steps} steps in {time.perf_counter() - start:.1f} s: residual {found.residual:.1e} m, "
+          f"band of energy {found.band:.3e} J, that of the first tenth {found.early:.3e} J, "
+          f"trend {found.trend:.1e} J")  # fmt: skip
+    kept = found.band < 1.01 * found.early and abs(found.trend) < 0.01 * found.band
+    return int(found.residual > WELL or not kept)
+
+
 PARTS = {
     "random": (random, 300),
     "pinocchio": (pinocchio, 60),
     "peaucellier": (peaucellier, 100_000),
+    "symplectic": (symplectic, 1_000_000),
 }
 
 

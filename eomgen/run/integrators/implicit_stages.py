@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.run.failure import StepFailure
-from eomgen.run.integrators.elimination import factored
+from eomgen.run.integrators.elimination import factored, product
 from eomgen.run.integrators.interface import FixedStep
 from eomgen.run.integrators.tableau import ButcherTableau
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import Projection
+from eomgen.run.tangents import tangents
 
 MAX_ITERATIONS, MAX_PROJECTED = 20, 60
 """Most iterations, and those of a step with symmetric projection, which converge linearly."""
@@ -145,23 +146,23 @@ class _Newton:
 
         Raises `StepFailure` if the iteration does not converge.
         """
-        normals, end = projection.normals(self._end, y), y
+        normals = normals_at(projection, self._end, y)
         beyond, changes = normals, np.zeros(self.shape)
         multipliers, previous = np.zeros(normals.shape[1]), 0.0
         for _ in range(MAX_PROJECTED):
-            start = y + normals @ multipliers
-            update = self.update(start, changes)
+            aside = product(normals, multipliers)
+            update = self.update(y + aside, changes)
             changes += update
-            step = normals @ multipliers + _last(changes, axis=0)
-            end = y + step + beyond @ multipliers
-            beyond = projection.normals(self._end, end)
+            step = aside + _last(changes, axis=0)
+            end = y + step + product(beyond, multipliers)
+            beyond = normals_at(projection, self._end, end)
             ways = self._carried(normals) + beyond
-            more = -projection.multipliers(self._end, end, ways)
-            multipliers += more
-            updates = np.vstack((update, beyond @ more))
+            more = -multipliers_at(projection, self._end, end, ways)
+            before, multipliers = multipliers, multipliers + more
+            updates = np.vstack((update, product(beyond, more)))
             size = _finite(updates)
             if size == 0 or (previous and _is_solved(y, changes, updates, size, previous)):
-                return np.asarray(step + (normals + beyond) @ more + beyond @ (multipliers - more))
+                return np.asarray(step + product(normals + beyond, more) + product(beyond, before))
             previous = size
         raise _unsolved(MAX_PROJECTED)
 
@@ -170,8 +171,39 @@ class _Newton:
         with the Jacobian of the last stage.
         """
         half = 0.5 * self._step * self._last
-        one = np.eye(len(normals))
-        return np.asarray(np.linalg.solve(one - half, (one + half) @ normals))
+        factors = factored(half, 1.0, self._positions // self.shape[0])
+        if factors is None:
+            raise StepFailure("the matrix of a step is singular", REMEDY)
+        begun = product(np.eye(len(normals)) + half, normals)
+        return np.array([factors.solve(column) for column in begun.T]).T
+
+
+def normals_at(projection: Projection, t: float, y: FloatArray) -> FloatArray:
+    """Directions (ny, 2 nc) that lead off the constraints: of positions, then of velocities."""
+    nq, jacobian = projection.coordinates, projection.scaled_jacobian(t, y)
+    nc, nv = jacobian.shape
+    found = np.zeros((len(y), 2 * nc))
+    found[:nq, :nc] = product(tangents(y[:nq], projection.quaternions), jacobian.T)
+    found[nq : nq + nv, nc:] = jacobian.T
+    return found
+
+
+def multipliers_at(projection: Projection, t: float, y: FloatArray, ways: FloatArray) -> FloatArray:
+    """How far a state is off the constraints, in directions `ways` (ny, 2 nc), to first order,
+    (2 nc,). Raises `StepFailure` if these do not lead off all of them.
+    """
+    jacobian, nq = projection.scaled_jacobian(t, y), projection.coordinates
+    nv, sizes = jacobian.shape[1], projection.sizes
+    moved = ways[:nq]
+    if projection.quaternions:
+        basis = tangents(y[:nq], projection.quaternions)  # its columns are orthogonal
+        moved = product(basis.T, moved) / _last(basis**2, axis=0)[:, np.newaxis]
+    matrix = np.vstack((product(jacobian, moved), product(jacobian, ways[nq : nq + nv])))
+    off = np.concatenate((projection.residuals(t, y) / sizes, projection.rates(t, y) / sizes))
+    factors = factored(-matrix, 0.0, 0)
+    if factors is None:
+        raise StepFailure("the constraints are singular", REMEDY)
+    return factors.solve(off)
 
 
 def _finite(update: FloatArray) -> float:

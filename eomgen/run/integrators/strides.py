@@ -8,9 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from eomgen.run.branches import BranchMonitor
-from eomgen.run.compiled import Steps, Stride, Watched
+from eomgen.run.compiled import Margins, Steps, Stride, Watched
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.projection import PROJECTS, constrained_by
 
 MOST = 1024
 """Greatest number of steps at once: between them progress is shown, and Ctrl-C is heard."""
@@ -62,6 +63,7 @@ class Strides:
         self._needed = (
             *(OF_STATE if switching and switching.of_state else ()),
             *(OF_CONTACTS if contacts else ()),
+            *(PROJECTS if problem.projection else ()),
         )
         self._sizes = None
         if contacts:
@@ -95,6 +97,7 @@ class Strides:
             watched=watched,
             sizes=self._sizes,
             dense=self._dense,
+            constrained=constrained_by(self._problem.projection),
         )
         count = len(stride.ends)
         if not count:
@@ -144,8 +147,16 @@ class Strides:
                 checked=True,
                 resume=self._resume(stride, min(i, whole - 1)) if resumes and whole else None,
                 capped=shortened,
+                margins=self._margins(stride, i),
             )
             rows += passed
+
+    def _margins(self, stride: Stride, i: int) -> Margins | None:
+        """The margins of step i."""
+        if stride.margins is None:
+            return None
+        start = float(stride.ends[i - 1]) if i else self._start
+        return Margins(start, float(stride.margins[i]), float(stride.margins[i + 1]))
 
     def _resume(self, stride: Stride, i: int) -> Callable[[], Resume]:
         """A function that gives what a later run needs to continue after step i."""
