@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from eomgen.api.reopening import load_run
     from eomgen.api.simulating import simulate
     from eomgen.api.sweeping import Ensemble, ensemble, grid, sampled
+    from eomgen.api.symbolic import casadi_functions
     from eomgen.api.verifying import horizon, verify
     from eomgen.equations import Derivation
     from eomgen.errors import EomgenError, RunError, SceneError
@@ -38,6 +39,7 @@ __all__ = [
     "accuracy",
     "arithmetic",
     "built_in_names",
+    "casadi_functions",
     "check",
     "derive",
     "effects",
@@ -67,6 +69,7 @@ _PLACES = {
     "load_run": "api.reopening",
     "simulate": "api.simulating",
     **dict.fromkeys(("Ensemble", "ensemble", "grid", "sampled"), "api.sweeping"),
+    "casadi_functions": "api.symbolic",
     **dict.fromkeys(("horizon", "verify"), "api.verifying"),
     **dict.fromkeys(("accuracy", "arithmetic"), "api.accuracy"),
     "effects": "api.effects",
