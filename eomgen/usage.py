@@ -18,7 +18,7 @@ EXAMPLES = {
     "check": "eomgen check two_body",
     "derive": "eomgen derive two_body -o two_body.html",
     "generate": "eomgen generate two_body pendulum -o modules",
-    "export": "eomgen export cart_pole --firmware -o firmware",
+    "export": "eomgen export cart_pole --fmu -o cart_pole.fmu",
     "simulate": "eomgen simulate cart_pole --set l=0.4 --state theta=0.3 --input push=3*sin(t)",
     "view": "eomgen view double_pendulum",
     "gallery": "eomgen gallery -o course --scene pendulum two_body",

@@ -1,10 +1,13 @@
 """Pages in headless Chromium; tests/campaigns/browser.py tries those of all built-in scenes."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from browser import check_page, chromium, missing, opened
 
@@ -82,3 +85,41 @@ def test_nothing_can_be_sent(browser: Any, run: Run, tmp_path: Path) -> None:
     assert page.evaluate(SENT) == ["connect-src", "img-src", "script-src-elem"]
     assert asked == [path.as_uri()]
     page.close()
+
+
+def test_pictures_are_saved_as_vectors(browser: Any, run: Run, tmp_path: Path) -> None:
+    """Bodies are where the page shows them, curves have their values, and a PDF has no pixels."""
+    save_page(run.motion, run.page(), tmp_path / "page.html")
+    with opened(browser, tmp_path / "page.html") as page:
+        page.at(1.0)
+        drawn = []
+        for button in ("#save-svg", ".plot-tools >> text=SVG"):
+            with page.page.expect_download() as found:
+                page.page.locator(button).first.click()
+            drawn.append(ElementTree.parse(found.value.path()).getroot())
+        assert (float(drawn[0].get("width", 0)), float(drawn[0].get("height", 0))) == page.size()
+        fills = [
+            corners(path.get("d", ""))
+            for path in drawn[0].iter(f"{SVG}path")
+            if path.get("fill") not in (None, "none")
+        ]
+        for center in page.page.evaluate("window.eomgen.screen"):
+            # A rod's outline is symmetrical about its centre of mass.
+            assert min(np.abs((f.min(0) + f.max(0)) / 2 - center).max() for f in fills) < 0.1
+        path = drawn[1].find(f".//{SVG}svg/{SVG}path")
+        assert path is not None
+        curve = corners(path.get("d", ""))
+        times, values = run.t, run[run.states[0]]
+        x, y = (np.interp(curve[:, 0], curve[[0, -1], 0], times[[0, -1]]), curve[:, 1])
+        wanted = np.interp(x, times, values)
+        slope, level = np.polyfit(wanted, y, 1)
+        assert slope < 0 and np.abs(slope * wanted + level - y).max() < 0.1
+        assert b"/Subtype /Image" not in page.page.pdf()
+
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def corners(path: str) -> np.ndarray:
+    """The corners of a path, (n, 2)."""
+    return np.array([tuple(map(float, x.split(","))) for x in re.findall(r"[-\d.]+,[-\d.]+", path)])

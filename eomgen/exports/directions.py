@@ -30,12 +30,11 @@ def with_directions(
         extra.append(f"d__{name}")
         if name in known:
             seeds[known[name]] = seed
-    nodes = [
-        Node(tape, program.outputs[name].nodes[i]) for name, which in entries for i in which
-    ]
+    nodes = [Node(tape, program.outputs[name].nodes[i]) for name, which in entries for i in which]
     found = tuple(node.index for node in tangent(nodes, seeds))
     outputs = {**program.outputs, NAME: Output((len(found),), found)}
-    function = Function(NAME, "Derivatives along a direction.", (len(found),), tuple(extra), False, False)
+    about = "Derivatives along a direction."
+    function = Function(NAME, about, (len(found),), tuple(extra), tangent=False, matrix=False)
     return (
         replace(program, steps=tuple(tape.steps), outputs=outputs),
         replace(interface, functions=(*interface.functions, function)),

@@ -1,11 +1,98 @@
-"""C99 for firmware: a header and a source without allocation or global state."""
+"""C99 for firmware: a source and a header without allocation or global state, and an observer.
+
+Sines and cosines are polynomials of the source itself, so that most scenes need no mathematical
+library; numbers are `double` or `float`.
+"""
 
 from eomgen.codegen.backends import c
+from eomgen.codegen.interface import Interface
+from eomgen.errors import SceneError
 from eomgen.exports import Options, Written
 from eomgen.model.model import Model
+from eomgen.program.ordering import ordered
 from eomgen.store import interfaced_program_of
+from eomgen.templating import render
+
+CIRCULAR = ("sin", "cos", "tan")
+SINES = {
+    "double": (
+        *("1.5918129294866609e-10", "-2.5051131845003624e-08", "2.755731610255244e-06"),
+        *("-0.00019841269836758574", "0.0083333333333309485", "-0.16666666666666665"),
+    ),
+    "float": ("-0.00019587890880412386", "0.0083327482706297495", "-0.16666664662314379"),
+}
+"""Factors of (sin r - r)/r³ in r², the highest power first: Chebyshev fits for |r| <= π/4."""
+COSINES = {
+    "double": (
+        *("-1.1382632425521718e-11", "2.0876146268403198e-09", "-2.7557317271729793e-07"),
+        *("2.4801587298765688e-05", "-0.0013888888888887397", "0.041666666666666665"),
+    ),
+    "float": ("2.4547942085071573e-05", "-0.0013888303035894866", "0.041666664659502207"),
+}
+"""Those of (cos r - 1 + r²/2)/r⁴."""
+THIRDS = {
+    "double": ("1.5707963267341256142", "6.0771005063039659766e-11", "2.0222662487959507324e-21"),
+    "float": ("1.5703125", "0.00048351287841796875", "3.1391647865048132169e-7"),
+}
+"""π/2 in three parts; the products of the first two with a number of quarter turns are exact."""
+FARTHEST = {"double": "1e6", "float": "4e4"}
+"""Greatest angle, rad, for which they are."""
+ERRORS = {"double": "2.3e-16", "float": "1.2e-7"}
+"""Greatest errors of sine and cosine, as `tests/test_firmware.py` measures them."""
 
 
 def files(model: Model, options: Options) -> Written:
-    """The source and its header."""
-    return Written(c.files(*interfaced_program_of(model)))
+    """The source, its header, and an example. Raises `SceneError` for a scene without states."""
+    program, interface = interfaced_program_of(model)
+    if not interface.states:
+        raise SceneError("firmware: the scene has no states, so there is nothing to step")
+    values = c.context(ordered(program), interface)
+    name, number = interface.name, options.number
+    called = [(f, name) for f, name in values["functions"] if f not in (*CIRCULAR, "abs")]
+    circular = [f for f in CIRCULAR if f in {f for f, _ in values["functions"]}]
+    source = {
+        **{key: value for key, value in values.items() if key != "functions"},
+        "library": called,
+        "functions": circular,
+        "suffix": "f" if number == "float" else "",
+        "states": len(interface.states),
+        "sines": SINES[number],
+        "cosines": COSINES[number],
+        "thirds": THIRDS[number],
+        "farthest": FARTHEST[number],
+        "sine_error": ERRORS[number],
+        "quaternions": interface.quaternions,
+        "constrained": bool(interface.constraints),
+        "coordinates": interface.coordinates,
+        "velocities": interface.velocities,
+    }
+    header = {
+        **c.header(values, interface),
+        "real": number,
+        "functions": circular,
+    }
+    example = {
+        "scene": name,
+        "prefix": name,
+        "measured": interface.states[0].name,
+        "index": 0,
+        "coordinates": interface.coordinates,
+        "held": len(values["held"]),
+        "parameters": len(interface.parameters),
+        "inputs": len(interface.inputs),
+    }
+    return Written(
+        {
+            f"{name}.c": render(c.TEMPLATES, "firmware.c.jinja", source),
+            f"{name}.h": render(c.TEMPLATES, "firmware.h.jinja", header),
+            f"{name}_observer.c": render(c.TEMPLATES, "firmware_example.c.jinja", example),
+        },
+        _remarks(interface),
+    )
+
+
+def _remarks(interface: Interface) -> tuple[str, ...]:
+    found = []
+    if interface.contacts:
+        found.append("steps of firmware know no impacts: rigid contacts are left out of them")
+    return tuple(found)

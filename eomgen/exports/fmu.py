@@ -36,7 +36,7 @@ def files(model: Model, options: Options) -> Written:
     unit = unit_of(model, options.simulation or Simulation())
     sources, token = sources_of(unit)
     binary, remark = _binary(model.name, sources)
-    content = {
+    content: dict[str, str | bytes] = {
         **description_files(unit, token, MAIN),
         **{f"sources/{name}": text for name, text in sources.items()},
         **binary,

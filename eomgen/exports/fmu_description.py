@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from eomgen.codegen.interface import Variable
+from eomgen.errors import SceneError
 from eomgen.exports.directions import dependencies
 from eomgen.exports.fmu_unit import Unit
 from eomgen.exports.units import exponents
@@ -20,7 +21,7 @@ ATTRIBUTES: Mapping[str, Mapping[str, str]] = {
 }
 """What each kind of variable is to an importer."""
 Structure = Iterator[tuple[str, int, Sequence[int] | None]]
-"""Elements of the model structure: kind, value reference, and those that it depends on, if known."""
+"""Elements of the model structure: kind, value reference, and what it depends on, if known."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,10 @@ def description_files(unit: Unit, token: str, main: str) -> Mapping[str, str]:
     interface, simulation = unit.interface, unit.simulation
     entries = list(_entries(unit))
     used = {value for e in entries for key, value in e.attributes if key == "unit"}
-    taken = {entry.name for entry in entries}
+    taken = {entry.name: entry for entry in entries}
+    for entry in entries:
+        if taken[entry.name] is not entry:
+            raise SceneError(f"an FMU has two variables '{entry.name}'; rename a body or a contact")
     context = {
         "name": interface.name,
         "token": token,

@@ -60,8 +60,8 @@ def _main(unit: Unit, token: str) -> str:
 
 
 def _observed(parts: Sequence[Observed], start: int) -> list[tuple[str, int, int, Sequence[int]]]:
-    """Each function, the place of its first entry, the number of its results, and which are taken."""
-    found = []
+    """Each function, the place of its first entry, the number of its results, which are taken."""
+    found: list[tuple[str, int, int, Sequence[int]]] = []
     for part in parts:
         found.append((part.function, start, part.size, part.picks))
         start += len(part.picks)

@@ -52,8 +52,8 @@ class Unit:
     nominals  (ny,) sizes of the states
     size      of the mechanism, m
     outputs   what it observes beside the states
-    gaps      the gaps of rigid contacts, and `switches` the functions whose signs select a branch of
-              the derivative: its event indicators
+    gaps      of rigid contacts, and `switches`, the functions whose signs select a branch of the
+              derivative: its event indicators
     """
 
     program: Program
@@ -113,11 +113,12 @@ def unit_of(model: Model, simulation: Simulation) -> Unit:
     gaps = _gaps(interface)
     switches = tuple(_switches(program))
     rates = range(len(interface.states))
-    entries = [("derivative", rates), *((o.function, o.picks) for o in (*outputs, *gaps, *switches))]
+    entries = [
+        ("derivative", rates),
+        *((o.function, o.picks) for o in (*outputs, *gaps, *switches)),
+    ]
     program, interface = with_directions(program, interface, entries)
-    return Unit(
-        program, interface, simulation, starts, nominals, size, outputs, gaps, switches
-    )
+    return Unit(program, interface, simulation, starts, nominals, size, outputs, gaps, switches)
 
 
 def _sizes(
@@ -180,7 +181,9 @@ def _switches(program: Program) -> Iterator[Observed]:
         if name in program.outputs:
             count = len(program.outputs[name].nodes)
             variables = tuple(
-                Variable(f"switch[{first + i}]", "", "selects a branch of the equations by its sign")
+                Variable(
+                    f"switch[{first + i}]", "", "selects a branch of the equations by its sign"
+                )
                 for i in range(count)
             )
             first += count

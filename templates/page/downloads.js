@@ -54,5 +54,6 @@ const downloads = (() => {
   // A name of a file from any text.
   const fileName = (text) => text.replace(/[^\p{L}\p{N}._-]+/gu, "_").replace(/^[._]+/, "").slice(0, 80) || "run";
 
-  return { save, saveText: (name, text) => save(name, new Blob([text], { type: "text/csv" })), decimal, table, fileName };
+  const saveText = (name, text, type = "text/csv") => save(name, new Blob([text], { type }));
+  return { save, saveText, decimal, table, fileName };
 })();

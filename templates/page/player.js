@@ -306,6 +306,7 @@ const player = (() => {
   const actions = {
     play: () => setPlaying(!clock.playing), back: () => step(-1), forth: () => step(1), restart: reset,
     closer: () => zoom(1.25), farther: () => zoom(0.8), fit: view(stage.fit),
+    "save-svg": () => downloads.saveText(`${downloads.fileName(DATA.name)}.svg`, stage.toSvg(), "image/svg+xml"),
     "mode-replay": () => setMode("replay"), "mode-live": () => { if (!isLive()) { setMode("live"); setPlaying(true); } },
   };
   for (const [id, action] of Object.entries(actions)) byId(id).addEventListener("click", action);
@@ -314,6 +315,8 @@ const player = (() => {
     slider.min = replay.begin;
     slider.max = replay.end;
   }
+  byId("save-svg").hidden = Boolean(stage.failed);
+  listenToPrinting(stage, plotting.plots);
   listenToKeys({ canvas, stage, setPlaying, step, goTo, reset, zoom, redraw, pointer, clock, replay, isLive });
   byId("modes").hidden = !DATA.live || !replay;
   say("");

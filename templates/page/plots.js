@@ -146,6 +146,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       button("Curves", "Add or remove curves", () => choose(plot), "small bare"),
       button("x axis", "Choose what lies along the horizontal axis", () => chooseAcross(plot), "small bare"),
       button("PNG", "Save this plot as a picture", () => savePicture(plot), "small bare"),
+      button("SVG", "Save this plot as a vector graphic", () => saveVectors(plot), "small bare"),
       button("×", "Remove this plot", () => removePlot(plot), "small bare"),
     );
     plot.box = plot.root.appendChild(make("div", "plot-box"));
@@ -314,6 +315,19 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     picture.toBlob((blob) => blob && downloads.save(`${downloads.fileName(`${name}_${plot.spec.y[0]}`)}.png`, blob));
   }
 
+  function vectorsOf(plot) {
+    const colors = { ink: "--ink", faint: "--faint", rule: "--rule", paper: "--card" };
+    const looks = Object.fromEntries(Object.entries(colors).map(([key, name]) => [key, paint(`var(${name})`)]));
+    const curves = plot.spec.y.map((key) =>
+      ({ label: channels.get(key).label, color: paint(colorName(plot, key)), dash: dashOf(plot, key) }));
+    return vectors.plot(plot.chart.plot(), curves, { ...looks, corners: plot.chart.corners(), title: name });
+  }
+
+  function saveVectors(plot) {
+    if (!plot.chart) return;
+    downloads.saveText(`${downloads.fileName(`${name}_${plot.spec.y[0]}`)}.svg`, vectorsOf(plot), "image/svg+xml");
+  }
+
   // ---- Drawing, at most once a frame ----
 
   function change(what) {
@@ -376,6 +390,8 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       specs.forEach(addPlot);
     },
     specs: () => plots.map(({ spec }) => ({ x: spec.x, y: [...spec.y] })),
+    // Each plot as SVG, and the box that it is drawn in.
+    drawings: () => plots.filter(({ chart }) => chart).map((plot) => ({ box: plot.box, source: vectorsOf(plot) })),
     keys: () => [...new Set(plots.flatMap(({ spec }) => [...(spec.x ? [spec.x] : []), ...spec.y]))],
     // What to show at first: the first positions of one unit, and the energies.
     first() {

@@ -156,6 +156,8 @@ const charts = (() => {
         u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT.time });
       },
       canvas: () => u.ctx.canvas,
+      plot: () => u,
+      corners: () => units.map((unit, i) => numbers.axisUnit(unit, exponents[`y${i}`] ?? 0)),
       destroy: () => u.destroy(),
     };
     plotGestures(u.over, box, {
@@ -223,6 +225,8 @@ const charts = (() => {
 
     const unit = place.channel(spec.y[0]).unit;
     const nameOf = (key) => place.channel(key).label;
+    const aboveAxis = () =>
+      [spec.y.length === 1 ? nameOf(spec.y[0]) : "", numbers.axisUnit(unit, exponents.y0 ?? 0)].filter(Boolean).join(", ");
     const u = new uPlot({
       mode: 2,
       width: Math.max(box.clientWidth, 120),
@@ -244,8 +248,7 @@ const charts = (() => {
       cursor: { show: false },
       hooks: {
         draw: [
-          (self) => corner(self, place,
-            [spec.y.length === 1 ? nameOf(spec.y[0]) : "", numbers.axisUnit(unit, exponents.y0 ?? 0)].filter(Boolean).join(", "), false),
+          (self) => corner(self, place, aboveAxis(), false),
           () => chart?.mark(),
         ],
       },
@@ -304,6 +307,8 @@ const charts = (() => {
         u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT.phase });
       },
       canvas: () => u.ctx.canvas,
+      plot: () => u,
+      corners: () => [aboveAxis()],
       destroy: () => u.destroy(),
     };
     function look(next) {

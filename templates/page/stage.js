@@ -188,6 +188,10 @@ const makeStage = (canvas, mechanism) => {
     renderer.render(scene, camera);
   };
 
+  // What was drawn last, as SVG;
+  stage.toSvg = () => vectors.picture(scene, view, size, paper.getStyle(),
+    { sun: sun.position.clone().sub(sun.target.position).toArray(), light: LIGHT, ambient: AMBIENT }, DATA.heading);
+
   // Whether the centres of mass of all bodies are out of the picture.
   const isGone = () => drawing.bodies.every((_, k) => {
     const [x, y] = view.toScreen(center(now.poses, k));

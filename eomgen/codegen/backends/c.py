@@ -94,24 +94,25 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
 def files_of(values: Mapping[str, Any], interface: Interface) -> dict[str, str]:
     """The same from the values for their templates."""
     name = interface.name
-    shared = {key: values[key] for key in _SHARED}
     return {
         f"{name}.c": render(TEMPLATES, "module.c.jinja", values),
         f"{name}.h": render(
-            TEMPLATES,
-            "module.h.jinja",
-            {
-                **shared,
-                "guard": f"{name.upper()}_H",
-                "title": _plain(interface.title),
-                "form": interface.form,
-                "states": _table(interface.states),
-                "inputs": _table(interface.inputs),
-                "parameters": _table(interface.parameters),
-                "held": len(values["held"]),
-                "left_out": interface.left_out,
-            },
+            TEMPLATES, "module.h.jinja", {**header(values, interface), "form": interface.form}
         ),
+    }
+
+
+def header(values: Mapping[str, Any], interface: Interface) -> dict[str, Any]:
+    """Values for a header, from those for the source."""
+    return {
+        **{key: values[key] for key in _SHARED},
+        "guard": f"{interface.name.upper()}_H",
+        "title": _plain(interface.title),
+        "states": _table(interface.states),
+        "inputs": _table(interface.inputs),
+        "parameters": _table(interface.parameters),
+        "held": len(values["held"]),
+        "left_out": interface.left_out,
     }
 
 
