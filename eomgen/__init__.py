@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from eomgen.api.exporting import export
     from eomgen.api.generating import generate, load
     from eomgen.api.given import check, read
+    from eomgen.api.importing import import_robot
     from eomgen.api.linearising import linearise
     from eomgen.api.reopening import load_run
     from eomgen.api.simulating import simulate
@@ -50,6 +51,7 @@ __all__ = [
     "generate",
     "grid",
     "horizon",
+    "import_robot",
     "linearise",
     "load",
     "load_run",
@@ -68,6 +70,7 @@ _PLACES = {
     "derive": "api.deriving",
     "export": "api.exporting",
     "gallery": "api.exhibiting",
+    "import_robot": "api.importing",
     "linearise": "api.linearising",
     "load_run": "api.reopening",
     "simulate": "api.simulating",
