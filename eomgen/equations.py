@@ -1,7 +1,7 @@
 """The equations of motion of a mechanism with their derivation, as `derive` returns them."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -70,8 +70,10 @@ class Derivation:
 
     @property
     def F(self) -> "Expr":
-        """All other generalised forces, (nv, 1), on the right side. Forces of effects that depend on
-        the motion are symbols in it; `written_out` puts their expressions in place.
+        """All other generalised forces, (nv, 1), on the right side.
+
+        Forces of effects that depend on the motion are symbols in it; `written_out` puts their
+        expressions in place.
         """
         return self.matrices.F
 
@@ -97,8 +99,8 @@ class Derivation:
     def meanings(self) -> dict[str, str]:
         """What each symbol is, with its unit, by name."""
         model = self.model
-        known = (*model.coordinates, *model.velocities, *model.states)
-        known += (*model.inputs, *model.parameters)
+        known: list[Any] = [*model.coordinates, *model.velocities, *model.states]
+        known += [*model.inputs, *model.parameters]
         meanings = {x.name: ", ".join(filter(None, (x.about, x.unit))) for x in known}
         rates = {c.acceleration: f"time derivative of {c.name}" for c in model.velocities}
         return {**meanings, **rates, TIME: "time, s"}

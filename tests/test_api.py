@@ -138,7 +138,7 @@ def test_forces_of_effects_are_written_out() -> None:
     found = eomgen.derive({**DROP, "joints": [pin], "effects": [motor], "initial": {}})
     angle, t = found.symbols["pin_angle_dot"], found.symbols["t"]
     assert found.F.free_symbols.isdisjoint({angle, t})
-    assert found.written_out(found.F) == sp.Matrix([3.0 * sp.sin(t) - sp.tanh(angle)])
+    assert found.written_out(found.F) == sp.Matrix([3 * sp.sin(t) - sp.tanh(angle)])
     assert found.written_out(found.F).free_symbols == {angle, t}
 
 

@@ -10,6 +10,7 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, values_of
 from eomgen.api.inputs import Inputs, constant_inputs
 from eomgen.api.linearising import Linearised, Place, Point, linearisable, linearised_at
+from eomgen.api.states import state_names
 from eomgen.errors import RunError, nearest
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
@@ -106,8 +107,10 @@ def nonlinear_system(source: Source, *, outputs: Sequence[str] = ()) -> Any:
     )
 
 
-def _states(model: Model) -> list[str]:
-    return [x.name for x in (*model.coordinates, *model.velocities, *model.states)]
+def _states(model: Model) -> tuple[str, ...]:
+    """The names of [q, v, x]."""
+    count = len(model.coordinates) + len(model.velocities) + len(model.states)
+    return state_names(model)[:count]
 
 
 def _outputs_of(names: Sequence[str], states: Sequence[str]) -> tuple[str, ...]:
