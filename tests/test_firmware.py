@@ -53,12 +53,15 @@ def test_steps_and_the_filter_are_those_of_the_module(number: Number) -> None:
     np.testing.assert_allclose(covariance, ahead - np.outer(gain, ahead[1]), atol=limit)
 
 
-def test_quaternions_stay_of_unit_length() -> None:
-    """After a thousand steps, beside our own run of the same method."""
-    made = Firmware("tumbling_body", "double")
-    run = eomgen.simulate("tumbling_body", integrator="rk4", dt=1e-3, t_end=1.0, samples=2)
-    end = made.stepped(run.y[0], (), 1e-3, 1000)
-    np.testing.assert_allclose(end, run.y[-1], atol=1e-11)
+@pytest.mark.parametrize(
+    "scene", ["tumbling_body", pytest.param("four_bar", marks=pytest.mark.full)]
+)
+def test_steps_keep_quaternions_and_loops(scene: str) -> None:
+    """After half a thousand steps, beside our own run of the same method."""
+    made = Firmware(scene, "double")
+    run = eomgen.simulate(scene, integrator="rk4", dt=1e-3, t_end=0.5, samples=2)
+    inputs = [i.default for i in eomgen.check(scene).inputs]
+    np.testing.assert_allclose(made.stepped(run.y[0], inputs, 1e-3, 500), run.y[-1], atol=1e-11)
 
 
 def test_the_example_estimates_what_is_not_measured(tmp_path: Path) -> None:

@@ -178,7 +178,9 @@ def test_same_scene_same_bytes_and_nothing_foreign_is_replaced(
         assert any(name.startswith("binaries") for name in made.namelist())
 
 
-def test_what_a_unit_cannot_hold_is_refused(tmp_path: Path) -> None:
+def test_what_a_unit_cannot_hold_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """One clear line, and no file."""
     with pytest.raises(SceneError, match=r"form: .*leave it out"):
         eomgen.export("two_body", "fmu", tmp_path / "x.fmu", form="momentum")
@@ -187,6 +189,8 @@ def test_what_a_unit_cannot_hold_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="unknown name 'fmi'"):
         eomgen.export("two_body", "fmi", tmp_path / "x.fmu")
     assert not list(tmp_path.iterdir())
+    assert main(["export", "two_body", "--fmu", "--float"]) == 1
+    assert capsys.readouterr().err == "eomgen: --float: not an option of fmu; only of firmware\n"
 
 
 def test_units_have_their_dimensions(folder: Path) -> None:

@@ -59,7 +59,7 @@ def exported(
     """As `export`, for a model. `name` replaces the scene's in the default path; `remark` is called
     with what the user should know.
     """
-    found, exporter = find_format(format, options)
+    found, exporter = find_format(format, options, reporter.argument)
     target = path or Path(f"{name or model.name}{found.suffix or f'_{format}'}")
     if found.suffix:
         check_writable(target, force=force)

@@ -28,6 +28,7 @@ OPTIONS = {
     "inputs": "--input",
     "state": "--state",
     "motion": "--motion-time",
+    "number": "--float",
     "parameters": "--set",
     "resume": "--from",
 }

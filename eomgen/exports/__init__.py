@@ -4,7 +4,7 @@ To add a format, write its module here, with a function `files(model, options)`,
 `FORMATS`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Literal, Protocol, cast
@@ -78,8 +78,11 @@ FORMATS: dict[str, Format] = {
 }
 
 
-def find_format(name: str, options: Options) -> tuple[Format, Exporter]:
-    """The format of that name, whose module is `eomgen.exports.NAME`.
+def find_format(
+    name: str, options: Options, called: Callable[[str], str] = str
+) -> tuple[Format, Exporter]:
+    """The format of that name, whose module is `eomgen.exports.NAME`; `called` gives the names of
+    options in messages.
 
     Raises `RunError` if there is none, or if it does not take one of the options.
     """
@@ -90,5 +93,5 @@ def find_format(name: str, options: Options) -> tuple[Format, Exporter]:
     for option in CHOICES:
         if getattr(options, option) != getattr(Options(), option) and option not in found.options:
             takers = ", ".join(n for n, each in FORMATS.items() if option in each.options)
-            raise RunError(f"{option}: not an option of {name}; only of {takers or 'none'}")
+            raise RunError(f"{called(option)}: not an option of {name}; only of {takers}")
     return found, cast(Exporter, import_module(f"{__name__}.{name}"))
