@@ -71,8 +71,8 @@ def check_at(functions: Any, module: Any, y: Any, t: float = 0.3) -> None:
 @pytest.mark.parametrize(
     "source",
     [
-        *("cart_pole", "babyboot", "two_body_forced", "tumbling_body", "bouncing_two_body"),
-        *("four_bar", "chain_in_wind", CORNERS, LANDING),
+        *("cart_pole", "babyboot", "tumbling_body", "bouncing_two_body"),
+        *("four_bar", CORNERS, LANDING),
     ],
     ids=lambda source: source if isinstance(source, str) else source["name"],
 )

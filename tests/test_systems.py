@@ -32,7 +32,7 @@ def test_the_state_space_of_a_cart_and_pole() -> None:
     [
         ("spinning_top", ["body_poses", "momentum", "kinetic_energy", "tip_wx"]),
         ("four_bar", ["body_poses.coupler", "body_velocities.coupler", "momentum"]),
-        ("two_body_forced", ["centre_of_mass", "joint_forces", "phi"]),
+        ("acrobot", ["centre_of_mass", "joint_forces", "theta_2"]),
     ],
 )
 def test_c_is_the_slope_of_the_outputs(scene: str, outputs: list[str]) -> None:
