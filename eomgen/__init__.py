@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from eomgen.api.reopening import load_run
     from eomgen.api.simulating import simulate
     from eomgen.api.sweeping import Ensemble, ensemble, grid, sampled
+    from eomgen.api.symbolic import casadi_functions
+    from eomgen.api.systems import nonlinear_system, state_space
     from eomgen.api.verifying import horizon, verify
     from eomgen.equations import Derivation
     from eomgen.errors import EomgenError, RunError, SceneError
@@ -39,6 +41,7 @@ __all__ = [
     "accuracy",
     "arithmetic",
     "built_in_names",
+    "casadi_functions",
     "check",
     "derive",
     "effects",
@@ -52,9 +55,11 @@ __all__ = [
     "linearise",
     "load",
     "load_run",
+    "nonlinear_system",
     "read",
     "sampled",
     "simulate",
+    "state_space",
     "verify",
 ]
 
@@ -69,7 +74,9 @@ _PLACES = {
     "linearise": "api.linearising",
     "load_run": "api.reopening",
     "simulate": "api.simulating",
+    **dict.fromkeys(("nonlinear_system", "state_space"), "api.systems"),
     **dict.fromkeys(("Ensemble", "ensemble", "grid", "sampled"), "api.sweeping"),
+    "casadi_functions": "api.symbolic",
     **dict.fromkeys(("horizon", "verify"), "api.verifying"),
     **dict.fromkeys(("accuracy", "arithmetic"), "api.accuracy"),
     "effects": "api.effects",

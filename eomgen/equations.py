@@ -1,10 +1,11 @@
 """The equations of motion of a mechanism with their derivation, as `derive` returns them."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
+from eomgen.program.tape import TIME
 
 if TYPE_CHECKING:
     from eomgen.derivation.matrices import Matrices
@@ -69,16 +70,53 @@ class Derivation:
 
     @property
     def F(self) -> "Expr":
-        """All other generalised forces, (nv, 1), on the right side."""
+        """All other generalised forces, (nv, 1), on the right side.
+
+        Forces of effects that depend on the motion are symbols in it; `written_out` puts their
+        expressions in place.
+        """
         return self.matrices.F
+
+    @property
+    def vd(self) -> "Expr":
+        """The accelerations v̇ = M⁻¹ (F - V - G), (nv, 1), written out as `solution` is."""
+        import sympy as sp
+
+        return sp.Matrix(list(self.solution.values()))
+
+    @property
+    def symbols(self) -> "dict[str, Expr]":
+        """The symbols of the equations by name: coordinates, velocities, accelerations, states of
+        controllers, inputs, parameters and the time t, as far as they occur.
+        """
+        found = self.matrices
+        values = [found.M, found.V, found.G, found.F, *(value for _, value in found.definitions)]
+        free = {s.name: s for value in values for s in value.free_symbols}
+        free |= {s.name: s for s in (*found.q, *found.v, *found.a)}
+        return {name: free[name] for name in self.meanings if name in free}
+
+    @property
+    def meanings(self) -> dict[str, str]:
+        """What each symbol is, with its unit, by name."""
+        model = self.model
+        known: list[Any] = [*model.coordinates, *model.velocities, *model.states]
+        known += [*model.inputs, *model.parameters]
+        meanings = {x.name: ", ".join(filter(None, (x.about, x.unit))) for x in known}
+        rates = {c.acceleration: f"time derivative of {c.name}" for c in model.velocities}
+        return {**meanings, **rates, TIME: "time, s"}
+
+    def written_out(self, expression: "Expr") -> "Expr":
+        """An expression over q, v, t, inputs and parameters alone: all other symbols, as those of
+        forces, are replaced by what they stand for. With loops their multipliers λ stay.
+        """
+        from eomgen.derivation.matrices import written_out
+
+        return written_out(expression, self.matrices.definitions)
 
     @property
     def solution(self) -> "dict[Expr, Expr]":
         """Each acceleration as an expression in q, v, parameters and inputs."""
-        from eomgen.derivation.matrices import written_out
-
-        found = self.matrices
-        return {a: written_out(a, found.definitions) for a in found.a}
+        return {a: self.written_out(a) for a in self.matrices.a}
 
     @property
     def steps(self) -> "tuple[Step, ...]":

@@ -35,8 +35,8 @@ SIGNATURES = (
     b"!\xfe\x06eomgen\0",  # GIF: a comment
 )
 """Every file that this program writes has one of these in its first `SIGNED_WITHIN` bytes."""
-SIGNED_AT_END = b"eomgen film"
-"""What films have there instead, in their last bytes: the comment of an MP4 comes last."""
+SIGNED_AT_END = (b"eomgen film", SIGNATURES[0])
+"""What films, and functions for CasADi, have in their last bytes instead."""
 SIGNED_WITHIN = 2048
 PIECE = 2**20
 """Bytes that are read in one call."""
@@ -118,10 +118,11 @@ def check_writable(path: Path, *, force: bool = False) -> None:
 
 
 def _ends_as_ours(file: BinaryIO) -> bool:
-    """Whether a file ends like a film of this program."""
+    """Whether a file ends like one of this program that cannot begin with a signature."""
     size = file.seek(0, os.SEEK_END)
     file.seek(max(0, size - SIGNED_WITHIN))
-    return SIGNED_AT_END in file.read(SIGNED_WITHIN)
+    tail = file.read(SIGNED_WITHIN)
+    return any(signature in tail for signature in SIGNED_AT_END)
 
 
 def check_folder(path: Path) -> None:

@@ -112,12 +112,34 @@ def test_the_matrices_are_the_equations(scene: str) -> None:
     M, rest = number(found.M), number(found.F - found.V - found.G).ravel()
     assert found.M == found.M.T
     assert M @ rates == pytest.approx(rest, rel=1e-12, abs=1e-12)
-    solved = number(sp.Matrix([found.solution[a] for a in found.matrices.a])).ravel()
-    assert solved == pytest.approx(rates, rel=1e-12)
+    assert list(found.vd) == [found.solution[a] for a in found.matrices.a]
+    assert number(found.vd).ravel() == pytest.approx(rates, rel=1e-12)
+    assert sp.sympify(sp.srepr(found.vd)) == found.vd
+    free = (found.M.free_symbols | found.vd.free_symbols) - {*found.symbols.values()}
+    assert not free and found.symbols.keys() <= found.meanings.keys()
+    assert found.symbols["g"].is_real and "m/s^2" in found.meanings["g"]
     assert found._repr_latex_().startswith("$\\displaystyle ")
     assert found.text().startswith(found.title) and "<html" in found.html()
     again = pickle.loads(pickle.dumps(found))
     assert again.M == found.M and again.solution == found.solution
+
+
+def test_forces_of_effects_are_written_out() -> None:
+    """F names them; `written_out` says what they are, as formulas of the motion and the time."""
+    import sympy as sp
+
+    motor = {
+        "type": "motor",
+        "name": "push",
+        "joint": "pin",
+        "torque": "3*sin(t) - tanh(pin_angle_dot)",
+    }
+    pin = {"name": "pin", "type": "revolute", "parent": "world", "child": "ball"}
+    found = eomgen.derive({**DROP, "joints": [pin], "effects": [motor], "initial": {}})
+    angle, t = found.symbols["pin_angle_dot"], found.symbols["t"]
+    assert found.F.free_symbols.isdisjoint({angle, t})
+    assert found.written_out(found.F) == sp.Matrix([3 * sp.sin(t) - sp.tanh(angle)])
+    assert found.written_out(found.F).free_symbols == {angle, t}
 
 
 def test_a_module(tmp_path: Path) -> None:

@@ -71,8 +71,10 @@ class Format:
 CHOICES = ("number",)
 """The options that only some formats take."""
 FORMATS: dict[str, Format] = {
+    "casadi": Format("a function for CasADi, which its `Function.load` reads", ".casadi"),
     "fmu": Format("an FMI 3.0 unit for model exchange and co-simulation", ".fmu"),
     "firmware": Format("a folder with C99 for firmware", options=("number",)),
+    "matlab": Format("a folder with functions for MATLAB and Octave"),
 }
 
 

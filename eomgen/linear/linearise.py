@@ -85,6 +85,12 @@ class Linearisation:
         )
 
     @property
+    def basis(self) -> FloatArray:
+        """T (ny, n) of δy = T δx, where δx are the deviations of the `reduced` system."""
+        free = tangents(self.y, self.quaternions)
+        return free @ self.manifold.T if self.manifold else free
+
+    @property
     def modes(self) -> tuple[Mode, ...]:
         """The modes of the `reduced` system, the fastest growing first."""
         return tuple(modes(self.reduced().A))

@@ -10,10 +10,12 @@ works, inputs          what the run keeps of them
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from eomgen.errors import RunError, nearest
+from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
@@ -179,12 +181,7 @@ def _of_output(
         rows = np.searchsorted(run.trajectory.t, t, side="right") - 1
         held = held_rows(run.trajectory)[rows].reshape(-1, *[1] * (array.ndim - 1))
         array = np.where(held, np.nan, array)
-    shape = array.shape[1:]
-    axes = spec.of(run.model.dimensions)[0]
-    labels = [
-        list(labels_of(output, axis, count, run.model, run.functions, last=i == len(shape) - 1))
-        for i, (axis, count) in enumerate(zip(axes, shape, strict=True))
-    ]
+    labels = _labels(output, array.shape[1:], run.model, run.functions)
     columns = array.reshape(len(t), -1)
     flat = _all(labels)
     units = [_unit(output, entry, run) for entry in flat]
@@ -202,6 +199,29 @@ def _of_output(
             columns[:, index],
             sizes[units[index]],
         )
+
+
+def components(
+    name: str, shape: tuple[int, ...], model: Model, functions: Any, argument: str
+) -> list[tuple[int, str]]:
+    """The entries of an output of this shape that a name chooses, as in `quantities`: the place of
+    each in the flat array, and its whole name. Raises `RunError` for an unknown component.
+    """
+    output, *parts = name.split(".")
+    labels = _labels(output, shape, model, functions)
+    flat = _all(labels)
+    chosen = _chosen(output, parts, labels, argument)
+    return [(flat.index(entry), ".".join((output, *entry))) for entry in chosen]
+
+
+def _labels(output: str, shape: tuple[int, ...], model: Model, functions: Any) -> list[list[str]]:
+    """The names along each axis of an output."""
+    axes = OUTPUTS[output].of(model.dimensions)[0]
+    last = len(shape) - 1
+    return [
+        list(labels_of(output, axis, count, model, functions, last=i == last))
+        for i, (axis, count) in enumerate(zip(axes, shape, strict=True))
+    ]
 
 
 def _all(labels: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
