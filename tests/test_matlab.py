@@ -1,9 +1,7 @@
-"""Functions for MATLAB: by a reader of their straight lines, and by Octave where there is one."""
+"""Functions for MATLAB, by a reader of their straight lines; see `campaigns/octave.py`."""
 
 import math
 import re
-import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -86,45 +84,6 @@ def test_the_lines_are_those_of_the_module(source: Any) -> None:
     main_file = found[f"{module.NAME}.m"]
     start = main_file.split("result = [\n")[1].split("    ];")[0].split()
     assert np.array_equal([float(x) for x in start], module.initial_state())
-
-
-@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="there is no Octave")
-def test_octave_computes_the_same(tmp_path: Path) -> None:
-    """It reads the files and returns the same bits; it refuses a state of another length, and
-    parameters that make no mechanism.
-    """
-    script, wanted = [], []
-    for source in SCENES:
-        found, module = files(source)
-        given = "; ".join(
-            f"{name} = [{' '.join(map(repr, values.tolist()))}]'"
-            for name, values in zip("ypu", arguments(module), strict=True)
-        )
-        script += [f"{given};"]
-        for name, text in found.items():
-            (tmp_path / name).write_text(text, "utf-8")
-            if output := checked(module, name):
-                called = f"r = {name[:-2]}(0.3, y, p, u)"
-                script += [f"{called}; printf('%.17g ', r'); disp('');"]
-                wanted.append(getattr(module, output)(0.3, *arguments(module)))
-    # At a corner the branch taken is that of the module, as its derivatives show.
-    script += ["printf('%.17g ', corners_jacobian(0, [0; 0])'); disp('');"]
-    wanted.append(module.jacobian(0.0, np.zeros(2)))
-    script += [
-        "try; cart_pole(0, 1); catch e; disp(e.message); end",
-        "try; cart_pole(0, [0 0 0 0], [-1 1 1 1 1]); catch e; disp(e.message); end",
-        "disp(size(cart_pole()));",
-    ]
-    (tmp_path / "all_of_them.m").write_text("\n".join(script), "utf-8")
-    command = ["octave-cli", "--norc", "--path", str(tmp_path), str(tmp_path / "all_of_them.m")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    *lines, short, negative, start = done.stdout.splitlines()
-    assert len(lines) == len(wanted) > 30, done.stderr
-    for line, value in zip(lines, wanted, strict=True):
-        assert np.array_equal([float(x) for x in line.split()], np.ravel(value))
-    assert short == "cart_pole: y, p and u need 4, 5 and 1 numbers"
-    assert negative == "cart_pole: mass of cart: change the parameters"
-    assert start.split() == ["4", "1"]
 
 
 def test_names_that_matlab_would_cut(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from eomgen.text import spelled
 
 EOMGEN = (sys.executable, "-m", "eomgen")
 QUICK = "--no-arithmetic --quick --methods rk4 --t-end 0.1 --run-time 1"
+ARM = Path(__file__).parent / "arm.urdf"
 COMMANDS = {
     "list": "list",
     "show": "show pendulum",
@@ -34,6 +35,7 @@ COMMANDS = {
     "completion": "completion bash",
     "schema": "schema",
     "reference": "reference",
+    "import": f"import {ARM} -o {{out}}/arm.toml",
     "check": "check two_body",
     "derive": "derive two_body",
     "generate": "generate pendulum -o {out}",
@@ -53,6 +55,7 @@ QUICKER = [name for name in COMMANDS if name != "accuracy"]
 WRITES = {
     "new": 1,
     "copy": 1,
+    "import": 1,
     "generate": 1,
     "export": 3,
     "simulate": 5,
