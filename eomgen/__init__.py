@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from eomgen.api.exhibiting import gallery
     from eomgen.api.generating import generate, load
     from eomgen.api.given import check, read
+    from eomgen.api.importing import import_robot
     from eomgen.api.linearising import linearise
     from eomgen.api.reopening import load_run
     from eomgen.api.simulating import simulate
@@ -45,6 +46,7 @@ __all__ = [
     "generate",
     "grid",
     "horizon",
+    "import_robot",
     "linearise",
     "load",
     "load_run",
@@ -60,6 +62,7 @@ _PLACES = {
     "Derivation": "equations",
     "derive": "api.deriving",
     "gallery": "api.exhibiting",
+    "import_robot": "api.importing",
     "linearise": "api.linearising",
     "load_run": "api.reopening",
     "simulate": "api.simulating",

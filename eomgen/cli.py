@@ -15,6 +15,7 @@ from eomgen.options import (
     add_folder,
     add_force,
     add_gallery,
+    add_import,
     add_inputs,
     add_parameters,
     add_plot,
@@ -231,6 +232,8 @@ def _scene_files(command: Command) -> None:
         "name", metavar="NAME", type=path, nargs="?", help="the copy is NAME.toml (the scene's)"
     )
     add_force(copy)
+    about = "write a robot file, URDF or MJCF, as a scene"
+    add_import(command("import", commands.import_, about, None))
 
 
 def _form(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:

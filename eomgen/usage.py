@@ -12,6 +12,7 @@ EXAMPLES = {
     "show": "eomgen show pendulum",
     "new": "eomgen new swing",
     "copy": "eomgen copy cart_pole my_cart",
+    "import": "eomgen import robot.urdf -o robot.toml",
     "completion": "eomgen completion bash > ~/.local/share/bash-completion/completions/eomgen",
     "schema": "eomgen schema > scene.schema.json",
     "reference": "eomgen reference contact",

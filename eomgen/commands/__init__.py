@@ -33,6 +33,13 @@ def copy(given: Arguments) -> int:
     return scene_files.copy(given)
 
 
+def import_(given: Arguments) -> int:
+    """Write a robot file as a scene."""
+    from eomgen.commands import importing
+
+    return importing.import_(given)
+
+
 def completion(given: Arguments) -> int:
     """Print the completion of a shell."""
     from eomgen.commands import completing

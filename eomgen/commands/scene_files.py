@@ -7,6 +7,7 @@ from pathlib import Path
 from eomgen.errors import RunError
 from eomgen.files import write_whole
 from eomgen.scene.built_in import START
+from eomgen.scene.importers import is_robot_file
 from eomgen.scene.reader import LARGEST_FILE, find_scene, parse_scene, scene_text
 
 _NAME = re.compile(r"""^name\s*=\s*("[^"\n]*"|'[^'\n]*')""", re.MULTILINE)
@@ -29,6 +30,8 @@ def new(given: argparse.Namespace) -> int:
 def copy(given: argparse.Namespace) -> int:
     """Copy a scene, which takes the name of its new file."""
     path = find_scene(given.scene)
+    if is_robot_file(path):
+        raise RunError(f"{path}: is a robot file; eomgen import writes it as a scene")
     _write(scene_text(path), given.name or Path(path.name), given.force)
     return 0
 

@@ -94,6 +94,7 @@ def elaborate(scene: Scene) -> Model:
         constraints=constraints,
         held=start.given if constraints else (),
         notices=(
+            *scene.remarks,
             *dict.fromkeys(lengths),
             *dict.fromkeys(notice for body in bodies for notice in body.notices),
             *start.notices,

@@ -12,6 +12,8 @@ from eomgen.errors import SceneError, nearest
 from eomgen.files import read_plain
 from eomgen.language.base import LARGEST
 from eomgen.scene.built_in import BUILT_IN, built_in_names
+from eomgen.scene.importers import import_file, is_robot_file
+from eomgen.scene.importers.imported import Imported
 from eomgen.scene.lines import with_lines
 from eomgen.scene.mistakes import mistakes, shown
 from eomgen.scene.schema import MOST, Scene
@@ -55,11 +57,14 @@ def find_scene(scene: str) -> Path:
 
 
 def read_scene(scene: str | Path) -> Scene:
-    """Read a scene from a path or by its built-in name.
+    """Read a scene from a path or by its built-in name. A robot file (URDF, MJCF) is imported, and
+    what the scene lacks of it is in `remarks`.
 
     Raises `SceneError` with a message for each mistake: line of the file, location, value, remedy.
     """
     path = find_scene(scene) if isinstance(scene, str) else scene
+    if is_robot_file(path):
+        return imported_scene(import_file(path), path.name)
     text = scene_text(path)
     try:
         return parse_scene(text, path.name)
@@ -108,6 +113,11 @@ def read_tables(tables: Mapping[Any, Any], source: str = "scene") -> Scene:
     except RecursionError:
         raise SceneError(f"{source}: is nested too deep") from None
     return _scene(table, source)
+
+
+def imported_scene(imported: Imported, source: str) -> Scene:
+    """The scene of an imported file, which `source` names. Raises `SceneError`."""
+    return read_tables(imported.tables, source).with_remarks(imported.remarks)
 
 
 def _plain(value: Any) -> Any:

@@ -1,9 +1,16 @@
 """The scene: all tables and keys of the language."""
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, Strict, ValidationError
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    Strict,
+    ValidationError,
+)
 
 from eomgen.displays import Displayed
 from eomgen.integrators import INTEGRATORS
@@ -291,6 +298,19 @@ class Scene(Table, Displayed):
     initial: Initial = Field(default=Initial(), description="initial state")
     simulation: Simulation = Field(default=Simulation(), description="settings of a run")
     camera: Camera = Field(default=Camera(), description="camera of pictures")
+
+    _remarks: tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What an imported file says and this scene lacks, one sentence each."""
+        return self._remarks
+
+    def with_remarks(self, remarks: tuple[str, ...]) -> Self:
+        """A copy with these remarks."""
+        copy = self.replaced()
+        copy._remarks = remarks
+        return copy
 
     def __init__(self, **tables: Any) -> None:
         try:

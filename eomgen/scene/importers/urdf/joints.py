@@ -1,0 +1,199 @@
+"""Joints of a URDF file as joints, effects and constraints of a scene."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from eomgen.scene.importers.attributes import Vector
+from eomgen.scene.importers.rotations import (
+    EYE,
+    angles_of,
+    image,
+    rotation,
+    squared,
+    times,
+    to_axis,
+    transposed,
+)
+from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved
+from eomgen.scene.joints.base import WORLD
+
+Tables = list[dict[str, Any]]
+SLIDING_SPEED = "friction_speed"
+"""The parameter of the speed at which Coulomb friction is smoothed, rad/s or m/s."""
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names of bodies by link, and of joints by joint."""
+
+    bodies: Mapping[str, str]
+    joints: Mapping[str, str]
+
+    def of_parent(self, joint: Joint) -> str:
+        """The body, or the world, that carries a joint."""
+        return self.bodies[joint.parent]
+
+
+@dataclass
+class Mechanism:
+    """Tables of a scene, and what remarks are about."""
+
+    bodies: Tables = field(default_factory=list)
+    joints: Tables = field(default_factory=list)
+    effects: Tables = field(default_factory=list)
+    constraints: Tables = field(default_factory=list)
+    locked: dict[str, float] = field(default_factory=dict)
+    start: dict[str, float] = field(default_factory=dict)
+    unlimited: list[str] = field(default_factory=list)
+    clipped: list[str] = field(default_factory=list)
+
+
+def add_joints(tree: Tree, names: Names, made: Mechanism) -> None:
+    """The joints of a tree, each with its friction, motor and coupling."""
+    for joint in moved(tree):
+        name = names.joints[joint.name]
+        if joint.kind in SINGLE:
+            made.joints.append(_single(joint, name, names, made))
+        elif joint.kind == "fixed":
+            made.joints.append(_table(joint, name, "weld", names))
+        elif joint.kind == "planar":
+            _add_planar(joint, name, names, made)
+        else:
+            _add_floating(joint, name, names, made)
+    singles = {joint.name: joint for joint in moved(tree) if joint.kind in SINGLE}
+    for joint in singles.values():
+        name = names.joints[joint.name]
+        _add_coupling(joint, names, tree, made)
+        made.effects += _friction(joint, name)
+    for joint in singles.values():
+        if joint.mimic is None:
+            name = names.joints[joint.name]
+            made.effects.append(
+                {"type": "motor", "name": f"{name}_motor", "joint": name, "torque": "input"}
+            )
+
+
+def _table(joint: Joint, name: str, kind: str, names: Names) -> dict[str, Any]:
+    """The keys that all joints have."""
+    table: dict[str, Any] = {
+        "name": name,
+        "type": kind,
+        "parent": names.of_parent(joint),
+        "child": names.bodies[joint.child],
+    }
+    if any(joint.at):
+        table["r_parent"] = list(joint.at)
+    if any(joint.angles):
+        table["orientation"] = [squared(angle) for angle in joint.angles]
+    return table
+
+
+def _single(joint: Joint, name: str, names: Names, made: Mechanism) -> dict[str, Any]:
+    """A revolute or prismatic joint, whose coordinate has the joint's name."""
+    kind = "prismatic" if joint.kind == "prismatic" else "revolute"
+    table = _table(joint, name, kind, names)
+    table |= {"axis": list(joint.axis), "coordinate": name}
+    if joint.limits is None:
+        return table
+    low, high = joint.limits
+    if low >= high:
+        made.unlimited.append(joint.name)
+        return table
+    table["limits"] = [low, high]
+    if joint.mimic is None and not low <= 0.0 <= high:
+        made.start[name] = low if low > 0 else high
+        made.clipped.append(joint.name)
+    return table
+
+
+def _add_planar(joint: Joint, name: str, names: Names, made: Mechanism) -> None:
+    """Motion in the plane perpendicular to the axis: along z of a frame between two bodies."""
+    table = _table(joint, name, "planar", names)
+    tilt = to_axis(joint.axis)
+    if tilt == EYE:
+        made.joints.append(table)
+        return
+    between = _massless(f"{names.bodies[joint.child]}_plane", made)
+    turned = times(rotation(joint.angles), tilt)
+    table |= {"child": between, "orientation": _angles(angles_of(turned))}
+    back: dict[str, Any] = {"name": f"{name}_tilt", "type": "weld", "parent": between}
+    back |= {"child": names.bodies[joint.child]}
+    back |= {"orientation": _angles(angles_of(transposed(tilt)))}
+    made.joints += [table, back]
+
+
+def _add_floating(joint: Joint, name: str, names: Names, made: Mechanism) -> None:
+    """Three translations in the joint's axes, then a rotation."""
+    between = _massless(f"{names.bodies[joint.child]}_point", made)
+    slide = _table(joint, f"{name}_slide", "particle", names) | {"child": between}
+    turn = {"name": name, "type": "ball", "parent": between}
+    made.joints += [slide, turn | {"child": names.bodies[joint.child]}]
+
+
+def _massless(name: str, made: Mechanism) -> str:
+    """A body without mass, which is a frame between two joints."""
+    zeros = [0.0, 0.0, 0.0]
+    made.bodies.append({"name": name, "mass": 0.0, "inertia_com": zeros, "com": zeros})
+    return name
+
+
+def _angles(angles: Vector) -> list[float]:
+    return [squared(angle) for angle in angles]
+
+
+def _friction(joint: Joint, name: str) -> Iterator[dict[str, Any]]:
+    table: dict[str, Any] = {"type": "joint_friction", "name": f"{name}_friction", "joint": name}
+    if joint.damping:
+        table["viscous"] = joint.damping
+    if joint.friction:
+        table |= {"coulomb": joint.friction, "speed": SLIDING_SPEED}
+    if len(table) > 3:
+        yield table
+
+
+def _add_coupling(joint: Joint, names: Names, tree: Tree, made: Mechanism) -> None:
+    """The coordinate of a mimic joint is a multiple of that of the joint at the end of the line,
+    or constant if that is fixed.
+    """
+    if joint.mimic is None:
+        return
+    by_name = {other.name: other for other in moved(tree)}
+    factor, offset, master = 1.0, 0.0, joint
+    while master.mimic is not None and master.kind in SINGLE:
+        offset += factor * master.mimic.offset
+        factor *= master.mimic.multiplier
+        master = by_name[master.mimic.of]
+    name = names.joints[joint.name]
+    if master.kind not in SINGLE or factor == 0.0:
+        made.locked[name] = offset
+        return
+    of = names.joints[master.name]
+    text = of if factor == 1.0 else f"{factor!r} * {of}"
+    made.constraints.append(
+        {
+            "type": "coupling",
+            "name": f"{name}_mimic",
+            "coordinate": name,
+            "equals": f"{text} + {offset!r}" if offset else text,
+        }
+    )
+    start = factor * made.start.get(of, 0.0) + offset
+    if start:
+        made.start[name] = start
+
+
+def floating_base(root: str, names: Names) -> dict[str, Any]:
+    """The free joint of the root."""
+    return {"name": f"{names.bodies[root]}_base", "type": "free", "child": names.bodies[root]}
+
+
+def fixed_base(root: str, names: Names) -> dict[str, Any]:
+    """The weld of the root to the world."""
+    body = names.bodies[root]
+    return {"name": f"{body}_base", "type": "weld", "parent": WORLD, "child": body}
+
+
+def world_pose(joint: Joint) -> tuple[Vector, Vector]:
+    """Where a link that is fixed to the world is: position and angles."""
+    return image(EYE, joint.at), joint.angles

@@ -1,0 +1,186 @@
+"""A URDF file as the tables of a scene."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from eomgen.errors import listed
+from eomgen.scene.importers.imported import Imported, Wishes
+from eomgen.scene.importers.names import identifiers, renamed, scene_name
+from eomgen.scene.importers.urdf.joints import (
+    SLIDING_SPEED,
+    Mechanism,
+    Names,
+    add_joints,
+    fixed_base,
+    floating_base,
+)
+from eomgen.scene.importers.urdf.links import body_table
+from eomgen.scene.importers.urdf.shapes import Meshes, colours_of, shapes_of
+from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved, read_tree
+from eomgen.scene.importers.xml_elements import Element
+from eomgen.scene.joints.base import WORLD
+from eomgen.text import brief
+
+GRAVITY = 9.81
+SPEED = 0.01
+"""Speed at which Coulomb friction is smoothed, rad/s or m/s."""
+KNOWN = {
+    "robot": ("link", "joint", "material"),
+    "link": ("inertial", "visual", "collision"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+}
+"""What is read of each element; the rest is listed in a remark."""
+
+
+def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
+    """The scene of a robot. Raises `SceneError`, one line with the line of the file."""
+    if any("xacro" in element.namespace for element in robot.walk()):
+        raise robot.error("has xacro macros; expand them first: xacro robot.xacro > robot.urdf")
+    tree = read_tree(robot)
+    if wishes.floating:
+        tree = _without_world(tree)
+    names = _names(tree)
+    made, remarks = Mechanism(), list[str]()
+    meshes = Meshes((path.parent, *wishes.allowed))
+    strange = _add_bodies(tree, names, made, meshes, colours_of(robot))
+    if names.bodies[tree.root] != WORLD:
+        base = floating_base if wishes.floating else fixed_base
+        made.joints.append(base(tree.root, names))
+    add_joints(tree, names, made)
+    if not wishes.floating and all(joint.kind == "fixed" for joint in moved(tree)):
+        raise robot.error("nothing can move; let the root move freely with --floating")
+    remarks += _remarks(robot, tree, names, made)
+    remarks += _remarks_on_bodies(tree, meshes, strange)
+    name = scene_name(robot.attributes.get("name", ""), path.stem)
+    return Imported(_tables(name, path.name, made), tuple(remarks))
+
+
+def _without_world(tree: Tree) -> Tree:
+    """The tree without a root link named world that carries one link: that is what moves freely."""
+    below = [joint for joint in moved(tree) if joint.parent == tree.root]
+    if tree.root != WORLD:
+        return tree
+    if len(below) != 1 or below[0].kind not in ("fixed", "floating"):
+        raise tree.links[tree.root].error(
+            f"the root link is '{WORLD}', the ground, so it cannot move freely; give it one fixed "
+            "joint to the robot's base, or leave --floating out"
+        )
+    links = {name: link for name, link in tree.links.items() if name != WORLD}
+    carried = {name: joint for name, joint in tree.carried.items() if joint is not below[0]}
+    return Tree(below[0].child, links, carried)
+
+
+def _names(tree: Tree) -> Names:
+    """Names of bodies and joints. A root link named world is the world of the scene."""
+    bodies = {WORLD: WORLD} if tree.root == WORLD else {}
+    bodies |= identifiers((name for name in tree.links if name not in bodies), "link")
+    return Names(bodies, identifiers((joint.name for joint in moved(tree)), "joint"))
+
+
+def _add_bodies(
+    tree: Tree, names: Names, made: Mechanism, meshes: Meshes, colours: Mapping[str, str]
+) -> list[str]:
+    """The bodies of the links; returns the links whose inertia no body can have."""
+    strange = []
+    for name, element in tree.links.items():
+        what = f"link '{brief(name)}'"
+        table, odd = body_table(element, names.bodies[name], what)
+        if names.bodies[name] == WORLD:
+            continue
+        strange += [name] * odd
+        if shapes := shapes_of(element, what, colours, meshes):
+            table["shapes"] = shapes
+        made.bodies.append(table)
+    return strange
+
+
+def _tables(name: str, file: str, made: Mechanism) -> dict[str, Any]:
+    """All tables of the scene, in the order of a file."""
+    tables: dict[str, Any] = {"name": name, "title": brief(f"{name}, from {file}"), "dimensions": 3}
+    if any("coulomb" in effect for effect in made.effects):
+        about = "speed at which Coulomb friction is smoothed, rad/s or m/s"
+        tables["parameters"] = {SLIDING_SPEED: {"value": SPEED, "about": about}}
+    tables |= {"bodies": made.bodies, "joints": made.joints}
+    gravity = {"type": "gravity", "g": GRAVITY}
+    tables["effects"] = [gravity, *made.effects]
+    if made.constraints:
+        tables["constraints"] = made.constraints
+    if made.locked:
+        tables["locked"] = made.locked
+    if made.start:
+        tables["initial"] = {"q": made.start}
+    return tables
+
+
+def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Iterator[str]:
+    """What has no counterpart, and what was changed, of joints and the robot."""
+    left = Counter(
+        f"<{part.tag}> of a {element.tag}" if element.tag != "robot" else f"<{part.tag}>"
+        for element in (robot, *robot.all("link"), *robot.all("joint"))
+        for part in element.children
+        if part.tag not in KNOWN[element.tag]
+    )
+    if left:
+        yield f"left out: {listed(f'{count} {tag}' for tag, count in left.items())}"
+    joints = moved(tree)
+    single = [joint for joint in joints if joint.kind in SINGLE]
+    if any(_has(joint, "effort") for joint in single):
+        yield "left out: bounds of efforts of joints; each motor is an input without bounds"
+    if any(_has(joint, "velocity") for joint in single):
+        yield "left out: bounds of velocities of joints"
+    if any(joint.limits for joint in single):
+        yield (
+            "a coordinate beyond the limits of its joint is reported, not prevented; an effect "
+            "joint_stop prevents it"
+        )
+    if made.unlimited:
+        yield (
+            "left out: limits whose lower bound is not below the upper, of "
+            f"{_listed(made.unlimited)}"
+        )
+    if made.clipped:
+        yield f"0 is beyond the limits of {_listed(made.clipped)}, which start at the nearest limit"
+    if any("coulomb" in effect for effect in made.effects):
+        yield f"friction of joints is smoothed within {SPEED:g} rad/s or m/s: {SLIDING_SPEED}"
+    lost = [joint for joint in joints if joint.mimic and joint.kind not in SINGLE]
+    if lost:
+        yield f"left out: mimic of joints that are no hinge or slide: {_names_of(lost)}"
+    changed = [*renamed(dict(names.bodies)), *renamed(dict(names.joints))]
+    if changed:
+        yield f"renamed: {listed(changed)}"
+
+
+def _remarks_on_bodies(tree: Tree, meshes: Meshes, strange: list[str]) -> Iterator[str]:
+    """The same of links."""
+    if strange:
+        yield (
+            "one principal moment is larger than the other two together, which no body has; taken "
+            f"as it is: {_listed(strange)}"
+        )
+    if tree.root == WORLD and tree.links[WORLD].first("inertial"):
+        yield f"left out: the inertia of the root link '{WORLD}', which cannot move"
+    if any(link.first("collision") for link in tree.links.values()):
+        yield "left out: collision geometry; contacts are effects that a scene adds"
+    if meshes.drawn:
+        yield f"{meshes.drawn} meshes are drawn as the boxes around them"
+    if meshes.missing:
+        reasons = [f"'{brief(name)}' {why}" for name, why in meshes.missing.items()]
+        yield (
+            f"left out: {len(reasons)} meshes, of which the first {reasons[0]}; import with "
+            "--allow DIR reads those in another folder"
+        )
+
+
+def _has(joint: Joint, key: str) -> bool:
+    limit = joint.element.first("limit")
+    return limit is not None and key in limit.attributes
+
+
+def _names_of(joints: list[Joint]) -> str:
+    return _listed([joint.name for joint in joints])
+
+
+def _listed(names: list[str]) -> str:
+    return listed(f"'{brief(name)}'" for name in names)
