@@ -1,0 +1,84 @@
+"""Compiles an MJCF file by MuJoCo and writes the arrays of the model: a program of its own.
+
+`python compiler.py FILE` writes to standard output what `numpy.load` reads. It runs in a process of
+its own because an error in a C library may end the process that it happens in. On failure its last
+line on standard error is MuJoCo's message.
+"""
+
+import io
+import json
+import sys
+from typing import Any
+
+KINDS = ("body", "joint", "geom", "site", "actuator", "tendon", "equality")
+"""Objects whose names are written."""
+PREFIXES = (
+    "body_",
+    "jnt_",
+    "dof_",
+    "geom_",
+    "site_",
+    "actuator_",
+    "tendon_",
+    "wrap_",
+    "eq_",
+    "mat_rgba",
+    "qpos",
+)
+SINGLE = (
+    "nbody",
+    "njnt",
+    "ngeom",
+    "nsite",
+    "nactuator",
+    "ntendon",
+    "neq",
+    "nsensor",
+    "ncam",
+    "nkey",
+    "nflex",
+    "nskin",
+    "nplugin",
+    "npair",
+    "nmocap",
+    "nv",
+)
+OPTIONS = ("gravity", "density", "viscosity", "wind", "magnetic", "disableflags", "disableactuator")
+
+
+def arrays_of(model: Any) -> dict[str, Any]:
+    """The arrays of a compiled model that describe the mechanism, by their names in mjModel."""
+    import numpy as np
+
+    names = [name for name in dir(model) if name.startswith(PREFIXES)]
+    found = {name: np.asarray(getattr(model, name)) for name in (*names, *SINGLE)}
+    found |= {f"opt_{name}": np.asarray(getattr(model.opt, name)) for name in OPTIONS}
+    for kind in KINDS:
+        count = getattr(model, {"joint": "njnt", "equality": "neq"}.get(kind, f"n{kind}"))
+        called = [getattr(model, kind)(i).name for i in range(count)]
+        found[f"names_{kind}"] = np.array(json.dumps(called))
+    return found
+
+
+def main(path: str) -> int:
+    """Compile a file."""
+    try:
+        import mujoco
+        import numpy as np
+    except ImportError:
+        print("MuJoCo is not installed", file=sys.stderr)
+        return 3
+    try:
+        model = mujoco.MjModel.from_xml_path(path)
+    except Exception as error:  # whatever MuJoCo raises, its message is all that is wanted
+        lines = [line.strip() for line in str(error).splitlines()]
+        print("; ".join(line for line in lines if line), file=sys.stderr)
+        return 1
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays_of(model))
+    sys.stdout.buffer.write(buffer.getvalue())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,95 @@
+"""The files that an MJCF file would open, checked before MuJoCo sees it.
+
+MuJoCo resolves a name in several folders: beside the main file, beside the file that includes
+another, in `meshdir`, `texturedir` and `assetdir`. A name is refused if in any of them it would be
+outside of the allowed folders.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from eomgen.errors import SceneError
+from eomgen.scene.importers.xml_elements import Element, read_xml
+from eomgen.text import brief
+
+FOLDERS = ("meshdir", "texturedir", "assetdir")
+DEEPEST = 20
+"""Greatest depth of files that include files."""
+MOST_FILES = 1000
+LARGEST_ASSET = 200_000_000
+
+
+def check_files(path: Path, root: Element, allowed: Sequence[Path]) -> None:
+    """Check the files that an MJCF file names, and those that these include.
+
+    Raises `SceneError`, with file and line, for one outside of the file's folder and the `allowed`
+    ones, one that is not XML, or includes without end.
+    """
+    folders = [folder.resolve() for folder in (path.parent, *allowed)]
+    elements = list(_with_includes(path, root, folders))
+    within = {path.parent.resolve(), *(file.parent.resolve() for file, _ in elements)}
+    for _, element in elements:
+        if element.tag == "compiler":
+            for key in FOLDERS:
+                if name := element.attributes.get(key, "").strip():
+                    for base in (path.parent, *(file.parent for file, _ in elements)):
+                        within.add(_inside(base, name, element, folders))
+    for _, element in elements:
+        for key, name in element.attributes.items():
+            if key.startswith("file") and element.tag != "include":
+                for base in sorted(within):
+                    _check_size(_inside(base, name, element, folders), name, element)
+
+
+def _with_includes(
+    path: Path, root: Element, folders: Sequence[Path]
+) -> Iterator[tuple[Path, Element]]:
+    """All elements of a file and of those that it includes, each with its file."""
+    pending, count = [(path, root, 0)], 0
+    while pending:
+        file, top, depth = pending.pop()
+        for element in top.walk():
+            yield file, element
+            if not _reads_mjcf(element):
+                continue
+            count += 1
+            name = element.attributes["file"].strip()
+            if depth >= DEEPEST or count > MOST_FILES:
+                raise element.error(
+                    f"includes '{brief(name)}', more than {DEEPEST} files deep or "
+                    f"{MOST_FILES} in all; does a file include itself?"
+                )
+            tried = [_inside(base, name, element, folders) for base in (file.parent, path.parent)]
+            found = next((other for other in tried if other.is_file()), None)
+            if found is None:
+                raise element.error(f"no file '{brief(name)}' to include; correct its name")
+            pending.append((found, read_xml(found), depth + 1))
+
+
+def _reads_mjcf(element: Element) -> bool:
+    """Whether an element names another file of MJCF."""
+    return element.tag in ("include", "model") and "file" in element.attributes
+
+
+def _inside(base: Path, name: str, element: Element, folders: Sequence[Path]) -> Path:
+    """The file of a name in a folder. Raises `SceneError` if it is outside of the allowed ones."""
+    try:
+        found = (base / name.strip()).resolve()
+        inside = any(found.is_relative_to(folder) for folder in folders)
+    except (OSError, ValueError, RuntimeError):
+        inside = False
+    if not inside:
+        raise element.error(
+            f"'{brief(name)}' is outside of the file's folder; allow its folder with --allow DIR"
+        )
+    return found
+
+
+def _check_size(path: Path, name: str, element: Element) -> None:
+    if path.exists() and not path.is_dir():
+        if not path.is_file():
+            raise element.error(f"'{brief(name)}' is no ordinary file; name one that is")
+        if path.stat().st_size > LARGEST_ASSET:
+            raise element.error(f"'{brief(name)}' is larger than {LARGEST_ASSET} bytes")
+
+

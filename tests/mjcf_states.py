@@ -1,0 +1,183 @@
+"""Imported MJCF models beside MuJoCo: the same state for both, and their accelerations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.model.elaborate import elaborate
+from eomgen.model.model import Model
+from eomgen.scalars.floats import FloatScalars
+from eomgen.scene.importers import import_file
+from eomgen.scene.importers.imported import Imported, Wishes
+from eomgen.scene.importers.mjcf.compiled import compiled
+from eomgen.scene.importers.mjcf.mechanism import Names
+from eomgen.scene.importers.mjcf.robot import names_of
+from eomgen.scene.reader import read_tables
+
+Array = Any
+FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "EQUALITY")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A file's scene and its model in MuJoCo, with what the scene lacks switched off in it."""
+
+    imported: Imported
+    names: Names
+    mj: Any
+    tables: dict[str, Any]
+    driven: bool
+
+    @staticmethod
+    def of(path: Path, *, equalities: bool = False) -> "Comparison":
+        """The comparison of a file, with or without its equality constraints."""
+        imported = import_file(path, Wishes(allowed=tuple(path.parents)))
+        mj = mujoco.MjModel.from_xml_path(str(path))
+        for name in OFF:
+            mj.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
+        mj.opt.density = mj.opt.viscosity = 0.0
+        tables = dict(imported.tables)
+        driven = not any("actuator" in remark.split(":")[0] or " actuators " in remark
+                         for remark in imported.remarks)
+        effects = [e for e in tables["effects"] if e["type"] != "joint_friction"]
+        if not driven:
+            mj.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+            effects = [
+                e
+                for e in effects
+                if not (e["type"] == "motor" and "_drive" in e["name"])
+            ]
+            tables.pop("inputs", None)
+            tables["definitions"] = {
+                k: v for k, v in tables.get("definitions", {}).items() if k.endswith("_tension")
+            }
+        tables["effects"] = effects
+        tables.pop("parameters", None)
+        if not equalities:
+            tables.pop("constraints", None)
+            tables.pop("locked", None)
+            tables["joints"] = [j for j in tables["joints"] if not j.get("loop")]
+        return Comparison(imported, names_of(compiled(path))[0], mj, tables, driven)
+
+    @property
+    def nv(self) -> int:
+        """The number of velocities."""
+        return int(self.mj.nv)
+
+    @cached_property
+    def model(self) -> Model:
+        """The model of the scene."""
+        return elaborate(read_tables(self.tables))
+
+    def random_state(self, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+        """Coordinates, velocities and controls of MuJoCo."""
+        qpos = self.mj.qpos0 + rng.uniform(-1.0, 1.0, self.mj.nq)
+        for j in range(self.mj.njnt):
+            first = self.mj.jnt_qposadr[j] + 3 * (self.mj.jnt_type[j] == FREE)
+            if self.mj.jnt_type[j] in (FREE, BALL):
+                part = rng.normal(size=4)
+                qpos[first : first + 4] = part / np.linalg.norm(part)
+        return qpos, rng.normal(size=self.mj.nv), rng.uniform(-0.9, 0.9, self.mj.nu)
+
+    def in_mujoco(self, rng: np.random.Generator) -> Any:
+        """MuJoCo's data after forward dynamics at a random state, with generalised forces that
+        alone would give accelerations of order 1.
+        """
+        data, whole = mujoco.MjData(self.mj), np.zeros((self.nv, self.nv))
+        data.qpos[:], data.qvel[:], data.ctrl[:] = self.random_state(rng)
+        mujoco.mj_forward(self.mj, data)
+        mujoco.mj_fullM(self.mj, data, whole)
+        data.qfrc_applied[:] = rng.normal(size=self.nv) * np.diag(whole)
+        mujoco.mj_forward(self.mj, data)
+        return data
+
+    def values(self, data: Any, rates: Array | None = None) -> dict[str, float]:
+        """The state of the scene by name; of velocities their rates, if these are given."""
+        mj, names, found = self.mj, self.names, dict[str, float]()
+        speeds, accelerating = (data.qvel if rates is None else rates), rates is not None
+        for j in range(mj.njnt):
+            kind, q, v = mj.jnt_type[j], mj.jnt_qposadr[j], mj.jnt_dofadr[j]
+            name, body = names.joints[j], mj.jnt_bodyid[j]
+            if kind not in (FREE, BALL):
+                found |= {name: data.qpos[q], f"{name}_dot": speeds[v]}
+                continue
+            spin, turn = v + 3 * (kind == FREE), q + 3 * (kind == FREE)
+            whole = kind == FREE and j not in names.split
+            prefix = names.bodies[body] if whole else name
+            if kind == FREE:
+                point = prefix if whole else names.between[body, j]
+                place, pace = np.array(data.qpos[q : q + 3]), np.array(speeds[v : v + 3])
+                if whole:
+                    arm = data.xmat[body].reshape(3, 3) @ mj.body_ipos[body]
+                    w = data.xmat[body].reshape(3, 3) @ data.qvel[spin : spin + 3]
+                    turned = data.xmat[body].reshape(3, 3) @ speeds[spin : spin + 3]
+                    pace = pace + np.cross(turned, arm)
+                    if accelerating:
+                        pace = pace + np.cross(w, np.cross(w, arm))
+                    place = place + arm
+                found |= {f"{point}_{x}": place[i] for i, x in enumerate("xyz")}
+                found |= {f"{point}_{x}_dot": pace[i] for i, x in enumerate("xyz")}
+            found |= {f"{prefix}_q{x}": data.qpos[turn + i] for i, x in enumerate("wxyz")}
+            found |= {f"{prefix}_w{x}": speeds[spin + i] for i, x in enumerate("xyz")}
+        return found
+
+    def velocity_names(self) -> list[str]:
+        """The name in the scene of each of MuJoCo's velocities."""
+        mj, names, found = self.mj, self.names, list[str]()
+        for j in range(mj.njnt):
+            kind, name, body = mj.jnt_type[j], names.joints[j], mj.jnt_bodyid[j]
+            if kind not in (FREE, BALL):
+                found.append(f"{name}_dot")
+                continue
+            whole = kind == FREE and j not in names.split
+            prefix = names.bodies[body] if whole else name
+            if kind == FREE:
+                point = prefix if whole else names.between[body, j]
+                found += [f"{point}_{x}_dot" for x in "xyz"]
+            found += [f"{prefix}_w{x}" for x in "xyz"]
+        return found
+
+    def forces(self, data: Any) -> list[float]:
+        """The generalised forces, in the order of the scene's velocities."""
+        mj, applied = self.mj, data.qfrc_applied.copy()
+        for j in range(mj.njnt):
+            v, body = mj.jnt_dofadr[j], mj.jnt_bodyid[j]
+            if mj.jnt_type[j] == FREE and j not in self.names.split:
+                turned = data.xmat[body].reshape(3, 3)
+                moment = np.cross(turned @ mj.body_ipos[body], applied[v : v + 3])
+                applied[v + 3 : v + 6] -= turned.T @ moment
+        named = dict(zip(self.velocity_names(), applied, strict=True))
+        return [named[c.name] for c in self.model.velocities]
+
+    def inputs(self, ctrl: Array) -> dict[str, float]:
+        """The inputs of the scene."""
+        return dict(zip(self.names.inputs, ctrl, strict=True)) if self.driven else {}
+
+    def accelerations(self, data: Any, route: str = "aba") -> Array:
+        """v̇ of the scene at a state of MuJoCo, by the recursion of a route."""
+        values, model = self.values(data), self.model
+        q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
+        given = Values(model.defaults, self.inputs(data.ctrl), q, v)
+        return np.array(Dynamics(model, given, FloatScalars(), "own").forward(route)(self.forces(data)))
+
+    def expected(self, data: Any) -> Array:
+        """v̇ of MuJoCo, in the order of the scene's velocities."""
+        values = self.values(data, data.qacc)
+        return np.array([values[c.name] for c in self.model.velocities])
+
+    def differences(self, count: int, *, module: bool = False) -> Sequence[float]:
+        """The greatest relative difference of accelerations at each of some random states."""
+        rng, found = np.random.default_rng(0), list[float]()
+        for _ in range(count):
+            data = self.in_mujoco(rng)
+            expected = self.expected(data)
+            scale = np.abs(expected).max()
+            found.append(float(np.abs(self.accelerations(data) - expected).max() / scale))
+        return found
