@@ -42,7 +42,10 @@ def find_file(name: str, folders: Sequence[Path]) -> Path:
 
     Of `package://PACKAGE/PATH` it is PACKAGE/PATH or PATH in a folder. Raises `MeshError`.
     """
-    parts = urlsplit(name)
+    try:
+        parts = urlsplit(name)
+    except ValueError:  # an address of the network that is none
+        raise MeshError("is not a file") from None
     if parts.scheme in ("package", "model"):
         rest = unquote(parts.path).lstrip("/")
         tried = [folder / way for folder in folders for way in (f"{parts.netloc}/{rest}", rest)]

@@ -3,7 +3,7 @@
 import keyword
 import re
 import sys
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 
 from eomgen.scene.joints.base import WORLD
 
@@ -13,24 +13,32 @@ TAKEN = frozenset(("t", "pi", WORLD))
 """Names that have a meaning in scenes."""
 
 
-def identifiers(names: Iterable[str], kind: str, taken: Collection[str] = TAKEN) -> dict[str, str]:
+def identifiers(
+    names: Iterable[str],
+    kind: str,
+    taken: Collection[str] = TAKEN,
+    endings: Sequence[str] = (),
+) -> dict[str, str]:
     """An identifier for each name, all different and none of `taken`.
 
-    Names that are identifiers stay. Others begin with `kind` where they need a letter.
+    Names that are identifiers stay. Others begin or end with `kind` where they need more letters.
+    Names with one of the `endings` stand for something else, so no other name is one of these.
     """
     listed = list(names)
-    found = {name: name for name in listed if _plain(name, kind) == name and name not in taken}
-    used = {*found, *taken}
-    for name in listed:
+    plain = {name: _plain(name, kind) for name in listed}
+    reserved = {*taken, *(f"{stem}{ending}" for stem in plain.values() for ending in endings)}
+    found = {name: name for name, stem in plain.items() if stem == name and name not in reserved}
+    used = {*found, *reserved}
+    for name, stem in plain.items():
         if name in found:
             continue
-        stem = _plain(name, kind)
-        new, count = (f"{stem}_{kind}" if stem in taken else stem), 1
+        stem = f"{stem}_{kind}" if stem in reserved else stem
+        new, count = stem, 1
         while new in used:
             count += 1
             new = f"{stem}_{count}"
         found[name] = new
-        used.add(new)
+        used |= {new, *(f"{new}{ending}" for ending in endings)}
     return {name: found[name] for name in listed}
 
 

@@ -7,6 +7,8 @@ from eomgen.scene.importers.attributes import Vector
 
 NEAR = 1e-9
 """An angle this near to a right angle, rad, is a right angle that was printed with few digits."""
+SLIGHT = 1e-15
+"""Lengths below this, m, are rounding errors of 0."""
 Matrix = tuple[Vector, Vector, Vector]
 EYE: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -15,6 +17,16 @@ def squared(angle: float) -> float:
     """The angle, rad, or the multiple of π/2 that it is within `NEAR` of."""
     right = round(angle / (math.pi / 2)) * (math.pi / 2)
     return right if abs(angle - right) < NEAR else angle
+
+
+def is_slight(x: float) -> bool:
+    """Whether a length is a rounding error of 0."""
+    return 0.0 < abs(x) < SLIGHT
+
+
+def cleaned(vector: Sequence[float]) -> list[float]:
+    """A vector of lengths, with 0 for rounding errors."""
+    return [0.0 if is_slight(x) else x for x in vector]
 
 
 def rotation(angles: Vector) -> Matrix:

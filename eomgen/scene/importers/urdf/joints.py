@@ -1,6 +1,6 @@
 """Joints of a URDF file as joints, effects and constraints of a scene."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -8,7 +8,7 @@ from eomgen.scene.importers.attributes import Vector
 from eomgen.scene.importers.rotations import (
     EYE,
     angles_of,
-    image,
+    cleaned,
     rotation,
     squared,
     times,
@@ -47,10 +47,15 @@ class Mechanism:
     start: dict[str, float] = field(default_factory=dict)
     unlimited: list[str] = field(default_factory=list)
     clipped: list[str] = field(default_factory=list)
+    held: list[str] = field(default_factory=list)
 
 
-def add_joints(tree: Tree, names: Names, made: Mechanism) -> None:
-    """The joints of a tree, each with its friction, motor and coupling."""
+def add_joints(tree: Tree, names: Names, made: Mechanism, massless: Collection[str]) -> None:
+    """The joints of a tree, each with its friction, motor and coupling.
+
+    `massless` are links that neither have nor carry mass. Nothing resists the joints of these, so
+    they are held, unless other motion depends on them.
+    """
     for joint in moved(tree):
         name = names.joints[joint.name]
         if joint.kind in SINGLE:
@@ -61,17 +66,65 @@ def add_joints(tree: Tree, names: Names, made: Mechanism) -> None:
             _add_planar(joint, name, names, made)
         else:
             _add_floating(joint, name, names, made)
-    singles = {joint.name: joint for joint in moved(tree) if joint.kind in SINGLE}
-    for joint in singles.values():
-        name = names.joints[joint.name]
-        _add_coupling(joint, names, tree, made)
+    followed = {joint.name: _followed(joint, tree) for joint in moved(tree) if joint.kind in SINGLE}
+    heavy = {f.of.name for name, f in followed.items() if tree.joint(name).child not in massless}
+    for name, following in followed.items():
+        joint = tree.joint(name)
+        free = following.of is joint
+        acts = name in heavy if free else bool(joint.damping or joint.friction)
+        if joint.child in massless and not acts:
+            made.held.append(name)
+            made.locked[names.joints[name]] = made.start.pop(names.joints[name], 0.0)
+        else:
+            _add_effects(joint, following, names, made)
+
+
+@dataclass(frozen=True)
+class _Following:
+    """A coordinate is `factor` times that of joint `of`, plus `offset`."""
+
+    of: Joint
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def _followed(joint: Joint, tree: Tree) -> _Following:
+    """What a joint follows in the end: itself, if it mimics no other."""
+    factor, offset, of = 1.0, 0.0, joint
+    while of.mimic is not None and of.kind in SINGLE:
+        offset += factor * of.mimic.offset
+        factor *= of.mimic.multiplier
+        of = tree.joint(of.mimic.of)
+    return _Following(of, factor, offset)
+
+
+def _add_effects(joint: Joint, following: _Following, names: Names, made: Mechanism) -> None:
+    """The motor of a joint, or what it follows; and its friction.
+
+    A joint that follows one that is fixed is held.
+    """
+    name, of = names.joints[joint.name], following.of
+    if of is joint:
         made.effects += _friction(joint, name)
-    for joint in singles.values():
-        if joint.mimic is None:
-            name = names.joints[joint.name]
-            made.effects.append(
-                {"type": "motor", "name": f"{name}_motor", "joint": name, "torque": "input"}
-            )
+        motor = {"type": "motor", "name": f"{name}_motor", "joint": name, "torque": "input"}
+        made.effects.append(motor)
+    elif of.kind not in SINGLE or following.factor == 0.0:
+        made.locked[name] = following.offset
+    else:
+        made.effects += _friction(joint, name)
+        _add_coupling(name, following, names.joints[of.name], made)
+
+
+def _add_coupling(name: str, following: _Following, of: str, made: Mechanism) -> None:
+    """The constraint of a joint that follows joint `of`, and where it starts."""
+    factor, offset = following.factor, following.offset
+    text = of if factor == 1.0 else f"{factor!r} * {of}"
+    equals = f"{text} + {offset!r}" if offset else text
+    coupling = {"type": "coupling", "name": f"{name}_mimic", "coordinate": name, "equals": equals}
+    made.constraints.append(coupling)
+    start = factor * made.start.get(of, 0.0) + offset
+    if start:
+        made.start[name] = start
 
 
 def _table(joint: Joint, name: str, kind: str, names: Names) -> dict[str, Any]:
@@ -82,8 +135,8 @@ def _table(joint: Joint, name: str, kind: str, names: Names) -> dict[str, Any]:
         "parent": names.of_parent(joint),
         "child": names.bodies[joint.child],
     }
-    if any(joint.at):
-        table["r_parent"] = list(joint.at)
+    if any(at := cleaned(joint.at)):
+        table["r_parent"] = at
     if any(joint.angles):
         table["orientation"] = [squared(angle) for angle in joint.angles]
     return table
@@ -152,37 +205,6 @@ def _friction(joint: Joint, name: str) -> Iterator[dict[str, Any]]:
         yield table
 
 
-def _add_coupling(joint: Joint, names: Names, tree: Tree, made: Mechanism) -> None:
-    """The coordinate of a mimic joint is a multiple of that of the joint at the end of the line,
-    or constant if that is fixed.
-    """
-    if joint.mimic is None:
-        return
-    by_name = {other.name: other for other in moved(tree)}
-    factor, offset, master = 1.0, 0.0, joint
-    while master.mimic is not None and master.kind in SINGLE:
-        offset += factor * master.mimic.offset
-        factor *= master.mimic.multiplier
-        master = by_name[master.mimic.of]
-    name = names.joints[joint.name]
-    if master.kind not in SINGLE or factor == 0.0:
-        made.locked[name] = offset
-        return
-    of = names.joints[master.name]
-    text = of if factor == 1.0 else f"{factor!r} * {of}"
-    made.constraints.append(
-        {
-            "type": "coupling",
-            "name": f"{name}_mimic",
-            "coordinate": name,
-            "equals": f"{text} + {offset!r}" if offset else text,
-        }
-    )
-    start = factor * made.start.get(of, 0.0) + offset
-    if start:
-        made.start[name] = start
-
-
 def floating_base(root: str, names: Names) -> dict[str, Any]:
     """The free joint of the root."""
     return {"name": f"{names.bodies[root]}_base", "type": "free", "child": names.bodies[root]}
@@ -192,8 +214,3 @@ def fixed_base(root: str, names: Names) -> dict[str, Any]:
     """The weld of the root to the world."""
     body = names.bodies[root]
     return {"name": f"{body}_base", "type": "weld", "parent": WORLD, "child": body}
-
-
-def world_pose(joint: Joint) -> tuple[Vector, Vector]:
-    """Where a link that is fixed to the world is: position and angles."""
-    return image(EYE, joint.at), joint.angles

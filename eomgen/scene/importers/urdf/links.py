@@ -1,58 +1,156 @@
-"""Links as bodies of a scene."""
+"""Masses and inertias of links."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from eomgen.scene.importers.attributes import child, number, vector
-from eomgen.scene.importers.rotations import rotated_inertia, rotation
+import numpy as np
+import numpy.typing as npt
+
+from eomgen.scene.importers.attributes import ORIGIN, Vector, child, number, vector
+from eomgen.scene.importers.rotations import cleaned, is_slight, rotated_inertia, rotation
+from eomgen.scene.importers.urdf.tree import Tree
 from eomgen.scene.importers.xml_elements import Element
+from eomgen.text import brief
+
+Array = npt.NDArray[np.float64]
 
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 TOLERANCE = 2e-4
 """Part of the trace by which a principal moment may exceed the other two; scenes allow more."""
+ROUNDING = 1e-15
+"""Entries of an inertia below this, m², times the mass are rounding errors of 0."""
 
 
-def body_table(element: Element, name: str, what: str) -> tuple[dict[str, Any], bool]:
-    """The table of a link: in its own axes, without mass if it has no inertia; and whether its
-    inertia is one that no body can have, which is then not checked.
+@dataclass(frozen=True)
+class Inertial:
+    """Mass, centre of mass and inertia about it, all in the link's axes.
 
-    Raises `SceneError` for what is missing or negative, or an inertia that is not positive.
+    entries  xx, yy, zz, xy, xz, yz
+    moments  the principal moments, in ascending order
     """
-    inertial = element.first("inertial")
+
+    mass: float = 0.0
+    com: Vector = ORIGIN
+    entries: tuple[float, ...] = (0.0,) * 6
+    moments: tuple[float, ...] = (0.0,) * 3
+
+    @property
+    def is_strange(self) -> bool:
+        """Whether no body can have this inertia."""
+        low, middle, high = self.moments
+        return high - low - middle > TOLERANCE * (low + middle + high) or low < 0
+
+    def table(self, name: str) -> dict[str, Any]:
+        """The table of a body in its own axes."""
+        xx, yy, zz, *products = self.entries
+        found: dict[str, Any] = {"name": name, "mass": self.mass, "com": list(self.com)}
+        found["inertia_com"] = [xx, yy, zz, *(products if any(products) else ())]
+        return found | ({"inertia_check": "off"} if self.is_strange else {})
+
+
+@dataclass
+class Changes:
+    """Links whose inertia was changed, or taken as it is though no body has it."""
+
+    rounded: list[str] = field(default_factory=list)
+    lent: list[str] = field(default_factory=list)
+    strange: list[str] = field(default_factory=list)
+
+
+def read_inertials(tree: Tree) -> tuple[dict[str, Inertial], Changes]:
+    """The inertias of all links by name; none is negative together with what is fixed to it.
+
+    A link without mass may have an inertia if it is fixed to one with mass, which then has it: the
+    motion is the same. Raises `SceneError` for what is missing or negative.
+    """
+    found, changes = dict[str, Inertial](), Changes()
+    for name, element in tree.links.items():
+        found[name] = _read(element, name, changes)
+    for name in reversed(list(tree.links)):
+        if found[name].mass == 0 and any(found[name].entries):
+            _lend(tree, name, found)
+            changes.lent.append(name)
+    changes.strange += [name for name, inertial in found.items() if inertial.is_strange]
+    for name in changes.strange:
+        if found[name].moments[0] < 0:
+            _check_group(tree, name, found)
+    return found, changes
+
+
+def _read(element: Element, name: str, changes: Changes) -> Inertial:
+    inertial, what = element.first("inertial"), f"link '{brief(name)}'"
     if inertial is None:
-        zeros = [0.0, 0.0, 0.0]
-        return {"name": name, "mass": 0.0, "inertia_com": zeros, "com": zeros}, False
+        return Inertial()
     mass = number(child(inertial, "mass", what), "value", what)
     if mass < 0:
         raise inertial.error(f"{what}: its mass {mass:g} is negative; give a number >= 0")
     given = child(inertial, "inertia", what)
     entries = [number(given, key, what, 0.0 if key[1] != key[2] else None) for key in ENTRIES]
-    if mass == 0 and any(entries):
-        raise given.error(f"{what}: has an inertia but no mass; give it a mass, or no inertia")
+    given_com = vector(inertial.first("origin"), "xyz", what)
+    whole = [0.0 if abs(x) < ROUNDING * mass else x for x in entries]
+    if whole != entries or any(map(is_slight, given_com)):
+        changes.rounded.append(name)
+    entries = whole
+    for key, moment in zip(ENTRIES[:3], entries, strict=False):
+        if moment < 0:
+            raise given.error(f"{what}: {key} {moment:g} is negative; give a number >= 0")
     origin = inertial.first("origin")
-    moments = _principal(entries)
-    if moments[0] < -1e-9 * max(map(abs, moments)):
-        raise given.error(
-            f"{what}: its inertia has a principal moment of {moments[0]:.3g} kg m^2, which is "
-            "negative; correct the entries"
-        )
-    table: dict[str, Any] = {
-        "name": name,
-        "mass": mass,
-        "inertia_com": rotated_inertia(entries, rotation(vector(origin, "rpy", what))),
-        "com": list(vector(origin, "xyz", what)),
-    }
-    excess = moments[2] - moments[0] - moments[1]
-    strange = excess > TOLERANCE * sum(moments) or moments[0] < 0
-    if strange:
-        table["inertia_check"] = "off"
-    return table, strange
+    turned = rotated_inertia(entries, rotation(vector(origin, "rpy", what)))
+    x, y, z = cleaned(given_com)
+    return _with(Inertial(mass, (x, y, z)), turned)
 
 
-def _principal(entries: list[float]) -> list[float]:
-    """The principal moments, in ascending order."""
-    import numpy as np  # here, so that reading names does not load it
-
-    xx, yy, zz, xy, xz, yz = entries
+def _with(inertial: Inertial, entries: Sequence[float]) -> Inertial:
+    """An inertial with other entries."""
     scale = max(map(abs, entries)) or 1.0
-    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / scale
-    return [float(x) * scale for x in np.linalg.eigvalsh(matrix)]
+    moments = np.linalg.eigvalsh(_matrix(entries) / scale)
+    slight = 1e-12 * float(moments[-1])
+    values = [0.0 if -slight <= float(x) < 0 else float(x) * scale for x in moments]
+    return replace(inertial, entries=tuple(entries), moments=tuple(values))
+
+
+def _matrix(entries: Sequence[float]) -> Array:
+    xx, yy, zz, xy, xz, yz = entries
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _lend(tree: Tree, name: str, found: dict[str, Inertial]) -> None:
+    """Count the inertia of a link without mass with the link that it is fixed to."""
+    joint = tree.carried.get(name)
+    if joint is None or joint.kind != "fixed":
+        raise tree.links[name].error(
+            f"link '{brief(name)}': has an inertia but no mass; give it a mass, or no inertia"
+        )
+    turned = rotated_inertia(found[name].entries, rotation(joint.angles))
+    carrier = found[joint.parent]
+    total = [a + b for a, b in zip(carrier.entries, turned, strict=True)]
+    found[name] = Inertial(com=found[name].com)
+    found[joint.parent] = _with(carrier, total)
+
+
+def _check_group(tree: Tree, name: str, found: Mapping[str, Inertial]) -> None:
+    """Raise `SceneError` if the inertia of all links that are fixed to one another is negative."""
+    top = name
+    while top in tree.carried and tree.carried[top].kind == "fixed":
+        top = tree.carried[top].parent
+    poses: dict[str, tuple[Array, Array]] = {top: (np.eye(3), np.zeros(3))}
+    for other in tree.links:
+        joint = tree.carried.get(other)
+        if joint is not None and joint.kind == "fixed" and joint.parent in poses:
+            turn, at = poses[joint.parent]
+            poses[other] = turn @ np.array(rotation(joint.angles)), at + turn @ np.array(joint.at)
+    masses = {other: found[other].mass for other in poses}
+    centres = {other: at + turn @ np.array(found[other].com) for other, (turn, at) in poses.items()}
+    mass = sum(masses.values())
+    middle = sum(masses[other] * centres[other] for other in poses) / (mass or 1.0)
+    total = np.zeros((3, 3))
+    for other, (turn, _) in poses.items():
+        arm = centres[other] - middle
+        total += turn @ _matrix(found[other].entries) @ turn.T
+        total += masses[other] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    if np.linalg.eigvalsh(total)[0] < 0:
+        raise tree.links[name].error(
+            f"link '{brief(name)}': its inertia has a principal moment of "
+            f"{found[name].moments[0]:.3g} kg m^2, which is negative; correct the entries"
+        )

@@ -7,7 +7,8 @@ from typing import Any
 
 from eomgen.errors import listed
 from eomgen.scene.importers.imported import Imported, Wishes
-from eomgen.scene.importers.names import identifiers, renamed, scene_name
+from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
+from eomgen.scene.importers.rotations import is_slight
 from eomgen.scene.importers.urdf.joints import (
     SLIDING_SPEED,
     Mechanism,
@@ -16,7 +17,7 @@ from eomgen.scene.importers.urdf.joints import (
     fixed_base,
     floating_base,
 )
-from eomgen.scene.importers.urdf.links import body_table
+from eomgen.scene.importers.urdf.links import ENTRIES, Changes, Inertial, read_inertials
 from eomgen.scene.importers.urdf.shapes import Meshes, colours_of, shapes_of
 from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved, read_tree
 from eomgen.scene.importers.xml_elements import Element
@@ -26,6 +27,10 @@ from eomgen.text import brief
 GRAVITY = 9.81
 SPEED = 0.01
 """Speed at which Coulomb friction is smoothed, rad/s or m/s."""
+OF_JOINTS = ("_dot", "_ddot", "_motor")
+"""Endings of names that are made from those of joints."""
+OF_BODIES = ("mass", *(f"com_{axis}" for axis in "xyz"), *(f"inertia_com_{e[1:]}" for e in ENTRIES))
+"""The same of parameters of bodies."""
 KNOWN = {
     "robot": ("link", "joint", "material"),
     "link": ("inertial", "visual", "collision"),
@@ -44,15 +49,18 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     names = _names(tree)
     made, remarks = Mechanism(), list[str]()
     meshes = Meshes((path.parent, *wishes.allowed))
-    strange = _add_bodies(tree, names, made, meshes, colours_of(robot))
+    inertials, changes = read_inertials(tree)
+    _add_bodies(tree, inertials, names, made, meshes, colours_of(robot))
     if names.bodies[tree.root] != WORLD:
         base = floating_base if wishes.floating else fixed_base
         made.joints.append(base(tree.root, names))
-    add_joints(tree, names, made)
-    if not wishes.floating and all(joint.kind == "fixed" for joint in moved(tree)):
+    add_joints(tree, names, made, _without_mass(tree, inertials))
+    driven = any(effect["type"] == "motor" for effect in made.effects)
+    loose = any(joint.kind in ("planar", "floating") for joint in moved(tree))
+    if not (driven or loose or wishes.floating):
         raise robot.error("nothing can move; let the root move freely with --floating")
     remarks += _remarks(robot, tree, names, made)
-    remarks += _remarks_on_bodies(tree, meshes, strange)
+    remarks += _remarks_on_bodies(tree, meshes, changes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
     return Imported(_tables(name, path.name, made), tuple(remarks))
 
@@ -76,24 +84,38 @@ def _names(tree: Tree) -> Names:
     """Names of bodies and joints. A root link named world is the world of the scene."""
     bodies = {WORLD: WORLD} if tree.root == WORLD else {}
     bodies |= identifiers((name for name in tree.links if name not in bodies), "link")
-    return Names(bodies, identifiers((joint.name for joint in moved(tree)), "joint"))
+    taken = TAKEN | {f"{body}_{ending}" for body in bodies.values() for ending in OF_BODIES}
+    joints = identifiers((joint.name for joint in moved(tree)), "joint", taken, OF_JOINTS)
+    return Names(bodies, joints)
+
+
+def _without_mass(tree: Tree, inertials: Mapping[str, Inertial]) -> set[str]:
+    """The links that neither have nor carry any mass."""
+    heavy = set[str]()
+    for name in reversed(list(tree.links)):
+        if inertials[name].mass:
+            heavy.add(name)
+        if name in heavy and name in tree.carried:
+            heavy.add(tree.carried[name].parent)
+    return set(tree.links) - heavy
 
 
 def _add_bodies(
-    tree: Tree, names: Names, made: Mechanism, meshes: Meshes, colours: Mapping[str, str]
-) -> list[str]:
-    """The bodies of the links; returns the links whose inertia no body can have."""
-    strange = []
+    tree: Tree,
+    inertials: Mapping[str, Inertial],
+    names: Names,
+    made: Mechanism,
+    meshes: Meshes,
+    colours: Mapping[str, str],
+) -> None:
+    """The bodies of the links, with their shapes."""
     for name, element in tree.links.items():
-        what = f"link '{brief(name)}'"
-        table, odd = body_table(element, names.bodies[name], what)
         if names.bodies[name] == WORLD:
             continue
-        strange += [name] * odd
-        if shapes := shapes_of(element, what, colours, meshes):
+        table = inertials[name].table(names.bodies[name])
+        if shapes := shapes_of(element, f"link '{brief(name)}'", colours, meshes):
             table["shapes"] = shapes
         made.bodies.append(table)
-    return strange
 
 
 def _tables(name: str, file: str, made: Mechanism) -> dict[str, Any]:
@@ -126,15 +148,18 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
         yield f"left out: {listed(f'{count} {tag}' for tag, count in left.items())}"
     joints = moved(tree)
     single = [joint for joint in joints if joint.kind in SINGLE]
-    if any(_has(joint, "effort") for joint in single):
-        yield "left out: bounds of efforts of joints; each motor is an input without bounds"
-    if any(_has(joint, "velocity") for joint in single):
-        yield "left out: bounds of velocities of joints"
+    if any(_has(joint, key) for joint in single for key in ("effort", "velocity")):
+        yield (
+            "left out: bounds of efforts and velocities of joints; each motor is an input without "
+            "bounds"
+        )
     if any(joint.limits for joint in single):
         yield (
             "a coordinate beyond the limits of its joint is reported, not prevented; an effect "
             "joint_stop prevents it"
         )
+    if slight := [joint for joint in joints if any(map(is_slight, joint.at))]:
+        yield f"rounding errors in origins count as 0: {_names_of(slight)}"
     if made.unlimited:
         yield (
             "left out: limits whose lower bound is not below the upper, of "
@@ -144,6 +169,8 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
         yield f"0 is beyond the limits of {_listed(made.clipped)}, which start at the nearest limit"
     if any("coulomb" in effect for effect in made.effects):
         yield f"friction of joints is smoothed within {SPEED:g} rad/s or m/s: {SLIDING_SPEED}"
+    if made.held:
+        yield f"held, because nothing resists joints that carry no mass: {_listed(made.held)}"
     lost = [joint for joint in joints if joint.mimic and joint.kind not in SINGLE]
     if lost:
         yield f"left out: mimic of joints that are no hinge or slide: {_names_of(lost)}"
@@ -152,13 +179,16 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
         yield f"renamed: {listed(changed)}"
 
 
-def _remarks_on_bodies(tree: Tree, meshes: Meshes, strange: list[str]) -> Iterator[str]:
+def _remarks_on_bodies(tree: Tree, meshes: Meshes, changes: Changes) -> Iterator[str]:
     """The same of links."""
-    if strange:
-        yield (
-            "one principal moment is larger than the other two together, which no body has; taken "
-            f"as it is: {_listed(strange)}"
-        )
+    if changes.strange:
+        yield f"no body has the inertia of {_listed(changes.strange)}; taken as it is"
+    if changes.rounded:
+        rounded = _listed(changes.rounded)
+        yield f"rounding errors in inertias or centres of mass count as 0: {rounded}"
+    if changes.lent:
+        lent = _listed(changes.lent)
+        yield f"inertias of links without mass count with what carries them: {lent}"
     if tree.root == WORLD and tree.links[WORLD].first("inertial"):
         yield f"left out: the inertia of the root link '{WORLD}', which cannot move"
     if any(link.first("collision") for link in tree.links.values()):

@@ -53,7 +53,7 @@ def shapes_of(
 
 def colours_of(robot: Element) -> dict[str, str]:
     """The colours of named materials, as #rrggbb."""
-    found = {}
+    found = dict[str, str]()
     for element in robot.walk():
         if element.tag == "material" and (colour := _own_colour(element)):
             found.setdefault(element.attributes.get("name", ""), colour)

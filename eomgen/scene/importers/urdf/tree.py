@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from eomgen.errors import nearest
 from eomgen.scene.importers.attributes import Vector, child, number, required, vector
@@ -49,11 +50,21 @@ class Joint:
 
 @dataclass(frozen=True)
 class Tree:
-    """The links by name, the root first and each after its parent; the joint that carries each."""
+    """The links by name, the root first and each after its parent; the joint that carries each;
+    and the joints by name.
+    """
 
     root: str
     links: Mapping[str, Element]
     carried: Mapping[str, Joint]
+
+    @cached_property
+    def _joints(self) -> Mapping[str, Joint]:
+        return {joint.name: joint for joint in self.carried.values()}
+
+    def joint(self, name: str) -> Joint:
+        """The joint of a name."""
+        return self._joints[name]
 
 
 def read_tree(robot: Element) -> Tree:
