@@ -44,16 +44,14 @@ class Comparison:
             mj.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
         mj.opt.density = mj.opt.viscosity = 0.0
         tables = dict(imported.tables)
-        driven = not any("actuator" in remark.split(":")[0] or " actuators " in remark
-                         for remark in imported.remarks)
+        driven = not any(
+            "actuator" in remark.split(":")[0] or " actuators " in remark
+            for remark in imported.remarks
+        )
         effects = [e for e in tables["effects"] if e["type"] != "joint_friction"]
         if not driven:
             mj.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
-            effects = [
-                e
-                for e in effects
-                if not (e["type"] == "motor" and "_drive" in e["name"])
-            ]
+            effects = [e for e in effects if not (e["type"] == "motor" and "_drive" in e["name"])]
             tables.pop("inputs", None)
             tables["definitions"] = {
                 k: v for k, v in tables.get("definitions", {}).items() if k.endswith("_tension")
@@ -165,7 +163,9 @@ class Comparison:
         values, model = self.values(data), self.model
         q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
         given = Values(model.defaults, self.inputs(data.ctrl), q, v)
-        return np.array(Dynamics(model, given, FloatScalars(), "own").forward(route)(self.forces(data)))
+        return np.array(
+            Dynamics(model, given, FloatScalars(), "own").forward(route)(self.forces(data))
+        )
 
     def expected(self, data: Any) -> Array:
         """v̇ of MuJoCo, in the order of the scene's velocities."""

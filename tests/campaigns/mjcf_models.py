@@ -12,14 +12,9 @@ too. The greatest relative difference of each model is printed, then its remarks
 import argparse
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from eomgen.errors import EomgenError
-from eomgen.scene.importers.imported import Imported
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 

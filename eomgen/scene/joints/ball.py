@@ -2,7 +2,7 @@
 
 from typing import ClassVar, Literal
 
-from eomgen.scene.joints.base import Coordinate, WithRotor, Primitive
+from eomgen.scene.joints.base import Coordinate, Primitive, WithRotor
 
 
 class Ball(WithRotor):

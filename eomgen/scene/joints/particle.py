@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from eomgen.language.base import Identifier
-from eomgen.scene.joints.base import Z_AXIS, Coordinate, WithRotor, Primitive
+from eomgen.scene.joints.base import Z_AXIS, Coordinate, Primitive, WithRotor
 
 
 class Particle(WithRotor):

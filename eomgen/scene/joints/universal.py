@@ -6,7 +6,7 @@ from pydantic import Field
 
 from eomgen.language.base import Identifier
 from eomgen.language.quantity import Numbers
-from eomgen.scene.joints.base import Coordinate, WithRotor, Primitive, spatial
+from eomgen.scene.joints.base import Coordinate, Primitive, WithRotor, spatial
 
 
 class Universal(WithRotor):

@@ -13,10 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from eomgen.errors import SceneError
+from eomgen.text import one_line
 
 SECONDS = 120.0
 """Longest time that MuJoCo may take for a file."""
-MISSING = "reading MJCF needs MuJoCo; install it with: pip install 'eomgen[robots]'"
+MISSING = "reading MJCF needs MuJoCo 4; install it with: pip install 'eomgen[robots]'"
+NO_MUJOCO = 3
+"""The exit code of `compiler` without it."""
 MEASURED = ("body_", "jnt_", "dof_", "geom_", "actuator_", "tendon_", "wrap_", "eq_data", "qpos")
 """Beginnings of the names of arrays in which each number must be finite."""
 
@@ -28,10 +31,12 @@ class Compiled:
     arrays  the arrays of mjModel by name, as numbers or lists; those of its options begin with
             `opt_`. An array over objects of one kind has an entry for each
     names   for each kind of object a name for each; nameless ones are called by kind and number
+    warnings  what MuJoCo warns of
     """
 
     arrays: Mapping[str, Any]
     names: Mapping[str, tuple[str, ...]]
+    warnings: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Any:
         return self.arrays[name]
@@ -44,6 +49,16 @@ def compiled(path: Path) -> Compiled:
     """
     if find_spec("mujoco") is None:
         raise SceneError(f"{path.name}: {MISSING}")
+    code, data, said = _compile(path)
+    if code == NO_MUJOCO:
+        raise SceneError(f"{path.name}: {MISSING}")
+    if code:
+        raise SceneError(f"{path.name}: {_why(code, said)}")
+    return _read(data, said, path.name)
+
+
+def _compile(path: Path) -> tuple[int, bytes, list[str]]:
+    """The exit code of the compiler, its output, and the lines of its messages."""
     program = Path(__file__).with_name("compiler.py")
     with tempfile.TemporaryDirectory() as folder:  # MuJoCo writes its log into the working folder
         command = [sys.executable, "-P", str(program), str(path.resolve())]
@@ -60,23 +75,19 @@ def compiled(path: Path) -> Compiled:
             raise SceneError(
                 f"{path.name}: MuJoCo does not compile it within {SECONDS:g} s; make it smaller"
             ) from None
-    if done.returncode == 3:
-        raise SceneError(f"{path.name}: {MISSING}")
-    if done.returncode:
-        raise SceneError(f"{path.name}: {_why(done)}")
-    return _read(done.stdout, path.name)
+    lines = done.stderr.decode("utf-8", "replace").splitlines()
+    return done.returncode, done.stdout, [line.strip() for line in lines if line.strip()]
 
 
-def _why(done: subprocess.CompletedProcess[bytes]) -> str:
+def _why(code: int, said: list[str]) -> str:
     """What MuJoCo says of a file that it does not compile."""
-    lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
-    if done.returncode < 0 or not lines:
-        said = f": {lines[-1]}" if lines else ""
-        return f"MuJoCo ends while it compiles the file (code {done.returncode}){said}"
-    return f"MuJoCo: {lines[-1].removeprefix('Error: ').removesuffix(';')}"
+    last = said[-1] if said else ""
+    if code < 0 or not last:
+        return f"MuJoCo ends while it compiles the file (code {code}){f': {last}' if last else ''}"
+    return f"MuJoCo: {last.removeprefix('Error: ').removesuffix(';')}"
 
 
-def _read(data: bytes, name: str) -> Compiled:
+def _read(data: bytes, said: list[str], name: str) -> Compiled:
     import numpy as np  # here, so that reading a scene does not load it
 
     with np.load(io.BytesIO(data), allow_pickle=False) as found:
@@ -90,7 +101,8 @@ def _read(data: bytes, name: str) -> Compiled:
         if key.startswith(MEASURED) and array.dtype.kind == "f" and not np.isfinite(array).all():
             raise SceneError(f"{name}: {key} has a number that is not finite; correct the file")
     lists = {key: a.tolist() for key, a in arrays.items() if not key.startswith("names_")}
-    return Compiled(lists, names)
+    warnings = [f"MuJoCo warns: {line[8:].strip()}" for line in said if line.startswith("WARNING")]
+    return Compiled(lists, names, tuple(dict.fromkeys(map(one_line, warnings))))
 
 
 def _called(kind: str, names: list[str]) -> tuple[str, ...]:

@@ -10,6 +10,10 @@ import json
 import sys
 from typing import Any
 
+OLDEST = 4
+"""The first version of MuJoCo whose arrays are read."""
+MISSING = 3
+"""The exit code without such a MuJoCo."""
 KINDS = ("body", "joint", "geom", "site", "actuator", "tendon", "equality")
 """Objects whose names are written."""
 PREFIXES = (
@@ -66,8 +70,9 @@ def main(path: str) -> int:
         import mujoco
         import numpy as np
     except ImportError:
-        print("MuJoCo is not installed", file=sys.stderr)
-        return 3
+        return MISSING
+    if int(mujoco.__version__.split(".")[0]) < OLDEST:
+        return MISSING
     try:
         model = mujoco.MjModel.from_xml_path(path)
     except Exception as error:  # whatever MuJoCo raises, its message is all that is wanted

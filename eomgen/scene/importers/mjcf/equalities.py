@@ -62,10 +62,8 @@ def _loop(model: Compiled, e: int, names: Names) -> dict[str, Any]:
     return table
 
 
-def _poses(
-    model: Compiled, e: int, kind: int, data: Sequence[float]
-) -> tuple[Pose, Pose]:
-    """The two poses that coincide. Of bodies they are in `eq_data`, else they are those of sites."""
+def _poses(model: Compiled, e: int, kind: int, data: Sequence[float]) -> tuple[Pose, Pose]:
+    """The two poses that coincide: of sites, or of bodies as in `eq_data`."""
     ends = (model["eq_obj1id"][e], model["eq_obj2id"][e])
     if model["eq_objtype"][e] == SITE:
         one, other = (

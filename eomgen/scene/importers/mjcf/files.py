@@ -8,7 +8,6 @@ outside of the allowed folders.
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from eomgen.errors import SceneError
 from eomgen.scene.importers.xml_elements import Element, read_xml
 from eomgen.text import brief
 
@@ -91,5 +90,3 @@ def _check_size(path: Path, name: str, element: Element) -> None:
             raise element.error(f"'{brief(name)}' is no ordinary file; name one that is")
         if path.stat().st_size > LARGEST_ASSET:
             raise element.error(f"'{brief(name)}' is larger than {LARGEST_ASSET} bytes")
-
-

@@ -47,8 +47,10 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
     if changed:
         made.remark(f"renamed: {listed(changed)}")
     name = scene_name(root.attributes.get("model", ""), path.stem)
-    lost = listed(f"{count} {what}" for what, count in made.lost.items())
-    remarks = (*([f"left out: {lost}"] if lost else []), *made.remarks)
+    lost = [f"left out: {what} ({count})" for what, count in made.lost.items()]
+    beside = ", ".join(f"{what} ({model[key]})" for key, what in COUNTED.items() if model[key])
+    lost += [f"left out: {beside}"] if beside else []
+    remarks = (*lost, *made.remarks, *model.warnings)
     return Imported(_tables(name, path.name, made), remarks)
 
 
@@ -115,9 +117,6 @@ def _tables(name: str, file: str, made: Mechanism) -> dict[str, Any]:
 
 def _remarks(model: Compiled, made: Mechanism, wishes: Wishes) -> Iterable[str]:
     """What else has no counterpart, or is otherwise than in MuJoCo."""
-    for key, what in COUNTED.items():
-        if model[key]:
-            made.lost[what] += model[key]
     if wishes.floating:
         yield "--floating is for URDF; an MJCF file says which bodies move freely"
     if model["opt_density"] or model["opt_viscosity"]:

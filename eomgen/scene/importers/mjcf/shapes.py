@@ -45,11 +45,11 @@ def _shape(model: Compiled, g: int, made: Mechanism) -> list[dict[str, Any]]:
         case _ if kind == BOX:
             table = {"type": "box", "size": [2 * a, 2 * b, 2 * c], "center": at} | _turned(quat)
         case _ if kind in (MESH, SDF):
-            low = model["geom_aabb"][g]
-            arm = image(matrix_of(quat), low[:3])
-            size = [max(2 * half, THINNEST) for half in low[3:]]
+            bounds = model["geom_aabb"][g]
+            arm = image(matrix_of(quat), bounds[:3])
+            edges = [max(2 * half, THINNEST) for half in bounds[3:]]
             center = [x + d for x, d in zip(at, arm, strict=True)]
-            table = {"type": "box", "size": size, "center": center} | _turned(quat)
+            table = {"type": "box", "size": edges, "center": center} | _turned(quat)
             made.remark("meshes are drawn as the boxes around them")
         case _:
             made.lost["planes and fields of heights"] += 1
