@@ -59,6 +59,11 @@ def add_import(parser: argparse.ArgumentParser) -> None:
         help="let the root link of a URDF move freely; else it is fixed to the world",
     )
     parser.add_argument(
+        "--stops",
+        action="store_true",
+        help="make rigid stops of the limits of a URDF's joints, which are else reported",
+    )
+    parser.add_argument(
         "--allow",
         metavar="DIR",
         type=path,

@@ -31,7 +31,7 @@ PAGES = [
     *sorted((DOCS / "howto").glob("*.md")),
     *sorted((DOCS / "concepts").glob("*.md")),
 ]
-FILE = re.compile(r"^(?:#|/\*) (append to )?(\S+\.\w+)\b.*\n")
+FILE = re.compile(r"^(?:#|/\*|<!--) (append to )?(\S+\.\w+)\b.*\n")
 """The first line of a block that is a file, or the end of one."""
 
 

@@ -156,21 +156,25 @@ def test_the_scene_written_is_the_robot(
 
 
 def test_what_a_scene_lacks_is_listed(tmp_path: Path) -> None:
-    """Each kind once, with names; names that are no identifiers are changed."""
+    """Each kind once, with names; names that are no identifiers are changed, and never more than a
+    comment of what is written.
+    """
     (tmp_path / "robot.urdf").write_text(
-        GOOD_URDF.replace('name="tip"', 'name="tip 1"')
-        .replace('link="tip"', 'link="tip 1"')
+        GOOD_URDF.replace('name="tip"', 'name="tip&#10;1"')
+        .replace('link="tip"', 'link="tip&#10;1"')
         .replace('lower="-1"', 'lower="1"')
         .replace("</robot>", '<gazebo/><gazebo/><transmission name="x"/></robot>'),
         "utf-8",
     )
-    remarks = "\n".join(eomgen.import_robot(tmp_path / "robot.urdf").remarks)
+    imported = eomgen.import_robot(tmp_path / "robot.urdf")
+    assert tomllib.loads(imported.toml()) == imported.tables
+    remarks = "\n".join(imported.remarks)
     for part in (
         "left out: 2 <gazebo>, 1 <transmission>",
         "bounds of efforts and velocities",
         "0 is beyond the limits of 'shoulder'",
         "smoothed within 0.01 rad/s",
-        "renamed: 'tip 1' is tip_1",
+        "renamed: 'tip\\n1' is tip_1",
         "'package://arm/lower.stl' is not there; import with --allow DIR",
     ):
         assert part in remarks, remarks

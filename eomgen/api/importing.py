@@ -10,16 +10,22 @@ from eomgen.scene.reader import find_scene
 
 
 def import_robot(
-    path: str | PathLike[str], *, floating: bool = False, allow: Sequence[str | PathLike[str]] = ()
+    path: str | PathLike[str],
+    *,
+    floating: bool = False,
+    stops: bool = False,
+    allow: Sequence[str | PathLike[str]] = (),
 ) -> Imported:
     """Read a robot file, URDF or MJCF: its `tables`, as a scene's file holds them, and `remarks`.
 
     path      the file
     floating  of a URDF, whether its root link moves freely; else it is fixed to the world
+    stops     of a URDF, whether the limits of joints are rigid stops without bounce; else a
+              coordinate beyond them is reported
     allow     folders in which meshes and included files may lie, beside the file's own
 
     All functions that take a scene take `tables`, and the path of a robot file as well. `toml()`
     of the result is the text of a scene's file. Raises `SceneError` for a file that is no robot.
     """
-    wishes = Wishes(floating=floating, allowed=tuple(map(Path, allow)))
+    wishes = Wishes(floating=floating, stops=stops, allowed=tuple(map(Path, allow)))
     return import_file(find_scene(str(path)), wishes)

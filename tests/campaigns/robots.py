@@ -11,6 +11,7 @@ to the largest of the state. What is not supported has its message instead.
 
 import argparse
 import sys
+import xml.etree.ElementTree as xml
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -37,7 +38,7 @@ def urdf(given: argparse.Namespace) -> int:
     bases = {"both": (False, True)}.get(given.base, (given.base == "floating",))
     for path in robots():
         for floating in bases if given.only in str(path) else ():
-            if floating and '<link name="world"' in path.read_text("utf-8"):
+            if floating and xml.parse(path).find("link[@name='world']") is not None:
                 continue  # Pinocchio would let the world move
             label = f"{path.stem:32} {'floating' if floating else 'fixed':8}"
             try:

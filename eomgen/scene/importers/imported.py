@@ -13,10 +13,12 @@ class Wishes:
     """What a user wants of an import, beyond what the file says.
 
     floating  the root link moves freely instead of being fixed to the world
+    stops     the limits of joints are rigid stops
     allowed   folders that files named in the robot file may lie in, beside its own folder
     """
 
     floating: bool = False
+    stops: bool = False
     allowed: tuple[Path, ...] = ()
 
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Collection, Iterable, Sequence
 
 from eomgen.scene.joints.base import WORLD
+from eomgen.text import brief
 
 LONGEST = 60
 """Longer names are cut, so that names made from them are not too long either."""
@@ -60,4 +61,4 @@ def _plain(name: str, kind: str) -> str:
 
 def renamed(found: dict[str, str]) -> list[str]:
     """What was changed, as "'a b' is a_b", for remarks."""
-    return [f"'{name}' is {new}" for name, new in found.items() if name != new]
+    return [f"'{brief(name)}' is {new}" for name, new in found.items() if name != new]

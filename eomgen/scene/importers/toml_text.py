@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from eomgen.text import one_line
+
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 LONGEST_LINE = 100
 
@@ -14,7 +16,7 @@ def toml_text(tables: Mapping[str, Any], comments: Sequence[str] = ()) -> str:
 
     Numbers have all their digits. Raises `TypeError` for a value that TOML lacks.
     """
-    lines = [f"# {comment}" for comment in comments]
+    lines = [f"# {one_line(comment)}" for comment in comments]
     lines += _pairs(tables)
     for key, value in tables.items():
         if isinstance(value, Mapping):

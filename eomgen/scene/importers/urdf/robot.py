@@ -16,6 +16,7 @@ from eomgen.scene.importers.urdf.joints import (
     add_joints,
     fixed_base,
     floating_base,
+    stops,
 )
 from eomgen.scene.importers.urdf.links import ENTRIES, Changes, Inertial, read_inertials
 from eomgen.scene.importers.urdf.shapes import Meshes, colours_of, shapes_of
@@ -59,6 +60,8 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     loose = any(joint.kind in ("planar", "floating") for joint in moved(tree))
     if not (driven or loose or wishes.floating):
         raise robot.error("nothing can move; let the root move freely with --floating")
+    if wishes.stops:
+        made.effects += stops(made)
     remarks += _remarks(robot, tree, names, made)
     remarks += _remarks_on_bodies(tree, meshes, changes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
@@ -153,10 +156,10 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
             "left out: bounds of efforts and velocities of joints; each motor is an input without "
             "bounds"
         )
-    if any(joint.limits for joint in single):
+    if any(joint.limits for joint in single) and not any("low" in e for e in made.effects):
         yield (
-            "a coordinate beyond the limits of its joint is reported, not prevented; an effect "
-            "joint_stop prevents it"
+            "a coordinate beyond the limits of its joint is reported, not prevented; import with "
+            "--stops adds rigid stops"
         )
     if slight := [joint for joint in joints if any(map(is_slight, joint.at))]:
         yield f"rounding errors in origins count as 0: {_names_of(slight)}"

@@ -39,16 +39,20 @@ class Meshes:
 def shapes_of(
     link: Element, what: str, colours: Mapping[str, str], meshes: Meshes
 ) -> list[dict[str, Any]]:
-    """The shapes of a link's visual elements; without any, of its collision elements.
+    """The shapes of a link's visual elements; without any that can be read, of its collision
+    elements.
 
     Raises `SceneError` for sizes that are no positive numbers.
     """
-    elements = link.all("visual") or link.all("collision")
-    return [
-        table | ({"color": colour} if (colour := _colour(element, colours)) else {})
-        for element in elements
-        for table in _shapes(element, what, meshes)
-    ]
+    for tag in ("visual", "collision"):
+        found = [
+            table | ({"color": colour} if (colour := _colour(element, colours)) else {})
+            for element in link.all(tag)
+            for table in _shapes(element, what, meshes)
+        ]
+        if found:
+            return found
+    return []
 
 
 def colours_of(robot: Element) -> dict[str, str]:
