@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from eomgen.errors import SceneError
+from eomgen.language.base import LARGEST
 from eomgen.text import one_line
 
-SECONDS = 120.0
+SECONDS = 60.0
 """Longest time that MuJoCo may take for a file."""
 MISSING = "reading MJCF needs MuJoCo 4; install it with: pip install 'eomgen[robots]'"
 NO_MUJOCO = 3
@@ -97,9 +98,13 @@ def _read(data: bytes, said: list[str], name: str) -> Compiled:
         for key, array in arrays.items()
         if key.startswith("names_")
     }
-    for key, array in arrays.items():
-        if key.startswith(MEASURED) and array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise SceneError(f"{name}: {key} has a number that is not finite; correct the file")
+    for key in sorted(arrays, key=lambda key: (key.endswith("0"), key)):  # what is computed: last
+        measured = key.startswith(MEASURED) and arrays[key].dtype.kind == "f"
+        if measured and not (np.abs(arrays[key].astype(float)) <= LARGEST).all():
+            raise SceneError(
+                f"{name}: {key} of the compiled model has a number that is not finite or larger "
+                f"than {LARGEST:g}; correct the file"
+            )
     lists = {key: a.tolist() for key, a in arrays.items() if not key.startswith("names_")}
     warnings = [f"MuJoCo warns: {line[8:].strip()}" for line in said if line.startswith("WARNING")]
     return Compiled(lists, names, tuple(dict.fromkeys(map(one_line, warnings))))

@@ -8,8 +8,11 @@ line on standard error is MuJoCo's message.
 import io
 import json
 import sys
+from contextlib import suppress
 from typing import Any
 
+MOST_MEMORY = 8 << 30
+"""Bytes of memory that a compilation may take, where the system can limit it."""
 OLDEST = 4
 """The first version of MuJoCo whose arrays are read."""
 MISSING = 3
@@ -64,26 +67,36 @@ def arrays_of(model: Any) -> dict[str, Any]:
     return found
 
 
-def main(path: str) -> int:
-    """Compile a file."""
+def compile_file(path: str) -> tuple[int, bytes, str]:
+    """The exit code, the arrays as `numpy.savez` writes them, and MuJoCo's message."""
     try:
         import mujoco
         import numpy as np
     except ImportError:
-        return MISSING
+        return MISSING, b"", ""
     if int(mujoco.__version__.split(".")[0]) < OLDEST:
-        return MISSING
+        return MISSING, b"", ""
     try:
         model = mujoco.MjModel.from_xml_path(path)
     except Exception as error:  # whatever MuJoCo raises, its message is all that is wanted
         lines = [line.strip() for line in str(error).splitlines()]
-        print("; ".join(line for line in lines if line), file=sys.stderr)
-        return 1
+        return 1, b"", "; ".join(line for line in lines if line)
     buffer = io.BytesIO()
     np.savez(buffer, **arrays_of(model))
-    sys.stdout.buffer.write(buffer.getvalue())
-    return 0
+    return 0, buffer.getvalue(), ""
+
+
+def limit_memory() -> None:
+    """Let allocations beyond `MOST_MEMORY` fail."""
+    with suppress(ImportError, OSError, ValueError):
+        import resource  # POSIX only
+
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    limit_memory()
+    code, data, message = compile_file(sys.argv[1])
+    sys.stdout.buffer.write(data)
+    print(message, file=sys.stderr)
+    sys.exit(code)

@@ -8,7 +8,7 @@ outside of the allowed folders.
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from eomgen.scene.importers.xml_elements import Element, read_xml
+from eomgen.scene.importers.xml_elements import MOST_ELEMENTS, Element, read_xml
 from eomgen.text import brief
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")
@@ -16,6 +16,8 @@ DEEPEST = 20
 """Greatest depth of files that include files."""
 MOST_FILES = 1000
 LARGEST_ASSET = 200_000_000
+MOST_POINTS = 100_000_000
+"""Greatest number of points of a field of heights, and of a picture."""
 
 
 def check_files(path: Path, root: Element, allowed: Sequence[Path]) -> None:
@@ -25,6 +27,7 @@ def check_files(path: Path, root: Element, allowed: Sequence[Path]) -> None:
     ones, one that is not XML, or includes without end.
     """
     folders = [folder.resolve() for folder in (path.parent, *allowed)]
+    check_sizes(root)
     elements = list(_with_includes(path, root, folders))
     within = {path.parent.resolve(), *(file.parent.resolve() for file, _ in elements)}
     for _, element in elements:
@@ -62,7 +65,9 @@ def _with_includes(
             found = next((other for other in tried if other.is_file()), None)
             if found is None:
                 raise element.error(f"no file '{brief(name)}' to include; correct its name")
-            pending.append((found, read_xml(found), depth + 1))
+            inner = read_xml(found)
+            check_sizes(inner)
+            pending.append((found, inner, depth + 1))
 
 
 def _reads_mjcf(element: Element) -> bool:
@@ -85,8 +90,45 @@ def _inside(base: Path, name: str, element: Element, folders: Sequence[Path]) ->
 
 
 def _check_size(path: Path, name: str, element: Element) -> None:
-    if path.exists() and not path.is_dir():
-        if not path.is_file():
-            raise element.error(f"'{brief(name)}' is no ordinary file; name one that is")
-        if path.stat().st_size > LARGEST_ASSET:
-            raise element.error(f"'{brief(name)}' is larger than {LARGEST_ASSET} bytes")
+    try:
+        if not path.exists() or path.is_dir():
+            return
+        ordinary, size = path.is_file(), path.stat().st_size
+    except OSError as error:
+        raise element.error(f"'{brief(name)}' cannot be read: {error.strerror}") from None
+    if not ordinary:
+        raise element.error(f"'{brief(name)}' is no ordinary file; name one that is")
+    if size > LARGEST_ASSET:
+        raise element.error(f"'{brief(name)}' is larger than {LARGEST_ASSET} bytes")
+
+
+def check_sizes(root: Element) -> None:
+    """Check what a few attributes could make large: numbers of copies, and of points in a grid.
+
+    Raises `SceneError` with file and line.
+    """
+    pending, total = [(root, 1)], 0
+    while pending:
+        element, copies = pending.pop()
+        if count := _product(element, ("count",)):
+            copies *= count
+        if _product(element, ("nrow", "ncol")) > MOST_POINTS:
+            raise element.error(f"has more than {MOST_POINTS} points; give a coarser grid")
+        if _product(element, ("width", "height")) > MOST_POINTS:
+            raise element.error(f"has more than {MOST_POINTS} points; give a smaller picture")
+        total += copies
+        if total > MOST_ELEMENTS:
+            raise element.error(
+                f"the file has more than {MOST_ELEMENTS} elements with all copies; make fewer"
+            )
+        pending += [(child, copies) for child in element.children]
+
+
+def _product(element: Element, keys: Sequence[str]) -> int:
+    """The product of the positive whole numbers of some attributes, 0 without any."""
+    words = [word for key in keys for word in element.attributes.get(key, "").split()]
+    found = 0
+    for word in words:
+        if word.isascii() and word.isdigit() and int(word[:20]):
+            found = max(found, 1) * int(word[:20])
+    return found

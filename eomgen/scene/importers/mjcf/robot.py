@@ -40,7 +40,7 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
     check_files(path, root, wishes.allowed)
     model = compiled(path)
     if not model["nv"]:
-        raise root.error("nothing can move: no body has a joint")
+        raise root.error("nothing can move: the file has no joints")
     names, changed = names_of(model)
     made = mechanism_of(model, names)
     made.remarks |= dict.fromkeys(_remarks(model, made, wishes))
