@@ -26,7 +26,10 @@ class Robot:
     def __init__(self, path: Path, floating: bool, route: str | None = None) -> None:
         tables = eomgen.import_robot(path, floating=floating).tables
         begun = time.perf_counter()
-        self.module = eomgen.load(eomgen.generate(tables, route=route, outputs=[]))
+        generated = eomgen.generate(tables, route=route, outputs=[])
+        self.module = eomgen.load(generated)
+        taken = (line.split()[0] for line in generated.explanation if line.endswith("<- taken"))
+        self.route = next(taken, route)
         self.seconds = time.perf_counter() - begun
         base = (pin.JointModelFreeFlyer(),) if floating else ()
         self.pin = pin.buildModelFromUrdf(str(path), *base)

@@ -30,6 +30,19 @@ DRAWN = """<link name="base"><visual>{}
   <geometry><mesh filename="{}" scale="0.1 0.1 0.1"/></geometry>
 </visual></link>
 """
+COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
+<asset><unit meter="0.01"/></asset>
+<library_geometries><geometry id="g"><mesh>
+  <source id="n"><float_array>9 9 9</float_array></source>
+  <source id="p"><float_array>{}</float_array></source>
+  <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene><node>
+  <translate>100 0 0</translate><rotate>0 0 1 90</rotate>
+  <node><instance_geometry url="#g"/></node>
+</node></visual_scene></library_visual_scenes>
+</COLLADA>
+"""
 
 
 def link(name: str, com: str = "0.02 0.05 0.1") -> str:
@@ -175,7 +188,7 @@ def test_what_a_scene_lacks_is_listed(tmp_path: Path) -> None:
         "0 is beyond the limits of 'shoulder'",
         "smoothed within 0.01 rad/s",
         "renamed: 'tip\\n1' is tip_1",
-        "'package://arm/lower.stl' is not there; import with --allow DIR",
+        "left out: 1 mesh, 'package://arm/lower.stl' is not there; import with --allow DIR",
     ):
         assert part in remarks, remarks
 
@@ -214,7 +227,7 @@ def test_masses_that_are_odd_keep_the_motion(tmp_path: Path) -> None:
 
 
 def mesh(folder: Path, kind: str) -> Path:
-    """A triangle from (-1, 0, 2) to (3, 4, 2.5), in three ways."""
+    """A triangle from (-1, 0, 2) to (3, 4, 2.5), in four ways."""
     corners = [(-1.0, 0.0, 2.0), (3.0, 0.0, 2.5), (0.0, 4.0, 2.0)]
     path = folder / f"part.{kind[:3]}"
     if kind == "stl":
@@ -223,6 +236,10 @@ def mesh(folder: Path, kind: str) -> Path:
     elif kind == "stl_text":
         lines = ["vertex {} {} {}".format(*corner) for corner in corners]
         path.write_text("\n".join(["solid a", "facet normal 0 0 1", *lines, "endsolid"]))
+    elif kind == "dae":
+        # In cm, and turned by its node: (x, y, z) is (y, -x, z) there, moved by 1 along x.
+        numbers = " ".join(f"{100 * y} {-100 * (x - 1)} {100 * z}" for x, y, z in corners)
+        path.write_text(COLLADA.format(numbers))
     else:
         path.write_text(
             "\n".join(["vn 9 9 9", *("v {} {} {}".format(*c) for c in corners), "f 1 2 3"])
@@ -230,7 +247,7 @@ def mesh(folder: Path, kind: str) -> Path:
     return path
 
 
-@pytest.mark.parametrize("kind", ["stl", "stl_text", "obj"])
+@pytest.mark.parametrize("kind", ["stl", "stl_text", "obj", "dae"])
 def test_a_mesh_is_drawn_as_the_box_around_it(tmp_path: Path, kind: str) -> None:
     """Scaled, turned and moved with its visual element."""
     path = mesh(tmp_path, kind)
@@ -261,7 +278,7 @@ def test_only_files_of_allowed_folders_are_read(tmp_path: Path) -> None:
         robot = written(inside, visual, link("arm"), joint("turn", "continuous", "base", "arm"))
         refused = eomgen.import_robot(robot)
         assert "shapes" not in refused.tables["bodies"][0]
-        assert "left out: 1 meshes" in "\n".join(refused.remarks)
+        assert "left out: 1 mesh, " in "\n".join(refused.remarks)
         if not name.startswith("package"):
             allowed = eomgen.import_robot(robot, allow=[outside])
             assert "shapes" in allowed.tables["bodies"][0]

@@ -51,11 +51,9 @@ def urdf(given: argparse.Namespace) -> int:
             found = max(robot.difference(rng) for _ in range(given.states))
             wrong, worst, count = wrong + (not found < BOUND), max(worst, found), count + 1
             total = robot.module.COST["derivative"]["total"]
-            print(
-                f"{label} {len(robot.velocities):3} velocities {total:6} operations "
-                f"{robot.seconds:6.1f} s  {found:.1e}{'' if found < BOUND else ' !'}",
-                flush=True,
-            )
+            label = f"{label} {len(robot.velocities):3} velocities {total:6} operations"
+            mark = "" if found < BOUND else " !"
+            print(f"{label} {robot.route:11} {robot.seconds:6.1f} s  {found:.1e}{mark}", flush=True)
     print(f"{count} compared, {wrong} beyond {BOUND:g}, worst {worst:.1e}")
     return wrong
 

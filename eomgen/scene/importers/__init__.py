@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from eomgen.errors import SceneError
@@ -59,5 +60,5 @@ def import_file(path: Path, wishes: Wishes | None = None) -> Imported:
     return imported
 
 
-def _importer(root: "Element"):  # type: ignore[no-untyped-def]
+def _importer(root: "Element") -> ModuleType:
     return import_module(f"{__name__}.{IMPORTERS[root.tag].module}")

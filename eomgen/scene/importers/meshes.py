@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from eomgen.errors import EomgenError, RunError
 from eomgen.files import read_plain
+from eomgen.scene.importers.collada import corners_of
 
 LARGEST_MESH = 100_000_000
 LARGEST = 1e30
@@ -31,6 +32,11 @@ class Bounds:
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
+
+
+ABSENT, OUTSIDE = "is not there", "is outside of the file's folder"
+ELSEWHERE = (ABSENT, OUTSIDE)
+"""Reasons that another folder would help against."""
 
 
 class MeshError(Exception):
@@ -58,22 +64,28 @@ def find_file(name: str, folders: Sequence[Path]) -> Path:
             if path.is_file():
                 if any(path.resolve().is_relative_to(folder.resolve()) for folder in folders):
                     return path
-                raise MeshError("is outside of the file's folder")
+                raise MeshError(OUTSIDE)
         except (OSError, ValueError):
             continue
-    raise MeshError("is not there")
+    raise MeshError(ABSENT)
 
 
 def bounds_of(path: Path) -> Bounds:
-    """The bounds of a mesh, STL or OBJ. Raises `MeshError`."""
+    """The bounds of a mesh, STL, OBJ or COLLADA. Raises `MeshError`."""
     kind = path.suffix.lower()
-    if kind not in (".stl", ".obj"):
-        raise MeshError(f"is a {kind or 'file without an ending'}, not STL or OBJ")
+    if kind not in (".stl", ".obj", ".dae"):
+        raise MeshError("is not STL, OBJ or DAE")
     try:
         data = read_plain(path, LARGEST_MESH, name=path.name, error=RunError)
     except EomgenError:
         raise MeshError("cannot be read") from None
-    corners = _binary(data) if kind == ".stl" and _is_binary(data) else _text(data)
+    try:
+        if kind == ".dae":
+            corners = corners_of(data)
+        else:
+            corners = _binary(data) if kind == ".stl" and _is_binary(data) else _text(data)
+    except (ValueError, TypeError):
+        raise MeshError("has corners that are not numbers") from None
     if not len(corners) or not (np.abs(corners) < LARGEST).all():
         raise MeshError("has no corners, or some that are not finite")
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -98,7 +110,4 @@ def _binary(data: bytes) -> npt.NDArray[np.float64]:
 
 
 def _text(data: bytes) -> npt.NDArray[np.float64]:
-    try:
-        return np.array(_CORNER.findall(data)).astype(np.float64).reshape(-1, 3)
-    except ValueError:
-        raise MeshError("has corners that are not numbers") from None
+    return np.array(_CORNER.findall(data)).astype(np.float64).reshape(-1, 3)

@@ -7,6 +7,7 @@ from typing import Any
 
 from eomgen.errors import listed
 from eomgen.scene.importers.imported import Imported, Wishes
+from eomgen.scene.importers.meshes import ELSEWHERE
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
 from eomgen.scene.importers.rotations import is_slight
 from eomgen.scene.importers.urdf.joints import (
@@ -198,11 +199,12 @@ def _remarks_on_bodies(tree: Tree, meshes: Meshes, changes: Changes) -> Iterator
         yield "left out: collision geometry; contacts are effects that a scene adds"
     if meshes.drawn:
         yield f"{meshes.drawn} meshes are drawn as the boxes around them"
-    if meshes.missing:
-        reasons = [f"'{brief(name)}' {why}" for name, why in meshes.missing.items()]
+    for reason in dict.fromkeys(meshes.missing.values()):
+        names = [name for name, why in meshes.missing.items() if why == reason]
+        hint = "; import with --allow DIR reads those in another folder"
         yield (
-            f"left out: {len(reasons)} meshes, of which the first {reasons[0]}; import with "
-            "--allow DIR reads those in another folder"
+            f"left out: {len(names)} mesh{'es' * (len(names) > 1)}, '{brief(names[0])}' "
+            f"{'for one ' * (len(names) > 1)}{reason}{hint * (reason in ELSEWHERE)}"
         )
 
 
