@@ -41,11 +41,13 @@ EVERYTHING = """
       <body name="leg" pos="0 -0.3 0">
         <inertial mass="1.3" pos="0.1 0.2 0" fullinertia="0.03 0.04 0.05 0.001 0.002 -0.003"/>
         <joint name="hip" axis="0 1 0"/>
+        <site name="foot" pos="0.1 0 -0.2"/>
       </body>
     </body>
     <body name="flier" pos="0 0 2">
       <freejoint/>
       <geom type="cylinder" size="0.1 0.2" pos="0.2 0.1 0"/>
+      <site name="jet" pos="0.1 0.2 0.3" euler="0.4 0.5 0.6"/>
     </body>
     <body name="heavy" pos="1 0 2" quat="0 1 0 0">
       <joint type="free" name="loose" armature="0.4" damping="0.3"/>
@@ -56,8 +58,12 @@ EVERYTHING = """
     <fixed name="pull" stiffness="2" damping="0.3" springlength="0.1 0.2">
       <joint joint="knee" coef="1.5"/><joint joint="hip" coef="-0.5"/>
     </fixed>
+    <spatial name="elastic" stiffness="5" damping="0.2" springlength="0.3">
+      <site site="jet"/><site site="foot"/>
+    </spatial>
   </tendon>
   <actuator>
+    <motor name="thrust" site="jet" gear="1 2 3 0.1 0.2 0.3"/>
     <motor name="t" joint="t" gear="3" ctrlrange="-0.2 0.3" ctrllimited="true"/>
     <position joint="knee" kp="4" kv="0.2" forcerange="-1 1" forcelimited="true"/>
     <velocity joint="hip" kv="0.7" gear="-2"/>

@@ -347,7 +347,7 @@ def generalised(
 
 def armatures(model: Model, symbols: Symbols) -> dict[int, Expr]:
     """The inertia of motors' rotors, by velocity."""
-    found = {}
+    found: dict[int, Expr] = {}
     for body, first in zip(model.bodies, model.first_velocity, strict=True):
         if isinstance(body.joint, WithRotor):
             inertia = body.joint.reflected_inertia(symbols.value)

@@ -6,6 +6,8 @@ from typing import Any
 
 from eomgen.scene.importers.mjcf.compiled import Compiled
 from eomgen.scene.importers.mjcf.mechanism import BALL, FREE, SINGLE, Mechanism, Names
+from eomgen.scene.importers.mjcf.poses import cleaned, matrix_of
+from eomgen.scene.importers.rotations import image
 
 SLIDING_SPEED = "friction_speed"
 """The parameter of the speed at which Coulomb friction is smoothed, rad/s or m/s."""
@@ -15,6 +17,9 @@ ON_JOINT, IN_PARENT, ON_TENDON = 0, 1, 3
 FIXED, AFFINE = 0, 1
 """MuJoCo's gains (mjtGain), and biases (mjtBias) of none and affine."""
 FIXED_TENDON = 0
+SITE = 3
+"""MuJoCo's kind of point on a tendon (mjtWrap) that is a site."""
+ON_SITE = 4
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
 
@@ -140,7 +145,7 @@ def _add_tendon(model: Compiled, t: int, names: Names, made: Mechanism, off: int
     damping = 0.0 if off & NO_DAMPER else model["tendon_damping"][t]
     more = (*model["tendon_stiffnesspoly"][t], *model["tendon_dampingpoly"][t])
     if not is_fixed(model, t):
-        if stiffness or damping or any(more):
+        if (stiffness or damping or any(more)) and not _add_elastic(model, t, names, made, off):
             made.lost["springs and dampers of tendons in space"] += 1
         return
     if any(more):
@@ -163,6 +168,31 @@ def _add_tendon(model: Compiled, t: int, names: Names, made: Mechanism, off: int
     _add_motors(f"{names.tendons[t]}_tendon", name, factors, made)
 
 
+def _add_elastic(model: Compiled, t: int, names: Names, made: Mechanism, off: int) -> bool:
+    """The spring of a tendon between two sites, if it is one: linear, about one length."""
+    first, (low, high) = model["tendon_adr"][t], model["tendon_lengthspring"][t]
+    more = (*model["tendon_stiffnesspoly"][t], *model["tendon_dampingpoly"][t])
+    wraps = range(first, first + model["tendon_num"][t])
+    if len(wraps) != 2 or any(model["wrap_type"][w] != SITE for w in wraps):
+        return False
+    if low != high or any(more) or model["tendon_actuatorid"][t] >= 0:
+        return False
+    one, other = (model["wrap_objid"][w] for w in wraps)
+    ends = [model["site_bodyid"][site] for site in (one, other)]
+    if ends[0] == ends[1]:
+        return True
+    table: dict[str, Any] = {"type": "spring", "name": f"{names.tendons[t]}_spring"}
+    for n, (site, body) in enumerate(zip((one, other), ends, strict=True), 1):
+        table |= {f"body_{n}": names.bodies[body], f"at_{n}": list(model["site_pos"][site])}
+    table["rest_length"] = low
+    if not off & NO_SPRING:
+        table["stiffness"] = model["tendon_stiffness"][t]
+    if not off & NO_DAMPER:
+        table["damping"] = model["tendon_damping"][t]
+    made.effects.append(table)
+    return True
+
+
 def add_actuators(model: Compiled, names: Names, made: Mechanism, off: int) -> None:
     """Actuators along coordinates: an input each, and the torque of its control."""
     for a in range(model["nactuator"]):
@@ -182,8 +212,11 @@ def _unsupported(model: Compiled, a: int) -> str:
     if kind in (ON_JOINT, IN_PARENT):
         if model["jnt_type"][of] not in SINGLE:
             return "on ball and free joints"
+    elif kind == ON_SITE:
+        if model["actuator_trnid"][a][1] >= 0:
+            return "between sites"
     elif kind != ON_TENDON or not is_fixed(model, of):
-        return "on sites, bodies and tendons in space"
+        return "on bodies and tendons in space"
     if model["actuator_dyntype"][a]:
         return "with states (filters, integrators, muscles)"
     gain, bias = model["actuator_gaintype"][a], model["actuator_biastype"][a]
@@ -199,11 +232,13 @@ def _unsupported(model: Compiled, a: int) -> str:
 def _add_actuator(model: Compiled, a: int, names: Names, made: Mechanism) -> None:
     """gain control + bias, each affine in length and velocity, times the moment arm."""
     of = model["actuator_trnid"][a][0]
-    gear = model["actuator_gear"][model["actuator_outadr"][a]][0]
-    if model["actuator_trntype"][a] == ON_TENDON:
-        arms = {names.joints[j]: gear * x for j, x in tendon_factors(model, of).items()}
+    kind, gears = model["actuator_trntype"][a], model["actuator_gear"][model["actuator_outadr"][a]]
+    if kind == ON_SITE:
+        arms = {}
+    elif kind == ON_TENDON:
+        arms = {names.joints[j]: gears[0] * x for j, x in tendon_factors(model, of).items()}
     else:
-        arms = {names.joints[of]: gear}
+        arms = {names.joints[of]: gears[0]}
     name = names.inputs[a]
     made.inputs.append({"name": name, "about": "control of an actuator"})
     control, at = name, model["actuator_ctrladr"][a]
@@ -220,6 +255,29 @@ def _add_actuator(model: Compiled, a: int, names: Names, made: Mechanism) -> Non
         force = f"max({low!r}, min({high!r}, {force}))"
     made.definitions[f"{name}_force"] = force
     _add_motors(f"{name}_drive", f"{name}_force", arms, made)
+    if kind == ON_SITE:
+        _add_thrust(model, of, f"{name}_drive", f"{name}_force", gears, names, made)
+
+
+def _add_thrust(
+    model: Compiled,
+    site: int,
+    name: str,
+    force: str,
+    gears: list[float],
+    names: Names,
+    made: Mechanism,
+) -> None:
+    """A force and a torque at a site, in its axes: multiples of a named force."""
+    axes, body = matrix_of(model["site_quat"][site]), model["site_bodyid"][site]
+    for kind, part in (("force", gears[:3]), ("torque", gears[3:])):
+        if any(part) and body:
+            table: dict[str, Any] = {"type": f"external_{kind}", "name": f"{name}_{kind}"}
+            table |= {"axes": "body", "body": names.bodies[body]}
+            if kind == "force":
+                table["at"] = list(model["site_pos"][site])
+            vector = [f"{x!r}*{force}" if x else 0.0 for x in cleaned(image(axes, part))]
+            made.effects.append(table | {kind: vector})
 
 
 def _affine(numbers: list[float], moving: bool, arms: Mapping[str, float]) -> str:

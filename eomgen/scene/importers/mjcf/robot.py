@@ -18,6 +18,7 @@ from eomgen.scene.importers.mjcf.forces import (
 )
 from eomgen.scene.importers.mjcf.mechanism import BALL, FREE, Mechanism, Names
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
+from eomgen.scene.importers.stops import stops
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
 from eomgen.text import brief
@@ -43,6 +44,9 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
         raise root.error("nothing can move: the file has no joints")
     names, changed = names_of(model)
     made = mechanism_of(model, names)
+    if wishes.stops:
+        following = {c["coordinate"] for c in made.constraints if "coordinate" in c}
+        made.effects += stops(made.joints, following | set(made.locked))
     made.remarks |= dict.fromkeys(_remarks(model, made, wishes))
     if changed:
         made.remark(f"renamed: {listed(changed)}")
@@ -126,10 +130,10 @@ def _remarks(model: Compiled, made: Mechanism, wishes: Wishes) -> Iterable[str]:
         )
     if any(model["geom_contype"]) or any(model["geom_conaffinity"]):
         yield "left out: contacts between geoms; contacts are effects that a scene adds"
-    if any(limited for limited in model["jnt_limited"]):
+    if any("limits" in joint for joint in made.joints) and not wishes.stops:
         yield (
-            "a coordinate beyond the limits of its joint is reported, not prevented; an effect "
-            "joint_stop prevents it"
+            "a coordinate beyond the limits of its joint is reported, not prevented; import with "
+            "--stops adds rigid stops"
         )
     if any(
         limited and kind == BALL
