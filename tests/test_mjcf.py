@@ -16,6 +16,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.importers import import_file
 from eomgen.scene.importers.mjcf import compiled as compiling
+from eomgen.scene.importers.rotations import rotation
 from eomgen.scene.reader import parse_scene, read_tables
 
 ROUNDING = 1e-11
@@ -38,9 +39,9 @@ EVERYTHING = """
           <geom type="ellipsoid" size="0.1 0.05 0.2"/>
         </body>
       </body>
-      <body name="leg" pos="0 -0.3 0">
+      <body name="leg" pos="0 -0.3 0" euler="0.3 0.4 0.5">
         <inertial mass="1.3" pos="0.1 0.2 0" fullinertia="0.03 0.04 0.05 0.001 0.002 -0.003"/>
-        <joint name="hip" axis="0 1 0"/>
+        <joint name="hip" axis="1 2 0" pos="0 0.1 0" ref="0.7"/>
         <site name="foot" pos="0.1 0 -0.2"/>
       </body>
     </body>
@@ -199,7 +200,8 @@ def test_welds_are_poses(tmp_path: Path) -> None:
         '<weld site1="s" site2="r"/><connect site1="s" site2="r"/>',
     ).replace('<geom type="box"', '<site name="s" pos="1 2 3" euler="1 2 3"/><geom type="box"')
     text = text.replace(
-        '<geom fromto="0 0 0 0.1', '<site name="r" pos="0 0 1"/><geom fromto="0 0 0 0.1'
+        '<geom fromto="0 0 0 0.1',
+        '<site name="r" pos="0 0 1" euler="3 1 2"/><geom fromto="0 0 0 0.1',
     )
     imported = import_file(written(tmp_path, text))
     loops = [joint for joint in imported.tables["joints"] if joint.get("loop")]
@@ -208,12 +210,18 @@ def test_welds_are_poses(tmp_path: Path) -> None:
     data, rng = mujoco.MjData(mj), np.random.default_rng(1)
     data.qpos[:] = mj.qpos0 + rng.normal(size=mj.nq)
     mujoco.mj_forward(mj, data)
-    for joint in loops[:1]:
-        ends = []
-        for side in ("parent", "child"):
-            body = data.body(joint[side])
-            ends.append(body.xpos + body.xmat.reshape(3, 3) @ joint[f"r_{side}"])
-        assert np.abs(data.efc_pos[:3] - (ends[0] - ends[1])).max() < 1e-12
+    bodies = [[data.body(joint[side]) for side in ("parent", "child")] for joint in loops]
+    at = [
+        body.xpos + body.xmat.reshape(3, 3) @ loops[0][f"r_{side}"]
+        for side, body in zip(("parent", "child"), bodies[0], strict=True)
+    ]
+    assert np.abs(data.efc_pos[:3] - (at[0] - at[1])).max() < 1e-12
+    # Where the sites coincide, the child's axes are E in the parent's.
+    parent, child = (body.xmat.reshape(3, 3) for body in bodies[1])
+    s, r = (data.site(name).xmat.reshape(3, 3) for name in "sr")
+    held = parent.T @ s @ (child.T @ r).T
+    turned = rotation(loops[1]["orientation"])
+    assert np.abs(held - turned).max() < 1e-12
 
 
 BODY = '<worldbody><body name="b"><joint name="j"/><geom size="0.1"/>{}</body></worldbody>'
