@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 import eomgen
+from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -201,3 +202,94 @@ class Comparison:
             size = np.abs(expected)
             found.append((off.max() / size.max(), (off / size).max()))
         return np.array(found)
+
+    def constrained(self, route: str, rng: np.random.Generator) -> "Constrained":
+        """Accelerations under equality constraints, where these are met at the start."""
+        model, mj = assembled(self.model), self.mj
+        mj.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
+        data, whole = mujoco.MjData(mj), np.zeros((mj.nv, mj.nv))
+        data.qpos[:] = self._qpos(model)
+        mujoco.mj_forward(mj, data)
+        residual = np.abs(data.efc_pos).max()
+        rows = np.zeros((data.nefc, mj.nv))
+        if mujoco.mj_isSparse(mj):
+            mujoco.mju_sparse2dense(
+                rows, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+            )
+        else:
+            rows[:] = data.efc_J.reshape(-1, mj.nv)
+        free = np.linalg.svd(rows)[2][np.linalg.matrix_rank(rows, tol=1e-8) :]
+        data.qvel[:] = free.T @ rng.normal(size=len(free))
+        mujoco.mj_forward(mj, data)
+        mujoco.mj_fullM(mj, data, whole)
+        values = self.values(data)
+        q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
+        dynamics = Dynamics(model, Values(model.defaults, {}, q, v), FloatScalars(), "own")
+        found = dict(
+            zip((c.name for c in model.velocities), dynamics.forward(route)(None), strict=True)
+        )
+        vd = self._rates(data, found)
+        left = whole @ vd - data.qfrc_smooth
+        pushed = rows.T @ np.linalg.lstsq(rows.T, left, rcond=1e-9)[0]
+        # Along a motion with this acceleration the rows stay met, but for the third power of time.
+        step, moved = 1e-4, mujoco.MjData(mj)
+        moved.qpos[:] = data.qpos
+        mujoco.mj_integratePos(mj, moved.qpos, data.qvel * step + vd * step**2 / 2, 1.0)
+        mujoco.mj_forward(mj, moved)
+        return Constrained(
+            np.abs(left).max(),
+            np.abs(left - pushed).max(),
+            residual,
+            np.abs(moved.efc_pos).max() / step**3,
+        )
+
+    def _qpos(self, model: Model) -> Array:
+        """MuJoCo's coordinates at the start of a model."""
+        mj, names = self.mj, self.names
+        named = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))
+        named |= dict(model.locked)
+        qpos = mj.qpos0.copy()
+        for j in range(mj.njnt):
+            kind, at, name = mj.jnt_type[j], mj.jnt_qposadr[j], names.joints[j]
+            if kind == BALL:
+                qpos[at : at + 4] = [named[f"{name}_q{x}"] for x in "wxyz"]
+            elif kind == FREE:
+                body = mj.jnt_bodyid[j]
+                turn = [named[f"{names.bodies[body]}_q{x}"] for x in "wxyz"]
+                matrix = np.zeros(9)
+                mujoco.mju_quat2Mat(matrix, np.array(turn))
+                place = [named[f"{names.bodies[body]}_{x}"] for x in "xyz"]
+                qpos[at : at + 3] = place - matrix.reshape(3, 3) @ mj.body_ipos[body]
+                qpos[at + 3 : at + 7] = turn
+            else:
+                qpos[at] = named[name]
+        return qpos
+
+    def _rates(self, data: Any, found: dict[str, float]) -> Array:
+        """v̇ of MuJoCo by that of the scene, without free joints that are split."""
+        mj = self.mj
+        vd = np.array([found.get(name, 0.0) for name in self.velocity_names()])
+        for j in range(mj.njnt):
+            if mj.jnt_type[j] == FREE:
+                v, body = mj.jnt_dofadr[j], mj.jnt_bodyid[j]
+                turned = data.xmat[body].reshape(3, 3)
+                arm = turned @ mj.body_ipos[body]
+                w, turning = turned @ data.qvel[v + 3 : v + 6], turned @ vd[v + 3 : v + 6]
+                vd[v : v + 3] -= np.cross(turning, arm) + np.cross(w, np.cross(w, arm))
+        return vd
+
+
+@dataclass(frozen=True)
+class Constrained:
+    """How far accelerations are from what they must be under constraints.
+
+    force     greatest component of the force M v̇ - f of the constraints
+    apart     what of it is no combination of MuJoCo's rows
+    residual  greatest residual at the start
+    growth    greatest residual after a small time, over its third power
+    """
+
+    force: float
+    apart: float
+    residual: float
+    growth: float

@@ -61,13 +61,15 @@ def _with_includes(
                     f"includes '{brief(name)}', more than {DEEPEST} files deep or "
                     f"{MOST_FILES} in all; does a file include itself?"
                 )
-            tried = [_inside(base, name, element, folders) for base in (file.parent, path.parent)]
-            found = next((other for other in tried if other.is_file()), None)
-            if found is None:
+            tried = {_inside(base, name, element, folders) for base in (file.parent, path.parent)}
+            # MuJoCo takes one of them.
+            found = sorted(other for other in tried if other.is_file())
+            if not found:
                 raise element.error(f"no file '{brief(name)}' to include; correct its name")
-            inner = read_xml(found)
-            check_sizes(inner)
-            pending.append((found, inner, depth + 1))
+            for other in found:
+                inner = read_xml(other)
+                check_sizes(inner)
+                pending.append((other, inner, depth + 1))
 
 
 def _reads_mjcf(element: Element) -> bool:
@@ -78,7 +80,7 @@ def _reads_mjcf(element: Element) -> bool:
 def _inside(base: Path, name: str, element: Element, folders: Sequence[Path]) -> Path:
     """The file of a name in a folder. Raises `SceneError` if it is outside of the allowed ones."""
     try:
-        found = (base / name.strip()).resolve()
+        found = (base / name.strip().replace("\\", "/")).resolve()  # as MuJoCo reads it
         inside = any(found.is_relative_to(folder) for folder in folders)
     except (OSError, ValueError, RuntimeError):
         inside = False
