@@ -66,6 +66,12 @@ class Comparison:
         return Comparison(imported, names_of(compiled(path))[0], mj, tables, driven)
 
     @property
+    def has_constraints(self) -> bool:
+        """Whether the scene has constraints; locked coordinates are none."""
+        loops = any(joint.get("loop") for joint in self.tables["joints"])
+        return loops or bool(self.tables.get("constraints"))
+
+    @property
     def nv(self) -> int:
         """The number of velocities."""
         return int(self.mj.nv)
@@ -224,7 +230,9 @@ class Comparison:
         mujoco.mj_fullM(mj, data, whole)
         values = self.values(data)
         q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
-        dynamics = Dynamics(model, Values(model.defaults, {}, q, v), FloatScalars(), "own")
+        dynamics = Dynamics(
+            model, Values(model.defaults, self.inputs(data.ctrl), q, v), FloatScalars(), "own"
+        )
         found = dict(
             zip((c.name for c in model.velocities), dynamics.forward(route)(None), strict=True)
         )
