@@ -226,6 +226,33 @@ def test_masses_that_are_odd_keep_the_motion(tmp_path: Path) -> None:
     assert "of 'odd'" in said and "'ring'" in said and "held" in said and "'wave'" in said
 
 
+def test_limits_are_stops_on_wish(tmp_path: Path) -> None:
+    """A falling arm passes its limit, and is stopped there on wish. A joint that mimics another has
+    no stop, and follows in a line of joints to the end.
+    """
+    path = written(
+        tmp_path,
+        *('<link name="base"/>', *(link(name) for name in ("arm", "a", "b"))),
+        joint("turn", "revolute", "base", "arm"),
+        joint("first", "revolute", "arm", "a", more=MIMIC.replace("grip", "turn")),
+        joint("second", "revolute", "a", "b", more=MIMIC.replace("grip", "first")),
+    )
+    ends = []
+    for stops in (False, True):
+        imported = eomgen.import_robot(path, stops=stops)
+        made = [effect["name"] for effect in imported.tables["effects"] if "low" in effect]
+        assert made == ["turn_stop"] * stops
+        assert ("reported, not prevented" in "".join(imported.remarks)) != stops
+        found = {c["name"]: c["equals"] for c in imported.tables["constraints"]}
+        assert found["first_mimic"] == "0.8 * turn + 0.05"
+        factor, _, rest = found["second_mimic"].partition(" * turn + ")
+        assert (float(factor), float(rest)) == pytest.approx((0.64, 0.09))
+        alone = {"constraints": [], "locked": {"first": 0.0, "second": 0.0}, "initial": {}}
+        run = eomgen.simulate({**imported.tables, **alone}, t_end=1.5)
+        ends.append(np.abs(run["turn"]).max())
+    assert ends[0] > 1.2 and ends[1] == pytest.approx(1.0, abs=1e-6)
+
+
 def mesh(folder: Path, kind: str) -> Path:
     """A triangle from (-1, 0, 2) to (3, 4, 2.5), in four ways."""
     corners = [(-1.0, 0.0, 2.0), (3.0, 0.0, 2.5), (0.0, 4.0, 2.0)]

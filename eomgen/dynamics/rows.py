@@ -236,7 +236,7 @@ class Rows:
         noise, left_noise = pivot.noise, row.noise
         if noise is not self.one:
             left_noise = left_noise + x * x * noise
-            noise = c * c * noise + s * s * row.noise
+            noise = c * (c * noise) + s * (s * row.noise)
         return (
             Row(pivot.index, d, alpha, a, right, force, noise),
             Row(

@@ -155,7 +155,7 @@ def _single(joint: Joint, name: str, names: Names, made: Mechanism) -> dict[str,
         return table
     table["limits"] = [low, high]
     if joint.mimic is None and not low <= 0.0 <= high:
-        made.start[name] = low if low > 0 else high
+        made.start[name] = (low + high) / 2
         made.clipped.append(joint.name)
     return table
 

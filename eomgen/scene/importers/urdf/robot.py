@@ -171,7 +171,7 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
             f"{_listed(made.unlimited)}"
         )
     if made.clipped:
-        yield f"0 is beyond the limits of {_listed(made.clipped)}, which start at the nearest limit"
+        yield f"0 is beyond the limits of {_listed(made.clipped)}, which start between them"
     if any("coulomb" in effect for effect in made.effects):
         yield f"friction of joints is smoothed within {SPEED:g} rad/s or m/s: {SLIDING_SPEED}"
     if made.held:

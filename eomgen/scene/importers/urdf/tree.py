@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from eomgen.errors import nearest
+from eomgen.errors import SceneError, nearest
 from eomgen.scene.importers.attributes import Vector, child, number, required, vector
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.text import brief
@@ -72,7 +72,8 @@ def read_tree(robot: Element) -> Tree:
     links: dict[str, Element] = {}
     for element in robot.all("link"):
         name = required(element, "name", "a link")
-        _once(name, links, element, "link")
+        if name in links:
+            raise _twice(name, links[name], element, "link")
         links[name] = element
     if not links:
         raise robot.error("has no links; give a robot with <link> and <joint>")
@@ -82,7 +83,8 @@ def read_tree(robot: Element) -> Tree:
     carried: dict[str, Joint] = {}
     for element in robot.all("joint"):
         joint = _joint(element)
-        _once(joint.name, {name: j.element for name, j in joints.items()}, element, "joint")
+        if joint.name in joints:
+            raise _twice(joint.name, joints[joint.name].element, element, "joint")
         for tag, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
                 hint = nearest(link, links) or "; name one of the links"
@@ -100,12 +102,10 @@ def read_tree(robot: Element) -> Tree:
     return _ordered(robot, links, carried)
 
 
-def _once(name: str, seen: Mapping[str, Element], element: Element, what: str) -> None:
-    if name in seen:
-        raise element.error(
-            f"{what} '{brief(name)}' is given twice, also in line {seen[name].line}; "
-            "give each its own name"
-        )
+def _twice(name: str, first: Element, second: Element, what: str) -> SceneError:
+    return second.error(
+        f"{what} '{brief(name)}' is given twice, also in line {first.line}; give each its own name"
+    )
 
 
 def _joint(element: Element) -> Joint:
