@@ -11,7 +11,10 @@ from eomgen.scene.importers.rotations import image
 
 SLIDING_SPEED = "friction_speed"
 """The parameter of the speed at which Coulomb friction is smoothed, rad/s or m/s."""
-NO_SPRING, NO_DAMPER, NO_GRAVITY, NO_FRICTION, NO_ACTUATION = (1 << n for n in (5, 6, 7, 2, 11))
+NO_FRICTION, NO_SPRING, NO_DAMPER, NO_GRAVITY, UNBOUNDED, NO_ACTUATION = (
+    1 << n for n in (2, 5, 6, 7, 8, 11)
+)
+"""MuJoCo's disable flags (mjtDisableBit) of what is imported."""
 ON_JOINT, IN_PARENT, ON_TENDON = 0, 1, 3
 """MuJoCo's transmissions (mjtTrn) along coordinates."""
 FIXED, AFFINE = 0, 1
@@ -242,7 +245,7 @@ def _add_actuator(model: Compiled, a: int, names: Names, made: Mechanism) -> Non
     name = names.inputs[a]
     made.inputs.append({"name": name, "about": "control of an actuator"})
     control, at = name, model["actuator_ctrladr"][a]
-    if model["actuator_ctrllimited"][at]:
+    if model["actuator_ctrllimited"][at] and not model["opt_disableflags"] & UNBOUNDED:
         low, high = model["actuator_ctrlrange"][at]
         control = f"max({low!r}, min({high!r}, {control}))"
     gain = _affine(model["actuator_gainprm"][a], model["actuator_gaintype"][a] == AFFINE, arms)
