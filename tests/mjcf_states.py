@@ -45,14 +45,11 @@ class Comparison:
             mj.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
         mj.opt.density = mj.opt.viscosity = 0.0
         tables = dict(imported.tables)
-        driven = not any(
-            "actuator" in remark.split(":")[0] or " actuators " in remark
-            for remark in imported.remarks
-        )
+        driven = not any(r.startswith("left out: actuators") for r in imported.remarks)
         effects = [e for e in tables["effects"] if e["type"] != "joint_friction"]
         if not driven:
             mj.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
-            effects = [e for e in effects if not (e["type"] == "motor" and "_drive" in e["name"])]
+            effects = [e for e in effects if "_drive" not in e.get("name", "")]
             tables.pop("inputs", None)
             tables["definitions"] = {
                 k: v for k, v in tables.get("definitions", {}).items() if k.endswith("_tension")
@@ -97,6 +94,7 @@ class Comparison:
         """
         data, whole = mujoco.MjData(self.mj), np.zeros((self.nv, self.nv))
         data.qpos[:], data.qvel[:], data.ctrl[:] = self.random_state(rng)
+        data.act[:] = rng.uniform(-0.9, 0.9, self.mj.na)
         mujoco.mj_forward(self.mj, data)
         mujoco.mj_fullM(self.mj, data, whole)
         data.qfrc_applied[:] = rng.normal(size=self.nv) * np.diag(whole)
@@ -169,7 +167,7 @@ class Comparison:
         """v̇ of the scene at a state of MuJoCo, by the recursion of a route."""
         values, model = self.values(data), self.model
         q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
-        given = Values(model.defaults, self.inputs(data.ctrl), q, v)
+        given = Values(model.defaults, self.inputs(data.ctrl), q, v, self.activations(data.act))
         return np.array(
             Dynamics(model, given, FloatScalars(), "own").forward(route)(self.forces(data))
         )
@@ -178,6 +176,15 @@ class Comparison:
         """v̇ of MuJoCo, in the order of the scene's velocities."""
         values = self.values(data, data.qacc)
         return np.array([values[c.name] for c in self.model.velocities])
+
+    def activations(self, act: Array) -> dict[str, float]:
+        """The extra states of the scene, by MuJoCo's activations."""
+        named = {
+            f"{name}_activation": act[first]
+            for name, first in zip(self.names.inputs, self.mj.actuator_actadr, strict=True)
+            if first >= 0
+        }
+        return {state.name: named[state.name] for state in self.model.states}
 
     @cached_property
     def module(self) -> Any:
@@ -189,8 +196,9 @@ class Comparison:
         """v̇ of the generated module."""
         values = self.values(data)
         q, v = ([values[c.name] for c in part] for part in self._state)
-        u = self.inputs(data.ctrl)
-        return self.module.forward_dynamics(q, v, self.forces(data), 0.0, None, u)
+        x, u = [*self.activations(data.act).values()], self.inputs(data.ctrl)
+        state = (q, v, x) if x else (q, v)
+        return self.module.forward_dynamics(*state, self.forces(data), 0.0, None, u)
 
     @property
     def _state(self) -> tuple[Any, Any]:
@@ -230,9 +238,8 @@ class Comparison:
         mujoco.mj_fullM(mj, data, whole)
         values = self.values(data)
         q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
-        dynamics = Dynamics(
-            model, Values(model.defaults, self.inputs(data.ctrl), q, v), FloatScalars(), "own"
-        )
+        given = Values(model.defaults, self.inputs(data.ctrl), q, v, self.activations(data.act))
+        dynamics = Dynamics(model, given, FloatScalars(), "own")
         found = dict(
             zip((c.name for c in model.velocities), dynamics.forward(route)(None), strict=True)
         )

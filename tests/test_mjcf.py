@@ -66,6 +66,9 @@ EVERYTHING = """
     <position joint="knee" kp="4" kv="0.2" forcerange="-1 1" forcelimited="true"/>
     <velocity joint="hip" kv="0.7" gear="-2"/>
     <general tendon="pull" gainprm="2" biasprm="0.1 -0.2 -0.3" biastype="affine" gear="1.5"/>
+    <general name="lagged" joint="knee" dyntype="filter" dynprm="0.1" gainprm="3"
+      biasprm="0 -2 -0.1" biastype="affine" ctrlrange="-0.1 0.1" ctrllimited="true"/>
+    <intvelocity name="summed" joint="hip" kp="2" actrange="-9 9" gear="0.5"/>
     <motor name="geared" joint="roll" gear="2" armature="0.2" damping="0.1"/>
   </actuator>
   <sensor><jointpos joint="knee"/></sensor>

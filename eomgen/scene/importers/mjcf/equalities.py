@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from eomgen.scene.importers.mjcf.compiled import Compiled
-from eomgen.scene.importers.mjcf.forces import is_fixed, linear, tendon_factors
+from eomgen.scene.importers.mjcf.forces import is_fixed, tendon_factors
 from eomgen.scene.importers.mjcf.mechanism import SINGLE, Mechanism, Names
 from eomgen.scene.importers.mjcf.poses import angles, inverse, product
 
@@ -112,9 +112,10 @@ def _are_fixed(model: Compiled, e: int) -> bool:
 def _add_equation(model: Compiled, e: int, names: Names, made: Mechanism) -> None:
     """L - L0 = a + b d + c d² + …, d = M - M0 of the lengths L and M of tendons."""
     t, other = model["eq_obj1id"][e], model["eq_obj2id"][e]
-    length = _stretch(model, t, names)
+    length = _stretch(model, t, names, made)
     numbers = list(model["eq_data"][e][: 5 if other >= 0 else 1])
-    equals = _polynomial(f"({_stretch(model, other, names)})" if other >= 0 else "", numbers)
+    other_length = f"({_stretch(model, other, names, made)})" if other >= 0 else ""
+    equals = _polynomial(other_length, numbers)
     made.constraints.append(
         {
             "type": "equation",
@@ -124,8 +125,9 @@ def _add_equation(model: Compiled, e: int, names: Names, made: Mechanism) -> Non
     )
 
 
-def _stretch(model: Compiled, t: int, names: Names) -> str:
+def _stretch(model: Compiled, t: int, names: Names, made: Mechanism) -> str:
     """The length of a tendon minus that at the start."""
-    text = linear({names.joints[j]: x for j, x in tendon_factors(model, t).items()})
+    factors = {names.joints[j]: x for j, x in tendon_factors(model, t).items()}
+    text = made.sum(f"{names.tendons[t]}_stretch", factors)
     rest = model["tendon_length0"][t]
     return f"{text} - {rest!r}" if rest else text

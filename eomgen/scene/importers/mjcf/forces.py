@@ -17,12 +17,16 @@ NO_FRICTION, NO_SPRING, NO_DAMPER, NO_GRAVITY, UNBOUNDED, NO_ACTUATION = (
 """MuJoCo's disable flags (mjtDisableBit) of what is imported."""
 ON_JOINT, IN_PARENT, ON_TENDON = 0, 1, 3
 """MuJoCo's transmissions (mjtTrn) along coordinates."""
+AT_ONCE, INTEGRATOR, FILTER, FILTER_EXACT = range(4)
+"""MuJoCo's activations (mjtDyn): none, and those with one state that obeys a linear equation."""
 FIXED, AFFINE = 0, 1
 """MuJoCo's gains (mjtGain), and biases (mjtBias) of none and affine."""
 FIXED_TENDON = 0
 SITE = 3
 """MuJoCo's kind of point on a tendon (mjtWrap) that is a site."""
 ON_SITE = 4
+TINY = 1e-15
+"""Least time of a filter, s, as in MuJoCo."""
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
 
@@ -161,7 +165,7 @@ def _add_tendon(model: Compiled, t: int, names: Names, made: Mechanism, off: int
     if not (stiffness or damping):
         return
     factors = {names.joints[j]: factor for j, factor in tendon_factors(model, t).items()}
-    length, rate = linear(factors), linear({f"{c}_dot": x for c, x in factors.items()})
+    length, rate = _length_and_rate(names.tendons[t], factors, made)
     low, high = model["tendon_lengthspring"][t]
     stretch = f"({length}) - {low!r}"
     if low != high:
@@ -220,8 +224,11 @@ def _unsupported(model: Compiled, a: int) -> str:
             return "between sites"
     elif kind != ON_TENDON or not is_fixed(model, of):
         return "on bodies and tendons in space"
-    if model["actuator_dyntype"][a]:
-        return "with states (filters, integrators, muscles)"
+    activation = model["actuator_dyntype"][a]
+    if activation not in (AT_ONCE, INTEGRATOR, FILTER, FILTER_EXACT):
+        return "with states of muscles, motors or controllers"
+    if activation and (kind == ON_SITE or model["actuator_actearly"][a]):
+        return "on sites with states, or with states that act early"
     gain, bias = model["actuator_gaintype"][a], model["actuator_biastype"][a]
     if gain not in (FIXED, AFFINE) or bias not in (0, AFFINE) or model["actuator_plugin"][a] >= 0:
         return "whose force is not affine in control, length and velocity"
@@ -248,18 +255,38 @@ def _add_actuator(model: Compiled, a: int, names: Names, made: Mechanism) -> Non
     if model["actuator_ctrllimited"][at] and not model["opt_disableflags"] & UNBOUNDED:
         low, high = model["actuator_ctrlrange"][at]
         control = f"max({low!r}, min({high!r}, {control}))"
-    gain = _affine(model["actuator_gainprm"][a], model["actuator_gaintype"][a] == AFFINE, arms)
+    states = _states(model, a, name, control)
+    control = next(iter(states), control)
+    if states and model["actuator_actlimited"][a]:
+        made.lost["bounds of states of actuators"] += 1
+    along = _length_and_rate(name, arms, made) if _depends(model, a) else ("0", "0")
+    gain = _affine(model["actuator_gainprm"][a], model["actuator_gaintype"][a] == AFFINE, along)
     force = control if gain == "1.0" else f"({gain})*{control}"
     if model["actuator_biastype"][a] == AFFINE:
-        bias = _affine(model["actuator_biasprm"][a], True, arms)
+        bias = _affine(model["actuator_biasprm"][a], True, along)
         force = force if bias == "0.0" else f"{force} + {bias}"
     if model["actuator_forcelimited"][a]:
         low, high = model["actuator_forcerange"][a]
         force = f"max({low!r}, min({high!r}, {force}))"
     made.definitions[f"{name}_force"] = force
-    _add_motors(f"{name}_drive", f"{name}_force", arms, made)
+    if states:
+        torques = {joint: f"{arm!r}*{name}_force" for joint, arm in arms.items()}
+        table = {"type": "controller", "name": f"{name}_drive", "states": states}
+        made.effects.append(table | {"torques": torques})
+    else:
+        _add_motors(f"{name}_drive", f"{name}_force", arms, made)
     if kind == ON_SITE:
         _add_thrust(model, of, f"{name}_drive", f"{name}_force", gears, names, made)
+
+
+def _states(model: Compiled, a: int, name: str, control: str) -> dict[str, Any]:
+    """The state of an actuator's activation, by name, with its rate; none without one."""
+    activation, time = model["actuator_dyntype"][a], model["actuator_dynprm"][a][0]
+    if activation == AT_ONCE:
+        return {}
+    state = f"{name}_activation"
+    rate = control if activation == INTEGRATOR else f"({control} - {state})/{max(time, TINY)!r}"
+    return {state: {"rate": rate, "about": f"activation of actuator {name}"}}
 
 
 def _add_thrust(
@@ -283,20 +310,25 @@ def _add_thrust(
             made.effects.append(table | {kind: vector})
 
 
-def _affine(numbers: list[float], moving: bool, arms: Mapping[str, float]) -> str:
-    """a + b length + c velocity of an actuator or tendon."""
-    a, b, c = numbers[:3]
-    terms = [repr(a)] if a or not moving or not (b or c) else []
-    if moving and b:
-        terms.append(f"{b!r}*({linear(arms)})")
-    if moving and c:
-        terms.append(f"{c!r}*({linear({f'{x}_dot': r for x, r in arms.items()})})")
-    return " + ".join(terms)
+def _length_and_rate(name: str, arms: Mapping[str, float], made: Mechanism) -> tuple[str, str]:
+    """The length of an actuator or tendon as a formula, and its rate."""
+    rates = {f"{joint}_dot": arm for joint, arm in arms.items()}
+    return made.sum(f"{name}_length", arms), made.sum(f"{name}_rate", rates)
 
 
-def linear(factors: Mapping[str, float]) -> str:
-    """A sum of names with factors."""
-    return " + ".join(f"{x!r}*{name}" if x != 1.0 else name for name, x in factors.items()) or "0"
+def _depends(model: Compiled, a: int) -> bool:
+    """Whether the force of an actuator depends on its length or rate."""
+    gain = model["actuator_gaintype"][a] == AFFINE and any(model["actuator_gainprm"][a][1:3])
+    return gain or (
+        model["actuator_biastype"][a] == AFFINE and any(model["actuator_biasprm"][a][1:3])
+    )
+
+
+def _affine(numbers: list[float], moving: bool, along: tuple[str, str]) -> str:
+    """a + b length + c rate of an actuator; a alone unless it is `moving`."""
+    a, *others = numbers[:3]
+    terms = [f"{x!r}*({of})" for x, of in zip(others, along, strict=True) if x and moving]
+    return " + ".join([*([repr(a)] if a or not terms else []), *terms])
 
 
 def _add_motors(name: str, force: str, arms: Mapping[str, float], made: Mechanism) -> None:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 Tables = list[dict[str, Any]]
-WORLD_BODY = 0
+LONGEST = 300
+"""Longest sum that is written as one formula; the reader takes formulas of 500 characters."""
 FREE, BALL, SLIDE, HINGE = range(4)
 """MuJoCo's joint types (mjtJoint)."""
 SINGLE = (SLIDE, HINGE)
@@ -45,6 +46,17 @@ class Mechanism:
     start: dict[str, float] = field(default_factory=dict)
     lost: Counter[str] = field(default_factory=Counter)
     remarks: dict[str, None] = field(default_factory=dict)
+
+    def sum(self, name: str, factors: Mapping[str, float]) -> str:
+        """A sum of names with factors as a formula; a long one is that of definitions `name_1`, …"""
+        terms = [f"{x!r}*{of}" if x != 1.0 else of for of, x in factors.items()]
+        while len(" + ".join(terms)) > LONGEST:
+            parts, terms = [terms[i : i + 3] for i in range(0, len(terms), 3)], []
+            for part in parts:
+                own = f"{name}_{sum(key.startswith(f'{name}_') for key in self.definitions) + 1}"
+                self.definitions[own] = " + ".join(part)
+                terms.append(own)
+        return " + ".join(terms) or "0"
 
     def remark(self, text: str) -> None:
         """Add a remark, once."""
