@@ -172,6 +172,15 @@ class Comparison:
             Dynamics(model, given, FloatScalars(), "own").forward(route)(self.forces(data))
         )
 
+    def activation_rates(self, data: Any) -> tuple[Array, Array]:
+        """Rates of the scene's extra states, and MuJoCo's, in the same order."""
+        values, model = self.values(data), self.model
+        q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
+        given = Values(model.defaults, self.inputs(data.ctrl), q, v, self.activations(data.act))
+        dynamics = Dynamics(model, given, FloatScalars(), "own")
+        rates = [rate for effect in model.effects for rate in effect.rates(dynamics)]
+        return np.array(rates), np.array([*self.activations(data.act_dot).values()])
+
     def expected(self, data: Any) -> Array:
         """v̇ of MuJoCo, in the order of the scene's velocities."""
         values = self.values(data, data.qacc)
@@ -197,8 +206,8 @@ class Comparison:
         values = self.values(data)
         q, v = ([values[c.name] for c in part] for part in self._state)
         x, u = [*self.activations(data.act).values()], self.inputs(data.ctrl)
-        state = (q, v, x) if x else (q, v)
-        return self.module.forward_dynamics(*state, self.forces(data), 0.0, None, u)
+        more = {"x": x} if x else {}
+        return self.module.forward_dynamics(q, v, self.forces(data), 0.0, None, u, **more)
 
     @property
     def _state(self) -> tuple[Any, Any]:

@@ -91,6 +91,9 @@ def test_accelerations_are_those_of_mujoco(tmp_path: Path) -> None:
     for _ in range(4):
         data = comparison.in_mujoco(rng)
         expected = comparison.expected(data)
+        found, rates = comparison.activation_rates(data)
+        assert len(rates) == 2
+        assert np.abs(found / rates - 1).max() < ROUNDING
         for route in ("aba", "ldl", "orthogonal"):
             found = comparison.accelerations(data, route)
             assert np.abs(found / expected - 1).max() < ROUNDING

@@ -318,9 +318,9 @@ def _length_and_rate(name: str, arms: Mapping[str, float], made: Mechanism) -> t
 
 def _depends(model: Compiled, a: int) -> bool:
     """Whether the force of an actuator depends on its length or rate."""
-    gain = model["actuator_gaintype"][a] == AFFINE and any(model["actuator_gainprm"][a][1:3])
-    return gain or (
-        model["actuator_biastype"][a] == AFFINE and any(model["actuator_biasprm"][a][1:3])
+    return any(
+        model[f"actuator_{part}type"][a] == AFFINE and any(model[f"actuator_{part}prm"][a][1:3])
+        for part in ("gain", "bias")
     )
 
 

@@ -48,7 +48,7 @@ class Mechanism:
     remarks: dict[str, None] = field(default_factory=dict)
 
     def sum(self, name: str, factors: Mapping[str, float]) -> str:
-        """A sum of names with factors as a formula; a long one is that of definitions `name_1`, …"""
+        """A sum of names with factors as a formula; a long one is of definitions `name_1`, …"""
         terms = [f"{x!r}*{of}" if x != 1.0 else of for of, x in factors.items()]
         while len(" + ".join(terms)) > LONGEST:
             parts, terms = [terms[i : i + 3] for i in range(0, len(terms), 3)], []
