@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from eomgen.scene.importers.mjcf.compiled import Compiled
-from eomgen.scene.importers.mjcf.forces import is_fixed, tendon_factors
 from eomgen.scene.importers.mjcf.mechanism import SINGLE, Mechanism, Names
 from eomgen.scene.importers.mjcf.poses import angles, inverse, product
+from eomgen.scene.importers.mjcf.tendons import is_fixed, tendon_factors
 
 CONNECT, WELD, JOINT, TENDON = 0, 1, 2, 3
 """MuJoCo's kinds of equality (mjtEq) that have a counterpart."""

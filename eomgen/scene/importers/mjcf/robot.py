@@ -6,17 +6,14 @@ from typing import Any
 
 from eomgen.errors import listed
 from eomgen.scene.importers.imported import Imported, Wishes
+from eomgen.scene.importers.mjcf.actuators import add_actuators
 from eomgen.scene.importers.mjcf.bodies import add_bodies, is_split, joints_of
 from eomgen.scene.importers.mjcf.compiled import Compiled, compiled
 from eomgen.scene.importers.mjcf.equalities import add_equalities
 from eomgen.scene.importers.mjcf.files import check_files
-from eomgen.scene.importers.mjcf.forces import (
-    SLIDING_SPEED,
-    add_actuators,
-    add_gravity,
-    add_passive,
-)
+from eomgen.scene.importers.mjcf.forces import SLIDING_SPEED, add_gravity, add_passive
 from eomgen.scene.importers.mjcf.mechanism import BALL, FREE, Mechanism, Names
+from eomgen.scene.importers.mjcf.tendons import add_tendon
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
 from eomgen.scene.importers.stops import stops
 from eomgen.scene.importers.xml_elements import Element
@@ -94,6 +91,8 @@ def mechanism_of(model: Compiled, names: Names) -> Mechanism:
     add_bodies(model, names, made)
     add_gravity(model, names, made, off)
     add_passive(model, names, made, off)
+    for t in range(model["ntendon"]):
+        add_tendon(model, t, names, made, off)
     add_actuators(model, names, made, off)
     add_equalities(model, names, made, off)
     return made
