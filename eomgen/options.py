@@ -47,33 +47,6 @@ def add_inputs(parser: argparse.ArgumentParser, *, constant: bool = False) -> No
     )
 
 
-def add_import(parser: argparse.ArgumentParser) -> None:
-    """The options of `import`."""
-    parser.add_argument("robot", metavar="ROBOT", type=path, help="file, .urdf, .xml or .mjcf")
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", type=path, help="the scene (NAME.toml, the robot's name)"
-    )
-    parser.add_argument(
-        "--floating",
-        action="store_true",
-        help="let the root link of a URDF move freely; else it is fixed to the world",
-    )
-    parser.add_argument(
-        "--stops",
-        action="store_true",
-        help="make rigid stops of the limits of a URDF's joints, which are else reported",
-    )
-    parser.add_argument(
-        "--allow",
-        metavar="DIR",
-        type=path,
-        action="append",
-        default=[],
-        help="also read meshes and included files in this folder; else only beside ROBOT",
-    )
-    add_force(parser)
-
-
 def add_gallery(parser: argparse.ArgumentParser) -> None:
     """The options of `gallery`."""
     parser.add_argument(
@@ -257,4 +230,31 @@ def _add_picture(parser: argparse.ArgumentParser, what: str) -> None:
         "--set", metavar="NAME=X", action="append", default=[], help="value of a parameter, then"
     )
     parser.add_argument("-o", "--output", metavar="FILE", type=path, help=what)
+    add_force(parser)
+
+
+def add_import(parser: argparse.ArgumentParser) -> None:
+    """The options of `import`."""
+    parser.add_argument("robot", metavar="ROBOT", type=path, help="file, .urdf, .xml or .mjcf")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=path, help="the scene (NAME.toml, the robot's name)"
+    )
+    parser.add_argument(
+        "--floating",
+        action="store_true",
+        help="let the root link of a URDF move freely; else it is fixed to the world",
+    )
+    parser.add_argument(
+        "--stops",
+        action="store_true",
+        help="make rigid stops of the limits of a URDF's joints, which are else reported",
+    )
+    parser.add_argument(
+        "--allow",
+        metavar="DIR",
+        type=path,
+        action="append",
+        default=[],
+        help="also read meshes and included files in this folder; else only beside ROBOT",
+    )
     add_force(parser)
