@@ -12,6 +12,7 @@ from mjcf_states import Comparison
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.importers import import_file
+from eomgen.scene.importers.imported import Wishes
 from eomgen.scene.importers.mjcf import compiled as compiling
 from eomgen.scene.importers.rotations import rotation
 from eomgen.scene.reader import parse_scene, read_tables
@@ -119,6 +120,16 @@ def test_what_is_left_out_is_remarked(tmp_path: Path) -> None:
     model = elaborate(read_tables(imported.tables))
     start = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))
     assert (start["t_joint"], start["roll"], start["heavy_1_z"]) == (0.2, 0.4, 2.0)
+
+
+def test_limits_are_stops_on_wish(tmp_path: Path) -> None:
+    """Of hinges and slides that follow no others; a tendon may have the name of a joint."""
+    text = EVERYTHING.replace('name="elastic"', 'name="roll"')
+    imported = import_file(written(tmp_path, text), Wishes(stops=True))
+    stops = [e for e in imported.tables["effects"] if e["type"] == "joint_stop"]
+    assert [(stop["joint"], stop["low"], stop["high"]) for stop in stops] == [("roll", -1.0, 1.0)]
+    assert not any("reported" in remark for remark in imported.remarks)
+    elaborate(read_tables(imported.tables))
 
 
 CLOSED = """

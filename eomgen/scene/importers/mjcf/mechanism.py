@@ -18,8 +18,10 @@ SINGLE = (SLIDE, HINGE)
 class Names:
     """Names in the scene of bodies, joints, actuators, tendons and equalities, by number.
 
-    A hinge or slide has its joint's name for coordinate, and `<name>_dot` for velocity. `split` are
-    the free joints that became a particle joint and a ball joint.
+    A hinge or slide has its joint's name for coordinate, and `<name>_dot` for velocity.
+
+    between  massless bodies between the joints of a body, by body and number of the joint before
+    split    free joints that became a particle joint and a ball joint
     """
 
     bodies: tuple[str, ...]
@@ -28,7 +30,6 @@ class Names:
     tendons: tuple[str, ...]
     equalities: tuple[str, ...]
     between: Mapping[tuple[int, int], str]
-    """Massless bodies between the joints of a body, by body and number of the joint before."""
     split: frozenset[int] = frozenset()
 
 

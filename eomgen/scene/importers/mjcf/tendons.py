@@ -28,8 +28,8 @@ def is_fixed(model: Compiled, t: int) -> bool:
 
 
 def add_tendon(model: Compiled, t: int, names: Names, made: Mechanism, off: int) -> None:
-    """Spring and damper of a fixed tendon, and remarks on what else tendons have."""
-    if any(model["tendon_armature"][t : t + 1]):
+    """The spring and damper of a tendon; what else it has is counted as left out."""
+    if model["tendon_armature"][t]:
         made.lost["inertias (armature) of tendons, which would add to the mass matrix"] += 1
     if model["tendon_limited"][t]:
         made.lost["limits of tendons"] += 1
@@ -75,7 +75,7 @@ def _add_elastic(model: Compiled, t: int, names: Names, made: Mechanism, off: in
     ends = [model["site_bodyid"][site] for site in (one, other)]
     if ends[0] == ends[1]:
         return True
-    table: dict[str, Any] = {"type": "spring", "name": f"{names.tendons[t]}_spring"}
+    table: dict[str, Any] = {"type": "spring", "name": f"{names.tendons[t]}_elastic"}
     for n, (site, body) in enumerate(zip((one, other), ends, strict=True), 1):
         table |= {f"body_{n}": names.bodies[body], f"at_{n}": list(model["site_pos"][site])}
     table["rest_length"] = low
