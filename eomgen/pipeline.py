@@ -2,7 +2,8 @@
 
     Model ─choose▶ Choice ─record▶ System ─optimise▶ System ─render▶ Generated
 
-Before it, `scene.reader` reads a scene and `model.elaborate` makes a model of it. After it, `store`
+Before it, `scene.reader` reads a scene, `model.elaborate` makes a model of it, and
+`dynamics.assembly` gives it a start that meets its constraints. After it, `store`
 keeps the generated code, and `run` loads and integrates it.
 """
 

@@ -240,3 +240,20 @@ def test_a_name_is_taken_with_either_sign(
     ):
         with pytest.raises(eomgen.SceneError, match=hint.format(name)):
             eomgen.check(text)
+
+
+def test_what_looks_like_a_mistake_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An angle in degrees without `_deg`, and gravity with a sign. Neither is an error."""
+    scene = tmp_path / "odd.toml"
+    text = (BUILT_IN / "double_pendulum.toml").read_text()
+    scene.write_text(
+        text.replace("g = { value = 9.81", "g = { value = -9.81").replace("theta_1_deg", "theta_1")
+    )
+    assert main(["check", str(scene)]) == 0
+    said = capsys.readouterr().err
+    assert (
+        "initial.q.theta_1: 30 rad are more than two turns; for degrees write theta_1_deg" in said
+    )
+    assert "gravity.g: is -9.81 m/s², so bodies fall upwards; for downwards write 9.81" in said

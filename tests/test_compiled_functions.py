@@ -116,7 +116,10 @@ def prepared(scene: str) -> tuple[Model, GeneratedModule, Problem]:
     return model, module, problem_of(module, None, None, model)
 
 
-@pytest.mark.parametrize("name", ["double_pendulum", "bouncing_two_body", "human_figure"])
+EACH = ("double_pendulum", "bouncing_two_body", "tumbling_body")
+
+
+@pytest.mark.parametrize("name", some(EACH, (*EACH, "human_figure")))
 def test_each_function_is_that_of_its_module(name: str) -> None:
     """Also with perturbed constants, which must be used."""
     model, module, plain = prepared(name)

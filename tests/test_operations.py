@@ -72,6 +72,7 @@ def test_a_load_at_a_joint_adds_four_operations(name: str, joint: str) -> None:
         assert operations(loaded(name, joint, f'type = "{kind}"\n{values}')) <= alone + 4, kind
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("load", LOADS)
 def test_closed_takes_loads_at_joints(load: str) -> None:
     """The derivative, the power of the load, and what else depends on it, as by articulated bodies;

@@ -179,6 +179,7 @@ def state(e: Engine, seed: int) -> tuple[np.ndarray, dict, dict]:
     return y, u, p
 
 
+@pytest.mark.every(2)
 @every_case
 def test_derivatives_are_exact(name: str, route: str) -> None:
     """Written out, and along directions as for large models, by the program and by the module."""

@@ -1,6 +1,6 @@
 """Elaboration of a scene to a model: names are resolved, values checked, bodies put in a tree."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -98,9 +98,14 @@ def elaborate(scene: Scene) -> Model:
             *dict.fromkeys(lengths),
             *dict.fromkeys(notice for body in bodies for notice in body.notices),
             *start.notices,
+            *_notices(effects, {p.name: p.default for p in found.parameters}),
         ),
     )
     return replace(model, outputs=outputs_for(scene.outputs, "outputs[{}]", available_in(model)))
+
+
+def _notices(effects: Sequence[Effect], values: Mapping[str, float]) -> Iterator[str]:
+    return (f"{e.name}.{line}" for e in effects for line in e.notices(values))
 
 
 def expanded(scene: Scene) -> Scene:

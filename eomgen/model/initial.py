@@ -14,8 +14,9 @@ from eomgen.scene.schema import Initial
 
 @dataclass(frozen=True)
 class Start:
-    """The initial `q` (nq,) and `v` (nv,), a notice for each quaternion that was scaled, and the
-    names of the coordinates and velocities that the scene gives.
+    """The initial `q` (nq,) and `v` (nv,), a notice for each quaternion that was scaled and each
+    angle that may be in degrees, and the names of the coordinates and velocities that the scene
+    gives.
     """
 
     q: tuple[float, ...]
@@ -37,7 +38,7 @@ def initial_state(
     v = _values(given.v, velocities_of(bodies, prescribed), "initial.v", prescribed)
     values = {c.name: x for c, x in zip(coordinates, q, strict=True)}
     values |= _guesses(given, coordinates, prescribed)
-    notices = []
+    notices = [_angle_notice(c.name, x) for c, x in zip(coordinates, q, strict=True) if _far(c, x)]
     for body in bodies:
         if names := [c.name for c in body.positions[body.plain :]]:
             parts = [values[name] for name in names]
@@ -88,6 +89,15 @@ def _unit(parts: Sequence[float], first: str, is_given: bool) -> list[float]:
             "no rotation"
         )
     return [1.0, 0.0, 0.0, 0.0]
+
+
+def _far(coordinate: Coordinate, value: float) -> bool:
+    """Whether the value is an angle of more than two turns."""
+    return coordinate.unit == "rad" and abs(value) > 4.0 * math.pi
+
+
+def _angle_notice(name: str, value: float) -> str:
+    return f"initial.q.{name}: {value:g} rad are more than two turns; for degrees write {name}_deg"
 
 
 def _length_notice(parts: Sequence[float], first: str) -> list[str]:

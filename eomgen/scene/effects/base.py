@@ -260,6 +260,12 @@ class EffectTable(Table):
         """Conditions on quantities beyond the bounds of each; `location` is that of the effect."""
         return ()
 
+    def notices(self, values: Mapping[str, float]) -> Iterable[str]:
+        """What looks like a mistake but is not one for certain, at these values of parameters; each
+        starts with the key.
+        """
+        return ()
+
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """The inputs that it adds."""
         return ()

@@ -6,9 +6,10 @@ from typing import ClassVar, Literal
 from pydantic import Field, field_validator
 
 from eomgen.language.base import Identifier
-from eomgen.language.formula import ZERO
+from eomgen.language.formula import ZERO, evaluate
 from eomgen.language.quantity import Numbers, Quantity, quantity
 from eomgen.scalars.exact import direction
+from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
 
 
@@ -44,6 +45,11 @@ g = 9.81
         if direction is not None and not any(direction):
             raise ValueError("has no direction; give a vector that is not zero")
         return direction
+
+    def notices(self, values: Mapping[str, float]) -> Iterator[str]:
+        """Whether g is negative, so that bodies fall upwards."""
+        if (g := evaluate(self.g, values, FloatScalars())) < 0.0:
+            yield f"g: is {g:g} m/s², so bodies fall upwards; for downwards write {-g:g}"
 
     def acceleration(self, mechanism: Mechanism) -> Vector:
         """Acceleration of free fall, world axes, m/s²."""
