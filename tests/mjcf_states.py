@@ -11,6 +11,7 @@ import numpy as np
 import eomgen
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
@@ -44,6 +45,8 @@ class Comparison:
         for name in OFF:
             mj.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
         mj.opt.density = mj.opt.viscosity = 0.0
+        mj.tendon_armature[:] = 0.0
+        mj.jnt_actgravcomp[:] = 0  # gravity compensation is then no actuation
         tables = dict(imported.tables)
         driven = not any(r.startswith("left out: actuators") for r in imported.remarks)
         effects = [e for e in tables["effects"] if e["type"] != "joint_friction"]
@@ -97,6 +100,8 @@ class Comparison:
         data.act[:] = rng.uniform(-0.9, 0.9, self.mj.na)
         mujoco.mj_forward(self.mj, data)
         mujoco.mj_fullM(self.mj, data, whole)
+        if np.linalg.cond(whole / np.sqrt(np.outer(np.diag(whole), np.diag(whole)))) > 1e12:
+            raise SceneError("the mass matrix is singular")
         data.qfrc_applied[:] = rng.normal(size=self.nv) * np.diag(whole)
         mujoco.mj_forward(self.mj, data)
         return data
