@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from mjcf_files import GOOD_MJCF, MJCF_MISTAKES
+
 GOOD_URDF = """\
 <?xml version="1.0"?>
 <robot name="arm">
@@ -174,7 +176,10 @@ URDF_MISTAKES = (
     ),
 )
 
-KINDS: Mapping[str, Kind] = {"urdf": Kind(".urdf", "robot", GOOD_URDF, URDF_MISTAKES)}
+KINDS: Mapping[str, Kind] = {
+    "urdf": Kind(".urdf", "robot", GOOD_URDF, URDF_MISTAKES),
+    "mjcf": Kind(".mjcf", "mujoco", GOOD_MJCF, MJCF_MISTAKES),
+}
 
 
 def mistaken(kind: Kind) -> Iterator[tuple[bytes, str]]:

@@ -380,6 +380,9 @@ def _joint(
             text, ratio = writer.write(writer.number(2.0, 10.0, 1), f"{name}_gear_ratio")
             lines.append(f"gear_ratio = {text}")
             armature *= ratio**2
+    if kind in ("ball", "universal", "particle") and k % 2:
+        text, armature = writer.write(0.0125 * (k + 1), f"{name}_motor_inertia")
+        lines.append(f"motor_inertia = {text}")
     ends = FREE_ENDS[writer.dimensions] if free else ENDS[kind]
     prefix = f"b{k}" if free else name
     coordinates = tuple(f"{prefix}_{end}" for end in ends)

@@ -599,12 +599,11 @@ MISTAKES_IN_SPACE = [
     # Joints that cannot do what is asked.
     (None, '[[effects]]\ntype = "motor"\nname = "tau"\njoint = "wrist"\ntorque = "input"\n',
      "effects[1].joint: 'wrist' is a ball joint and has no angle"),
-    (BALL, BALL + "\nmotor_inertia = 1e-5",
-     "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
-     "orientation_deg, orientation, loop, type"),
+    (BALL, BALL + "\nmotor_inertia = -1e-5",
+     "joints[1].motor_inertia: -1e-05 is negative; give a number >= 0 in kg m^2"),
     (BALL, BALL + '\ncoordinate = "a"',
      "joints[1].coordinate: unknown key; known here: name, parent, child, r_parent, r_child, "
-     "orientation_deg, orientation, loop, type"),
+     "orientation_deg, orientation, loop, motor_inertia, type"),
     (f'{BALL}\nparent = "arm"\nchild = "hand"\nr_parent = [0.5, 0, 0]\nr_child = [-0.1, 0, 0]',
      'name = "wrist"\ntype = "free"\nparent = "arm"\nchild = "hand"',
      "joints[1].parent: unknown value 'arm'; known: world"),

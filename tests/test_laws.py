@@ -31,7 +31,7 @@ from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects import ExternalForce, Gravity, Motor
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import Geared
+from eomgen.scene.joints.base import WithRotor
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene
 
 FIGURES = ("human_figure", "hanging_figure", "quadruped")
@@ -236,10 +236,11 @@ class Moment:
         """Rotor inertia that each velocity feels: gear ratio squared times its own."""
         found = exact(np.zeros(len(self.v)))
         for body, first in zip(self.model.bodies, self.model.first_velocity, strict=True):
-            if isinstance(body.joint, Geared):
-                ratio = body.joint.gear_ratio
+            if isinstance(body.joint, WithRotor):
+                ratio = getattr(body.joint, "gear_ratio", None)
                 geared = MP.mpf(1) if ratio is None else self.value(ratio)
-                found[first] = geared**2 * self.value(body.joint.motor_inertia)
+                inertia = geared**2 * self.value(body.joint.motor_inertia)
+                found[first : first + len(body.velocities)] = inertia
         return found
 
 

@@ -42,7 +42,7 @@ from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects import Gravity
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import Geared, Primitive
+from eomgen.scene.joints.base import Primitive, WithRotor
 
 
 def make_linkage(model: Model, parameters: Mapping[str, Scalar], scalars: Scalars) -> Linkage:
@@ -100,8 +100,8 @@ def _drafted(
                 assert isinstance(joint.orientation_deg, float | int)
                 angle = exact.total(angle, exact.radians(joint.orientation_deg))
             point = vector(joint.r_child)
-            if isinstance(joint, Geared):
-                armature = _armature(joint, value)
+            if isinstance(joint, WithRotor):
+                armature = joint.reflected_inertia(value)
             if joint.orientation is not None:
                 held = _held(rows_of(joint.orientation), value, scalars)
                 place = {"parent": frame, "offset": at, "fixed": axes, "angle": angle}
@@ -156,14 +156,6 @@ def _drafted(
             )
         )
     return drafts, mounts
-
-
-def _armature(joint: Geared, value: Callable[[Formula], Scalar]) -> Scalar:
-    """The reflected inertia of a motor's rotor, kg m² or kg."""
-    inertia = value(joint.motor_inertia)
-    if joint.gear_ratio is None:
-        return inertia
-    return value(joint.gear_ratio) * value(joint.gear_ratio) * inertia
 
 
 def _held(

@@ -261,8 +261,10 @@ class Elimination:
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
             first, sources, kept, free, gathered = self._pivot_row(axis[0], held, kept, free)
+            # The rows of rotors of several axes contain all of these.
+            early = len(link.free) > 1 and not s.is_zero(link.armature)
             one, kept, free, term = self._eliminate_axis(
-                link, axis, first, kept, free, term, tau[axis[1]]
+                link, axis, first, kept, free, term, tau[axis[1]], early=early
             )
             taken.append(replace(one, rows=sources, gathered=gathered, before=tuple(rotations)))
             rotations.clear()

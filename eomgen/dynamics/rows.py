@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 from eomgen.dynamics.kinematics import Link, MotionAxis
-from eomgen.dynamics.vectors import AXES, Vec, add, cross, unit, zeros
+from eomgen.dynamics.vectors import AXES, Vec, add, cross, replaced, unit, zeros
 from eomgen.scalars.protocol import Scalar, Scalars
 
 TINY = 1e-200
@@ -156,7 +156,8 @@ class Rows:
         own, rows = dict(own), list(rows)
         for j in order:
             first = pivot = own.get(j) or self.empty((angular, j))
-            if angular and j == order[-1] and j in own:
+            last = angular and j == order[-1] and j in own
+            if last and all(self._has_only(j, row) for row in (pivot, *rows)):
                 pivot, rows = self._summed(pivot, rows, j, rotations)
             for n, row in enumerate(rows):
                 pivot, rows[n] = self.rotated(
@@ -164,6 +165,12 @@ class Rows:
                 )
             own[j] = pivot
         return own, rows
+
+    def _has_only(self, j: int, row: Row) -> bool:
+        """Whether a row contains no acceleration but angular acceleration j. The row of a rotor may
+        contain those of the parent too.
+        """
+        return self.is_empty(replace(row, angular=replaced(row.angular, j, self.zero)))
 
     def _summed(
         self, pivot: Row, rows: Sequence[Row], j: int, rotations: Steps

@@ -27,7 +27,7 @@ from eomgen.model.model import Body, Model
 from eomgen.scalars.exact import exactly
 from eomgen.scalars.floats import ArrayScalars
 from eomgen.scalars.protocol import Scalars
-from eomgen.scene.joints.base import Geared
+from eomgen.scene.joints.base import Geared, WithRotor
 
 Array = npt.NDArray[np.float64]
 
@@ -125,10 +125,11 @@ def _evened_body(body: Body, model: Model) -> Body:
 
     entries = [abs(model.value(entry)) for entry in body.inertia_com]
     joint = body.joint
-    if isinstance(joint, Geared):
-        turns = 1.0 if joint.gear_ratio is None else model.value(joint.gear_ratio)
-        rotor = Constant(float(model.value(joint.motor_inertia) > 0 and turns != 0.0))
-        joint = joint.replaced(motor_inertia=rotor, gear_ratio=None)
+    if isinstance(joint, WithRotor):
+        rotor = Constant(float(joint.reflected_inertia(model.value) > 0))
+        joint = joint.replaced(motor_inertia=rotor)
+        if isinstance(joint, Geared):
+            joint = joint.replaced(gear_ratio=None)
     return replace(
         body,
         mass=Constant(float(model.value(body.mass) > 0)),

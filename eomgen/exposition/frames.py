@@ -19,7 +19,7 @@ from eomgen.model.model import Body, JointIndex, Model
 from eomgen.model.orientation import rows_of
 from eomgen.scalars.exact import direction, quarters, radians
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import Geared, Primitive
+from eomgen.scene.joints.base import Primitive, WithRotor
 
 ORIGIN = sp.zeros(3, 1)
 
@@ -102,8 +102,8 @@ def _add(
             angle = count * sp.pi / 2 + symbols.number(rest)
         offset = _vector(joint.r_parent, symbols)
         centre = -_vector(joint.r_child, symbols)
-        if isinstance(joint, Geared):
-            armature = _armature(joint, symbols)
+        if isinstance(joint, WithRotor):
+            armature = joint.reflected_inertia(symbols.value)
     if parent >= 0:
         offset = offset + found[parent].centre
     primitives = joint.primitives(model.dimensions)
@@ -166,11 +166,6 @@ def _scale(q: Sequence[Expr]) -> Expr:
 def _vector(parts: tuple[Formula, ...], symbols: NamingMechanism) -> Expr:
     x, y, *z = (symbols.value(part) for part in parts)
     return sp.Matrix([x, y, *(z or [0])])
-
-
-def _armature(joint: Geared, symbols: NamingMechanism) -> Expr:
-    inertia = symbols.value(joint.motor_inertia)
-    return inertia * (symbols.value(joint.gear_ratio) ** 2 if joint.gear_ratio else 1)
 
 
 def _inertia(body: Body, symbols: NamingMechanism) -> Expr:

@@ -353,7 +353,7 @@ def _articulated(r: Recursion, k: int) -> Iterator[Equation]:
     yield Equation(column, sp.MatMul(whole, subspace))
     along = sp.MatMul(subspace.T, column)
     if frame.armature != 0:
-        along = sp.MatAdd(along, sp.ImmutableMatrix([[frame.armature]]))
+        along = sp.MatAdd(along, sp.ImmutableMatrix(frame.armature * sp.eye(n)))
     yield Equation(pivot, along)
     pull = sp.MatMul(-1, subspace.T, bias)
     tau = _joint_force(r, frame)

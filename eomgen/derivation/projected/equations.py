@@ -17,7 +17,7 @@ from eomgen.derivation.projected.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
-from eomgen.scene.joints.base import Geared
+from eomgen.scene.joints.base import WithRotor
 
 ROTATIONS = ("R__", "k__", "W__")
 """Prefixes of names of rotation entries, which are not substituted."""
@@ -346,16 +346,13 @@ def generalised(
 
 
 def armatures(model: Model, symbols: Symbols) -> dict[int, Expr]:
-    """gear_ratio² motor_inertia by velocity."""
-    found = {}
-    for body, j in zip(model.bodies, model.first_velocity, strict=True):
-        joint = body.joint
-        if isinstance(joint, Geared):
-            inertia = symbols.value(joint.motor_inertia)
-            if joint.gear_ratio is not None:
-                inertia *= symbols.value(joint.gear_ratio) ** 2
+    """The inertia of motors' rotors, by velocity."""
+    found: dict[int, Expr] = {}
+    for body, first in zip(model.bodies, model.first_velocity, strict=True):
+        if isinstance(body.joint, WithRotor):
+            inertia = body.joint.reflected_inertia(symbols.value)
             if inertia != 0:
-                found[j] = inertia
+                found |= {first + i: inertia for i in range(len(body.velocities))}
     return found
 
 

@@ -12,7 +12,7 @@ from eomgen.model.model import Model
 from eomgen.model.orientation import rows_of, turns_of
 from eomgen.scalars.exact import Real, direction, opposite, orientation, quarters, radians
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import Geared
+from eomgen.scene.joints.base import WithRotor
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def triple(word: str, name: str) -> Expr:
 def make_symbols(model: Model) -> Symbols:
     """Symbols for a model; masses, moments, rotors that are one parameter are positive symbols."""
     quantities = [q for body in model.bodies for q in (body.mass, *body.inertia_com[:3])]
-    quantities += [b.joint.motor_inertia for b in model.bodies if isinstance(b.joint, Geared)]
+    quantities += [b.joint.motor_inertia for b in model.bodies if isinstance(b.joint, WithRotor)]
     positive = {quantity.name for quantity in quantities if isinstance(quantity, Name)}
     called = dict.fromkeys(functions_of_parameters(model))
     return Symbols(

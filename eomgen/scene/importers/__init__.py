@@ -30,7 +30,10 @@ class Importer:
     module: str
 
 
-IMPORTERS: Mapping[str, Importer] = {"robot": Importer("URDF", "urdf.robot")}
+IMPORTERS: Mapping[str, Importer] = {
+    "robot": Importer("URDF", "urdf.robot"),
+    "mujoco": Importer("MJCF", "mjcf.robot"),
+}
 """By the name of the root element."""
 SUFFIXES = (".urdf", ".xml", ".mjcf", ".xacro")
 

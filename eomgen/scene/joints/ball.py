@@ -2,10 +2,10 @@
 
 from typing import ClassVar, Literal
 
-from eomgen.scene.joints.base import Coordinate, JointTable, Primitive
+from eomgen.scene.joints.base import Coordinate, Primitive, WithRotor
 
 
-class Ball(JointTable):
+class Ball(WithRotor):
     """The child rotates about a point: world_R_child = world_R_parent E R(quaternion).
 
     E is the fixed rotation `orientation_deg`. The velocities are the angular velocity of the child

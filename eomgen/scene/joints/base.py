@@ -7,13 +7,14 @@ revolute primitive, a linear one for a prismatic, three angular ones for a spher
 own axes every column is constant; `dynamics.kinematics.MotionAxis` is one column.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from eomgen.language.base import AngleOrNumber, Identifier, Number, Table
-from eomgen.language.formula import ZERO
+from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Quantity, Vector, quantity
 
 WORLD = "world"
@@ -105,19 +106,46 @@ class JointTable(Table):
     )
 
 
-class Geared(JointTable):
+class WithRotor(JointTable):
+    """A joint whose velocities are all angular or all linear, and to each of which a motor's rotor
+    may add inertia.
+
+    The inertia is added to the velocity's diagonal entry of M, as `armature` in MuJoCo and the
+    reflected inertia of Drake are. The rotor's mass is part of a body's, and the moment that turns
+    its axis (gyroscopic moment) is left out: it is smaller by the gear ratio.
+    """
+
+    motor_inertia: Quantity = quantity(
+        "kg m^2",
+        "rotor inertia, added to each velocity; in kg if these are linear and there is no "
+        "gear_ratio",
+        "nonnegative",
+        default=ZERO,
+        validate_default=False,
+    )
+
+    def reflected_inertia(self, value: Callable[[Formula], Any]) -> Any:
+        """The inertia that is added to each velocity, kg m² or kg, over `value` of quantities."""
+        return value(self.motor_inertia)
+
+
+class Geared(WithRotor):
     """A joint with one coordinate, and optionally the geared rotor of a motor."""
 
     coordinate: Identifier | None = Field(default=None, description="name of the coordinate")
-    motor_inertia: Quantity = quantity(
-        "kg m^2", "rotor inertia", "nonnegative", default=ZERO, validate_default=False
-    )
     gear_ratio: Quantity | None = quantity(
         "", "turns of the rotor for one turn of the joint", default=None
     )
     limits: tuple[AngleOrNumber, AngleOrNumber] | None = Field(
         default=None, description="range of the coordinate; leaving it is reported, not prevented"
     )
+
+    def reflected_inertia(self, value: Callable[[Formula], Any]) -> Any:
+        """gear_ratio² motor_inertia, kg m² or kg, over `value` of quantities."""
+        inertia = value(self.motor_inertia)
+        if self.gear_ratio is None:
+            return inertia
+        return value(self.gear_ratio) * value(self.gear_ratio) * inertia
 
 
 def spatial(vector: tuple[float, ...]) -> tuple[float, float, float]:

@@ -5,10 +5,10 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from eomgen.language.base import Identifier
-from eomgen.scene.joints.base import Z_AXIS, Coordinate, JointTable, Primitive
+from eomgen.scene.joints.base import Z_AXIS, Coordinate, Primitive, WithRotor
 
 
-class Particle(JointTable):
+class Particle(WithRotor):
     """The child translates along all axes of the parent and does not rotate relative to it.
 
     A point mass is a body on a particle joint to the world: it needs no `inertia_com`, which is

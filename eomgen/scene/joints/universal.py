@@ -6,10 +6,10 @@ from pydantic import Field
 
 from eomgen.language.base import Identifier
 from eomgen.language.quantity import Numbers
-from eomgen.scene.joints.base import Coordinate, JointTable, Primitive, spatial
+from eomgen.scene.joints.base import Coordinate, Primitive, WithRotor, spatial
 
 
-class Universal(JointTable):
+class Universal(WithRotor):
     """The child rotates about the first axis, and about the second, which moves with the first."""
 
     example: ClassVar[str] = """

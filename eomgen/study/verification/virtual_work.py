@@ -34,7 +34,7 @@ from eomgen.precision.extended import NOTHING, Array, along, extended, solved, z
 from eomgen.precision.precise import Extended
 from eomgen.scene.constraints.base import Row
 from eomgen.scene.effects.base import JointLoad, Load
-from eomgen.scene.joints.base import WORLD, Geared
+from eomgen.scene.joints.base import WORLD, Geared, WithRotor
 from eomgen.study.verification.evaluated import EvaluatedModel
 from eomgen.study.verification.poses import composed
 
@@ -84,9 +84,11 @@ class FreeBodies(EvaluatedModel):
         found = {}
         for index in self.model.joint_indices:
             joint = index.body.joint
-            if isinstance(joint, Geared) and index.v[0] < self.moved:
-                ratio = mpfr(1) if joint.gear_ratio is None else self.value(joint.gear_ratio)
-                found[index.v[0]] = ratio * ratio * self.value(joint.motor_inertia)
+            if isinstance(joint, WithRotor):
+                inertia = self.value(joint.motor_inertia)
+                if isinstance(joint, Geared) and joint.gear_ratio is not None:
+                    inertia = self.value(joint.gear_ratio) ** 2 * inertia
+                found.update({i: inertia for i in index.v if i < self.moved})
         return found
 
     @cached_property

@@ -205,17 +205,6 @@ def _friction(joint: Joint, name: str) -> Iterator[dict[str, Any]]:
         yield table
 
 
-def stops(made: Mechanism) -> Iterator[dict[str, Any]]:
-    """A rigid stop without bounce for each joint that has limits and follows no other."""
-    following = {constraint["coordinate"] for constraint in made.constraints} | set(made.locked)
-    for joint in made.joints:
-        if "limits" in joint and joint["coordinate"] not in following:
-            low, high = joint["limits"]
-            name = joint["name"]
-            stop = {"type": "joint_stop", "name": f"{name}_stop", "joint": name}
-            yield stop | {"low": low, "high": high, "restitution": 0.0}
-
-
 def floating_base(root: str, names: Names) -> dict[str, Any]:
     """The free joint of the root."""
     return {"name": f"{names.bodies[root]}_base", "type": "free", "child": names.bodies[root]}

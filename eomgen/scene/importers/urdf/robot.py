@@ -10,6 +10,7 @@ from eomgen.scene.importers.imported import Imported, Wishes
 from eomgen.scene.importers.meshes import ELSEWHERE
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
 from eomgen.scene.importers.rotations import is_slight
+from eomgen.scene.importers.stops import stops
 from eomgen.scene.importers.urdf.joints import (
     SLIDING_SPEED,
     Mechanism,
@@ -17,7 +18,6 @@ from eomgen.scene.importers.urdf.joints import (
     add_joints,
     fixed_base,
     floating_base,
-    stops,
 )
 from eomgen.scene.importers.urdf.links import ENTRIES, Changes, Inertial, read_inertials
 from eomgen.scene.importers.urdf.shapes import Meshes, colours_of, shapes_of
@@ -62,7 +62,8 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     if not (driven or loose or wishes.floating):
         raise robot.error("nothing can move; let the root move freely with --floating")
     if wishes.stops:
-        made.effects += stops(made)
+        following = {constraint["coordinate"] for constraint in made.constraints}
+        made.effects += stops(made.joints, following | set(made.locked))
     remarks += _remarks(robot, tree, names, made)
     remarks += _remarks_on_bodies(tree, meshes, changes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)

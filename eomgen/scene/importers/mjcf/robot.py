@@ -1,0 +1,155 @@
+"""An MJCF file as the tables of a scene."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from eomgen.errors import listed
+from eomgen.scene.importers.imported import Imported, Wishes
+from eomgen.scene.importers.mjcf.actuators import add_actuators
+from eomgen.scene.importers.mjcf.bodies import add_bodies, is_split, joints_of
+from eomgen.scene.importers.mjcf.compiled import Compiled, compiled
+from eomgen.scene.importers.mjcf.equalities import add_equalities
+from eomgen.scene.importers.mjcf.files import check_files
+from eomgen.scene.importers.mjcf.forces import SLIDING_SPEED, add_gravity, add_passive
+from eomgen.scene.importers.mjcf.mechanism import BALL, FREE, Mechanism, Names
+from eomgen.scene.importers.mjcf.tendons import add_tendon
+from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
+from eomgen.scene.importers.stops import stops
+from eomgen.scene.importers.xml_elements import Element
+from eomgen.scene.joints.base import WORLD
+from eomgen.text import brief
+
+SPEED = 0.01
+"""Speed at which Coulomb friction is smoothed, rad/s or m/s."""
+COUNTED = {
+    "nsensor": "sensors",
+    "ncam": "cameras",
+    "nkey": "key frames",
+    "nflex": "flexible bodies",
+    "nskin": "skins",
+    "nplugin": "plugins",
+    "npair": "pairs of contacts",
+}
+
+
+def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
+    """The scene of a mechanism. Raises `SceneError`, one line."""
+    check_files(path, root, wishes.allowed)
+    model = compiled(path)
+    if not model["nv"]:
+        raise root.error("nothing can move: the file has no joints")
+    names, changed = names_of(model)
+    made = mechanism_of(model, names)
+    if wishes.stops:
+        following = {c["coordinate"] for c in made.constraints if "coordinate" in c}
+        made.effects += stops(made.joints, following | set(made.locked))
+    made.remarks |= dict.fromkeys(_remarks(model, made, wishes))
+    if changed:
+        made.remark(f"renamed: {listed(changed)}")
+    name = scene_name(root.attributes.get("model", ""), path.stem)
+    lost = [f"left out: {what} ({count})" for what, count in made.lost.items()]
+    beside = ", ".join(f"{what} ({model[key]})" for key, what in COUNTED.items() if model[key])
+    lost += [f"left out: {beside}"] if beside else []
+    remarks = (*lost, *made.remarks, *model.warnings)
+    return Imported(_tables(name, path.name, made), remarks)
+
+
+def names_of(model: Compiled) -> tuple[Names, list[str]]:
+    """Names in the scene of all objects that need one, and which of them are changed."""
+    split = frozenset(j for j in range(model["njnt"]) if is_split(model, j))
+    between = {}
+    for k in range(1, model["nbody"]):
+        numbers = joints_of(model, k)
+        for n, j in enumerate(numbers):
+            if j in split or j != numbers[-1]:
+                between[k, j] = f"{model.names['body'][k]} {n + 1}"
+    listed_bodies = list(model.names["body"][1:])
+    bodies = identifiers([*listed_bodies, *between.values()], "body")
+    joints = identifiers(model.names["joint"], "joint")
+    moving = {*joints.values(), *(f"{name}_dot" for name in joints.values())}
+    inputs = identifiers(model.names["actuator"], "control", {*TAKEN, *moving})
+    tendons = identifiers(model.names["tendon"], "tendon")
+    equalities = identifiers(model.names["equality"], "equality", {*TAKEN, *joints.values()})
+    names = Names(
+        bodies=(WORLD, *(bodies[name] for name in listed_bodies)),
+        joints=tuple(joints.values()),
+        inputs=tuple(inputs.values()),
+        tendons=tuple(tendons[name] for name in model.names["tendon"]),
+        equalities=tuple(equalities[name] for name in model.names["equality"]),
+        between={key: bodies[name] for key, name in between.items()},
+        split=split,
+    )
+    own = {name: bodies[name] for name in listed_bodies}
+    others = {name: new for name, new in inputs.items() if new != f"{name}_control"}
+    return names, [text for found in (own, joints, others) for text in renamed(found)]
+
+
+def mechanism_of(model: Compiled, names: Names) -> Mechanism:
+    """All tables of a compiled model."""
+    made, off = Mechanism(), model["opt_disableflags"]
+    add_bodies(model, names, made)
+    add_gravity(model, names, made, off)
+    add_passive(model, names, made, off)
+    for t in range(model["ntendon"]):
+        add_tendon(model, t, names, made, off)
+    add_actuators(model, names, made, off)
+    add_equalities(model, names, made, off)
+    return made
+
+
+def _tables(name: str, file: str, made: Mechanism) -> dict[str, Any]:
+    """All tables of the scene, in the order of a file."""
+    tables: dict[str, Any] = {"name": name, "title": brief(f"{name}, from {file}"), "dimensions": 3}
+    if made.inputs:
+        tables["inputs"] = made.inputs
+    if any("coulomb" in effect for effect in made.effects):
+        about = "speed at which Coulomb friction is smoothed, rad/s or m/s"
+        tables["parameters"] = {SLIDING_SPEED: {"value": SPEED, "about": about}}
+    if made.definitions:
+        tables["definitions"] = made.definitions
+    tables |= {"bodies": made.bodies, "joints": made.joints, "effects": made.effects}
+    if made.constraints:
+        tables["constraints"] = made.constraints
+    if made.locked:
+        tables["locked"] = made.locked
+    if made.start:
+        tables["initial"] = {"q": made.start}
+    return tables
+
+
+def _remarks(model: Compiled, made: Mechanism, wishes: Wishes) -> Iterable[str]:
+    """What else has no counterpart, or is otherwise than in MuJoCo."""
+    if wishes.floating:
+        yield "--floating is for URDF; an MJCF file says which bodies move freely"
+    if model["opt_density"] or model["opt_viscosity"]:
+        yield (
+            f"left out: forces of the medium of density {model['opt_density']:g} kg/m^3 and "
+            f"viscosity {model['opt_viscosity']:g} Pa s; an effect drag may replace them"
+        )
+    if any(model["geom_contype"]) or any(model["geom_conaffinity"]):
+        yield "left out: contacts between geoms; contacts are effects that a scene adds"
+    if any("limits" in joint for joint in made.joints) and not wishes.stops:
+        yield (
+            "a coordinate beyond the limits of its joint is reported, not prevented; import with "
+            "--stops adds rigid stops"
+        )
+    if any(
+        limited and kind == BALL
+        for limited, kind in zip(model["jnt_limited"], model["jnt_type"], strict=True)
+    ):
+        made.lost["limits of ball joints"] += 1
+    if any(model["jnt_actfrclimited"]):
+        made.lost["bounds of the whole actuator force at joints"] += sum(model["jnt_actfrclimited"])
+    if any(model["jnt_springyield"]) or any(model["tendon_springyield"]):
+        made.lost["plastic yields of springs"] += 1
+    if model["nmocap"]:
+        yield "bodies of motion capture (mocap) are fixed where the file has them"
+    if model["body_geomnum"][0]:
+        made.lost["geoms of the world"] += model["body_geomnum"][0]
+    if any("coulomb" in effect for effect in made.effects):
+        yield f"friction of joints is smoothed within {SPEED:g} rad/s or m/s: {SLIDING_SPEED}"
+    if FREE in model["jnt_type"]:
+        yield (
+            "coordinates of a free body are those of its centre of mass, in MuJoCo of its origin"
+        )
