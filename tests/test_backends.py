@@ -126,7 +126,7 @@ def test_a_language_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_pa
     assert main(["generate", "pendulum", "--backend", "javascrip", "-o", str(tmp_path)]) == 1
     assert capsys.readouterr().err == (
         "eomgen: backend: unknown name 'javascrip' (did you mean 'javascript'?); known: "
-        "numpy, c, javascript\n"
+        "numpy, c, javascript, jax\n"
     )
     with pytest.raises(RunError, match="unknown name 'fortran'; known: numpy, c, javascript"):
         eomgen.generate("pendulum", backend="fortran")
