@@ -81,8 +81,8 @@ def test_numbers_are_those_of_the_python_module(scene: str) -> None:
     wanted = python.derivative(0.7, y)
     assert error(jax.jit(ours.derivative)(0.7, y), wanted) < 1e-13
     if scene != SCENES[1]:
-        mapped = jax.jit(jax.vmap(lambda state: ours.derivative(0.7, state)))(y[:, :130].T)
-        assert error(mapped.T, wanted[:, :130]) < 1e-13
+        mapped = jax.jit(jax.vmap(lambda state: ours.derivative(0.7, state)))(y[:, :3].T)
+        assert error(mapped.T, wanted[:, :3]) < 1e-13
 
 
 def test_parameters_and_inputs_are_arrays_or_named() -> None:

@@ -1,12 +1,15 @@
-"""Many runs by the classical Runge-Kutta method in JAX, on the device that JAX has, beside ours in C.
+"""Modules of the backend jax on the device that JAX has: compilation, derivatives, and many runs.
 
     python tests/benchmarks/jax_lanes.py
     python tests/benchmarks/jax_lanes.py --scenes two_body human_figure --lanes 1000 100000 1000000
+    python tests/benchmarks/jax_lanes.py --kernels --lanes 1000 100000
 
-Prints states a second: a step of a run is one state, four derivatives. The columns of JAX are runs of
-the module of the backend jax in float64 and float32; those of C are lanes on one core of the
-processor (`eomgen.native.lanes`), where there is a compiler. For the chain of ten rods the last
-column is MJX, float32, with the same rods, if `mujoco.mjx` can be imported.
+Runs by the classical Runge-Kutta method: states a second, where a step of a run is one state, four
+derivatives. JAX runs them in float64 and float32, C in lanes on one core of the processor
+(`eomgen.native.lanes`), where there is a compiler. With `--mjx` the last column is MJX in float32,
+for the chain, with the same rods; on a processor its compilation takes minutes.
+
+With `--kernels`: seconds to trace and compile the derivative and its gradient, and times a state.
 """
 
 import argparse
@@ -104,11 +107,19 @@ def row(*cells: object) -> None:
     print("| " + " | ".join(map(str, cells)) + " |", flush=True)
 
 
-def measured(scene: str, lanes: int, steps: int) -> None:
-    """Print a row of the table."""
-    module = eomgen.load(eomgen.generate(scene, backend="jax"))
-    start = np.asarray(module.initial_state())[:, None]
+def states(module: Any, lanes: int) -> np.ndarray:
+    """Columns of states near the initial one."""
+    start = np.asarray(module.initial_state(), float)[:, None]
     y = start + 1e-2 * np.random.default_rng(1).uniform(-1.0, 1.0, (len(start), lanes))
+    for parts in map(list, module.QUATERNIONS):
+        y[parts] /= np.linalg.norm(y[parts], axis=0)
+    return y
+
+
+def runs(scene: str, lanes: int, steps: int, mjx: bool) -> None:
+    """Print a row of the table of runs."""
+    module = eomgen.load(eomgen.generate(scene, backend="jax"))
+    y = states(module, lanes)
     compiled = in_c(scene, y[:, :MOST_IN_C], steps)
     cells = []
     for kind in ("float64", "float32"):
@@ -118,27 +129,67 @@ def measured(scene: str, lanes: int, steps: int) -> None:
         if compiled and kind == "float64":
             found, wanted = np.asarray(run(given))[:, :MOST_IN_C], compiled[1]
             assert np.abs(found - wanted).max() < 1e-10 * np.abs(wanted).max(), scene
-    ours = f"{min(lanes, MOST_IN_C) * steps / compiled[0]:.3g}" if compiled else ""
-    jax.config.update("jax_enable_x64", False)
-    mjx = by_mjx(lanes, steps) if scene == "chain" else None
-    jax.config.update("jax_enable_x64", True)
-    row(scene, f"{lanes:,}", *cells, ours, f"{lanes * steps / mjx:.3g}" if mjx else "")
+    cells.append(f"{min(lanes, MOST_IN_C) * steps / compiled[0]:.3g}" if compiled else "")
+    if mjx:
+        jax.config.update("jax_enable_x64", False)
+        seconds = by_mjx(lanes, steps) if scene == "chain" else None
+        jax.config.update("jax_enable_x64", True)
+        cells.append(f"{lanes * steps / seconds:.3g}" if seconds else "")
+    row(scene, f"{lanes:,}", *cells)
+
+
+def kernels(scene: str, lanes: list[int]) -> None:
+    """Print a row for each function of a scene: of one state, and of columns."""
+    module = eomgen.load(eomgen.generate(scene, backend="jax"))
+
+    def derivative(y: Any) -> Any:
+        return module.derivative(0.0, y)
+
+    def squares(y: Any) -> Any:
+        return jnp.sum(derivative(y) ** 2)
+
+    functions = {
+        "derivative": (derivative, (True, False)),
+        "derivative by vmap": (jax.vmap(derivative, in_axes=1, out_axes=1), (False,)),
+        "gradient": (jax.grad(squares), (True, False)),
+        "Jacobian": (jax.jacfwd(derivative), (True,)),
+    }
+    for name, (function, taken) in functions.items():
+        cells = []
+        for count in [1, *lanes]:
+            if (alone := count == 1) not in taken:
+                cells += ["", ""]
+                continue
+            y = jnp.asarray(states(module, count)[:, 0] if alone else states(module, count))
+            made = jax.jit(function)
+            first, seconds = least(lambda made=made, y=y: made(y))
+            cells += [f"{first - seconds:.2g}", f"{seconds / count * 1e6:.3g}"]
+        row(scene, name, *cells)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Runs by rk4 in JAX beside ours in C")
+    parser = argparse.ArgumentParser(description="Modules of the backend jax")
     parser.add_argument("--scenes", nargs="+", default=["two_body", "chain", "human_figure"])
     parser.add_argument("--lanes", nargs="+", type=int, default=[1000, 10_000])
     parser.add_argument("--steps", type=int, default=10)
+    parser.add_argument("--kernels", action="store_true")
+    parser.add_argument("--mjx", action="store_true")
     given = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
-    print(f"{jax.devices()[0].device_kind}, JAX {jax.__version__}; states a second\n")
-    names = ("float64", "compile, s", "float32", "compile, s", "C, one core, float64", "MJX, float32")
+    print(f"{jax.devices()[0].device_kind}, JAX {jax.__version__}\n")
+    if given.kernels:
+        row("scene", "function", *(f"{n:,}: {w}" for n in (1, *given.lanes) for w in ("s", "µs")))
+        row(*["---"] * (4 + 2 * len(given.lanes)))
+        for scene in given.scenes:
+            kernels(scene, given.lanes)
+        return
+    names = ["float64", "compile, s", "float32", "compile, s", "C, one core"]
+    names += ["MJX, float32"] * given.mjx
     row("scene", "runs", *names)
     row(*["---"] * (2 + len(names)))
     for scene in given.scenes:
         for lanes in given.lanes:
-            measured(scene, lanes, given.steps)
+            runs(scene, lanes, given.steps, given.mjx)
 
 
 if __name__ == "__main__":
