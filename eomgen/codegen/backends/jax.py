@@ -29,7 +29,7 @@ from eomgen.templating import render
 SUFFIXES: tuple[str, ...] = ("_jax.py",)
 TEMPLATES = "jax"
 ABOUT = "a Python module for JAX: jit, vmap and grad, float32 or float64"
-DIALECT = Dialect({name: f"f.{name}" for name in FUNCTIONS}, RESERVED | {"f", "t_", "jax", "jnp"})
+DIALECT = Dialect({name: f"f.{name}" for name in FUNCTIONS}, RESERVED | {"f"})
 LONGEST = 120
 """Most operations that are evaluated in line."""
 BLOCK = 128
@@ -60,7 +60,7 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
         "title": plain(interface.title),
         "scene": interface.name,
         "form": interface.form,
-        "about": document(interface, kernels_counts(kernels)),
+        "about": document(interface, _counts(kernels)),
         "data": _data(interface),
         "ny": len(interface.states),
         "nv": interface.velocities,
@@ -82,7 +82,7 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
     return {f"{interface.name}{SUFFIXES[0]}": render(TEMPLATES, "module.py.jinja", context)}
 
 
-def kernels_counts(kernels: list[Kernel]) -> Mapping[str, int]:
+def _counts(kernels: list[Kernel]) -> Mapping[str, int]:
     """The operations of `derivative` by kind."""
     return next(kernel.counts for kernel in kernels if kernel.function.name == "derivative")
 
