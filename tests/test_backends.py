@@ -126,13 +126,13 @@ def test_a_language_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_pa
     assert main(["generate", "pendulum", "--backend", "javascrip", "-o", str(tmp_path)]) == 1
     assert capsys.readouterr().err == (
         "eomgen: backend: unknown name 'javascrip' (did you mean 'javascript'?); known: "
-        "numpy, c, javascript, matlab\n"
+        "numpy, c, javascript, jax, matlab\n"
     )
     with pytest.raises(RunError, match="unknown name 'fortran'; known: numpy, c, javascript"):
         eomgen.generate("pendulum", backend="fortran")
     other = eomgen.generate("pendulum", backend="javascript")
     assert other.source.startswith("/* ") and json.loads(json.dumps(other.backend)) == "javascript"
-    with pytest.raises(RunError, match="loads modules of 'numpy' and 'c', not of 'javascript'"):
+    with pytest.raises(RunError, match="loads modules of 'numpy', 'c' and 'jax', not of"):
         eomgen.load(other)
 
 

@@ -47,10 +47,15 @@ class GeneratedModule(Protocol):
 def load_module(source: str, name: str = "generated") -> GeneratedModule:
     """Load a generated module from its source, which must be written by this program.
 
-    Raises `RunError` if the equations have no solution at the scene's parameters.
+    Raises `RunError` if the equations have no solution at the scene's parameters, or if JAX is not
+    installed, which a module of the backend "jax" imports.
     """
     try:
         module = load_source(source, name)
+    except ModuleNotFoundError as error:
+        raise RunError(
+            f"backend 'jax': {error.name} is not installed; run: pip install 'eomgen[jax]'"
+        ) from None
     except (ValueError, ArithmeticError) as error:
         raise RunError(_unsolvable(error)) from None
     return cast(GeneratedModule, module)

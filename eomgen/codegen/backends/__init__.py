@@ -6,7 +6,7 @@ To add a language, write a module that is a `Backend` and its templates, and ent
 from collections.abc import Mapping
 from typing import Protocol
 
-from eomgen.codegen.backends import c, javascript, matlab, python
+from eomgen.codegen.backends import c, javascript, jax, matlab, python
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError, nearest
 from eomgen.program.program import Program
@@ -30,7 +30,13 @@ class Backend(Protocol):
         """The contents of a program's files, by name."""
 
 
-BACKENDS: dict[str, Backend] = {"numpy": python, "c": c, "javascript": javascript, "matlab": matlab}
+BACKENDS: dict[str, Backend] = {
+    "numpy": python,
+    "c": c,
+    "javascript": javascript,
+    "jax": jax,
+    "matlab": matlab,
+}
 
 
 def find_backend(name: str) -> Backend:

@@ -96,9 +96,9 @@ def module(program: Program, interface: Interface) -> str:
     special = {"initial_state", "derivative", *matrices, *(name for name, _, _ in dynamics)}
     special |= {"impact", "held"}
     context: dict[str, Any] = {
-        "title": _plain(interface.title),
+        "title": plain(interface.title),
         "scene": interface.name,
-        "about": _document(interface, costs["derivative"]),
+        "about": document(interface, costs["derivative"]),
         "form": interface.form,
         "dimensions": interface.dimensions,
         "states": interface.states,
@@ -113,7 +113,7 @@ def module(program: Program, interface: Interface) -> str:
         "refused": refused.lines,
         "tests": [(_test(test), _words(test)) for test in refused.tests],
         "inputs": interface.inputs,
-        "units": _units(interface),
+        "units": units(interface),
         "effects": repr(tuple(kind for _, kind in interface.effects)),
         "effect_names": repr(tuple(name for name, _ in interface.effects)),
         "bodies": repr(interface.bodies),
@@ -140,7 +140,7 @@ def module(program: Program, interface: Interface) -> str:
         "dynamics": [(written[name], *rest) for name, *rest in dynamics if name in written],
         "checked": constants.checked,
         "checks": [
-            (_plain(check.about), source, check.relation, check.problem)
+            (plain(check.about), source, check.relation, check.problem)
             for check, source in constants.checks
         ],
         "fixed": constants.lines,
@@ -156,15 +156,15 @@ def _written(kernel: Kernel) -> Written:
         about=function.about,
         shape=repr(function.shape),
         block=kernel.block,
-        state=_unpacking(kernel.state),
-        inputs=_unpacking(kernel.inputs),
-        extra=_unpacking(kernel.extra),
-        constants=_joined(kernel.constants),
+        state=unpacking(kernel.state),
+        inputs=unpacking(kernel.inputs),
+        extra=unpacking(kernel.extra),
+        constants=joined(kernel.constants),
         functions=tuple(f for f in FUNCTIONS if f in wanted) if base else kernel.block.functions,
-        operations=_operations(kernel.counts),
+        operations=operations(kernel.counts),
         tangent=function.tangent,
         time=kernel.time or (base is not None and base.time),
-        held=_joined((*(base.constants if base else ()), *kernel.constants)),
+        held=joined((*(base.constants if base else ()), *kernel.constants)),
         passed=_wrapped(kernel.passed),
         base=_written(base) if base else None,
         known=len(base.constants) if base else 0,
@@ -227,17 +227,17 @@ def _words(test: Test) -> str:
     return repr(text.replace("{{", "{").replace("}}", "}"))
 
 
-def _unpacking(names: Sequence[str]) -> str:
+def unpacking(names: Sequence[str]) -> str:
     """The names as unpacking targets, `_` for those not used; "" if none is used."""
-    return _joined([name or "_" for name in names]) if any(names) else ""
+    return joined([name or "_" for name in names]) if any(names) else ""
 
 
-def _joined(words: Sequence[str]) -> str:
+def joined(words: Sequence[str]) -> str:
     """The source of a tuple; a single word gets a trailing comma."""
     return f"{words[0]}," if len(words) == 1 else ", ".join(words)
 
 
-def _operations(counts: Mapping[str, int]) -> str:
+def operations(counts: Mapping[str, int]) -> str:
     kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items() if kind not in _SUMS)
     return f"{counts['total']} operations" + (f": {kinds}" if kinds else "")
 
@@ -245,7 +245,7 @@ def _operations(counts: Mapping[str, int]) -> str:
 _SUMS = ("total", "parameters")
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Text of a scene made safe for a docstring: no double quotes, backslashes or control
     characters.
     """
@@ -253,16 +253,16 @@ def _plain(text: str) -> str:
     return kept.replace("\\", "/").replace('"', "'")
 
 
-def _units(interface: Interface) -> list[tuple[str, str]]:
+def units(interface: Interface) -> list[tuple[str, str]]:
     entries = [(s.name, s.unit) for s in (*interface.states, *interface.inputs)]
-    entries += [(p.name, _plain(p.unit)) for p in interface.parameters]
+    entries += [(p.name, plain(p.unit)) for p in interface.parameters]
     # Of a contact and a parameter of the same name, UNITS has the unit of the parameter.
     taken = {name for name, _ in entries}
     others = [(c.name, c.unit) for c in interface.contacts] + list(interface.constraints)
     return entries + [pair for pair in others if pair[0] not in taken]
 
 
-def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
+def document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
     """The docstring's tables: states, inputs, parameters, effects, operations."""
     lines = ["State y, in this order:"]
     lines += _table([(s.name, s.unit, s.about) for s in interface.states])
@@ -279,7 +279,7 @@ def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
         lines += ["", "Parameters p, with the scene's values:"]
         lines += _table(
             [
-                (f"{p.name} = {p.default!r}", _plain(p.unit), _plain(p.about))
+                (f"{p.name} = {p.default!r}", plain(p.unit), plain(p.about))
                 for p in interface.parameters
             ]
         )
@@ -296,7 +296,7 @@ def _document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
         lines += [""]
     lines += interface.left_out
     lines += textwrap.wrap(
-        f"One call of `derivative` takes {_operations(counts)}; "
+        f"One call of `derivative` takes {operations(counts)}; "
         f"{counts['parameters']} more depend on parameters alone and are done once.",
         WIDTH,
     )
