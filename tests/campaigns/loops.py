@@ -1,11 +1,15 @@
 """Mechanisms with loops: 300 random ones by every route, and other engines; see the parts.
 
-    python tests/campaigns/loops.py [random | pinocchio | peaucellier] [--count N]
+    python tests/campaigns/loops.py [random | pinocchio | mujoco | masses | peaucellier] [--count N]
 
 random       accelerations and wrenches of all joints by every route against the solver in maximal
              coordinates; 1 to 6 loops, all joint types, in the plane and in space by turns
 pinocchio    accelerations against Pinocchio's constraint dynamics, of mechanisms in space that
              balls and welds close
+mujoco       the same, of mechanisms that balls and welds close, against its own M, bias and rows of
+             equality constraints, with the constraints met exactly
+masses       accelerations by the route that `auto` takes where masses are spread over 12 decades:
+             right, as far off as is said, or refused
 peaucellier  how straight the line of Peaucellier's cell is over 1e5 steps
 """
 
@@ -22,6 +26,7 @@ sys.path.append(str(Path(__file__).parent.parent))
 
 import judges
 import planar_linkages
+import uneven_loops as uneven
 from engine import apart, engine
 from loop_routes import ROUTES, apart_by_route, model_of, solved
 from spatial_loops import random_loops
@@ -86,6 +91,28 @@ def pinocchio(count: int) -> int:
     return failed
 
 
+def masses(count: int) -> int:
+    """How many mechanisms of uneven masses are more off than is said, at any of some states."""
+    counts: Counter[str] = Counter()
+    routes: Counter[str] = Counter()
+    errors: dict[str, list[float]] = {}
+    for seed in range(count):
+        outcome = uneven.tried(seed)
+        counts[outcome.words if outcome.words in uneven.WELL else "silent"] += 1
+        routes[outcome.route] += 1
+        for route, off in outcome.errors.items():
+            errors.setdefault(route, []).append(off)
+        if outcome.words not in uneven.WELL:
+            print(f"{seed}: {outcome.route} {outcome.words}", flush=True)
+        if (seed + 1) % 50 == 0:
+            print(f"to {seed + 1}: {dict(counts)}", flush=True)
+    print(f"{count} mechanisms: {dict(counts)}; routes taken: {dict(routes)}")
+    print("error beyond what the data's last places decide: median, worst, more than 1e-10")
+    for route, off in errors.items():
+        print(f"{route:<12} {np.median(off):.1e} {max(off):.1e} {sum(x > 1e-10 for x in off)}")
+    return counts["silent"]
+
+
 def peaucellier(steps: int) -> int:
     """Whether the line is not straight to 1e-12 of its length."""
     text = planar_linkages.peaucellier_scene()
@@ -100,6 +127,7 @@ def peaucellier(steps: int) -> int:
 PARTS = {
     "random": (random, 300),
     "pinocchio": (pinocchio, 60),
+    "masses": (masses, 300),
     "peaucellier": (peaucellier, 100_000),
 }
 
