@@ -4,21 +4,28 @@ in space, over all joint types; and four-bars and slider-cranks with their close
 `campaigns/loops.py` tries 300 random ones.
 """
 
+from dataclasses import replace
+
+import judges
 import linkages
 import numpy as np
 import planar_linkages
 import pytest
+import uneven_loops
 from engine import apart, engine
 from loop_routes import apart_by_route, model_of, solved
 from spatial_loops import Closed, random_loops
 from spatial_trees import PLANE, SPACE
 
 from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.digits import Route, digits_lost
+from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
+from eomgen.scalars.floats import ArrayScalars
 from eomgen.scene.reader import parse_scene
 
 CASES = [(PLANE, 5, 0), (PLANE, 7, 1), (PLANE, 8, 3), (SPACE, 5, 1), (SPACE, 6, 2), (SPACE, 6, 3)]
@@ -45,6 +52,35 @@ def assert_as_solved(case: Closed, seed: int) -> None:
 @pytest.mark.parametrize(("dimensions", "most", "seed"), CASES)
 def test_every_route_is_the_solver(dimensions: int, most: int, seed: int) -> None:
     assert_as_solved(drawn(dimensions, most, seed), seed)
+
+
+@pytest.mark.parametrize(("dimensions", "seed"), [(PLANE, 4), (SPACE, 1), (SPACE, 3)])
+def test_every_route_is_mujoco(dimensions: int, seed: int) -> None:
+    """Its mass matrix, bias and equality constraints, which are kept exactly."""
+    kinds = ("revolute", "weld") if dimensions == PLANE else ("ball", "weld", "revolute")
+    case = random_loops(seed, dimensions, 6, 1 + seed % 2, kinds)
+    model, (u, motion) = model_of(case), solved(case, seed)
+    other = judges.mujoco_constrained(case.tree, case.q, case.v, u)
+    found = apart_by_route(case, model, u, replace(motion, accelerations=other))
+    assert max(accelerations for accelerations, _ in found.values()) < CLOSE
+
+
+@pytest.mark.parametrize("seed", [2, 5, 9])
+def test_masses_over_12_decades(seed: int) -> None:
+    """The route of last resort keeps every digit that the data have; the others do not."""
+    found = uneven_loops.errors(uneven_loops.drawn(seed), seed, ("ldl", "orthogonal"))
+    assert found["orthogonal"] < CLOSE < found["ldl"]
+
+
+def test_digits_are_judged_without_articulated_bodies() -> None:
+    """Of a single route too, as with many loops, where the others are not tried."""
+    model = uneven_loops.drawn(2)
+
+    def independent(values: Values) -> list[np.ndarray]:
+        return Dynamics(model, values, ArrayScalars(), "own").forward("independent")(None)
+
+    lost = digits_lost(model, {"independent": Route(independent, "own")})
+    assert lost["independent"] > 4 > lost["orthogonal"]
 
 
 def left_out(*kept: str) -> tuple[str, ...]:

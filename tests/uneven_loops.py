@@ -65,22 +65,29 @@ def tried(seed: int, routes: tuple[str, ...] = ROUTES) -> Outcome:
         made = taken(model)
     except SceneError:
         return Outcome("refused")
-    words, errors = "right", dict.fromkeys(routes, 0.0)
+    words = "right"
     for q, v, u in _states(model, seed):
         true, allowed = _truth(model, q, v, u)
-        size = size_of(true, model, v)
+        off = apart(found(made.system, q, v, u), true, size_of(true, model, v))
         bound = BOUND + TIMES * allowed
-        off = apart(found(made.system, q, v, u), true, size)
         if off > bound:
             stated = made.choice.digits is not None and off <= bound + 10.0**-made.choice.digits
             words = "reported" if stated else f"off by {off:.1e}, allowed {bound:.1e}"
-        for route in routes:
-            d = Dynamics(model, Values(model.defaults, u, q, v), FloatScalars(), "own")
-            own = apart(d.forward(route)(None), true, size)
-            errors[route] = max(errors[route], own - TIMES * allowed)
         if words not in WELL:
             break
-    return Outcome(words, made.choice.derived.route, errors)
+    return Outcome(words, made.choice.derived.route, errors(model, seed, routes))
+
+
+def errors(model: Model, seed: int, routes: tuple[str, ...]) -> dict[str, float]:
+    """The greatest error of routes at the states of a mechanism beyond what the data decide."""
+    worst = dict.fromkeys(routes, 0.0)
+    for q, v, u in _states(model, seed):
+        true, allowed = _truth(model, q, v, u)
+        for route in routes:
+            d = Dynamics(model, Values(model.defaults, u, q, v), FloatScalars(), "own")
+            own = apart(d.forward(route)(None), true, size_of(true, model, v))
+            worst[route] = max(worst[route], own - TIMES * allowed)
+    return worst
 
 
 def _states(model: Model, seed: int) -> list[tuple[list[float], list[float], dict[str, float]]]:

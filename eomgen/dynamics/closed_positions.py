@@ -111,10 +111,11 @@ def _timed(model: Model) -> bool:
 
 def _rows_by_cluster(model: Model) -> list[set[int]]:
     d = Closure.of(model).dynamics(np.array(model.initial_q))
+    clusters = clusters_of(d)
     found: dict[int, set[int]] = {}
     for i, row in enumerate(rows_of(d)):
         _, frames = span(d, row)
-        first = next(c.frames[0] for c in clusters_of(d) if frames & set(c.frames))
+        first = next(c.frames[0] for c in clusters if frames & set(c.frames))
         found.setdefault(first, set()).add(i)
     return list(found.values())
 

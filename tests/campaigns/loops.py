@@ -91,6 +91,25 @@ def pinocchio(count: int) -> int:
     return failed
 
 
+def mujoco(count: int) -> int:
+    """How many mechanisms that hinges, balls and welds close are not as MuJoCo has them."""
+    failed, worst = 0, 0.0
+    for seed in range(count):
+        dimensions, loops = 2 + seed % 2, 1 + seed // 2 % 4
+        kinds = ("revolute", "weld") if dimensions == 2 else ("ball", "weld", "revolute")
+        case = random_loops(seed, dimensions, 4 + loops + seed % 3, loops, kinds)
+        model, (u, motion) = model_of(case), solved(case, seed)
+        other = judges.mujoco_constrained(case.tree, case.q, case.v, u)
+        ours = apart_by_route(case, model, u, replace(motion, accelerations=other))
+        off = max(accelerations for accelerations, _ in ours.values())
+        worst = max(worst, off)
+        if off > CLOSE:
+            failed += 1
+            print(f"{seed}: off by {off:.1e}; condition {case.condition:.0f}", flush=True)
+    print(f"{count} mechanisms; the worst is off by {worst:.1e}")
+    return failed
+
+
 def masses(count: int) -> int:
     """How many mechanisms of uneven masses are more off than is said, at any of some states."""
     counts: Counter[str] = Counter()
@@ -127,6 +146,7 @@ def peaucellier(steps: int) -> int:
 PARTS = {
     "random": (random, 300),
     "pinocchio": (pinocchio, 60),
+    "mujoco": (mujoco, 100),
     "masses": (masses, 300),
     "peaucellier": (peaucellier, 100_000),
 }
