@@ -131,6 +131,23 @@ def test_rattle_keeps_energy_where_symmetry_does_not() -> None:
         eomgen.simulate(four_bar(effects=rubs), t_end=0.1, **settings)
 
 
+@pytest.mark.parametrize(("method", "order"), [("leapfrog_4", 4), ("leapfrog_6", 6)])
+def test_composed_rattle_has_its_order(method: str, order: int) -> None:
+    """Against DOP853 at its tightest, and back to where it came from."""
+    swings = "q = { theta = 1.0 }\nv = { theta_dot = 6.0 }"
+    run = eomgen.simulate(four_bar(initial=swings), t_end=0.32, rtol=1e-13)
+    names, true = run.states, run.y[-1]
+    ends = []
+    for dt in (0.016, 0.008):
+        settings: dict[str, Any] = {"integrator": method, "dt": dt, "backend": "numpy"}
+        ends.append(eomgen.simulate(four_bar(initial=swings), t_end=0.32, **settings).y[-1])
+    first, last = (float(np.abs(end - true).max()) for end in ends)
+    assert abs(np.log2(first / last) - order) < 0.5
+    turned = dict(zip(names, ends[1] * [1, 1, 1, -1, -1, -1], strict=True))
+    back = eomgen.simulate(four_bar(), state=turned, t_end=0.32, **settings)
+    assert back.y[-1][0] == pytest.approx(1.0, abs=1e-11)
+
+
 def test_given_states_are_kept_and_the_others_found() -> None:
     """Coordinates and velocities that are given stay; other parameters are assembled too."""
     run = eomgen.simulate(four_bar(), state={"psi_deg": -90, "theta_dot": 2.0}, t_end=0.01)

@@ -1,6 +1,6 @@
 """Mechanisms with loops: 300 random ones by every route, and other engines; see the parts.
 
-    python tests/campaigns/loops.py [random | pinocchio | mujoco | masses | peaucellier] [--count N]
+    python tests/campaigns/loops.py [PART] [--count N] [--method NAME]
 
 random       accelerations and wrenches of all joints by every route against the solver in maximal
              coordinates; 1 to 6 loops, all joint types, in the plane and in space by turns
@@ -10,6 +10,8 @@ mujoco       the same, of mechanisms that balls and welds close, against its own
              equality constraints, with the constraints met exactly
 masses       accelerations by the route that `auto` takes where masses are spread over 12 decades:
              right, as far off as is said, or refused
+energy       of a four-bar whose crank goes round, over 1e5 steps of each method of order 4 or more
+             that claims to keep it; --method NAME for one
 peaucellier  how straight the line of Peaucellier's cell is over 1e5 steps
 """
 
@@ -17,6 +19,7 @@ import argparse
 import sys
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +35,7 @@ from loop_routes import ROUTES, apart_by_route, model_of, solved
 from spatial_loops import random_loops
 from test_loops import CLOSE, CONDITION, WELL, left_out
 
+import eomgen
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
 
@@ -132,6 +136,27 @@ def masses(count: int) -> int:
     return counts["silent"]
 
 
+def energy(steps: int, methods: Sequence[str] = ("leapfrog_4", "leapfrog_6")) -> int:
+    """How many methods have a trend of energy, or let the constraints go."""
+    failed = 0
+    for method in methods:
+        scene = planar_linkages.four_bar_scene(1.0, 6.0)
+        run = eomgen.simulate(scene, t_end=0.01 * steps, integrator=method, dt=0.01,
+                              samples=min(steps, 20_000) + 1)  # fmt: skip
+        off = run.energy - run.energy[0]
+        means = np.array([block.mean() for block in np.array_split(off, 20)])
+        fit, spread = np.polyfit(np.arange(20), means, 1, cov=True)
+        slope, error = 20 * fit[0], 20 * float(np.sqrt(spread[0, 0]))
+        module = eomgen.load(eomgen.generate(scene))
+        gaps = np.abs(module.constraint_residuals(0.0, run.y.T)).max()
+        band = np.abs(off).max()
+        print(f"{method}: {steps} steps, energy {run.energy[0]:.3g} J within {band:.1e}; trend "
+              f"over the run {slope:.1e} ± {error:.1e}; constraints {gaps:.1e} m",
+              flush=True)  # fmt: skip
+        failed += (abs(slope) > 4 * error and abs(slope) > 0.02 * band) or gaps > 1e-12
+    return int(failed)
+
+
 def peaucellier(steps: int) -> int:
     """Whether the line is not straight to 1e-12 of its length."""
     text = planar_linkages.peaucellier_scene()
@@ -148,6 +173,7 @@ PARTS = {
     "pinocchio": (pinocchio, 60),
     "mujoco": (mujoco, 100),
     "masses": (masses, 300),
+    "energy": (energy, 100_000),
     "peaucellier": (peaucellier, 100_000),
 }
 
@@ -159,12 +185,14 @@ def main() -> None:
     )
     parser.add_argument("part", nargs="?", choices=PARTS)
     parser.add_argument("--count", type=int, help="mechanisms, or steps")
+    parser.add_argument("--method", help="integrator, of energy")
     given = parser.parse_args()
     failed = 0
     for name, (part, usual) in PARTS.items():
         if given.part in (None, name):
             print(f"{name}:")
-            failed += part(given.count or usual)
+            more = ([given.method],) if name == "energy" and given.method else ()
+            failed += part(given.count or usual, *more)
     sys.exit(failed > 0)
 
 
