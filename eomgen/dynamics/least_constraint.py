@@ -196,11 +196,11 @@ class LeastConstraint(NullSpace):
                     entries = [root * column[i] for column in N]
                     rows.append((0.0, entries, root * -bend[i]))
         rows.sort(key=lambda row: -row[0])
-        found = solved([(entries, right) for _, entries, right in rows], force, s)
-        total = list(bend)
-        for x, column in zip(found, N, strict=True):
-            total = added(total, x, column, s)
-        return total
+        w = solved([(entries, right) for _, entries, right in rows], force, s)
+        found = list(bend)
+        for x, freedom in zip(w, N, strict=True):
+            found = added(found, x, freedom, s)
+        return found
 
     def _own_rows(
         self, k: int, a: Acceleration | None, wrench: Wrench | None
