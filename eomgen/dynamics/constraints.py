@@ -79,7 +79,7 @@ def loads_of(d: MechanismState, multipliers: Sequence[Scalar]) -> list[list[Load
 
 def relative(d: MechanismState, pivots: Sequence[Scalar], sizes: Sequence[Scalar]) -> list[Scalar]:
     """Each row's pivot relative to the sum of the sizes of the rows of its constraint that have the
-    same unit: a row may vanish in a singular position.
+    same unit, since a row may vanish in a singular position; times the row's own margin.
     """
     of = {
         name: (constraint.name, unit)
@@ -90,7 +90,9 @@ def relative(d: MechanismState, pivots: Sequence[Scalar], sizes: Sequence[Scalar
     sums: dict[tuple[str, str], Scalar] = {}
     for kind, size in zip(kinds, sizes, strict=True):
         sums[kind] = sums[kind] + size if kind in sums else size
-    return [pivot / sums[kind] for kind, pivot in zip(kinds, pivots, strict=True)]
+    shares = [pivot / sums[kind] for kind, pivot in zip(kinds, pivots, strict=True)]
+    own = [row.margin for row in rows_of(d)]
+    return [x if m is None else x * m for x, m in zip(shares, own, strict=True)]
 
 
 # Factors.
