@@ -18,6 +18,7 @@ from spatial_loops import Closed, random_loops
 from spatial_trees import PLANE, SPACE
 
 from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.constraints import rates, residuals
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
@@ -25,7 +26,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
-from eomgen.scalars.floats import ArrayScalars
+from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import parse_scene
 
 CASES = [(PLANE, 5, 0), (PLANE, 7, 1), (PLANE, 8, 3), (SPACE, 5, 1), (SPACE, 6, 2), (SPACE, 6, 3)]
@@ -81,6 +82,62 @@ def test_digits_are_judged_without_articulated_bodies() -> None:
 
     lost = digits_lost(model, {"independent": Route(independent, "own")})
     assert lost["independent"] > 4 + lost["orthogonal"]
+
+
+ORIENTATIONS = {
+    (2, "angle"): ('"tilt"', "orientation_deg = {degrees}"),
+    (3, "angles"): ('["tilt", 0.3, "-tilt/2"]', "orientation = [{tilt}, 0.3, {half}]"),
+    (3, "quaternion"): ('["cos(tilt/2)", "sin(tilt/2)", 0, 0]', "orientation = [{tilt}, 0, 0]"),
+    (3, "matrix"): (
+        '[["cos(tilt)", "-sin(tilt)", 0], ["sin(tilt)", "cos(tilt)", 0], [0, 0, 1]]',
+        "orientation = [0, 0, {tilt}]",
+    ),
+}
+"""Dimensions, kind: an orientation by formulas, and the same by numbers."""
+SLIDE = """
+name = "slide"
+dimensions = {n}
+[parameters]
+tilt = {tilt}
+[[bodies]]
+name = "block"
+mass = 1.3
+inertia_com = {inertia}
+[[joints]]
+name = "free"
+type = "free"
+child = "block"
+[[joints]]
+name = "slope"
+type = "prismatic"
+loop = true
+parent = "world"
+child = "block"
+axis = {axis}
+{orientation}
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
+
+
+@pytest.mark.parametrize(("n", "kind"), ORIENTATIONS)
+def test_a_loop_joint_turned_by_formulas(n: int, kind: str) -> None:
+    """A block on a slope: as with numbers, and with other values of the parameter."""
+    formulas, numbers = ORIENTATIONS[n, kind]
+    of = {"n": n, "inertia": [0.1, 0.12, 0.15] if n == 3 else 0.1, "axis": [0.6, 0.8, 0][:n]}
+    rng, rows = np.random.default_rng(0), []
+    q, v = (rng.normal(size=k) for k in ((7, 6) if n == 3 else (3, 3)))
+    for tilt in (0.3, 0.7):
+        words = numbers.format(tilt=tilt, half=-tilt / 2, degrees=float(np.degrees(tilt)))
+        found = []
+        for orientation in (f"orientation = {formulas}", words):
+            model = elaborate(parse_scene(SLIDE.format(tilt=0.3, orientation=orientation, **of)))
+            d = Dynamics(model, Values({"tilt": tilt}, {}, q, v), FloatScalars())
+            found.append(np.vstack([[*residuals(d)], [*rates(d)]]))
+        assert np.allclose(*found, rtol=0, atol=1e-14)
+        rows.append(found[0])
+    assert np.abs(rows[0] - rows[1]).max() > 1e-2
 
 
 def left_out(*kept: str) -> tuple[str, ...]:
