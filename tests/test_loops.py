@@ -21,6 +21,7 @@ from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.constraints import rates, residuals
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
@@ -133,7 +134,7 @@ def test_a_loop_joint_turned_by_formulas(n: int, kind: str) -> None:
         found = []
         for orientation in (f"orientation = {formulas}", words):
             model = elaborate(parse_scene(SLIDE.format(tilt=0.3, orientation=orientation, **of)))
-            d = Dynamics(model, Values({"tilt": tilt}, {}, q, v), FloatScalars())
+            d = Dynamics(model, Values({**model.defaults, "tilt": tilt}, {}, q, v), FloatScalars())
             found.append(np.vstack([[*residuals(d)], [*rates(d)]]))
         assert np.allclose(*found, rtol=0, atol=1e-14)
         rows.append(found[0])
@@ -356,6 +357,16 @@ BAD = {
         "constraints[0].name: 'pin_close' is also the name of joints[3]; give each its own",
     ),
 }
+
+
+def test_a_link_without_mass_is_refused() -> None:
+    """The message says what will do."""
+    text = planar_linkages.four_bar_scene(1.0, 2.0)
+    own = planar_linkages.body("coupler", 2.2, 0.11)
+    assert own in text
+    model = elaborate(parse_scene(text.replace(own, planar_linkages.body("coupler", 0.0, 0.0))))
+    with pytest.raises(SceneError, match=r"'coupler'.*loops are cut.*a millionth"):
+        check_nonsingular(model)
 
 
 @pytest.mark.parametrize("name", BAD)
