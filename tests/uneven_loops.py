@@ -27,6 +27,8 @@ STATES, NUDGES = 3, 3
 BOUND, TIMES = 1e-10, 1e3
 """Of v̇ relative to its largest component, or that of ω v; and of what half a unit in the last place
 of all data changes it by: as for trees in `test_no_silent_error`."""
+State = tuple[list[float], list[float], dict[str, float]]
+"""q, v and inputs."""
 WELL = ("right", "reported", "refused")
 
 
@@ -65,9 +67,8 @@ def tried(seed: int, routes: tuple[str, ...] = ROUTES) -> Outcome:
         made = taken(model)
     except SceneError:
         return Outcome("refused")
-    words = "right"
-    for q, v, u in _states(model, seed):
-        true, allowed = _truth(model, q, v, u)
+    words, known = "right", _known(model, seed)
+    for (q, v, u), true, allowed in known:
         off = apart(found(made.system, q, v, u), true, size_of(true, model, v))
         bound = BOUND + TIMES * allowed
         if off > bound:
@@ -75,14 +76,24 @@ def tried(seed: int, routes: tuple[str, ...] = ROUTES) -> Outcome:
             words = "reported" if stated else f"off by {off:.1e}, allowed {bound:.1e}"
         if words not in WELL:
             break
-    return Outcome(words, made.choice.derived.route, errors(model, seed, routes))
+    return Outcome(words, made.choice.derived.route, _errors(model, known, routes))
 
 
 def errors(model: Model, seed: int, routes: tuple[str, ...]) -> dict[str, float]:
     """The greatest error of routes at the states of a mechanism beyond what the data decide."""
+    return _errors(model, _known(model, seed), routes)
+
+
+def _known(model: Model, seed: int) -> list[tuple[State, Any, float]]:
+    """The states, each with `_truth` there."""
+    return [(at, *_truth(model, *at)) for at in _states(model, seed)]
+
+
+def _errors(
+    model: Model, known: list[tuple[State, Any, float]], routes: tuple[str, ...]
+) -> dict[str, float]:
     worst = dict.fromkeys(routes, 0.0)
-    for q, v, u in _states(model, seed):
-        true, allowed = _truth(model, q, v, u)
+    for (q, v, u), true, allowed in known:
         for route in routes:
             d = Dynamics(model, Values(model.defaults, u, q, v), FloatScalars(), "own")
             own = apart(d.forward(route)(None), true, size_of(true, model, v))
@@ -90,7 +101,7 @@ def errors(model: Model, seed: int, routes: tuple[str, ...]) -> dict[str, float]
     return worst
 
 
-def _states(model: Model, seed: int) -> list[tuple[list[float], list[float], dict[str, float]]]:
+def _states(model: Model, seed: int) -> list[State]:
     """q, v and inputs: the scene's start, and positions along its motion with seeded velocities."""
     rng = np.random.default_rng(seed)
     positions = regular_positions(model)

@@ -127,7 +127,7 @@ def masses(count: int) -> int:
             errors.setdefault(route, []).append(off)
         if outcome.words not in uneven.WELL:
             print(f"{seed}: {outcome.route} {outcome.words}", flush=True)
-        if (seed + 1) % 50 == 0:
+        if (seed + 1) % 10 == 0:
             print(f"to {seed + 1}: {dict(counts)}", flush=True)
     print(f"{count} mechanisms: {dict(counts)}; routes taken: {dict(routes)}")
     print("error beyond what the data's last places decide: median, worst, more than 1e-10")
