@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from paired import COLUMNS, paired, row
+from paired import paired, row
 from peers import compiled_columns, library
 
 sys.path.append(str(Path(__file__).parent.parent))
@@ -40,6 +40,8 @@ COUNTS = (1, 2, 5, 10, 20, 50, 100)
 ROUTES = ("embedded", "independent", "aba", "ldl")
 LONGEST = 10.0
 """A cost that took longer for a chain, s, is not measured for longer ones."""
+FEW = 64
+"""States of a call, few so that the shortest calls are not interrupted."""
 MOST_GENERATED = 300.0
 """The same for the program by `embedded`."""
 TIMES = ("assembly, s", "generation, s", "call in C, µs")
@@ -78,9 +80,9 @@ def called(model: Model) -> float:
     module = load_module(generated_code(model).module, model.name)
     made, _ = library(model, False)
     start = np.array([*model.initial_q, *model.initial_v])[:, np.newaxis]
-    near = np.random.default_rng(1).uniform(-1e-3, 1e-3, (len(start), COLUMNS))
+    near = np.random.default_rng(1).uniform(-1e-3, 1e-3, (len(start), FEW))
     call, _ = compiled_columns(module, made, start + near)
-    return 1e6 * float(np.min(paired(20, call))) / COLUMNS
+    return 1e6 * float(np.min(paired(300, call))) / FEW
 
 
 def drawn(found: dict[int, dict[str, float]]) -> Figure:
