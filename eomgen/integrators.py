@@ -33,6 +33,12 @@ INTEGRATORS: Mapping[str, IntegratorSpec] = {
         "symplectic Euler, order 1", "symplectic", "semi_implicit_euler:INTEGRATOR"
     ),
     "leapfrog": IntegratorSpec("Störmer-Verlet, order 2", "symplectic", "leapfrog:INTEGRATOR"),
+    "leapfrog_4": IntegratorSpec(
+        "leapfrog composed to order 4, by Suzuki", "symplectic", "composed:LEAPFROG_4"
+    ),
+    "leapfrog_6": IntegratorSpec(
+        "leapfrog composed to order 6, by Kahan and Li", "symplectic", "composed:LEAPFROG_6"
+    ),
     "rk4": IntegratorSpec(
         "classical Runge-Kutta method, order 4", "explicit", "runge_kutta_4:INTEGRATOR"
     ),

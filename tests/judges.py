@@ -11,7 +11,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from spatial_trees import PLANE, SpatialTree, TreeJoint
+from scipy.spatial.transform import Rotation
+from spatial_trees import ORIGIN, PLANE, Loop, SpatialTree, TreeJoint
 
 Inputs = Mapping[str, float] | None
 Move = tuple[str, tuple[float, ...]]
@@ -90,6 +91,8 @@ def _mujoco_model(tree: SpatialTree) -> _MuJoCo:
                 armature=joint.armature,
             )
         made.append(own)
+    for loop in tree.loops:
+        _mujoco_loop(tree, spec, made, loop)
     model = spec.compile()
     own_bodies, own_q, own_v = [], [], []
     for body in tree.bodies:
@@ -110,6 +113,38 @@ def _mujoco_model(tree: SpatialTree) -> _MuJoCo:
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     return _MuJoCo(model, data, own_bodies, own_q, own_v)
+
+
+def _mujoco_loop(tree: SpatialTree, spec: Any, made: list[Any], loop: Loop) -> None:
+    """A loop joint as equality constraints between sites: a weld; or points that stay together, of
+    which a hinge in space has two.
+    """
+    import mujoco
+
+    joint = loop.joint
+    places = [ORIGIN]
+    if joint.kind == "revolute" and tree.dimensions != PLANE:
+        places.append(joint.axes[0])
+    elif joint.kind not in ("ball", "weld", "revolute"):
+        raise Unsuitable(f"it has no {joint.kind} joint that closes a loop")
+    turned = Rotation.from_euler("xyz", joint.orientation_deg, degrees=True)
+    sides = (
+        (joint.parent, joint.r_parent, turned),
+        (loop.child, joint.r_child, Rotation.identity()),
+    )
+    kind = "WELD" if joint.kind == "weld" else "CONNECT"
+    for n, place in enumerate(places):
+        names = [f"{joint.name}_{n}_{end}" for end in ("parent", "child")]
+        for name, (k, at, axes) in zip(names, sides, strict=True):
+            on = spec.worldbody if k < 0 else made[k]
+            quaternion = np.roll(axes.as_quat(), 1)
+            on.add_site(name=name, pos=np.array(at) + axes.apply(place), quat=quaternion)
+        spec.add_equality(
+            type=getattr(mujoco.mjtEq, f"mjEQ_{kind}"),
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name1=names[0],
+            name2=names[1],
+        )
 
 
 def _mujoco_run(tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs) -> _MuJoCo:
@@ -141,6 +176,41 @@ def mujoco_accelerations(
     """Rates of the velocities `v`, in their order. Raises `Unsuitable` if MuJoCo warns."""
     made = _mujoco_run(tree, q, v, u)
     return made.data.qacc[made.v]
+
+
+def mujoco_constrained(
+    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs = None
+) -> np.ndarray:
+    """Rates of the velocities `v` where the loops are kept exactly, from MuJoCo's mass matrix, its
+    accelerations without loops, and the Jacobian J of its equality constraints.
+
+    MuJoCo itself keeps them softly. J̇ v is the derivative of J v along the motion at constant v, by
+    differences of fourth order.
+    """
+    import mujoco
+
+    made = _mujoco_run(tree, q, v, u)
+    model, data = made.model, made.data
+    free, mass = data.qacc.copy(), np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    start, speed = data.qpos.copy(), data.qvel.copy()
+
+    def jacobian(t: float) -> np.ndarray:
+        data.qpos[:] = start
+        mujoco.mj_integratePos(model, data.qpos, speed, t)
+        flags, model.opt.disableflags = model.opt.disableflags, 0
+        mujoco.mj_fwdPosition(model, data)
+        model.opt.disableflags = flags
+        return np.array(data.efc_J).reshape(data.nefc, model.nv)
+
+    h = 1e-3 / max(1.0, float(np.abs(speed).max()))
+    rates = [jacobian(k * h) @ speed for k in (-2, -1, 1, 2)]
+    bend = (rates[0] - 8 * rates[1] + 8 * rates[2] - rates[3]) / (12 * h)
+    rows = jacobian(0.0)
+    inverse = np.linalg.solve(mass, rows.T)
+    forces = np.linalg.lstsq(rows @ inverse, -(rows @ free + bend), rcond=1e-10)[0]
+    return np.asarray((free + inverse @ forces)[made.v])
 
 
 def mujoco_wrenches(

@@ -107,7 +107,7 @@ def test_orders_are_those_of_the_methods() -> None:
     for method in FIXED:
         nominal = order(method)
         works = climbed(bench(), [method], most_steps=3200 if nominal == 1 else 800)[method]
-        if method == "leapfrog":  # z is pulled by v: it says so, once
+        if method.startswith("leapfrog"):  # z is pulled by v: it says so, once
             assert [work.status for work in works] == ["refused"] and "depends on" in works[
                 0
             ].reason

@@ -316,7 +316,8 @@ def test_columns(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "integrator", [name for name in INTEGRATORS if name not in ("leapfrog", "taylor", "heyoka")]
+    "integrator",
+    [name for name in INTEGRATORS if not name.startswith(("leapfrog", "taylor", "heyoka"))],
 )
 def test_integrators(integrator: str) -> None:
     """Each goes its way with states that are neither positions nor velocities."""

@@ -119,7 +119,8 @@ def test_infinite_at_the_start(
 
 
 @pytest.mark.parametrize(
-    "integrator", [name for name in INTEGRATORS if name not in ("leapfrog", *SERIES)]
+    "integrator",
+    [name for name in INTEGRATORS if not name.startswith("leapfrog") and name not in SERIES],
 )
 @pytest.mark.parametrize(
     ("formula", "x", "v", "low", "high"),

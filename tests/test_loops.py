@@ -4,21 +4,30 @@ in space, over all joint types; and four-bars and slider-cranks with their close
 `campaigns/loops.py` tries 300 random ones.
 """
 
+from dataclasses import replace
+
+import judges
 import linkages
 import numpy as np
 import planar_linkages
 import pytest
+import uneven_loops
 from engine import apart, engine
 from loop_routes import apart_by_route, model_of, solved
 from spatial_loops import Closed, random_loops
 from spatial_trees import PLANE, SPACE
 
 from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.constraints import rates, residuals
+from eomgen.dynamics.digits import Route, digits_lost
+from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.outputs import OUTPUTS
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
+from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import parse_scene
 
 CASES = [(PLANE, 5, 0), (PLANE, 7, 1), (PLANE, 8, 3), (SPACE, 5, 1), (SPACE, 6, 2), (SPACE, 6, 3)]
@@ -45,6 +54,91 @@ def assert_as_solved(case: Closed, seed: int) -> None:
 @pytest.mark.parametrize(("dimensions", "most", "seed"), CASES)
 def test_every_route_is_the_solver(dimensions: int, most: int, seed: int) -> None:
     assert_as_solved(drawn(dimensions, most, seed), seed)
+
+
+@pytest.mark.parametrize(("dimensions", "seed"), [(PLANE, 4), (SPACE, 1), (SPACE, 3)])
+def test_every_route_is_mujoco(dimensions: int, seed: int) -> None:
+    """Its mass matrix, bias and equality constraints, which are kept exactly."""
+    kinds = ("revolute", "weld") if dimensions == PLANE else ("ball", "weld", "revolute")
+    case = random_loops(seed, dimensions, 6, 1 + seed % 2, kinds)
+    model, (u, motion) = model_of(case), solved(case, seed)
+    other = judges.mujoco_constrained(case.tree, case.q, case.v, u)
+    found = apart_by_route(case, model, u, replace(motion, accelerations=other))
+    assert max(accelerations for accelerations, _ in found.values()) < CLOSE
+
+
+@pytest.mark.parametrize("seed", [2, 5, 9])
+def test_masses_over_12_decades(seed: int) -> None:
+    """The route of last resort keeps every digit that the data have; the others do not."""
+    found = uneven_loops.errors(uneven_loops.drawn(seed), seed, ("ldl", "orthogonal"))
+    assert found["orthogonal"] < CLOSE < found["ldl"]
+
+
+def test_digits_are_judged_without_articulated_bodies() -> None:
+    """Of a single route too, as with many loops, where the others are not tried."""
+    model = uneven_loops.drawn(2)
+
+    def independent(values: Values) -> list[np.ndarray]:
+        return Dynamics(model, values, ArrayScalars(), "own").forward("independent")(None)
+
+    lost = digits_lost(model, {"independent": Route(independent, "own")})
+    assert lost["independent"] > 4 + lost["orthogonal"]
+
+
+ORIENTATIONS = {
+    (2, "angle"): ('"tilt"', "orientation_deg = {degrees}"),
+    (3, "angles"): ('["tilt", 0.3, "-tilt/2"]', "orientation = [{tilt}, 0.3, {half}]"),
+    (3, "quaternion"): ('["cos(tilt/2)", "sin(tilt/2)", 0, 0]', "orientation = [{tilt}, 0, 0]"),
+    (3, "matrix"): (
+        '[["cos(tilt)", "-sin(tilt)", 0], ["sin(tilt)", "cos(tilt)", 0], [0, 0, 1]]',
+        "orientation = [0, 0, {tilt}]",
+    ),
+}
+"""Dimensions, kind: an orientation by formulas, and the same by numbers."""
+SLIDE = """
+name = "slide"
+dimensions = {n}
+[parameters]
+tilt = {tilt}
+[[bodies]]
+name = "block"
+mass = 1.3
+inertia_com = {inertia}
+[[joints]]
+name = "free"
+type = "free"
+child = "block"
+[[joints]]
+name = "slope"
+type = "prismatic"
+loop = true
+parent = "world"
+child = "block"
+axis = {axis}
+{orientation}
+[[effects]]
+type = "gravity"
+g = 9.81
+"""
+
+
+@pytest.mark.parametrize(("n", "kind"), ORIENTATIONS)
+def test_a_loop_joint_turned_by_formulas(n: int, kind: str) -> None:
+    """A block on a slope: as with numbers, and with other values of the parameter."""
+    formulas, numbers = ORIENTATIONS[n, kind]
+    of = {"n": n, "inertia": [0.1, 0.12, 0.15] if n == 3 else 0.1, "axis": [0.6, 0.8, 0][:n]}
+    rng, rows = np.random.default_rng(0), []
+    q, v = (rng.normal(size=k) for k in ((7, 6) if n == 3 else (3, 3)))
+    for tilt in (0.3, 0.7):
+        words = numbers.format(tilt=tilt, half=-tilt / 2, degrees=float(np.degrees(tilt)))
+        found = []
+        for orientation in (f"orientation = {formulas}", words):
+            model = elaborate(parse_scene(SLIDE.format(tilt=0.3, orientation=orientation, **of)))
+            d = Dynamics(model, Values({**model.defaults, "tilt": tilt}, {}, q, v), FloatScalars())
+            found.append(np.vstack([[*residuals(d)], [*rates(d)]]))
+        assert np.allclose(*found, rtol=0, atol=1e-14)
+        rows.append(found[0])
+    assert np.abs(rows[0] - rows[1]).max() > 1e-2
 
 
 def left_out(*kept: str) -> tuple[str, ...]:
@@ -263,6 +357,16 @@ BAD = {
         "constraints[0].name: 'pin_close' is also the name of joints[3]; give each its own",
     ),
 }
+
+
+def test_a_link_without_mass_is_refused() -> None:
+    """The message says what will do."""
+    text = planar_linkages.four_bar_scene(1.0, 2.0)
+    own = planar_linkages.body("coupler", 2.2, 0.11)
+    assert own in text
+    model = elaborate(parse_scene(text.replace(own, planar_linkages.body("coupler", 0.0, 0.0))))
+    with pytest.raises(SceneError, match=r"'coupler'.*loops are cut.*a millionth"):
+        check_nonsingular(model)
 
 
 @pytest.mark.parametrize("name", BAD)

@@ -12,6 +12,7 @@ import mpmath
 import numpy as np
 import pytest
 from campaign import some
+from scipy.integrate import quad
 from scipy.special import ellipj, ellipk
 from whipple import PRINTED, SPEEDS, TABLE, appendix, linearised, matrices, tangents
 
@@ -469,6 +470,23 @@ def test_steady_rolling_of_a_disc(tilt: float, turning: float) -> None:
     radius = r * spin / turning
     assert y["disc_x"] == pytest.approx(-radius * np.sin(turning * t), abs=1e-9)
     assert y["disc_y"] == pytest.approx(-radius * (1 - np.cos(turning * t)), abs=1e-9)
+
+
+def test_a_disc_that_falls_flat_stops() -> None:
+    """Where it has no lowest point any more, at the time of the integral of its energy."""
+    start = 0.9
+    made = module(disc(start, (0.0, 0.0, 0.0)))
+    found = integrate(as_problem(made), "DOP853", 1.0)
+    assert not found.finished and "lies flat" in found.message
+    m, r, diameter, _ = DISC
+
+    def slowness(tilt: float) -> float:
+        """By the energy about the fixed point of contact: (I + m r²) θ̇² / 2 = m g r Δ sin θ."""
+        fallen = 2 * m * 9.81 * r * (np.sin(start) - np.sin(tilt))
+        return float(np.sqrt((diameter + m * r * r) / fallen))
+
+    time = quad(lambda s: slowness(start - s * s) * 2 * s, 0.0, np.sqrt(start))[0]
+    assert found.t[-1] == pytest.approx(time, abs=1e-4)
 
 
 def test_the_integrals_of_a_rolling_disc() -> None:

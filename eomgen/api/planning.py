@@ -191,7 +191,7 @@ def _check_aims(
 
 def _of_method(setting: "Setting | None", model: Model) -> tuple[str, ...]:
     """The outputs that a method needs."""
-    if setting and setting.integrator == "leapfrog" and model.constraints:
+    if setting and setting.integrator.startswith("leapfrog") and model.constraints:
         return ("mass_matrix", "kinetic_slopes")
     return ()
 

@@ -100,7 +100,12 @@ def choose(model: Model, *, closed: bool = True) -> Choice:
         lost = digits_lost(model, routes, closely=True)
         judged = _judged(candidates, lost)
         if not _accepted(judged):
-            words = f"keeps digits that the other routes lose: aba loses {lost['aba']:.0f}"
+            one = (
+                "aba"
+                if "aba" in lost
+                else min((n for n in lost if n != last), key=lost.__getitem__)
+            )
+            words = f"keeps digits that the other routes lose: {one} loses {lost[one]:.0f}"
             judged.append(Candidate(last, _operations(attempts[last].alone), words))
             digits = _correct_digits(lost[last])
     best = min(_accepted(judged), key=lambda c: c.operations or 0)

@@ -48,12 +48,15 @@ def _regularity(matrix: Array) -> float:
 
 
 def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
-    """Positions along a walk with their J."""
+    """Positions along a walk with their J. It ends near a singular one, where a run ends too:
+    beyond, a linkage may go on in another way than the one it was assembled in.
+    """
     closure, nv = Closure.of(model), len(model.velocities)
     rng = random.Random(walk // 2)
     heading = np.array([rng.gauss(0.0, 1.0) for _ in range(nv)]) * (1.0 if walk % 2 else -1.0)
     q = np.array(model.initial_q)
     _, matrix = closure.both(q)
+    least = min(REGULAR, _regularity(matrix) / 2)
     for _ in range(max(SHORTEST, min(LONGEST, ALL // nv))):
         step = heading - np.linalg.lstsq(matrix, matrix @ heading, rcond=1e-9)[0]
         size = float(np.abs(step).max())
@@ -67,7 +70,7 @@ def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
             q = closure.moved(q, np.asarray(-np.linalg.lstsq(matrix, g, rcond=1e-9)[0]))
         else:
             return
-        if not closure.upright(q):
+        if not closure.upright(q) or _regularity(matrix) < least:
             return
         heading = step / size
         yield q, matrix
@@ -108,10 +111,11 @@ def _timed(model: Model) -> bool:
 
 def _rows_by_cluster(model: Model) -> list[set[int]]:
     d = Closure.of(model).dynamics(np.array(model.initial_q))
+    clusters = clusters_of(d)
     found: dict[int, set[int]] = {}
     for i, row in enumerate(rows_of(d)):
         _, frames = span(d, row)
-        first = next(c.frames[0] for c in clusters_of(d) if frames & set(c.frames))
+        first = next(c.frames[0] for c in clusters if frames & set(c.frames))
         found.setdefault(first, set()).add(i)
     return list(found.values())
 

@@ -9,11 +9,12 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.articulated import along
-from eomgen.dynamics.constraints import rows_of
+from eomgen.dynamics.constraints import position_rates, rows_of
 from eomgen.dynamics.forces import at_parent
 from eomgen.dynamics.kinematics import Link
-from eomgen.dynamics.loads import wrench_of
-from eomgen.dynamics.mechanism_state import MechanismState
+from eomgen.dynamics.loads import power_of, wrench_of
+from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.constraints.base import Row
 from eomgen.scene.effects.base import JointLoad
@@ -74,10 +75,46 @@ def jacobian_of(d: MechanismState) -> list[list[Scalar]]:
 
     The wrenches of a row's loads are carried inwards to its base only: beyond, they cancel.
     """
-    return [_derivatives(d, row) for row in rows_of(d)]
+    return [_derivatives(d, row)[: d.nv] for row in rows_of(d)]
+
+
+def accelerations_at_rest(d: MechanismState) -> list[Scalar]:
+    """β: the second derivative of each g at v̇ = 0, by dual numbers along q̇ and t.
+
+    It is taken in world axes, where the spin of a wheel does not turn its rolling point to and fro,
+    and of the motion relative to a row's base: that of the base cancels.
+    """
+    model, values, scalars = d.model, d.values, d.scalars
+    dual, one = Duals(scalars), scalars.number(1.0)
+    moving = Values(
+        {name: dual.still(x) for name, x in values.parameters.items()},
+        {name: dual.still(x) for name, x in values.inputs.items()},
+        [Dual(x, rate) for x, rate in zip(values.q, position_rates(d), strict=True)],
+        [dual.still(x) for x in values.v],
+        {name: dual.still(x) for name, x in values.states.items()},
+        Dual(values.time, one),
+    )
+    state = MechanismState(model, moving, dual, "world")
+    found = []
+    for row in rows_of(state):
+        rate = _inner_rate(state, row)
+        found.append((rate if row.drift is None else rate + row.drift).rate)
+    return found
+
+
+def _inner_rate(d: MechanismState, row: Row) -> Scalar:
+    """J v of a row: the power of its loads, without what cancels by the motion of its base."""
+    if span(d, row)[0] < 0:
+        return power_of(d, row.loads)
+    total = d.scalars.number(0.0)
+    for slope, speed in zip(_derivatives(d, row), d.v[: d.moved], strict=True):
+        if not d.scalars.is_zero(slope):
+            total = total + slope * speed
+    return total
 
 
 def _derivatives(d: MechanismState, row: Row) -> list[Scalar]:
+    """The derivatives of a row by all velocities that move, (moved,)."""
     links, (base, _) = d.kinematics.links, span(d, row)
     found = [d.scalars.number(0.0)] * d.moved
     for load in row.loads:
@@ -89,10 +126,11 @@ def _derivatives(d: MechanismState, row: Row) -> list[Scalar]:
         frame, wrench = wrench_of(d, load)
         while frame != base:
             link = links[frame]
-            for axis, i in link.free:
-                found[i] = found[i] + along(axis, wrench.moment, wrench.force)
+            for axis, i in zip(link.axes, link.v, strict=True):
+                if i < d.moved:
+                    found[i] = found[i] + along(axis, wrench.moment, wrench.force)
             wrench, frame = at_parent(link, wrench), link.parent
-    return found[: d.nv]
+    return found
 
 
 def path(links: Sequence[Link], end: int, base: int) -> list[int]:

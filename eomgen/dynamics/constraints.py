@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.loads import generalised, power_of, scaled
-from eomgen.dynamics.mechanism_state import MechanismState, Values
-from eomgen.scalars.duals import Dual, Duals
+from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.constraints.base import Row
 from eomgen.scene.effects.base import Load
@@ -43,21 +42,6 @@ def held(d: MechanismState, multipliers: Sequence[Scalar]) -> list[Scalar]:
     """Jᵀ λ: the generalised forces of the constraints, with the rows of driven velocities."""
     pairs = zip(rows_of(d), multipliers, strict=True)
     return generalised(d, [x for row, force in pairs for x in scaled(row.loads, force)])
-
-
-def accelerations_at_rest(d: MechanismState) -> list[Scalar]:
-    """β: the second derivative of each g at v̇ = 0, by dual numbers along q̇ and t."""
-    model, values, scalars = d.model, d.values, d.scalars
-    dual, one = Duals(scalars), scalars.number(1.0)
-    moving = Values(
-        {name: dual.still(x) for name, x in values.parameters.items()},
-        {name: dual.still(x) for name, x in values.inputs.items()},
-        [Dual(x, rate) for x, rate in zip(values.q, position_rates(d), strict=True)],
-        [dual.still(x) for x in values.v],
-        {name: dual.still(x) for name, x in values.states.items()},
-        Dual(values.time, one),
-    )
-    return [rate.rate for rate in rates(MechanismState(model, moving, dual, d.axes))]
 
 
 def position_rates(d: MechanismState, v: Sequence[Scalar] | None = None) -> list[Scalar]:
@@ -95,7 +79,7 @@ def loads_of(d: MechanismState, multipliers: Sequence[Scalar]) -> list[list[Load
 
 def relative(d: MechanismState, pivots: Sequence[Scalar], sizes: Sequence[Scalar]) -> list[Scalar]:
     """Each row's pivot relative to the sum of the sizes of the rows of its constraint that have the
-    same unit: a row may vanish in a singular position.
+    same unit, since a row may vanish in a singular position; times the row's own margin.
     """
     of = {
         name: (constraint.name, unit)
@@ -106,7 +90,9 @@ def relative(d: MechanismState, pivots: Sequence[Scalar], sizes: Sequence[Scalar
     sums: dict[tuple[str, str], Scalar] = {}
     for kind, size in zip(kinds, sizes, strict=True):
         sums[kind] = sums[kind] + size if kind in sums else size
-    return [pivot / sums[kind] for kind, pivot in zip(kinds, pivots, strict=True)]
+    shares = [pivot / sums[kind] for kind, pivot in zip(kinds, pivots, strict=True)]
+    own = [row.margin for row in rows_of(d)]
+    return [x if m is None else x * m for x, m in zip(shares, own, strict=True)]
 
 
 # Factors.

@@ -171,7 +171,8 @@ def _off(
     found = {"orthogonal": true, **named}
     least = _least(model, true, at)
     change = np.zeros(len(at))
-    doubts = [_shares(found["aba"], true, least)] if "aba" in found else []
+    asked = "aba" if "aba" in found else next(iter(named), "orthogonal")
+    doubts = [_shares(found[asked], true, least)]
     if closely:
         nudged = _recursion("orthogonal", perturbed(model), "own")
         change = _shares(_numbers(nudged, _nudged(together, len(at)), shape), true, least)

@@ -12,6 +12,7 @@ accelerations, without gyroscopic torques, and joint forces follow from the same
 energies and poses still use the velocities. Energy is not conserved then.
 """
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -29,6 +30,7 @@ from eomgen.dynamics.composite import (
 )
 from eomgen.dynamics.embedding import Embedded
 from eomgen.dynamics.kinematics import TreeKinematics
+from eomgen.dynamics.least_constraint import LeastConstraint
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.dynamics.motion import (
@@ -211,10 +213,30 @@ class Dynamics(AppliedLoads):
                 self._beyond_effects,
                 self._fall,
             )
+        if recursion == "orthogonal":
+            return LeastConstraint(
+                self,
+                self._solids,
+                solids(
+                    make_linkage(self.model, self.model.defaults, FloatScalars()), FloatScalars()
+                ),
+                self._applied_about_centres,
+                self._beyond_effects,
+                self._fall,
+                self._scales,
+            )
         forward, response = (
             getattr(self, f"{recursion}_{name}") for name in ("forward", "response")
         )
         return RangeSpace(self, forward, response)
+
+    @cached_property
+    def _scales(self) -> list[float]:
+        """Powers of two near the root of each diagonal entry of M⁻¹, of the scene's own numbers."""
+        model = self.model
+        values = Values(model.defaults, self.values.inputs, model.initial_q, model.initial_v)
+        entries = Dynamics(model, values, FloatScalars()).mass_entries
+        return [2.0 ** round(-math.log2(entries[i, i]) / 2) for i in range(self.nv)]
 
     def _beyond_effects(self, vd: Sequence[Scalar]) -> list[Scalar]:
         """The generalised forces besides the effects that v̇ takes: M v̇ + V + G - F."""
@@ -255,12 +277,17 @@ class Dynamics(AppliedLoads):
 
     def orthogonal_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
         """The same by orthogonal elimination, in the frames' own axes."""
+        return self._with_gravity(self._elimination.respond(*self._applied_about_centres(tau)))
+
+    def _applied_about_centres(
+        self, tau: Sequence[Scalar] | None
+    ) -> tuple[tuple[Acceleration, ...], tuple[fc.Wrench, ...], list[Scalar]]:
+        """The frames' accelerations at v̇ = 0 without gravity of trees on a free joint, the wrenches
+        about their centres of mass, and the generalised forces with `tau`.
+        """
         about = centres(self._solids, self.scalars)
         wrenches = fc.wrenches(self.linkage, self.kinematics, self.loads[0], self.scalars, about)
-        found = self._elimination.respond(
-            self._reference_accelerations, wrenches, self._generalised_forces(tau)
-        )
-        return self._with_gravity(found)
+        return self._reference_accelerations, wrenches, self._generalised_forces(tau)
 
     def articulated_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """M⁻¹ times generalised impulses, by articulated bodies."""

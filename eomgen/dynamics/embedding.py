@@ -8,10 +8,9 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from eomgen.dynamics.cluster_joint import Equation, Held, Independent, Joint
-from eomgen.dynamics.clusters import Cluster, clusters_of, span
+from eomgen.dynamics.clusters import Cluster, accelerations_at_rest, clusters_of, span
 from eomgen.dynamics.constraints import (
     Symmetric,
-    accelerations_at_rest,
     inner,
     position_rates,
     rates,

@@ -12,11 +12,10 @@ where the dependent velocities do not follow from the independent ones, as at a 
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
-from eomgen.dynamics.clusters import jacobian_of
+from eomgen.dynamics.clusters import accelerations_at_rest, jacobian_of
 from eomgen.dynamics.composite import Entries
 from eomgen.dynamics.constraints import (
     Square,
-    accelerations_at_rest,
     factored,
     inner,
     position_rates,

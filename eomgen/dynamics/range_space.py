@@ -10,10 +10,9 @@ definite if these are independent; its factors L D Lᵀ are written out.
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
-from eomgen.dynamics.clusters import jacobian_of
+from eomgen.dynamics.clusters import accelerations_at_rest, jacobian_of
 from eomgen.dynamics.constraints import (
     Symmetric,
-    accelerations_at_rest,
     factored,
     inner,
     position_rates,

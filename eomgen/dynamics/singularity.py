@@ -187,7 +187,12 @@ def _where(
 def _singular(model: Model, i: int) -> str:
     name = model.velocities[i].name
     body = next(index.body for index in model.joint_indices if i in index.v)
-    return (
+    found = (
         f"body '{body.name}': nothing resists '{name}', neither its mass or inertia nor what it "
-        "carries; give it some, or a joint that does not move so"
+        "carries"
     )
+    if model.constraints:
+        return (
+            f"{found}, once the loops are cut; give it some, a millionth of its neighbours' will do"
+        )
+    return f"{found}; give it some, or a joint that does not move so"

@@ -30,7 +30,7 @@ from eomgen.scene.appearance import appearance_of
 from eomgen.scene.chains import written_out
 from eomgen.scene.constraints import Constraint, closing
 from eomgen.scene.effects import Effect
-from eomgen.scene.joints import Free, Particle
+from eomgen.scene.joints import Particle
 from eomgen.scene.schema import BodyTable, Scene
 
 
@@ -279,11 +279,6 @@ def _loops(
     loops, found = list[Constraint](), list[Bindings]()
     for joint, location in closing_joints(scene):
         turned, kept = oriented(joint, location, scene.dimensions, scope)
-        if not isinstance(turned, Free) and turned.orientation is not None:
-            raise SceneError(
-                f"{location}.orientation: depends on parameters; a joint that closes a loop takes "
-                "numbers"
-            )
         joint = normalised_joint(turned, location, scene.dimensions)
         joint, bindings = bind(joint, joint.name, location, scope)
         loops.append(closing(joint_from_centres(joint, centres), location, scene.dimensions))

@@ -230,7 +230,8 @@ class SingularPositionError(StepFailure):
         name = projection.names[int(np.argmin(margins))]
         super().__init__(
             f"the mechanism is singular at t = {t:.6g} s: constraint {name} follows from the "
-            "others there, as at a dead point or a change point",
+            "others there, as at a dead point or a change point, or has no direction, as where a "
+            "disc lies flat",
             REMEDY,
         )
 

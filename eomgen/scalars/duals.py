@@ -46,6 +46,10 @@ class Duals(Scalars):
         """A scalar with derivative 0."""
         return Dual(value, self._scalars.number(0.0))
 
+    def is_zero(self, value: Dual) -> bool:
+        """Whether value and derivative are known to be 0."""
+        return self._scalars.is_zero(value.value) and self._scalars.is_zero(value.rate)
+
     def call(self, function: str, *arguments: Dual) -> Dual:
         """A function of formulas."""
         values = [argument.value for argument in arguments]

@@ -22,6 +22,8 @@ COLOURS = {
     "rk4": "#4477aa",
     "semi_implicit_euler": "#b8a000",
     "leapfrog": "#aa3377",
+    "leapfrog_4": "#882255",
+    "leapfrog_6": "#661166",
     "implicit_midpoint": "#ee6677",
     "gauss_4": "#cc3311",
     "gauss_6": "#7a1f4e",

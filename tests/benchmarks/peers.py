@@ -181,7 +181,7 @@ def is_same(peer: Any, y: np.ndarray) -> bool:
 
 def compiled_columns(module: Any, made: Any, y: np.ndarray) -> tuple[Callable[[], None], Any]:
     """A call of our kernel for columns of states, and where it puts the derivatives."""
-    out, sound = np.empty_like(y), np.empty(COLUMNS, np.int8)
+    out, sound = np.empty_like(y), np.empty(y.shape[1], np.int8)
     constants, inputs = Kernels(module, made).held(None), np.zeros(max(1, len(module.INPUTS)))
     call, pointer = made.columns_derivative, ctypes.c_void_p
     call.argtypes = (
@@ -190,7 +190,7 @@ def compiled_columns(module: Any, made: Any, y: np.ndarray) -> tuple[Callable[[]
     given = (y.ctypes.data, constants, inputs.ctypes.data, 0)
 
     def compute(kept: Any = inputs) -> None:
-        call(COLUMNS, 0.0, *given, out.ctypes.data, sound.ctypes.data)
+        call(y.shape[1], 0.0, *given, out.ctypes.data, sound.ctypes.data)
         assert sound[0]
 
     return compute, out

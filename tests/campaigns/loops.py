@@ -1,11 +1,17 @@
 """Mechanisms with loops: 300 random ones by every route, and other engines; see the parts.
 
-    python tests/campaigns/loops.py [random | pinocchio | peaucellier | symplectic] [--count N]
+    python tests/campaigns/loops.py [PART] [--count N] [--method NAME]
 
 random       accelerations and wrenches of all joints by every route against the solver in maximal
              coordinates; 1 to 6 loops, all joint types, in the plane and in space by turns
 pinocchio    accelerations against Pinocchio's constraint dynamics, of mechanisms in space that
              balls and welds close
+mujoco       the same, of mechanisms that balls and welds close, against its own M, bias and rows of
+             equality constraints, with the constraints met exactly
+masses       accelerations by the route that `auto` takes where masses are spread over 12 decades:
+             right, as far off as is said, or refused
+energy       of a four-bar whose crank goes round, over 1e5 steps of each method of order 4 or more
+             that claims to keep it; --method NAME for one
 peaucellier  how straight the line of Peaucellier's cell is over 1e5 steps
 symplectic   constraints and energy of a four-bar that swings, over 1e6 steps of RATTLE
 """
@@ -14,6 +20,7 @@ import argparse
 import sys
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,12 +30,14 @@ sys.path.append(str(Path(__file__).parent.parent))
 
 import judges
 import planar_linkages
+import uneven_loops as uneven
 from engine import apart, engine
 from loop_routes import ROUTES, apart_by_route, model_of, solved
 from spatial_loops import random_loops
 from test_loop_runs import four_bar
 from test_loops import CLOSE, CONDITION, WELL, left_out
 
+import eomgen
 from eomgen.dynamics.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.native.accelerator import Accelerator
@@ -91,6 +100,68 @@ def pinocchio(count: int) -> int:
             print(f"{seed}: off by {off:.1e}; condition {case.condition:.0f}", flush=True)
     print(f"{tried} mechanisms; the worst is off by {worst:.1e}")
     return failed
+
+
+def mujoco(count: int) -> int:
+    """How many mechanisms that hinges, balls and welds close are not as MuJoCo has them."""
+    failed, worst = 0, 0.0
+    for seed in range(count):
+        dimensions, loops = 2 + seed % 2, 1 + seed // 2 % 4
+        kinds = ("revolute", "weld") if dimensions == 2 else ("ball", "weld", "revolute")
+        case = random_loops(seed, dimensions, 4 + loops + seed % 3, loops, kinds)
+        model, (u, motion) = model_of(case), solved(case, seed)
+        other = judges.mujoco_constrained(case.tree, case.q, case.v, u)
+        ours = apart_by_route(case, model, u, replace(motion, accelerations=other))
+        off = max(accelerations for accelerations, _ in ours.values())
+        worst = max(worst, off)
+        if off > CLOSE:
+            failed += 1
+            print(f"{seed}: off by {off:.1e}; condition {case.condition:.0f}", flush=True)
+    print(f"{count} mechanisms; the worst is off by {worst:.1e}")
+    return failed
+
+
+def masses(count: int) -> int:
+    """How many mechanisms of uneven masses are more off than is said, at any of some states."""
+    counts: Counter[str] = Counter()
+    routes: Counter[str] = Counter()
+    errors: dict[str, list[float]] = {}
+    for seed in range(count):
+        outcome = uneven.tried(seed)
+        counts[outcome.words if outcome.words in uneven.WELL else "silent"] += 1
+        routes[outcome.route] += 1
+        for route, off in outcome.errors.items():
+            errors.setdefault(route, []).append(off)
+        if outcome.words not in uneven.WELL:
+            print(f"{seed}: {outcome.route} {outcome.words}", flush=True)
+        if (seed + 1) % 10 == 0:
+            print(f"to {seed + 1}: {dict(counts)}", flush=True)
+    print(f"{count} mechanisms: {dict(counts)}; routes taken: {dict(routes)}")
+    print("error beyond what the data's last places decide: median, worst, more than 1e-10")
+    for route, off in errors.items():
+        print(f"{route:<12} {np.median(off):.1e} {max(off):.1e} {sum(x > 1e-10 for x in off)}")
+    return counts["silent"]
+
+
+def energy(steps: int, methods: Sequence[str] = ("leapfrog_4", "leapfrog_6")) -> int:
+    """How many methods have a trend of energy, or let the constraints go."""
+    failed = 0
+    for method in methods:
+        scene = planar_linkages.four_bar_scene(1.0, 6.0)
+        run = eomgen.simulate(scene, t_end=0.01 * steps, integrator=method, dt=0.01,
+                              samples=min(steps, 20_000) + 1)  # fmt: skip
+        off = run.energy - run.energy[0]
+        means = np.array([block.mean() for block in np.array_split(off, 20)])
+        fit, spread = np.polyfit(np.arange(20), means, 1, cov=True)
+        slope, error = 20 * fit[0], 20 * float(np.sqrt(spread[0, 0]))
+        module = eomgen.load(eomgen.generate(scene))
+        gaps = np.abs(module.constraint_residuals(0.0, run.y.T)).max()
+        band = np.abs(off).max()
+        print(f"{method}: {steps} steps, energy {run.energy[0]:.3g} J within {band:.1e}; trend "
+              f"over the run {slope:.1e} ± {error:.1e}; constraints {gaps:.1e} m",
+              flush=True)  # fmt: skip
+        failed += (abs(slope) > 4 * error and abs(slope) > 0.02 * band) or gaps > 1e-12
+    return int(failed)
 
 
 def peaucellier(steps: int) -> int:
@@ -161,6 +232,9 @@ def symplectic(steps: int) -> int:
 PARTS = {
     "random": (random, 300),
     "pinocchio": (pinocchio, 60),
+    "mujoco": (mujoco, 100),
+    "masses": (masses, 300),
+    "energy": (energy, 100_000),
     "peaucellier": (peaucellier, 100_000),
     "symplectic": (symplectic, 1_000_000),
 }
@@ -173,12 +247,14 @@ def main() -> None:
     )
     parser.add_argument("part", nargs="?", choices=PARTS)
     parser.add_argument("--count", type=int, help="mechanisms, or steps")
+    parser.add_argument("--method", help="integrator, of energy")
     given = parser.parse_args()
     failed = 0
     for name, (part, usual) in PARTS.items():
         if given.part in (None, name):
             print(f"{name}:")
-            failed += part(given.count or usual)
+            more = ([given.method],) if name == "energy" and given.method else ()
+            failed += part(given.count or usual, *more)
     sys.exit(failed > 0)
 
 

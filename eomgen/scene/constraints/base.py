@@ -18,11 +18,13 @@ class Row:
     residual  g, m or rad; None if only its rate is constrained
     loads     the loads of a multiplier of 1
     drift     rate of g at rest, m/s or rad/s; None for 0
+    margin    how far it is from having no direction, squared, at most 1; None for 1
     """
 
     residual: Scalar | None
     loads: tuple[Load | JointLoad, ...]
     drift: Scalar | None = None
+    margin: Scalar | None = None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from eomgen.errors import SceneError
 from eomgen.scalars import exact
 from eomgen.scene.constraints.base import Linkage, Row
 from eomgen.scene.effects.base import Load, Scalar, Vector
-from eomgen.scene.effects.vectors import cross, dot, negative, sub
+from eomgen.scene.effects.vectors import add, cross, dot, negative, scale, sub
 from eomgen.scene.joints import (
     Ball,
     Cylindrical,
@@ -20,7 +20,7 @@ from eomgen.scene.joints import (
     Universal,
     Weld,
 )
-from eomgen.scene.joints.base import spatial
+from eomgen.scene.joints.base import Orientation, spatial
 
 Closing = Ball | Cylindrical | Particle | Planar | Prismatic | Revolute | Universal | Weld
 Direction = tuple[exact.Real, ...]
@@ -182,12 +182,43 @@ class LoopJoint:
         """A direction of the joint's axes on the parent, in world axes."""
         turned = exact.image(exact.orientation(self.joint.orientation_deg), direction)
         parts = tuple(map(mechanism.number, turned))[: mechanism.dimensions]
+        if self.joint.orientation is not None:
+            parts = rotated(mechanism, self.joint.orientation, parts)
         return mechanism.outward(self.joint.parent, parts)
 
     def _on_child(self, mechanism: Linkage, direction: Direction) -> Vector:
         """A direction of the joint's axes on the child, in world axes."""
         parts = tuple(map(mechanism.number, direction))[: mechanism.dimensions]
         return mechanism.outward(self.joint.child, parts)
+
+
+def rotated(mechanism: Linkage, by: Orientation, vector: Vector) -> Vector:
+    """A vector rotated by formulas: an angle in the plane; three angles about x, y and z, a
+    quaternion w, x, y, z of any length, or the rows of a matrix.
+    """
+    if not isinstance(by, tuple):
+        x, y = vector
+        return _about(mechanism, mechanism.value(by), x, y)
+    rows = [row for row in by if isinstance(row, tuple)]
+    if rows:
+        return tuple(dot(tuple(map(mechanism.value, row)), vector) for row in rows)
+    parts = [mechanism.value(part) for part in by if not isinstance(part, tuple)]
+    x, y, z = vector
+    if len(parts) == 3:
+        y, z = _about(mechanism, parts[0], y, z)
+        z, x = _about(mechanism, parts[1], z, x)
+        x, y = _about(mechanism, parts[2], x, y)
+        return x, y, z
+    w, u = parts[0], tuple(parts[1:])
+    once = cross(u, vector)
+    whole = add(scale(w, once), cross(u, once))
+    share = mechanism.number(2.0) / (w * w + dot(u, u))
+    return add(vector, scale(share, whole))
+
+
+def _about(mechanism: Linkage, angle: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+    c, s = mechanism.call("cos", angle), mechanism.call("sin", angle)
+    return c * x - s * y, s * x + c * y
 
 
 def closing(joint: Joint, location: str, dimensions: int) -> LoopJoint:

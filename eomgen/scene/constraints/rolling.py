@@ -142,7 +142,8 @@ other_at = [0, -1.4]
         else:
             touch = self._on_sphere(mechanism, mechanism.value(self.other_radius))
             along = list(tangents(mechanism, touch))
-        yield Row(touch.gap, normal_loads(touch, mechanism.number(1.0)))
+        loads = normal_loads(touch, mechanism.number(1.0))
+        yield Row(touch.gap, loads, margin=self._steepness(mechanism))
         for tangent in along:
             yield Row(None, point_loads(touch, tangent))
 
@@ -173,12 +174,23 @@ other_at = [0, -1.4]
         radius = mechanism.value(self.radius)
         if not self.axis:
             return radius, negative(scale(radius, n))
-        a, rim = unit(mechanism, self.body, self.axis), mechanism.value(self.rim)
-        steep = sub(n, scale(dot(n, a), a))  # n without its part along the axis
+        rim, steep = mechanism.value(self.rim), self._steep(mechanism, n)
         size = mechanism.call("sqrt", dot(steep, steep))
         inner = radius - rim
         lever = add(scale(inner / size, steep), scale(rim, n))
         return inner * size + rim, negative(lever)
+
+    def _steep(self, mechanism: Linkage, n: Components) -> Components:
+        """The normal n without its part along the axis of a disc."""
+        a = unit(mechanism, self.body, self.axis)
+        return sub(n, scale(dot(n, a), a))
+
+    def _steepness(self, mechanism: Linkage) -> Scalar | None:
+        """sin² of a disc's tilt: 0 where it lies flat and has no lowest point."""
+        if not self.axis:
+            return None
+        steep = self._steep(mechanism, unit(mechanism, self.other, self.normal))
+        return dot(steep, steep)
 
     def _support_of_ellipsoid(self, mechanism: Linkage, n: Components) -> tuple[Scalar, Components]:
         """h² = Σ (a_i n·e_i)²; ∇h = Σ a_i² (n·e_i) e_i / h."""

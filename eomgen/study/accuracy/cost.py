@@ -62,6 +62,8 @@ METHODS: Mapping[str, Overhead] = {
     "euler": Overhead(28.0, 1.0, 1.0),
     "semi_implicit_euler": Overhead(30.0, 1.0, 1.0),
     "leapfrog": Overhead(40.0, 1.0, 1.0),
+    "leapfrog_4": Overhead(10.0, 24.0, 5.0),
+    "leapfrog_6": Overhead(10.0, 42.0, 9.0),
     "rk4": Overhead(20.0, 4.0, 0.7),
     "implicit_midpoint": Overhead(55.0, 20.0, 1.5, stages=1),
     "gauss_4": Overhead(60.0, 17.0, 1.8, stages=2),
