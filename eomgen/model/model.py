@@ -11,6 +11,7 @@ from eomgen.displays import Displayed
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import Constant, Formula, evaluate
 from eomgen.language.quantity import Parameter
+from eomgen.model.groups import Group
 from eomgen.scalars.exact import Real, radians
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.constraints import Constraint, ConstraintTable, LoopJoint
@@ -18,7 +19,7 @@ from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import ExtraState, Input
 from eomgen.scene.joints import Free, Joint, Revolute
 from eomgen.scene.joints.base import Coordinate
-from eomgen.scene.schema import Form, LeftOut, Route
+from eomgen.scene.schema import Closing, Form, LeftOut, Route
 
 
 @dataclass(frozen=True)
@@ -178,6 +179,9 @@ class Model(Displayed):
     dropped     names of rows of constraints that follow from the others
     pivots      for each row of the constraints, in the order of elimination, its index and that of
                 the velocity that is solved for by it
+    closing     how loops are closed: "closed", in closed form; "projected"; or "auto"
+    groups      what determines the coordinates that follow from the others in closed form, in the
+                order in which they are solved; () if they are states too
     """
 
     name: str
@@ -203,6 +207,8 @@ class Model(Displayed):
     held: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
     pivots: tuple[tuple[int, int], ...] = ()
+    closing: Closing = "auto"
+    groups: tuple[Group, ...] = ()
 
     @cached_property
     def every_row(self) -> tuple[tuple[str, str], ...]:

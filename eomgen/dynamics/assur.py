@@ -1,0 +1,226 @@
+"""Which coordinates of a mechanism follow from the others in closed form, and in which order.
+
+A loop in the plane with two unknown coordinates is solved first, then those that hang on it (Assur
+1914: groups of two bars). Rows of `coupling` and `distance` determine one coordinate. The branch on
+which each polygon closes is that of the mechanism's start, and stays the same where the dependent
+velocities follow from the others in its whole motion. Angles are counted from where they do not
+jump in it.
+"""
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from eomgen.dynamics.closed_positions import reached_positions, with_safe_pivots
+from eomgen.dynamics.closing import Turn, angle_of, solved
+from eomgen.dynamics.closure import Array, Closure
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.errors import SceneError
+from eomgen.language.formula import names_in
+from eomgen.model.groups import Group
+from eomgen.model.model import Model
+from eomgen.scene.constraints import Constraint, Coupling, Distance, LoopJoint
+from eomgen.scene.joints import Prismatic, Revolute
+from eomgen.scene.joints.base import WORLD
+
+SAME = 1e-4
+"""The largest difference, in sizes, of coordinates found in closed form from those of a start."""
+FROM_JUMP = 0.1
+"""How near, rad, an angle may come to where its values jump."""
+
+
+def with_closed_form(model: Model) -> Model:
+    """The model with its `groups` where all dependent coordinates follow in closed form.
+
+    Raises `SceneError` if the model asks for that and they do not.
+    """
+    if model.closing == "projected" or not model.constraints:
+        return replace(model, groups=())
+    found, why = _groups(with_safe_pivots(model))
+    if why and model.closing == "closed":
+        raise SceneError(f"loops: 'closed' cannot be: {why}; leave it out")
+    return replace(model, groups=found)
+
+
+def why_not_closed_form(model: Model) -> str:
+    """Why the dependent coordinates are not found in closed form; "" if they can be."""
+    return _groups(with_safe_pivots(model))[1]
+
+
+def completed(model: Model, groups: Sequence[Group], q: Array) -> Array:
+    """All coordinates (nq,) by the independent ones among `q`."""
+    closure, q = Closure.of(model), q.copy()
+    for group in groups:
+        found = solved(closure.dynamics(q), group)
+        for i, value, cut in zip(group.coordinates, found, group.cuts, strict=True):
+            if isinstance(value, Turn):
+                assert cut is not None
+                value = angle_of(closure.dynamics(q), value, cut)
+            q[i] = value
+    return q
+
+
+def _groups(model: Model) -> tuple[tuple[Group, ...], str]:
+    """The groups of a model with safe pivots, in the order in which they are solved; why there are
+    none.
+    """
+    if model.form != "velocity":
+        return (), f"the form '{model.form}' is another state"
+    if model.prescribed and model.driven:
+        return (), "a coordinate is driven"
+    if len(model.pivots) < len(model.rows):
+        return (), "dependent coordinates do not follow from the others in every position"
+    unknown = _coordinates(model, [column for _, column in model.pivots])
+    if unknown is None:
+        return (), "a dependent coordinate is a rotation in space"
+    found: list[Group] = []
+    left, d = list(model.constraints), Closure.of(model).dynamics(np.array(model.initial_q))
+    while left:
+        for constraint in left:
+            group = _group(d, constraint, unknown)
+            if group is not None:
+                break
+        else:
+            names = ", ".join(c.name for c in left)
+            return (), f"no polygons with two unknown sides or angles: {names}"
+        found.append(group)
+        left.remove(constraint)
+        unknown -= set(group.coordinates)
+    if unknown:
+        return (), "a coordinate is in no loop"
+    return _measured(model, found)
+
+
+def _coordinates(model: Model, velocities: Sequence[int]) -> set[int] | None:
+    """The coordinates whose rates are these velocities; None if one is of a rotation in space."""
+    of = {j: i for index in model.joint_indices for i, j in index.plain}
+    return {of[j] for j in velocities} if all(j in of for j in velocities) else None
+
+
+def _group(d: Dynamics, constraint: Constraint, unknown: set[int]) -> Group | None:
+    """The group that a constraint determines if only `unknown` coordinates are not known; None if
+    it determines none.
+    """
+    rows = [name for name, _ in constraint.row_names(d.dimensions)]
+    if any(name in d.model.dropped for name in rows):
+        return None
+    names = [c.name for c in d.model.coordinates]
+    if isinstance(constraint, Coupling):
+        own = names.index(constraint.coordinate) if constraint.coordinate in names else -1
+        used = {names.index(name) for name in names_in(constraint.equals) if name in names}
+        if own in unknown and not used & unknown:
+            return Group(constraint.name, (own,), cuts=(None,))
+        return None
+    if d.dimensions == 3:
+        return None
+    if isinstance(constraint, Distance):
+        bodies, count = (constraint.body_1, constraint.body_2), 1
+    elif isinstance(constraint, LoopJoint) and isinstance(constraint.joint, Prismatic | Revolute):
+        bodies, count = (constraint.joint.parent, constraint.joint.child), 2
+    else:
+        return None
+    paths = [_path(d, body) for body in bodies]
+    of = {k: frame.q[0] for k, frame in enumerate(d.linkage.frames) if frame.q}
+    shared, apart = set(paths[0]) & set(paths[1]), set(paths[0]) ^ set(paths[1])
+    if any(of.get(k) in unknown for k in shared):
+        return None
+    own = sorted(k for k in apart if of.get(k) in unknown)
+    kinds = [d.linkage.frames[k].kind for k in own]
+    slider = isinstance(constraint, LoopJoint) and isinstance(constraint.joint, Prismatic)
+    if len(own) != count or (slider and "revolute" not in kinds):
+        return None
+    return Group(constraint.name, tuple(of[k] for k in own), 1, (None,) * count)
+
+
+def _path(d: Dynamics, body: str) -> list[int]:
+    """The frames between the world and a body."""
+    return _to_world(d, -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame)
+
+
+def _to_world(d: Dynamics, frame: int) -> list[int]:
+    found: list[int] = []
+    while frame >= 0:
+        found.append(frame)
+        frame = d.linkage.frames[frame].parent
+    return found
+
+
+def _measured(model: Model, groups: Sequence[Group]) -> tuple[tuple[Group, ...], str]:
+    """The groups with branches and cuts; why that cannot be."""
+    closure, start = Closure.of(model), np.array(model.initial_q)
+    places = [start, *reached_positions(model)]
+    states = [closure.dynamics(q) for q in places]
+    sizes = _in_sizes(model, closure)
+    found: list[Group] = []
+    for n, group in enumerate(groups):
+        later = {i for other in groups[n:] for i in other.coordinates}
+        for branch in (1, -1):
+            tried = replace(group, branch=branch)
+            if made := _with_cuts(tried, states, sizes, later):
+                found.append(made)
+                break
+        else:
+            return (), f"{group.constraint} does not stay on one branch, or an angle jumps"
+    return tuple(found), ""
+
+
+def _in_sizes(model: Model, closure: Closure) -> list[float]:
+    """1 for an angle, the mechanism's size for a length."""
+    return [closure.size if c.unit == "m" else 1.0 for c in model.coordinates]
+
+
+def _with_cuts(
+    group: Group, states: Sequence[Dynamics], sizes: Sequence[float], later: Collection[int]
+) -> Group | None:
+    """A group with the cuts of its angles; None if what is found in closed form is not the state
+    everywhere, or an angle jumps.
+    """
+    try:
+        values = [solved(d, group) for d in states]
+    except (ArithmeticError, ValueError):
+        return None
+    cuts: list[tuple[int, int] | None] = []
+    for n, i in enumerate(group.coordinates):
+        first, cut = values[0][n], None
+        if isinstance(first, Turn):
+            cut = _cut(first.frame, states, later)
+            if cut is None:
+                return None
+        for d, each in zip(states, values, strict=True):
+            value = each[n]
+            if isinstance(value, Turn):
+                assert cut is not None
+                value = angle_of(d, value, cut)
+            if not abs(value - d.q[i]) <= SAME * sizes[i]:
+                return None
+        cuts.append(cut)
+    return replace(group, cuts=tuple(cuts))
+
+
+def _cut(
+    frame: int, states: Sequence[Dynamics], later: Collection[int]
+) -> tuple[int, int] | None:
+    """From which frame, and from which quarter turn there, an angle stays within half a turn; the
+    world if possible, else a frame before it, else one that does not move with `later` coordinates.
+    """
+    frames = states[0].linkage.frames
+    before = _to_world(states[0], frames[frame].parent)
+    others = [
+        k
+        for k in range(len(frames))
+        if k not in before and not any({*frames[n].q} & {*later} for n in _to_world(states[0], k))
+    ]
+    for reference in (-1, *before, *others):
+        turns = [_angle(d, frame) - _angle(d, reference) for d in states]
+        middle = (min(turns) + max(turns)) / 2
+        quarter = round(middle / (math.pi / 2))
+        reached = max(abs(turn - quarter * math.pi / 2) for turn in turns)
+        if reached <= math.pi - FROM_JUMP:
+            return reference, quarter
+    return None
+
+
+def _angle(d: Dynamics, frame: int) -> float:
+    return float(d.in_world.angles[frame].moving) if frame >= 0 else 0.0
