@@ -243,6 +243,18 @@ class Model(Displayed):
         return velocities_of(self.bodies, self.prescribed)
 
     @cached_property
+    def state_coordinates(self) -> tuple[int, ...]:
+        """The indices in q of the coordinates that are states: those of no group."""
+        following = {i for group in self.groups for i in group.coordinates}
+        return tuple(i for i in range(len(self.coordinates)) if i not in following)
+
+    @cached_property
+    def state_velocities(self) -> tuple[int, ...]:
+        """The indices in v of the velocities that are states."""
+        following = {column for _, column in self.pivots} if self.groups else set()
+        return tuple(j for j in range(len(self.velocities)) if j not in following)
+
+    @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
         """The coordinates that are not states: driven ones in the order of the bodies, then locked
         ones.

@@ -18,10 +18,14 @@ class State:
 
 
 def velocity_states(model: Model) -> tuple[State, ...]:
-    """The states of the form [q, v, x]: coordinates, velocities, extra states of effects."""
+    """The states of the form [q, v, x]: coordinates, velocities, extra states of effects; without
+    coordinates and velocities that follow from others in closed form.
+    """
+    positions = (model.coordinates[i] for i in model.state_coordinates)
+    velocities = (model.velocities[j] for j in model.state_velocities)
     mechanical = (
         State(c.name, c.unit, c.about, position)
-        for group, position in ((model.coordinates, True), (model.velocities, False))
+        for group, position in ((positions, True), (velocities, False))
         for c in group
     )
     return (*mechanical, *(State(x.name, x.unit, x.about, False) for x in model.states))

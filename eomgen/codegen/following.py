@@ -1,0 +1,120 @@
+"""Dependent coordinates and velocities of a recorded tree put in as functions of the others.
+
+Cosines and sines of dependent angles, and of sums of angles with them, are those of the polygons
+that determine them: no arc tangent is taken where nothing but these is used.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from eomgen.dynamics.closing import Turn, angle_of, solved
+from eomgen.dynamics.dyads import Arrow, turned, turned_back
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.program.differentiate import substituted
+from eomgen.program.scalars import TapeScalars
+from eomgen.program.tape import Node, Tape
+
+Sum = dict[int, float]
+"""A sum of steps with factors, by their indices; under -1 a number."""
+NUMBER = -1
+
+
+@dataclass
+class Following:
+    """Nodes in place of the inputs that follow from others.
+
+    inputs  indices of the inputs that follow
+    """
+
+    tape: Tape
+    inputs: set[int]
+    _nodes: dict[int, Node] = field(default_factory=dict)
+    _turns: list[tuple[int, Sum, Arrow]] = field(default_factory=list)
+    _scanned: int = 0
+
+    def put(self, given: Node, value: Node) -> None:
+        """Let an input be a value, which is of inputs that do not follow, or of those before."""
+        (self._nodes[given.index],) = self.of([value])
+
+    def put_turn(self, coordinate: Node, angle: Node, direction: Arrow) -> None:
+        """Let an angle, a sum with one new coordinate, have a direction."""
+        x, y = self.of(direction)
+        self._turns.append((coordinate.index, self._sum(angle.index), (x, y)))
+        self._scanned = 0
+
+    def of(self, nodes: Sequence[Node]) -> list[Node]:
+        """Nodes without inputs that follow."""
+        steps = self.tape.steps
+        for i in range(self._scanned, len(steps)):
+            if steps[i].operation in ("cos", "sin") and i not in self._nodes:
+                direction = self._direction(self._sum(steps[i].operands[0]))
+                if direction is not None:
+                    self._nodes[i] = direction[steps[i].operation == "sin"]
+        self._scanned = len(steps)
+        return substituted(nodes, self._nodes)
+
+    def _direction(self, angle: Sum) -> Arrow | None:
+        """The cosine and sine of a sum of angles that follow; None if it has none, or others."""
+        if not self.inputs & set(angle):
+            return None
+        found: Arrow | None = None
+        rest = dict(angle)
+        for own, known, direction in reversed(self._turns):
+            times = rest.get(own, 0.0)
+            if abs(times) != 1.0:
+                continue
+            for i, factor in known.items():
+                rest[i] = rest.get(i, 0.0) - times * factor
+            if found is None:
+                found = direction if times > 0 else (direction[0], -direction[1])
+            else:
+                found = (turned if times > 0 else turned_back)(direction, found)
+        rest = {i: factor for i, factor in rest.items() if factor}
+        if found is None or self.inputs & set(rest):
+            return None
+        return turned(self._cosine_and_sine(rest), found) if rest else found
+
+    def _cosine_and_sine(self, angle: Sum) -> Arrow:
+        node = self.tape.constant(angle.get(NUMBER, 0.0))
+        for i, factor in angle.items():
+            if i == NUMBER:
+                continue
+            term = Node(self.tape, i)
+            node = node + term if factor == 1.0 else node + self.tape.constant(factor) * term
+        scalars = TapeScalars(self.tape)
+        return scalars.call("cos", node), scalars.call("sin", node)
+
+    def _sum(self, index: int) -> Sum:
+        """A node as a sum."""
+        found: Sum = {}
+        stack = [(index, 1.0)]
+        while stack:
+            i, factor = stack.pop()
+            step = self.tape.steps[i]
+            value = self.tape.values[i]
+            if value is not None:
+                found[NUMBER] = found.get(NUMBER, 0.0) + factor * value
+            elif step.operation == "neg":
+                stack.append((step.operands[0], -factor))
+            elif step.operation in ("add", "sub"):
+                left, right = step.operands
+                stack += [(right, factor if step.operation == "add" else -factor), (left, factor)]
+            else:
+                found[i] = found.get(i, 0.0) + factor
+        return {i: factor for i, factor in found.items() if factor}
+
+
+def positions(d: Dynamics, q: Sequence[Node], tape: Tape) -> Following:
+    """The coordinates of a mechanism's groups by the others; `q` are the inputs, of all."""
+    followed = [i for group in d.model.groups for i in group.coordinates]
+    following = Following(tape, {q[i].index for i in followed})
+    for group in d.model.groups:
+        found = solved(d, group)
+        for i, value, cut in zip(group.coordinates, found, group.cuts, strict=True):
+            if isinstance(value, Turn):
+                assert cut is not None
+                moving = d.in_world.angles[value.frame].moving
+                following.put_turn(q[i], moving, value.direction)
+                value = angle_of(d, value, cut)
+            following.put(q[i], value)
+    return following
