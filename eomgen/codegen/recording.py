@@ -77,7 +77,8 @@ class Recording:
         free, still = set(self.model.state_velocities), self.scalars.number(0.0)
         v = [node if j in free else still for j, node in enumerate(self.v)]
         moving = type(d)(self.model, replace(d.values, v=v), self.scalars, d.axes)
-        for j, value in enumerate(moving.constrained("independent").velocity()):
+        held = moving.constrained("independent")
+        for j, value in enumerate(held.carried_along() if self.route == "independent" else held.velocity()):
             if j not in free:
                 following.put(self.v[j], value)
                 following.inputs.add(self.v[j].index)

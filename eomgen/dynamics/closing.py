@@ -131,16 +131,16 @@ class _Polygon:
                 w = dyads.triangle(d, along(a, a), along(b, b), branch, scalars)
                 return self._turns((first, w), (second, minus(d, w)))
             case [_Guide(k, line), _Bar(arm=a) as bar]:
-                s = dyads.reach(d, line, along(a, a), branch, scalars)
-                return {k: s, **self._turns((bar, minus(d, dyads.times(s, line))))}
+                s, w = dyads.reach(d, line, along(a, a), branch, scalars)
+                return {k: s, **self._turns((bar, w))}
             case [_Guide(k, line), _Guide(n, other)]:
                 s, r = dyads.parts(d, line, other)
                 return {k: s, n: r}
             case [_Guided(frame, arm, guide, line)]:
                 square = along(d, d)
-                s = dyads.reach(opposite(arm), line, square, branch, scalars)
-                whole = plus(arm, dyads.times(s, line))
-                return {guide: s, frame: self._turn(frame, dyads.between(whole, d, square))}
+                s, w = dyads.reach(opposite(arm), line, square, branch, scalars)
+                whole = opposite(w)
+                return {guide: s, frame: self._turn(frame, dyads.between(whole, d, square, scalars))}
         raise AssertionError(f"no polygon: {terms}")
 
     def _rod(self, rod: Distance) -> dict[int, Turn | Scalar]:
@@ -155,7 +155,7 @@ class _Polygon:
                 w = dyads.triangle(d, along(a, a), square, self._branch, self._scalars)
                 return self._turns((bar, w))
             case [_Guide(k, line)]:
-                return {k: dyads.reach(d, line, square, self._branch, self._scalars)}
+                return {k: dyads.reach(d, line, square, self._branch, self._scalars)[0]}
         raise AssertionError(f"no polygon: {terms}")
 
     def _slider(self, joint: Prismatic) -> dict[int, Turn | Scalar]:
@@ -219,17 +219,18 @@ class _Polygon:
         square = along(d, d)
         # d in the axes of the normal.
         there = h, dyads.root(square - h * h, self._branch, self._scalars)
-        u = turned_back(normal, dyads.between(there, d, square))
+        u = turned_back(normal, dyads.between(there, d, square, self._scalars))
         return {i: self._turn(i, u), j: self._turn(j, turned(twist, u))}
 
     # Results.
 
     def _turns(self, *pairs: tuple[_Bar, Arrow]) -> dict[int, Turn | Scalar]:
         """The directions of bars from their vectors in the world."""
-        return {
-            bar.frame: self._turn(bar.frame, dyads.between(bar.arm, w, along(bar.arm, bar.arm)))
-            for bar, w in pairs
-        }
+        found: dict[int, Turn | Scalar] = {}
+        for bar, w in pairs:
+            u = dyads.between(bar.arm, w, along(bar.arm, bar.arm), self._scalars)
+            found[bar.frame] = self._turn(bar.frame, u)
+        return found
 
     def _turn(self, frame: int, u: Arrow) -> Turn:
         """A frame's direction without the fixed part of its angle."""

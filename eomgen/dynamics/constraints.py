@@ -10,10 +10,15 @@ from dataclasses import dataclass
 
 from eomgen.dynamics.loads import generalised, power_of, scaled
 from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.dynamics.motion import Acceleration, Twist, accelerations, velocities
+from eomgen.dynamics.observables import arm
+from eomgen.dynamics.vectors import add, in_space, sub, times, zeros
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar, Scalars
-from eomgen.scene.constraints.base import Row
+from eomgen.scene.constraints import LoopJoint, Row
 from eomgen.scene.effects.base import Load
+from eomgen.scene.joints import Revolute
+from eomgen.scene.joints.base import WORLD
 
 
 def rows_of(d: MechanismState) -> list[Row]:
@@ -46,7 +51,44 @@ def held(d: MechanismState, multipliers: Sequence[Scalar]) -> list[Scalar]:
 
 
 def accelerations_at_rest(d: MechanismState) -> list[Scalar]:
-    """β: the second derivative of each g at v̇ = 0, by dual numbers along q̇ and t."""
+    """β: the second derivative of each g at v̇ = 0. Of pins in the plane, the difference of the
+    accelerations of two points, of which the equations of motion take parts too; else by dual
+    numbers along q̇ and t.
+    """
+    points: dict[str, Scalar] = {}
+    if d.dimensions == 2 and not d.model.driven:
+        frames = accelerations(d.in_world, _in_world(d), d.v, None, zeros(d.scalars), d.scalars)
+        for loop in d.model.loops:
+            if isinstance(loop.joint, Revolute):
+                names = (name for name, _ in loop.row_names(2))
+                points.update(zip(names, _apart(d, loop, frames), strict=True))
+    names = [name for name, _ in d.model.rows]
+    if all(name in points for name in names):
+        return [points[name] for name in names]
+    pairs = zip(names, _by_duals(d), strict=True)
+    return [points.get(name, by_duals) for name, by_duals in pairs]
+
+
+def _in_world(d: MechanismState) -> tuple[Twist, ...]:
+    return d.twists if d.axes == "world" else velocities(d.in_world, d.v, d.scalars)
+
+
+def _apart(d: MechanismState, loop: LoopJoint, frames: Sequence[Acceleration]) -> list[Scalar]:
+    """The acceleration of a planar pin's point of the child minus that of the parent, (2,)."""
+    found = []
+    ends = ((loop.joint.child, loop.joint.r_child), (loop.joint.parent, loop.joint.r_parent))
+    for body, at in ends:
+        frame = -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame
+        if frame < 0:
+            found.append(zeros(d.scalars))
+            continue
+        own = in_space([d.value(part) for part in at], d.scalars)
+        reach = arm(d.linkage, d.in_world, d.index[body], own, d.scalars)
+        found.append(add(frames[frame].linear, times(frames[frame].field, reach)))
+    return list(sub(*found)[:2])
+
+
+def _by_duals(d: MechanismState) -> list[Scalar]:
     model, values, scalars = d.model, d.values, d.scalars
     dual, one = Duals(scalars), scalars.number(1.0)
     moving = Values(

@@ -52,8 +52,12 @@ def turned_back(u: Arrow, a: Arrow) -> Arrow:
     return u[0] * a[0] + u[1] * a[1], u[0] * a[1] - u[1] * a[0]
 
 
-def between(a: Arrow, b: Arrow, square: Scalar) -> Arrow:
+def between(a: Arrow, b: Arrow, square: Scalar, scalars: Scalars) -> Arrow:
     """The direction that turns a into b, which are of the same length, the root of `square`."""
+    if scalars.is_zero(a[1]):
+        return b[0] / a[0], b[1] / a[0]
+    if scalars.is_zero(a[0]):
+        return b[1] / a[1], -(b[0] / a[1])
     found = turned_back(a, b)
     return found[0] / square, found[1] / square
 
@@ -69,16 +73,19 @@ def triangle(d: Arrow, first: Scalar, second: Scalar, branch: int, scalars: Scal
 
     With a = x d + y e, e perpendicular to d: |a|² and |d - a|² give x, and then |a|² gives y.
     """
-    half, over = scalars.number(0.5), scalars.number(1.0) / along(d, d)
-    x = half + half * (first - second) * over
-    y = root(first * over - x * x, branch, scalars)
+    half, whole = scalars.number(0.5), along(d, d)
+    x = half + half * (first - second) / whole
+    y = root(first / whole - x * x, branch, scalars)
     return turned((x, y), d)
 
 
-def reach(d: Arrow, line: Arrow, square: Scalar, branch: int, scalars: Scalars) -> Scalar:
-    """s such that d - s `line` has a length, given by its square; `line` is a unit vector."""
+def reach(
+    d: Arrow, line: Arrow, square: Scalar, branch: int, scalars: Scalars
+) -> tuple[Scalar, Arrow]:
+    """s and w = d - s `line` of a length, given by its square; `line` is a unit vector."""
     side = across(line, d)
-    return along(line, d) + root(square - side * side, branch, scalars)
+    more = root(square - side * side, branch, scalars)
+    return along(line, d) + more, turned((-more, side), line)
 
 
 def leaning(n: Arrow, h: Scalar, square: Scalar, branch: int, scalars: Scalars) -> Arrow:

@@ -162,6 +162,17 @@ class NullSpace:
         return [v + dv for v, dv in zip(self._d.values.v, change, strict=True)]
 
 
+    def carried_along(self) -> list[Scalar]:
+        """The same by N: v = N v_i, and what time alone moves."""
+        own = self._d.values.v
+        found = list(own)
+        for k, column in zip(self._independent, self._basis, strict=True):
+            for j in self._dependent:
+                if not self._scalars.is_zero(column[j]):
+                    found[j] = found[j] + column[j] * own[k]
+        return found
+
+
 def first_of(pair: tuple[int, Scalar]) -> int:
     """The index of a pair."""
     return pair[0]
