@@ -8,19 +8,21 @@ jump in it.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from eomgen.dynamics.closed_positions import reached_positions, with_safe_pivots
 from eomgen.dynamics.closing import Turn, angle_of, solved
-from eomgen.dynamics.closure import Array, Closure
+from eomgen.dynamics.closure import Closure
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.errors import SceneError
 from eomgen.language.formula import names_in
 from eomgen.model.groups import Group
 from eomgen.model.model import Model
+from eomgen.scalars.protocol import Scalar
 from eomgen.scene.constraints import Constraint, Coupling, Distance, LoopJoint
 from eomgen.scene.joints import Prismatic, Revolute
 from eomgen.scene.joints.base import WORLD
@@ -49,15 +51,17 @@ def why_not_closed_form(model: Model) -> str:
     return _groups(with_safe_pivots(model))[1]
 
 
-def completed(model: Model, groups: Sequence[Group], q: Array) -> Array:
-    """All coordinates (nq,) by the independent ones among `q`."""
-    closure, q = Closure.of(model), q.copy()
+def completed(
+    at: Callable[[Sequence[Scalar]], MechanismState], groups: Sequence[Group], q: Sequence[Scalar]
+) -> list[Scalar]:
+    """All coordinates (nq,) by the independent ones among `q`; `at` gives the mechanism there."""
+    q = list(q)
     for group in groups:
-        found = solved(closure.dynamics(q), group)
+        found = solved(at(q), group)
         for i, value, cut in zip(group.coordinates, found, group.cuts, strict=True):
             if isinstance(value, Turn):
                 assert cut is not None
-                value = angle_of(closure.dynamics(q), value, cut)
+                value = angle_of(at(q), value, cut)
             q[i] = value
     return q
 
@@ -77,6 +81,8 @@ def _groups(model: Model) -> tuple[tuple[Group, ...], str]:
         return (), "a dependent coordinate is a rotation in space"
     found: list[Group] = []
     left, d = list(model.constraints), Closure.of(model).dynamics(np.array(model.initial_q))
+    if d.contacts:
+        return (), "a rigid contact strikes"
     while left:
         for constraint in left:
             group = _group(d, constraint, unknown)

@@ -29,3 +29,12 @@ def velocity_states(model: Model) -> tuple[State, ...]:
         for c in group
     )
     return (*mechanical, *(State(x.name, x.unit, x.about, False) for x in model.states))
+
+
+def initial_state(model: Model) -> tuple[float, ...]:
+    """The initial state of the form [q, v, x], in the order of `velocity_states`."""
+    return (
+        *(model.initial_q[i] for i in model.state_coordinates),
+        *(model.initial_v[j] for j in model.state_velocities),
+        *(x.initial for x in model.states),
+    )

@@ -284,8 +284,9 @@ def _advances(
             max_steps=asked.max_steps,
             resume=resume,
         )
-    if problem.projection:
-        advances = watched(problem.projection, advances, t_start, problem.initial)
+    held = problem.projection or problem.closed_form
+    if held:
+        advances = watched(held, advances, t_start, problem.initial)
     return monitored(monitor, advances, t_start, problem.initial) if monitor else advances
 
 

@@ -24,6 +24,10 @@ MET = 1e-15
 """A residual relative to the mechanism's size that is rounding, beside the last one."""
 SINGULAR, NEAR = 1e-9, 0.05
 """A margin that counts as 0; and one below which the least margin is searched between steps."""
+IN_CLOSED_FORM = 1e-7
+"""A margin that counts as 0 in closed form, which turns back on the same branch at a dead point."""
+BEFORE_END = 0.3
+"""A margin from which, in closed form, a step may lead to where the loops cannot be closed."""
 SEARCH = 60
 """Evaluations of that search."""
 REMEDY = (
@@ -175,7 +179,7 @@ def jacobian_of(module: Any) -> Callable[..., FloatArray]:
 def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Projection | None:
     """The projection of a module of this size, m; None if it has no constraints."""
     names = getattr(module, "CONSTRAINTS", None)
-    if not names:
+    if not names or not hasattr(module, "project_position"):
         return None
 
     jacobian = jacobian_of(module)
@@ -200,10 +204,32 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
     )
 
 
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """The constraints of a module that keeps them in closed form: nothing is projected.
+
+    names    of the rows
+    margins  (t, y) -> (nc,), as of `Projection`
+    """
+
+    names: tuple[str, ...]
+    margins: Value
+
+
+def closed_form_of(module: Any, parameters: Any, inputs: Any) -> ClosedForm | None:
+    """The constraints of a module that keeps them in closed form; None if it does not."""
+    if not getattr(module, "FOLLOWING", None):
+        return None
+    return ClosedForm(
+        tuple(module.CONSTRAINTS),
+        lambda t, y: module.constraint_margins(t, y, parameters, inputs),
+    )
+
+
 class SingularPositionError(StepFailure):
     """The mechanism is singular at a time."""
 
-    def __init__(self, projection: Projection, t: float, margins: FloatArray) -> None:
+    def __init__(self, projection: Projection | ClosedForm, t: float, margins: FloatArray) -> None:
         name = projection.names[int(np.argmin(margins))]
         super().__init__(
             f"the mechanism is singular at t = {t:.6g} s: constraint {name} follows from the "
@@ -235,7 +261,7 @@ Steps = TypeVar("Steps", bound=Part)
 
 
 def watched(
-    projection: Projection, advances: Iterator[Steps], t: float, y: FloatArray
+    projection: Projection | ClosedForm, advances: Iterator[Steps], t: float, y: FloatArray
 ) -> Iterator[Steps]:
     """The steps of a run from (t, y), which ends where the mechanism is singular.
 
@@ -246,6 +272,8 @@ def watched(
     start, margin, before, last = t, _least(projection, t, y), float("inf"), None
     try:
         for advance in advances:
+            if isinstance(projection, ClosedForm) and not np.isfinite(advance.y).all():
+                raise StepFailure("the loops cannot be closed", REMEDY)
             here = _checked(projection, advance.t, advance.y)
             if advance.t > start:
                 if margin < before and margin < here and margin < NEAR and last is not None:
@@ -258,13 +286,13 @@ def watched(
     except SingularPositionError:
         raise
     except StepFailure as failure:
-        if margin < NEAR:
+        if margin < (BEFORE_END if isinstance(projection, ClosedForm) else NEAR):
             reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
             raise StepFailure(reason, REMEDY) from None
         raise
 
 
-def _search(projection: Projection, last: tuple[float, Part], advance: Part) -> None:
+def _search(projection: Projection | ClosedForm, last: tuple[float, Part], advance: Part) -> None:
     """Look for a singular position in two steps, by golden section."""
     begin, first = last
 
@@ -284,20 +312,24 @@ def _search(projection: Projection, last: tuple[float, Part], advance: Part) -> 
             a, c, at_c = c, d, at_d
             d = a + ratio * (b - a)
             at_d = _least(projection, d, state(d))
-        if min(at_c, at_d) < SINGULAR:
+        if min(at_c, at_d) < _limit(projection):
             break
     best = c if at_c < at_d else d
     _checked(projection, best, state(best))
 
 
-def _checked(projection: Projection, t: float, y: FloatArray) -> float:
+def _checked(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:
     """The least margin. Raises `SingularPositionError` if it counts as 0."""
     margins = projection.margins(t, y)
     least = float(margins.min())
-    if least < SINGULAR:
+    if least < _limit(projection):
         raise SingularPositionError(projection, t, margins)
     return least
 
 
-def _least(projection: Projection, t: float, y: FloatArray) -> float:
+def _least(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:
     return float(projection.margins(t, y).min())
+
+
+def _limit(projection: Projection | ClosedForm) -> float:
+    return IN_CLOSED_FORM if isinstance(projection, ClosedForm) else SINGULAR

@@ -1,0 +1,78 @@
+"""States of all coordinates of a model, and those of its module, which may have fewer.
+
+Where loops are closed in closed form, coordinates and velocities that follow from others are no
+states of the module: `FOLLOWING` names them, and `coordinates` and `velocities` compute them.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from eomgen.errors import SceneError
+from eomgen.model.model import Model
+from eomgen.run.problem import FloatArray
+
+SAME = 1e-6
+"""The largest difference of a coordinate, rad or m, or relative, that is one of rounding."""
+
+
+def names_of(model: Model) -> list[str]:
+    """The names of all coordinates, velocities and extra states, [q, v, x]."""
+    return [c.name for c in (*model.coordinates, *model.velocities, *model.states)]
+
+
+def has_all(module: Any) -> bool:
+    """Whether the state of a module has all of them."""
+    return not getattr(module, "FOLLOWING", ())
+
+
+def initial_of(module: Any, model: Model, parameters: Any = None) -> FloatArray:
+    """The initial state of all coordinates, or of a model of another form that of the module."""
+    if has_all(module):
+        return np.asarray(module.initial_state(parameters))
+    extra = (x.initial for x in model.states)
+    return np.array([*model.initial_q, *model.initial_v, *extra])
+
+
+def own_of(module: Any, model: Model, whole: FloatArray) -> FloatArray:
+    """The state of a module for one of all coordinates, (n,) or (n, k)."""
+    if has_all(module):
+        return whole
+    names = names_of(model)
+    return whole[[names.index(name) for name in module.STATES]]
+
+
+def whole_of(
+    module: Any, model: Model, t: Any, y: FloatArray, parameters: Any = None, inputs: Any = None
+) -> FloatArray:
+    """The state of all coordinates for one of a module, (n,) or (n, k)."""
+    if has_all(module):
+        return y
+    extra = y[len(y) - len(model.states) :]
+    found = (module.coordinates, module.velocities)
+    return np.concatenate([*(each(t, y, parameters, inputs) for each in found), extra])
+
+
+def on_branch(
+    module: Any, model: Model, whole: FloatArray, parameters: Any = None, inputs: Any = None
+) -> FloatArray:
+    """The state of a module for one of all coordinates, which is to be on the module's branch.
+
+    Raises `SceneError` if it is on another.
+    """
+    y = own_of(module, model, whole)
+    if has_all(module):
+        return y
+    try:
+        found = whole_of(module, model, 0.0, y, parameters, inputs)
+    except (ArithmeticError, ValueError):
+        found = np.full(len(whole), np.nan)
+    off = np.abs(found - whole) <= SAME * np.maximum(1.0, np.abs(whole))
+    if not off.all():
+        name = names_of(model)[int(np.argmin(off))]
+        raise SceneError(
+            f"initial: {name} is on another branch of its loop, or in another turn, than in the "
+            "scene, whose branch is part of the equations; write this start into the scene, or "
+            "give loops = 'projected' there"
+        )
+    return y
