@@ -13,6 +13,7 @@ from eomgen.dynamics.dynamics import Dynamics
 from eomgen.program.differentiate import substituted
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import Node, Tape
+from eomgen.scalars import exact
 
 Sum = dict[int, float]
 """A sum of steps with factors, by their indices; under -1 a number."""
@@ -113,8 +114,10 @@ def positions(d: Dynamics, q: Sequence[Node], tape: Tape) -> Following:
         for i, value, cut in zip(group.coordinates, found, group.cuts, strict=True):
             if isinstance(value, Turn):
                 assert cut is not None
-                moving = d.in_world.angles[value.frame].moving
-                following.put_turn(q[i], moving, value.direction)
+                angle = d.in_world.angles[value.frame]
+                _, rest = exact.quarters(angle.fixed)
+                whole = angle.moving + d.scalars.number(rest)
+                following.put_turn(q[i], whole, value.direction)
                 value = angle_of(d, value, cut)
             following.put(q[i], value)
     return following

@@ -22,6 +22,7 @@ from eomgen.errors import SceneError
 from eomgen.language.formula import names_in
 from eomgen.model.groups import Group
 from eomgen.model.model import Model
+from eomgen.scalars import exact
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.constraints import Constraint, Coupling, Distance, LoopJoint
 from eomgen.scene.joints import Prismatic, Revolute
@@ -218,8 +219,9 @@ def _cut(
         for k in range(len(frames))
         if k not in before and not any({*frames[n].q} & {*later} for n in _to_world(states[0], k))
     ]
+    _, rest = exact.quarters(states[0].in_world.angles[frame].fixed)
     for reference in (-1, *before, *others):
-        turns = [_angle(d, frame) - _angle(d, reference) for d in states]
+        turns = [_angle(d, frame) - _angle(d, reference) + float(rest) for d in states]
         middle = (min(turns) + max(turns)) / 2
         quarter = round(middle / (math.pi / 2))
         reached = max(abs(turn - quarter * math.pi / 2) for turn in turns)

@@ -25,7 +25,9 @@ from eomgen.scene.joints.base import WORLD
 
 @dataclass(frozen=True)
 class Turn:
-    """The cosine and sine of the sum of the angles from the world to a frame."""
+    """The cosine and sine of the sum of the angles from the world to a frame, and of the part of
+    its fixed angle that is no quarter turn.
+    """
 
     frame: int
     direction: Arrow
@@ -80,7 +82,8 @@ def angle_of(d: MechanismState, turn: Turn, cut: tuple[int, int]) -> Scalar:
     """
     (reference, quarters), angles, scalars = cut, d.in_world.angles, d.scalars
     x, y = turn.direction
-    whole = scalars.number(exact.quarter_turns(quarters, exact.ZERO))
+    _, rest = exact.quarters(angles[turn.frame].fixed)
+    whole = scalars.number(exact.quarter_turns(quarters, exact.opposite(rest)))
     if reference >= 0:
         base = angles[reference].moving
         x, y = turned_back((scalars.call("cos", base), scalars.call("sin", base)), (x, y))
@@ -233,12 +236,8 @@ class _Polygon:
         return found
 
     def _turn(self, frame: int, u: Arrow) -> Turn:
-        """A frame's direction without the fixed part of its angle."""
-        fixed = self._d.in_world.angles[frame].fixed
-        count, rest = exact.quarters(fixed)
-        if rest != 0:
-            (c, *_), (s, *_), _ = exact.rotation_about(2, rest)
-            u = turned_back((self._scalars.number(c), self._scalars.number(s)), u)
+        """A frame's direction without the quarter turns of the fixed part of its angle."""
+        count, _ = exact.quarters(self._d.in_world.angles[frame].fixed)
         x, y = u
         return Turn(frame, ((x, y), (y, -x), (-x, -y), (-y, x))[count % 4])
 
