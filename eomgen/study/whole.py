@@ -53,6 +53,15 @@ def whole_of(
     return np.concatenate([*(each(t, y, parameters, inputs) for each in found), extra])
 
 
+def following(
+    module: Any, model: Model, t: Any, y: FloatArray, parameters: Any = None, inputs: Any = None
+) -> FloatArray:
+    """What a module names in `FOLLOWING`, (nf,) or (nf, k)."""
+    names = names_of(model)
+    whole = whole_of(module, model, t, y, parameters, inputs)
+    return whole[[names.index(name) for name in module.FOLLOWING]]
+
+
 def on_branch(
     module: Any, model: Model, whole: FloatArray, parameters: Any = None, inputs: Any = None
 ) -> FloatArray:
