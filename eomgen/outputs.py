@@ -82,6 +82,9 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "velocities": OutputSpec(
         ("nv",), "Their velocities, (nv,).", needs="constraints", forms=False
     ),
+    "accelerations": OutputSpec(
+        ("nv",), "Their accelerations, (nv,).", needs="constraints", forms=False, contacts=True
+    ),
     "momentum": OutputSpec(
         (3,),
         "Linear momentum x, y (kg m/s), angular momentum about the world's origin (kg m^2/s).",

@@ -38,7 +38,7 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
     derivatives = matrices(record, with_jacobian=jacobian)
     nodes |= derivatives.nodes
     extra = dict(derivatives.extra)
-    following = ("coordinates", "velocities") if model.groups else ()
+    following = ("coordinates", "velocities", "accelerations") if model.groups else ()
     for name in dict.fromkeys((*model.outputs, *following)):
         if name not in DERIVATIVES:
             shape, found = output(record, name, extra)
@@ -191,6 +191,7 @@ OF_DYNAMICS: Mapping[str, Callable[[Dynamics], list[Node]]] = {
 OBSERVED: Mapping[str, Callable[[Recording], list[Node]]] = {
     "coordinates": lambda record: list(record.q),
     "velocities": lambda record: list(record.v),
+    "accelerations": lambda record: list(record.vd),
     "mass_matrix": _mass_matrix,
     "kinetic_slopes": _kinetic_slopes,
     "effect_powers": _powers,

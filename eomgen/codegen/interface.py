@@ -81,6 +81,7 @@ class Interface:
     form            of the state: 'velocity', 'momentum', 'redundant'
     coordinates     number of coordinates in the state; `velocities` and `others`, the extra states,
                     are the numbers of those that follow
+    forces          number of generalised forces: of velocities, those too that follow from others
     conditions      conditions on parameter values that the program's own checks do not cover
     functions       the program's outputs
     quaternions     indices of each unit quaternion in the state
@@ -102,6 +103,7 @@ class Interface:
     coordinates: int
     velocities: int
     others: int
+    forces: int
     inputs: tuple[Variable, ...]
     parameters: tuple[Variable, ...]
     conditions: tuple[Condition, ...]
@@ -135,6 +137,7 @@ def interface_of(system: System) -> Interface:
         coordinates=len(model.state_coordinates),
         velocities=len(model.state_velocities),
         others=len(model.states),
+        forces=len(model.velocities),
         inputs=tuple(Variable(i.name, i.unit, i.about, i.default) for i in model.inputs),
         parameters=tuple(Variable(p.name, p.unit, p.about, p.default) for p in model.parameters),
         conditions=tuple(dict.fromkeys(_conditions(model))),

@@ -10,6 +10,7 @@ jump in it.
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def with_closed_form(model: Model) -> Model:
     """
     if model.closing == "projected" or not model.constraints:
         return replace(model, groups=())
-    found, why = _groups(with_safe_pivots(model))
+    found, why = _found(_without_choices(model))
     if why and model.closing == "closed":
         raise SceneError(f"loops: 'closed' cannot be: {why}; leave it out")
     return replace(model, groups=found)
@@ -49,7 +50,17 @@ def with_closed_form(model: Model) -> Model:
 
 def why_not_closed_form(model: Model) -> str:
     """Why the dependent coordinates are not found in closed form; "" if they can be."""
-    return _groups(with_safe_pivots(model))[1]
+    return _found(_without_choices(model))[1]
+
+
+def _without_choices(model: Model) -> Model:
+    """The model without what its groups do not depend on."""
+    return replace(model, outputs=(), route="auto", notices=(), groups=(), closing="auto")
+
+
+@lru_cache(maxsize=16)
+def _found(model: Model) -> tuple[tuple[Group, ...], str]:
+    return _groups(with_safe_pivots(model))
 
 
 def completed(

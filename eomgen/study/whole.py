@@ -10,8 +10,16 @@ import numpy as np
 
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
+from eomgen.outputs import OUTPUTS
 from eomgen.run.problem import FloatArray
 
+OWN = (
+    "constraint_residuals",
+    "constraint_rates",
+    "constraint_jacobian",
+    "constraint_margins",
+)
+"""Functions of the state beside `OUTPUTS`."""
 SAME = 1e-6
 """The largest difference of a coordinate, rad or m, or relative, that is one of rounding."""
 
@@ -60,6 +68,59 @@ def following(
     names = names_of(model)
     whole = whole_of(module, model, t, y, parameters, inputs)
     return whole[[names.index(name) for name in module.FOLLOWING]]
+
+
+class Viewed:
+    """A module as if all coordinates of its model were states: its functions take such states, of
+    which they read those that the module has. It has no `jacobian`.
+    """
+
+    def __init__(self, module: Any, model: Model) -> None:
+        self._module, self._model = module, model
+        self.STATES = tuple(names_of(model))
+        self.POSITIONS = tuple(range(len(model.coordinates)))
+        self.QUATERNIONS = model.quaternions
+
+    def derivative(self, t: Any, y: FloatArray, p: Any = None, u: Any = None) -> FloatArray:
+        """ẏ (n,) or (n, k)."""
+        module, model = self._module, self._model
+        own = own_of(module, model, y)
+        found = np.asarray(module.derivative(t, own, p, u))
+        names = names_of(model)
+        rates = np.empty((len(names), *found.shape[1:]))
+        nq, nv = len(model.coordinates), len(model.velocities)
+        speeds = module.velocities(t, own, p, u)
+        for index in model.joint_indices:
+            for i, j in index.plain:
+                rates[i] = speeds[j]
+        rates[nq : nq + nv] = module.accelerations(t, own, p, u)
+        for name, row in zip(module.STATES, found, strict=True):
+            rates[names.index(name)] = row
+        return rates
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("jacobian", "parameter_jacobian", "input_jacobian"):
+            raise AttributeError(name)
+        found = getattr(self._module, name)
+        if name in ("forward_dynamics", "inverse_dynamics"):
+            return lambda q, v, *extra, **more: self._split(found, q, v, *extra, **more)
+        if name not in (*OUTPUTS, *OWN):
+            return found
+        return lambda t, y, *given: found(t, own_of(self._module, self._model, y), *given)
+
+    def _split(self, function: Any, q: FloatArray, v: FloatArray, *extra: Any, **more: Any) -> Any:
+        """A function of q and v apart."""
+        names = names_of(self._model)
+        whole = dict(zip(names, (*q, *v), strict=False))
+        parts = self._module.STATES[: len(self._module.POSITIONS)], self._module.STATES
+        q = np.array([whole[name] for name in parts[0]])
+        v = np.array([whole[name] for name in parts[1][len(q) :] if name in whole])
+        return function(q, v, *extra, **more)
+
+
+def viewed(module: Any, model: Model) -> Any:
+    """A module whose states are all coordinates of its model: itself, or a view of it."""
+    return module if has_all(module) else Viewed(module, model)
 
 
 def on_branch(

@@ -106,6 +106,7 @@ def module(program: Program, interface: Interface) -> str:
         "nq": interface.coordinates,
         "nv": interface.velocities,
         "nx": interface.others,
+        "forces": interface.forces,
         "positions": repr(tuple(i for i, s in enumerate(interface.states) if s.position)),
         "quaternions": repr(interface.quaternions),
         "parameters": interface.parameters,
