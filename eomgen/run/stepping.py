@@ -178,7 +178,8 @@ def compiled_steps(problem: Problem) -> Compiled | None:
     constraints: compiled steps do not project onto these.
     """
     compiled = problem.compiled
-    if compiled is None or problem.projection or compiled.derivative is not problem.derivative:
+    held = problem.projection or problem.closed_form
+    if compiled is None or held or compiled.derivative is not problem.derivative:
         return None
     return compiled
 
