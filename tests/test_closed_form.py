@@ -1,6 +1,5 @@
 """Loops in closed form: positions to 50 digits, motion as by projection, and where they end."""
 
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -71,9 +70,9 @@ POLYGONS = {
     "a bar and a guide": BEND
     + slide("x", "world", "end", (0.1, 0.05), (0.02, 0.01))
     + turn("close", "bar", "end", (0.3, 0.05), (0.05, 0.0), LOOP),
-    "a guide, then a bar": slide("x", "crank", "bar", (0.05, 0.01), (0, 0), x=(1, 2))
+    "a guide, then a bar": slide("x", "world", "bar", (0.3, 0.05), (0.02, 0.01))
     + turn("elbow", "bar", "end", (0.05, 0.05), (-0.1, 0.02))
-    + turn("close", "world", "end", (-0.3, 0.05), (0.6, 0.0), LOOP),
+    + turn("close", "crank", "end", (0.05, 0.05), (0.3, 0.0), LOOP),
     "a bar with a guide": BEND
     + slide("x", "bar", "end", (0.1, 0.05), (0.02, 0.01), x=(2, 1))
     + turn("close", "end", "world", (0.03, 0.05), (0.6, 0.2), LOOP),
@@ -161,7 +160,7 @@ def test_modules_move_as_by_projection(name: str) -> None:
     assert apart(closed.coordinates(0.0, y[own]), y[: len(y) // 2]) < WELL
     assert apart(closed.velocities(0.0, y[own]), y[len(y) // 2 :]) < 1e-11
     assert apart(closed.joint_forces(0.0, y[own]), other.joint_forces(0.0, y)) < 1e-11
-    state = dict(zip(closed.STATES, y[own].tolist(), strict=True))
+    state = dict(zip(other.STATES, y.tolist(), strict=True))
     found = eomgen.linearise(text, at="initial", state=state).reduced()
     if found.state_names == closed.STATES:  # else others are the independent ones
         np.testing.assert_allclose(closed.jacobian(0.0, y[own]), found.A, rtol=1e-7, atol=1e-7)
@@ -244,14 +243,16 @@ def test_singular_positions_stop_the_run(settings: dict[str, Any]) -> None:
 def test_what_cannot_be_is_told() -> None:
     """A start on the other branch; a crank that cannot go round; and what is kept by projection."""
     text = four_bar()
-    run = eomgen.simulate(text, state={"psi_deg": 100.0}, t_end=0.01)
+    run = eomgen.simulate(text, state={"theta": 1.0}, t_end=0.01)
     assert run.states == ("theta", "theta_dot")
-    assert abs(run["psi"][0] - np.radians(100.0)) < WELL
-    upright = float(check(text).initial_q[1])
+    given = eomgen.simulate(text, state={"psi": run["psi"][0]}, t_end=0.01)
+    assert abs(given["theta"][0] - 1.0) < 1e-9
+    psi = float(check(text).initial_q[1])
+    turn = 2 * np.arctan2(-0.1 * np.sin(0.4), 0.6 - 0.1 * np.cos(0.4))  # across the diagonal
     with pytest.raises(SceneError, match="another branch of its loop, or in another turn"):
-        eomgen.simulate(text, state={"theta": 0.4, "psi": -upright}, t_end=0.01)
+        eomgen.simulate(text, state={"theta": 0.4, "psi": turn - psi}, t_end=0.01)
     dead = four_bar(lengths="0.5, 0.3, 0.3, 0.7", loops="closed", start="theta = 0.2")
-    with pytest.raises(SceneError, match="loops: 'closed' cannot be: dependent"):
+    with pytest.raises(SceneError, match="loops: 'closed' cannot be: pin"):
         eomgen.generate(dead)
     module = eomgen.load(eomgen.generate(dead.replace('"closed"', '"auto"')))
     assert len(module.STATES) == 6

@@ -88,30 +88,32 @@ def choose(model: Model, *, closed: bool = True) -> Choice:
     if model.constraints:
         if model.route not in ("auto", "embedded"):
             return _only(with_closed_form(model), model.route, "named")
-        model = with_closed_form(with_safe_pivots(model))
-        if model.groups and model.route == "auto":
-            return _of_loops(model, closed)
+        made = with_closed_form(model)
+        if made.groups and model.route == "auto":
+            return _of_loops(made, model, closed)
+        model = made if made.groups else with_safe_pivots(model)
     return _chosen(model, closed)
 
 
-def _of_loops(model: Model, closed: bool) -> Choice:
-    """The choice between loops in closed form and a state of all coordinates with projection: the
-    one whose steps take fewer operations, unless it loses digits or the scene names the other.
+def _of_loops(model: Model, other: Model, closed: bool) -> Choice:
+    """The choice between a model with loops in closed form and the `other` with a state of all
+    coordinates and projection: the one whose steps take fewer operations, unless it loses digits or
+    the scene names the other.
     """
     in_closed_form = _chosen(model, closed)
     if model.closing == "closed":
         return in_closed_form
-    projected = _chosen(replace(model, groups=()), closed)
+    projected = _chosen(with_safe_pivots(other), closed)
     steps = [_of_step(choice) for choice in (in_closed_form, projected)]
     loses = in_closed_form.digits is not None and projected.digits is None
     counts = f"{steps[0]} operations a step, by projection {steps[1]}"
     if steps[0] > steps[1] or loses:
         why = "would lose digits" if loses else counts
-        other = Candidate("closing", _derivative(in_closed_form), f"loops in closed form: {why}")
-        return replace(projected, candidates=(*projected.candidates, other))
+        beside = Candidate("closed form", _derivative(in_closed_form), f"of loops: {why}")
+        return replace(projected, candidates=(*projected.candidates, beside))
     words = f"loops by projection; in closed form {counts}"
-    other = Candidate("projection", _derivative(projected), words)
-    return replace(in_closed_form, candidates=(*in_closed_form.candidates, other))
+    beside = Candidate("projection", _derivative(projected), words)
+    return replace(in_closed_form, candidates=(*in_closed_form.candidates, beside))
 
 
 def _derivative(choice: Choice) -> int:

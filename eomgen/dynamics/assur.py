@@ -11,12 +11,13 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import permutations
 
 import numpy as np
 
-from eomgen.dynamics.closed_positions import reached_positions, with_safe_pivots
+from eomgen.dynamics.closed_positions import SAFE, reached_positions, relative_pivots, timed
 from eomgen.dynamics.closing import Turn, angle_of, solved
-from eomgen.dynamics.closure import Closure
+from eomgen.dynamics.closure import Array, Closure
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.errors import SceneError
@@ -42,15 +43,17 @@ def with_closed_form(model: Model) -> Model:
     """
     if model.closing == "projected" or not model.constraints:
         return replace(model, groups=())
-    found, why = _found(_without_choices(model))
+    made, why = _found(_without_choices(model))
     if why and model.closing == "closed":
         raise SceneError(f"loops: 'closed' cannot be: {why}; leave it out")
-    return replace(model, groups=found)
+    if why:
+        return replace(model, groups=())
+    return replace(model, groups=made.groups, pivots=made.pivots)
 
 
 def why_not_closed_form(model: Model) -> str:
     """Why the dependent coordinates are not found in closed form; "" if they can be."""
-    return _found(_without_choices(model))[1]
+    return "" if model.groups else _found(_without_choices(model))[1]
 
 
 def _without_choices(model: Model) -> Model:
@@ -59,8 +62,49 @@ def _without_choices(model: Model) -> Model:
 
 
 @lru_cache(maxsize=16)
-def _found(model: Model) -> tuple[tuple[Group, ...], str]:
-    return _groups(with_safe_pivots(model))
+def _found(model: Model) -> tuple[Model, str]:
+    """The model with its groups, and their pivots in their order; why there are none."""
+    groups, why = _groups(model)
+    if why:
+        return model, why
+    places = (np.array(model.initial_q), *reached_positions(model))
+    groups, why = _measured(model, groups, places)
+    if why:
+        return model, why
+    pivots = _safe_pivots(model, groups, places)
+    if pivots is None:
+        return model, "dependent coordinates do not follow from the others in every position"
+    return replace(model, groups=groups, pivots=pivots), ""
+
+
+def _safe_pivots(
+    model: Model, groups: Sequence[Group], places: Sequence[Array]
+) -> tuple[tuple[int, int], ...] | None:
+    """Pivots by which the velocities of each group are solved for, of those that stay large and
+    keep their signs the largest; None if there are none. The rows of a group depend on no later
+    one.
+    """
+    closure, names = Closure.of(model), [name for name, _ in model.rows]
+    column = {i: j for index in model.joint_indices for i, j in index.plain}
+    matrices = [closure.jacobian(q) for q in places]
+    found: list[tuple[int, int]] = []
+    for group in groups:
+        constraint = next(c for c in model.constraints if c.name == group.constraint)
+        rows = [names.index(name) for name, _ in constraint.row_names(model.dimensions)]
+        columns = [column[i] for i in group.coordinates]
+        best, least = None, SAFE
+        for order in permutations(rows):
+            for pairing in permutations(columns):
+                pairs = tuple(zip(order, pairing, strict=True))
+                sizes = np.array([relative_pivots(matrix, pairs) for matrix in matrices])
+                same = (np.sign(sizes) == np.sign(sizes[0])).all()
+                smallest = float(np.abs(sizes).min())
+                if same and smallest > least:
+                    best, least = pairs, smallest
+        if best is None:
+            return None
+        found += best
+    return tuple(found)
 
 
 def completed(
@@ -79,15 +123,15 @@ def completed(
 
 
 def _groups(model: Model) -> tuple[tuple[Group, ...], str]:
-    """The groups of a model with safe pivots, in the order in which they are solved; why there are
+    """The groups of a model, in the order in which they are solved, without branches; why there are
     none.
     """
     if model.form != "velocity":
         return (), f"the form '{model.form}' is another state"
-    if model.prescribed and model.driven:
+    if model.driven:
         return (), "a coordinate is driven"
-    if len(model.pivots) < len(model.rows):
-        return (), "dependent coordinates do not follow from the others in every position"
+    if timed(model):
+        return (), "a constraint depends on time"
     unknown = _coordinates(model, [column for _, column in model.pivots])
     if unknown is None:
         return (), "a dependent coordinate is a rotation in space"
@@ -108,7 +152,7 @@ def _groups(model: Model) -> tuple[tuple[Group, ...], str]:
         unknown -= set(group.coordinates)
     if unknown:
         return (), "a coordinate is in no loop"
-    return _measured(model, found)
+    return tuple(found), ""
 
 
 def _coordinates(model: Model, velocities: Sequence[int]) -> set[int] | None:
@@ -165,10 +209,11 @@ def _to_world(d: Dynamics, frame: int) -> list[int]:
     return found
 
 
-def _measured(model: Model, groups: Sequence[Group]) -> tuple[tuple[Group, ...], str]:
-    """The groups with branches and cuts; why that cannot be."""
-    closure, start = Closure.of(model), np.array(model.initial_q)
-    places = [start, *reached_positions(model)]
+def _measured(
+    model: Model, groups: Sequence[Group], places: Sequence[Array]
+) -> tuple[tuple[Group, ...], str]:
+    """The groups with branches and cuts at positions of the motion; why that cannot be."""
+    closure = Closure.of(model)
     states = [closure.dynamics(q) for q in places]
     sizes = _in_sizes(model, closure)
     found: list[Group] = []

@@ -91,13 +91,13 @@ def with_safe_pivots(model: Model) -> Model:
     driven: the walks know the positions at t = 0 only.
     """
     closure = Closure.of(model)
-    if model.driven or _timed(model):
+    if model.driven or timed(model):
         return replace(model, pivots=())
-    start = _pivots(closure.jacobian(np.array(model.initial_q)), model.pivots)
+    start = relative_pivots(closure.jacobian(np.array(model.initial_q)), model.pivots)
     safe = np.abs(start) >= SAFE
     for walk in range(WALKS):
         for _, matrix in _reached(model, walk):
-            found = _pivots(matrix, model.pivots)
+            found = relative_pivots(matrix, model.pivots)
             safe &= (np.abs(found) >= SAFE) & (np.sign(found) == np.sign(start))
     fit = {row for (row, _), is_safe in zip(model.pivots, safe, strict=True) if is_safe}
     kept = [rows for rows in _rows_by_cluster(model) if rows <= fit]
@@ -110,7 +110,7 @@ def safely_dependent(model: Model) -> bool:
     return len(with_safe_pivots(model).pivots) == len(model.rows)
 
 
-def _timed(model: Model) -> bool:
+def timed(model: Model) -> bool:
     """Whether a constraint depends on time."""
     tables = [c for c in model.constraints if isinstance(c, ConstraintTable)]
     values = (getattr(c, field) for c in tables for field in type(c).model_fields)
@@ -128,7 +128,7 @@ def _rows_by_cluster(model: Model) -> list[set[int]]:
     return list(found.values())
 
 
-def _pivots(matrix: Array, order: Sequence[tuple[int, int]]) -> Array:
+def relative_pivots(matrix: Array, order: Sequence[tuple[int, int]]) -> Array:
     """The pivots of elimination in an order, each relative to the greatest entry of its row."""
     work, found = matrix.copy(), []
     for n, (i, j) in enumerate(order):
