@@ -79,9 +79,7 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         needs="constraints",
         forms=False,
     ),
-    "velocities": OutputSpec(
-        ("nv",), "Their velocities, (nv,).", needs="constraints", forms=False
-    ),
+    "velocities": OutputSpec(("nv",), "Their velocities, (nv,).", needs="constraints", forms=False),
     "accelerations": OutputSpec(
         ("nv",), "Their accelerations, (nv,).", needs="constraints", forms=False, contacts=True
     ),

@@ -52,8 +52,8 @@ def slide(
 
 def rod(first: str, second: str, length: float) -> str:
     return (
-        f'[[constraints]]\ntype = "distance"\nname = "rod"\nbody_1 = "{first}"\nat_1 = [0.05, 0.02]\n'
-        f'body_2 = "{second}"\nat_2 = [0.1, -0.05]\nlength = {length}\n'
+        f'[[constraints]]\ntype = "distance"\nname = "rod"\nbody_1 = "{first}"\n'
+        f'at_1 = [0.05, 0.02]\nbody_2 = "{second}"\nat_2 = [0.1, -0.05]\nlength = {length}\n'
     )
 
 

@@ -77,8 +77,9 @@ class Recording:
         free, still = set(self.model.state_velocities), self.scalars.number(0.0)
         v = [node if j in free else still for j, node in enumerate(self.v)]
         moving = type(d)(self.model, replace(d.values, v=v), self.scalars, d.axes)
-        held = moving.constrained("independent")
-        for j, value in enumerate(held.carried_along() if self.route == "independent" else held.velocity()):
+        held = moving.by_independent_velocities
+        along = held.carried_along() if self.route == "independent" else held.velocity()
+        for j, value in enumerate(along):
             if j not in free:
                 following.put(self.v[j], value)
                 following.inputs.add(self.v[j].index)

@@ -188,12 +188,12 @@ def _group(d: Dynamics, constraint: Constraint, unknown: set[int]) -> Group | No
     shared, apart = set(paths[0]) & set(paths[1]), set(paths[0]) ^ set(paths[1])
     if any(of.get(k) in unknown for k in shared):
         return None
-    own = sorted(k for k in apart if of.get(k) in unknown)
-    kinds = [d.linkage.frames[k].kind for k in own]
+    moving = sorted(k for k in apart if of.get(k) in unknown)
+    kinds = [d.linkage.frames[k].kind for k in moving]
     slider = isinstance(constraint, LoopJoint) and isinstance(constraint.joint, Prismatic)
-    if len(own) != count or (slider and "revolute" not in kinds):
+    if len(moving) != count or (slider and "revolute" not in kinds):
         return None
-    return Group(constraint.name, tuple(of[k] for k in own), 1, (None,) * count)
+    return Group(constraint.name, tuple(of[k] for k in moving), 1, (None,) * count)
 
 
 def _path(d: Dynamics, body: str) -> list[int]:
@@ -262,9 +262,7 @@ def _with_cuts(
     return replace(group, cuts=tuple(cuts))
 
 
-def _cut(
-    frame: int, states: Sequence[Dynamics], later: Collection[int]
-) -> tuple[int, int] | None:
+def _cut(frame: int, states: Sequence[Dynamics], later: Collection[int]) -> tuple[int, int] | None:
     """From which frame, and from which quarter turn there, an angle stays within half a turn; the
     world if possible, else a frame before it, else one that does not move with `later` coordinates.
     """

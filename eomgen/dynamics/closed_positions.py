@@ -87,8 +87,9 @@ def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
 
 def with_safe_pivots(model: Model) -> Model:
     """The model with only those `pivots` whose dependent velocities follow from the others, with
-    large pivots, in all closed positions up to the first singular ones, where a run ends; all pivots of a cluster or none. None where something is
-    driven: the walks know the positions at t = 0 only.
+    large pivots, in all closed positions up to the first singular ones, where a run ends; all
+    pivots of a cluster or none. None where something is driven: the walks know the positions at
+    t = 0 only.
     """
     closure = Closure.of(model)
     if model.driven or timed(model):

@@ -143,7 +143,8 @@ class _Polygon:
                 square = along(d, d)
                 s, w = dyads.reach(opposite(arm), line, square, branch, scalars)
                 whole = opposite(w)
-                return {guide: s, frame: self._turn(frame, dyads.between(whole, d, square, scalars))}
+                u = dyads.between(whole, d, square, scalars)
+                return {guide: s, frame: self._turn(frame, u)}
         raise AssertionError(f"no polygon: {terms}")
 
     def _rod(self, rod: Distance) -> dict[int, Turn | Scalar]:

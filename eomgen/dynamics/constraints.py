@@ -60,8 +60,8 @@ def accelerations_at_rest(d: MechanismState) -> list[Scalar]:
         frames = accelerations(d.in_world, _in_world(d), d.v, None, zeros(d.scalars), d.scalars)
         for loop in d.model.loops:
             if isinstance(loop.joint, Revolute):
-                names = (name for name, _ in loop.row_names(2))
-                points.update(zip(names, _apart(d, loop, frames), strict=True))
+                own = [name for name, _ in loop.row_names(2)]
+                points.update(zip(own, _apart(d, loop, frames), strict=True))
     names = [name for name, _ in d.model.rows]
     if all(name in points for name in names):
         return [points[name] for name in names]

@@ -202,7 +202,7 @@ class Dynamics(AppliedLoads):
 
     def _solver(self, recursion: str) -> RangeSpace | NullSpace:
         if recursion == "independent":
-            return NullSpace(self, self.mass_entries, self._right, self._fall)
+            return self.by_independent_velocities
         if recursion == "embedded":
             return Embedded(
                 self,
@@ -215,6 +215,11 @@ class Dynamics(AppliedLoads):
             getattr(self, f"{recursion}_{name}") for name in ("forward", "response")
         )
         return RangeSpace(self, forward, response)
+
+    @cached_property
+    def by_independent_velocities(self) -> NullSpace:
+        """The constraints, solved for dependent velocities."""
+        return NullSpace(self, self.mass_entries, self._right, self._fall)
 
     def _beyond_effects(self, vd: Sequence[Scalar]) -> list[Scalar]:
         """The generalised forces besides the effects that v̇ takes: M v̇ + V + G - F."""

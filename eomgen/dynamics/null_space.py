@@ -161,7 +161,6 @@ class NullSpace:
         change = self.dependents(rates(self._d))
         return [v + dv for v, dv in zip(self._d.values.v, change, strict=True)]
 
-
     def carried_along(self) -> list[Scalar]:
         """The same by N: v = N v_i, and what time alone moves."""
         own = self._d.values.v

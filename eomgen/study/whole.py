@@ -26,7 +26,8 @@ SAME = 1e-6
 
 def names_of(model: Model) -> list[str]:
     """The names of all coordinates, velocities and extra states, [q, v, x]."""
-    return [c.name for c in (*model.coordinates, *model.velocities, *model.states)]
+    names = [c.name for c in (*model.coordinates, *model.velocities)]
+    return [*names, *(x.name for x in model.states)]
 
 
 def has_all(module: Any) -> bool:

@@ -125,7 +125,9 @@ def module(program: Program, interface: Interface) -> str:
         "contacts": [(c.name, c.effect) for c in interface.contacts],
         "constraints": repr(tuple(n for n, _ in interface.constraints)),
         "constrained": bool(interface.constraints),
-        "following": repr(tuple(n for n, _, _ in interface.following)) if interface.following else "",
+        "following": repr(tuple(n for n, _, _ in interface.following))
+        if interface.following
+        else "",
         "impact": written.get("impact"),
         "held": written.get("held"),
         "costs": [(name, json.dumps(counts)) for name, counts in costs.items()],

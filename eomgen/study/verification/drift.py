@@ -113,9 +113,7 @@ def drift(
     return Drift(float(run.t[-1]), run.counts["steps"], stopped, keeps, lost, books, unit)
 
 
-def _beside_change(
-    run: Trajectory, total: FloatArray, module: Any, model: Model
-) -> list[State]:
+def _beside_change(run: Trajectory, total: FloatArray, module: Any, model: Model) -> list[State]:
     """The rows before and after the greatest change of energy."""
     if len(run.t) < 2:
         return []
