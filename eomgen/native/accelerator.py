@@ -22,11 +22,12 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import functions, heyoka, implicit, runs, taylor
+from eomgen.native import functions, heyoka, implicit, rattle, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.program.program import Program
 from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
 from eomgen.run.problem import Problem
+from eomgen.run.projection import PROJECTS
 from eomgen.run.works import Powers
 from eomgen.store import interfaced_program_of, key_of
 from eomgen.templating import templates_folder
@@ -130,6 +131,8 @@ class Accelerator:
         origin, module = module and self._module, module or self._module
         made: dict[tuple[str, ...], runs.CompiledSteps] = {}
         stiff: list[implicit.CompiledImplicit] = []
+        by_rattle: list[EqualSteps | None] = []
+        projects = PROJECTS if problem.projection else ()
         problem = self._compilable(module, origin).problem(problem)
 
         def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
@@ -146,16 +149,21 @@ class Accelerator:
             return self._taylor(module)
 
         def implicit_steps() -> implicit.CompiledImplicit | None:
-            if not stiff and (libraries := self._of_implicit_steps()):
+            if not stiff and (libraries := self._implicit((*implicit.NEEDED, *projects))):
                 given = (module, libraries, *self._values, origin)
                 stiff.append(implicit.CompiledImplicit(problem, *given))
             return stiff[0] if stiff else None
+
+        def rattle_steps() -> EqualSteps | None:
+            if not by_rattle and (libraries := self._implicit(rattle.NEEDED)):
+                by_rattle.append(rattle.steps(problem, module, libraries, *self._values))
+            return by_rattle[0] if by_rattle else None
 
         def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
             if name == "taylor":  # its steps are not checked
                 return of.steps if not needed and (of := series()) else None
             if name in implicit.METHODS:
-                other = None if needed else implicit_steps()
+                other = None if set(needed) - set(projects) else implicit_steps()
                 found = other.named(name) if other else None
             else:
                 found = held.named(name, needed) if (held := compiled(needed)) else None
@@ -163,10 +171,14 @@ class Accelerator:
             return found
 
         def equal(name: str) -> EqualSteps | None:
-            if name in implicit.GAUSS:
+            if problem.projection and name == "leapfrog":
+                found = rattle_steps()
+            elif problem.projection and name not in runs.PROJECTED:
+                found = None
+            elif name in implicit.GAUSS:
                 found = other.equal(name) if (other := implicit_steps()) else None
             else:
-                found = held.equal(name, problem) if (held := compiled()) else None
+                found = held.equal(name, problem) if (held := compiled(projects)) else None
             self.used = self.used or found is not None
             return found
 
@@ -247,19 +259,22 @@ class Accelerator:
             self._begun = now
         return now - self._begun
 
-    def _of_implicit_steps(self) -> implicit.Libraries | None:
-        """The libraries of implicit steps, together: with fewer, Python makes all steps."""
+    def _implicit(self, names: Sequence[str]) -> dict[str, ctypes.CDLL] | None:
+        """The libraries of implicit methods and of these functions, together: with fewer, Python
+        makes all steps.
+        """
+        if not all(hasattr(self._module, name) for name in names):
+            return None
         now = time.perf_counter()
         if self._begun is None:
             self._begun = now
-        needed = [self._library(name) for name in implicit.NEEDED]
-        needed.append(self._methods)
-        pays = self._at_once or now - self._begun > sum(each.missing for each in needed)
-        found = [each.after(math.inf if pays else 0.0) for each in needed]
-        derivative, jacobian, methods = found
-        if derivative is None or jacobian is None or methods is None:
-            return None
-        return implicit.Libraries(derivative, jacobian, methods)
+        needed = {name: self._library(name) for name in names}
+        needed[implicit.METHODS_LIBRARY] = self._methods
+        pays = self._at_once or now - self._begun > sum(each.missing for each in needed.values())
+        spent = math.inf if pays else 0.0
+        found = {name: library.after(spent) for name, library in needed.items()}
+        there = {name: library for name, library in found.items() if library is not None}
+        return there if len(there) == len(found) else None
 
     @cached_property
     def _methods(self) -> _Library:

@@ -31,7 +31,9 @@ class Function(NamedTuple):
     size: int
 
 
-class _Function(ctypes.Structure):
+class FunctionStructure(ctypes.Structure):
+    """`function` of `templates/c/projection.c.jinja`."""
+
     _fields_ = (("value", _POINTER), ("k", _POINTER), ("count", _WHOLE))
 
 
@@ -39,7 +41,7 @@ class Watch(ctypes.Structure):
     """`watch` of `templates/c/checks.c.jinja`."""
 
     _fields_ = (
-        *((name, _Function) for name in ("switching", "gaps", "rates")),
+        *((name, FunctionStructure) for name in ("switching", "gaps", "rates")),
         *((name, _POINTER) for name in ("factors", "inner", "sizes", "angles")),
         *((name, _WHOLE) for name in ("angled", "timed")),
         *((name, _REAL) for name in ("clear", "earlier", "switched")),
@@ -96,12 +98,12 @@ def watch(
     if watched and watched.ends:
         (made.earlier, before), (_, start) = watched.ends
         switching, values = len(start), np.array((before, start, start))
-        made.switching = _Function(*found["switching_functions"])
+        made.switching = FunctionStructure(*found["switching_functions"])
         arrays["angles"] = np.array(watched.angles, np.int64)
         made.angled = len(watched.angles)
     if sizes is not None:
         contacts, arrays["sizes"] = len(sizes), sizes
-        made.gaps, made.rates = (_Function(*found[name]) for name in ("gaps", "gap_rates"))
+        made.gaps, made.rates = (FunctionStructure(*found[name]) for name in ("gaps", "gap_rates"))
     parts = _MOST_PARTS + 1
     arrays |= {
         "factors": np.ascontiguousarray(branches.FACTORS),

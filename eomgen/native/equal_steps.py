@@ -1,7 +1,7 @@
 """Steps of equal length in compiled code, with the bits of the same steps made in Python."""
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -9,7 +9,9 @@ import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
-from eomgen.run.compiled import Array, EqualSteps, EqualStride
+from eomgen.native.checked import Function
+from eomgen.native.constrained import address, constraints, made_margins
+from eomgen.run.compiled import Array, Constrained, EqualSteps, EqualStride
 from eomgen.run.integrators.leapfrog import rates_of
 from eomgen.run.integrators.runge_kutta_4 import TABLEAU
 from eomgen.run.integrators.tableau import terms
@@ -31,7 +33,9 @@ class Stride(ctypes.Structure):
         ("before", _WHOLE),
         ("most", _WHOLE),
         ("more", _POINTER),
+        ("held", _POINTER),
         *((name, _POINTER) for name in ("rate", "place", "slope", "ends", "states", "losses")),
+        ("margins", _POINTER),
         ("iterations", _POINTER),
     )
 
@@ -58,11 +62,18 @@ def _sum(row: Sequence[float]) -> str:
 
 
 def steps(
-    library: ctypes.CDLL, name: str, constants: Any, inputs: Array, problem: Problem
+    library: ctypes.CDLL,
+    name: str,
+    constants: Any,
+    inputs: Array,
+    functions: Mapping[str, Function],
+    problem: Problem,
 ) -> EqualSteps:
-    """The steps of a method, at the constants of parameters and at inputs."""
+    """The steps of a method, at the constants of parameters and at inputs; `functions` keep
+    constraints.
+    """
     more = np.ascontiguousarray(rates_of(problem)) if name == "leapfrog" else None
-    held = ctypes.cast(constants, _POINTER), inputs, more
+    held = ctypes.cast(constants, _POINTER), inputs, more, functions
     return partial(made, library[f"steps_{name}"], METHODS[name], *held)
 
 
@@ -72,6 +83,7 @@ def made(
     constants: Any,
     inputs: Array | None,
     more: Any,
+    functions: Mapping[str, Function],
     t: float,
     y: Array,
     lost: Array,
@@ -82,6 +94,7 @@ def made(
     made: int,
     most: int,
     limits: tuple[Array, Array],
+    constrained: Constrained | None = None,
     iterates: bool = False,
 ) -> EqualStride:
     """Make steps, with the arguments of `run.compiled.EqualSteps`.
@@ -89,6 +102,7 @@ def made(
     call   the method's function
     calls  derivatives in a step, or in an iteration if it `iterates`
     more   what only this method needs, an array or a structure
+    functions  that keep constraints, by name
     """
     call.restype = ctypes.c_int
     call.argtypes = [_REAL, *[_POINTER] * 4]
@@ -98,6 +112,8 @@ def made(
     place, slope = np.empty((2, ny))
     ends, (states, losses) = np.empty(most), np.empty((2, most, ny))
     iterations = np.empty(most, np.int64) if iterates else None
+    margins = made_margins(constrained, most)
+    keeps = constraints(functions, constrained, inputs, ny)
     arrays = (rate, place, slope, ends, states, losses)
     stride = Stride(
         constants,
@@ -109,7 +125,8 @@ def made(
         made,
         most,
         more.ctypes.data if isinstance(more, np.ndarray) else more and ctypes.addressof(more),
-        *(array.ctypes.data for array in arrays),
+        address(keeps),
+        *(array.ctypes.data for array in (*arrays, margins[1:])),
         None if iterations is None else iterations.ctypes.data,
     )
     why = call(
@@ -130,4 +147,5 @@ def made(
         slope,
         usual=why == _MADE_ALL,
         iterations=None if iterations is None else iterations[:n],
+        margins=margins[: n + 1] if constrained else None,
     )

@@ -7,7 +7,6 @@ scene, which are libraries of their own.
 import ctypes
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,14 +14,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
-from eomgen.native import equal_steps
+from eomgen.native import checked, equal_steps
+from eomgen.native.checked import Function
+from eomgen.native.constrained import address, constraints, made_margins
+from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import constants_of
 from eomgen.native.module import Kernels
-from eomgen.run.compiled import Array, EqualSteps, Steps, Stride, Watched
-from eomgen.run.integrators import gauss_4, gauss_6, implicit_midpoint, implicit_stages, rodas_5p
+from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
+from eomgen.run.integrators import (
+    gauss_4,
+    gauss_6,
+    implicit_midpoint,
+    implicit_stages,
+    rattle,
+    rodas_5p,
+)
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.integrators.rodas_5p_coefficients import GAMMA, IN_TIME, NODES, Row
-from eomgen.run.problem import USUAL_LENGTH, Problem
+from eomgen.run.problem import Problem
+from eomgen.run.projection import PROJECTS
 from eomgen.templating import render
 
 MAIN = "implicit.c"
@@ -33,7 +43,9 @@ GAUSS: Mapping[str, ImplicitMethod] = {
     method.METHOD.compiled: method.METHOD for method in (implicit_midpoint, gauss_4, gauss_6)
 }
 """The methods of adaptive and of equal steps, by the names of their compiled steps."""
-OPERATIONS = 3600
+METHODS_LIBRARY = "methods"
+"""The name of the library of the methods among the others."""
+OPERATIONS = 4500
 """The methods take as long to compile as a function of about this many operations."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _UNUSUAL = 2
@@ -42,11 +54,9 @@ _UNUSUAL = 2
 
 def sources() -> Mapping[str, str]:
     """The C source of the methods."""
-    low, high = USUAL_LENGTH
     sums = [_sum(row) for row in rodas_5p.SUMS]
     context = {
-        "shortest": repr(low),
-        "longest": repr(high),
+        **of_constraints(),
         "stages": rodas_5p.STAGES,
         "aside": repr(rodas_5p.ASIDE),
         "gamma": repr(GAMMA),
@@ -63,6 +73,9 @@ def sources() -> Mapping[str, str]:
         "negligible": repr(rodas_5p.NEGLIGIBLE),
         "least_error": repr(rodas_5p.LEAST_ERROR),
         "unit": "unit(((const iteration *)run->more)->of, ",
+        "most_of_rattle": rattle.MOST,
+        "rattle_roundoff": repr(rattle.ROUNDOFF),
+        "rattle_noise": repr(rattle.NOISE),
         "max_iterations": implicit_stages.MAX_ITERATIONS,
         "roundoff": repr(implicit_stages.ROUNDOFF),
         "noise": repr(implicit_stages.NOISE),
@@ -85,7 +98,9 @@ def _sum(row: Row) -> str:
     return " + ".join(["0.0", *(f"{factor!r} * u{j}[j]" for j, factor in enumerate(row))])
 
 
-class _System(ctypes.Structure):
+class System(ctypes.Structure):
+    """`problem` of `templates/c/implicit.c.jinja`."""
+
     _fields_ = (
         *((name, _POINTER) for name in NEEDED),
         *((name, _POINTER) for name in ("constants", "jacobian_constants", "inputs")),
@@ -98,55 +113,57 @@ class _Settings(ctypes.Structure):
     _fields_ = (
         ("atol", _POINTER),
         *((name, _REAL) for name in ("rtol", "longest", "t_end", "clear")),
+        ("held", _POINTER),
     )
 
 
 class _Records(ctypes.Structure):
     _fields_ = (
         *((name, _POINTER) for name in ("ends", "lengths", "last_lengths", "errors")),
-        *((name, _POINTER) for name in ("states", "losses")),
+        *((name, _POINTER) for name in ("states", "losses", "margins")),
         *((name, _POINTER) for name in ("derivatives", "jacobians", "factorisations", "sampled")),
         *((name, _POINTER) for name in ("times", "rows")),
         ("count", _WHOLE),
     )
 
 
-class _Iteration(ctypes.Structure):
+class Iteration(ctypes.Structure):
+    """`iteration` of `templates/c/implicit.c.jinja`."""
+
     _fields_ = tuple((name, _POINTER) for name in ("system", "reals", "wholes"))
-
-
-@dataclass(frozen=True, eq=False)
-class Libraries:
-    """The libraries of the derivative, of the Jacobian and of the methods."""
-
-    derivative: ctypes.CDLL
-    jacobian: ctypes.CDLL
-    methods: ctypes.CDLL
 
 
 class CompiledImplicit:
     """The compiled steps of a problem of a module at given parameters and inputs.
 
-    origin  the module that had the constants of its parameters, if this one has perturbed ones
+    libraries  those of the methods, of the functions `NEEDED` and of those that keep constraints
+    origin     the module that had the constants of its parameters, if this one has perturbed ones
     """
 
     def __init__(
-        self, problem: Problem, module: Any, libraries: Libraries, p: Any, u: Any, origin: Any
+        self,
+        problem: Problem,
+        module: Any,
+        libraries: Mapping[str, ctypes.CDLL],
+        p: Any,
+        u: Any,
+        origin: Any,
     ) -> None:
-        kernels = Kernels(module, libraries.derivative)
+        kernels = Kernels(module, libraries["derivative"])
         constants = constants_of(kernels, "derivative", p, origin)
-        others = constants_of(Kernels(module, libraries.jacobian), "jacobian", p, origin)
+        others = constants_of(Kernels(module, libraries["jacobian"]), "jacobian", p, origin)
         inputs = kernels.given(u)
-        self._methods, self._system = libraries.methods, None
+        self._methods, self._system = libraries[METHODS_LIBRARY], None
+        beside = {name: libraries[name] for name in (PROJECTS if problem.projection else ())}
+        self._functions, self._inputs = checked.functions(module, beside, p), inputs
         if constants is None or others is None or inputs is None:
+            return
+        if len(self._functions) < len(beside):
             return
         quaternions = np.array(problem.quaternions, np.int64)
         self._kept = constants, others, inputs, quaternions, libraries
-        self._system = _System(
-            *(
-                ctypes.cast(getattr(libraries, name)[f"{module.NAME}_{name}"], _POINTER)
-                for name in NEEDED
-            ),
+        self._system = System(
+            *(ctypes.cast(libraries[name][f"{module.NAME}_{name}"], _POINTER) for name in NEEDED),
             ctypes.cast(constants, _POINTER),
             ctypes.cast(others, _POINTER),
             inputs.ctypes.data,
@@ -164,7 +181,7 @@ class CompiledImplicit:
         call = self._methods.rodas_5p
         call.restype = ctypes.c_int
         call.argtypes = [_POINTER, _POINTER, _WHOLE, *[_REAL] * 4, *[_POINTER] * 6]
-        return partial(_rodas_5p, call, self._system)
+        return partial(_rodas_5p, call, self._system, self._functions, self._inputs)
 
     def equal(self, name: str) -> EqualSteps | None:
         """The same for methods with equal steps."""
@@ -172,12 +189,10 @@ class CompiledImplicit:
             return None
         stages = len(GAUSS[name].b)
         reals, wholes = _space(stages * self._system.states)
-        with_them = _Iteration(
-            ctypes.addressof(self._system), reals.ctypes.data, wholes.ctypes.data
-        )
+        with_them = Iteration(ctypes.addressof(self._system), reals.ctypes.data, wholes.ctypes.data)
         with_them.kept = self, reals, wholes
         call = self._methods[f"steps_{name}"]
-        return partial(equal_steps.made, call, stages, None, None, with_them, iterates=True)
+        return partial(equal_steps.made, call, stages, None, None, with_them, {}, iterates=True)
 
 
 def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:
@@ -188,7 +203,9 @@ def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:
 
 def _rodas_5p(
     call: Any,
-    system: _System,
+    system: System,
+    functions: Mapping[str, Function],
+    inputs: Array | None,
     t: float,
     y: Array,
     memory: Mapping[str, float | Array],
@@ -202,6 +219,7 @@ def _rodas_5p(
     watched: Watched | None = None,
     sizes: Array | None = None,
     dense: bool = False,
+    constrained: Constrained | None = None,
 ) -> Stride:
     """Steps of Rodas5P, with the arguments of `run.compiled.Steps`, of which `watched` may have
     switching functions of time alone only, and there are no `sizes`; none if they are to be
@@ -216,10 +234,12 @@ def _rodas_5p(
     rows, made = np.empty((len(times), ny)), ctypes.c_int64()
     memories = {"h_abs": lengths, "h_last": last_lengths, "error": errors, "lost": losses}
     counts = derivatives, jacobians, factorisations, sampled
-    arrays = ends, lengths, last_lengths, errors, states, losses, *counts, times, rows
+    margins = made_margins(constrained, most)
+    keeps = constraints(functions, constrained, inputs, ny)
+    arrays = ends, lengths, last_lengths, errors, states, losses, margins[1:], *counts, times, rows
     records = _Records(*(array.ctypes.data for array in arrays), len(times))
     clear = watched.clear if watched else math.inf
-    settings = _Settings(atol.ctypes.data, rtol, longest, t_end, clear)
+    settings = _Settings(atol.ctypes.data, rtol, longest, t_end, clear, address(keeps))
     start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
     reals, wholes = _space(ny)
     why = call(
@@ -250,4 +270,5 @@ def _rodas_5p(
         usual=why != _UNUSUAL,
         jacobians=jacobians[:n],
         factorisations=factorisations[:n],
+        margins=margins[: n + 1] if constrained else None,
     )

@@ -10,18 +10,23 @@ import numpy as np
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.native import checked, equal_steps
+from eomgen.native.constrained import address, constraints, made_margins
+from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import restricted
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
-from eomgen.run.compiled import Array, EqualSteps, Steps, Stride, Watched
+from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators import dormand_prince_8 as dop853
 from eomgen.run.integrators.dop853_coefficients import NODES, Row
-from eomgen.run.problem import USUAL_LENGTH, Problem
+from eomgen.run.problem import Problem
+from eomgen.run.projection import PROJECTS
 from eomgen.templating import render
 
 MAIN = "runs.c"
 METHODS = ("dop853", *equal_steps.METHODS)
 """The methods whose steps this library makes."""
+PROJECTED = ("dop853", "euler", "semi_implicit_euler", "runge_kutta_4")
+"""Those that keep constraints."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _UNUSUAL = 2
 """What C returns before a step that Python must make."""
@@ -30,14 +35,11 @@ _UNUSUAL = 2
 def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C sources of the derivative and of the methods that step with it."""
     program, interface = restricted(program, interface, ("derivative",))
-    low, high = USUAL_LENGTH
     context = {
         "prefix": interface.name,
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "shortest": repr(low),
-        "longest": repr(high),
         "slopes": dop853.SLOPES,
         "nodes": [repr(node) for node in NODES],
         "stages": [(i, _sum(dop853.SUMS[i])) for i in range(1, 12)],
@@ -54,6 +56,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "greatest": repr(dop853.GREATEST),
         "short_weight": repr(dop853.SHORT_WEIGHT),
         **checked.context(),
+        **of_constraints(),
     }
     main = render(c.TEMPLATES, "runs.c.jinja", context) + equal_steps.source(interface)
     return {**c.library(program, interface), MAIN: main}
@@ -69,13 +72,15 @@ class _Settings(ctypes.Structure):
         *((name, _POINTER) for name in ("k", "u", "atol")),
         *((name, _REAL) for name in ("rtol", "longest", "t_end")),
         ("dense", _WHOLE),
+        ("held", _POINTER),
     )
 
 
 class _Records(ctypes.Structure):
     _fields_ = (
         *((name, _POINTER) for name in ("ends", "lengths", "states", "slopes", "losses")),
-        *((name, _POINTER) for name in ("switched", "values", "terms", "derivatives", "sampled")),
+        *((name, _POINTER) for name in ("switched", "values", "terms", "margins")),
+        *((name, _POINTER) for name in ("derivatives", "sampled")),
         *((name, _POINTER) for name in ("switches", "gap_checks", "times", "rows")),
         ("count", _WHOLE),
     )
@@ -120,7 +125,10 @@ class CompiledSteps:
         """The same for methods with equal steps."""
         if self._constants is None or self._inputs is None or name not in equal_steps.METHODS:
             return None
-        return equal_steps.steps(self._library, name, self._constants, self._inputs, problem)
+        if problem.projection and not set(PROJECTS) <= self._checks.keys():
+            return None
+        held = self._constants, self._inputs, self._checks
+        return equal_steps.steps(self._library, name, *held, problem)
 
     def _dop853(
         self,
@@ -138,6 +146,7 @@ class CompiledSteps:
         watched: Watched | None = None,
         sizes: Array | None = None,
         dense: bool = False,
+        constrained: Constrained | None = None,
     ) -> Stride:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
@@ -148,10 +157,13 @@ class CompiledSteps:
         switched, values = np.empty(most), np.empty((most, watch.switching.count))
         rows, made = np.empty((len(times), ny)), ctypes.c_int64()
         terms = np.empty((most if dense else 0, 7, ny))
+        margins = made_margins(constrained, most)
+        keeps = constraints(self._checks, constrained, self._inputs, ny)
         arrays: list[Any] = [ends, lengths, states, slopes, losses, switched, values, terms]
+        arrays += [margins[1:]]
         arrays += [derivatives, sampled, switches, gap_checks, times, rows]
         records = _Records(*(array.ctypes.data for array in arrays), len(times))
-        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end, dense)
+        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end, dense, address(keeps))
         start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
         why = self._call(
             ctypes.byref(settings),
@@ -163,7 +175,7 @@ class CompiledSteps:
             ctypes.byref(records),
             ctypes.byref(made),
         )
-        del pointed
+        del pointed, keeps
         n = made.value
         passed = int(sampled[n - 1]) if n else 0
         return Stride(
@@ -179,6 +191,7 @@ class CompiledSteps:
             gap_checks[:n],
             usual=why != _UNUSUAL,
             within=partial(_within, t, y, ends, states, terms) if dense else None,
+            margins=margins[: n + 1] if constrained else None,
         )
 
 

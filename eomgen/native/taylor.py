@@ -14,7 +14,7 @@ from eomgen.program.program import Program, live_steps
 from eomgen.program.series import coefficients
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 from eomgen.program.taylor import NoSeriesError, Recurrences, recurrences
-from eomgen.run.compiled import Array, Series, Stride, Watched
+from eomgen.run.compiled import Array, Constrained, Series, Stride, Watched
 from eomgen.run.integrators.taylor import HIGHEST, order_of
 from eomgen.run.module import given_values
 from eomgen.run.problem import USUAL_LENGTH
@@ -142,11 +142,12 @@ class CompiledTaylor:
         watched: Watched | None = None,
         sizes: Array | None = None,
         dense: bool = False,
+        constrained: Constrained | None = None,
     ) -> Stride:
-        """Steps, with the arguments of `run.compiled.Steps`. None are made if they must be checked,
-        or if states within them are wanted.
+        """Steps, with the arguments of `run.compiled.Steps`. None are made if they must be checked
+        or keep constraints, or if states within them are wanted.
         """
-        most = 0 if dense or watched or sizes is not None else most
+        most = 0 if dense or watched or constrained or sizes is not None else most
         ny = self._states
         # Numbers and counts are parts of one array each: to ask for an address takes a microsecond.
         numbers, counts = np.empty((2 + 2 * ny) * most), np.empty(2 * most, np.int64)

@@ -14,6 +14,35 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Constrained:
+    """What steps that keep constraints are given of these; see `run.projection`.
+
+    sizes          (nc,), size of each residual
+    quaternions    indices of the components of each unit quaternion among the states
+    before, after  (nc,), the largest residuals so far before and after projection, which the steps
+                   update
+    margins        the ends of the last two steps, s, and the least margins there
+    """
+
+    sizes: Array
+    quaternions: Sequence[tuple[int, int, int, int]]
+    before: Array
+    after: Array
+    margins: tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Margins:
+    """The least margins of constraints at the start and the end of a step, which starts at `start`,
+    as far as compiled code has checked them; see `run.projection`.
+    """
+
+    start: float
+    before: float
+    here: float
+
+
+@dataclass(frozen=True, eq=False)
 class Stride:
     """Some steps of an adaptive method, in order: m of them, which may be none.
 
@@ -32,6 +61,8 @@ class Stride:
                  (m,), numbers of these so far; None if there are none
     within       gives the state at a time in the step of a number; None if that was not asked for
     ended        whether the last step reaches the end of the run
+    margins      (m + 1,), the least margins of constraints at the start and at their ends; None if
+                 there are none
     """
 
     ends: Array
@@ -49,6 +80,7 @@ class Stride:
     factorisations: NDArray[np.int64] | None = None
     within: Callable[[int, float], Array] | None = None
     ended: bool = False
+    margins: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +113,7 @@ class Steps(Protocol):
     sizes       given (nc,) to make no step in which a rigid contact, none of which is held, may
                 close; its gap is relative to its size
     dense       whether states within the steps are wanted
+    constrained the constraints to keep, if there are any
     """
 
     def __call__(
@@ -98,6 +131,7 @@ class Steps(Protocol):
         watched: Watched | None = None,
         sizes: Array | None = None,
         dense: bool = False,
+        constrained: Constrained | None = None,
     ) -> Stride: ...
 
 
@@ -118,6 +152,8 @@ class EqualStride:
     usual        whether the next step may be made so, too
     iterations   (m,), those in each step, with as many Jacobians as derivatives; None if the method
                  does not iterate
+    margins      (m + 1,), the least margins of constraints at the start and at their ends; None if
+                 there are none
     """
 
     ends: Array
@@ -129,6 +165,7 @@ class EqualStride:
     slope: Array
     usual: bool
     iterations: NDArray[np.int64] | None = None
+    margins: Array | None = None
 
 
 class EqualSteps(Protocol):
@@ -136,6 +173,7 @@ class EqualSteps(Protocol):
 
     Step i ends at t_start + i dt, and before `t_end`. No step is made whose rate differs from that
     of the step before by more than `limits[1]`; the first one's is compared with `limits[0]`.
+    Constraints are kept if they are given.
     """
 
     def __call__(
@@ -150,6 +188,7 @@ class EqualSteps(Protocol):
         made: int,
         most: int,
         limits: tuple[Array, Array],
+        constrained: Constrained | None = None,
     ) -> EqualStride: ...
 
 

@@ -16,7 +16,7 @@ from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_i
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
-from eomgen.run.projection import Violations, watched
+from eomgen.run.projection import Seen, Violations, watched
 from eomgen.run.stepping import (
     ANEW,
     Asked,
@@ -116,7 +116,10 @@ def integrate(
     violations = None
     if problem.projection:
         violations = Violations(len(problem.projection.names))
-        counted = replace(counted, projection=replace(problem.projection, violations=violations))
+        projection = replace(problem.projection, violations=violations, seen=Seen())
+        counted = replace(counted, projection=projection)
+    if problem.closed_form:
+        counted = replace(counted, closed_form=replace(problem.closed_form, seen=Seen()))
     if tally:
         counted = tally.counting(counted)
     remarks: list[str] = []

@@ -7,12 +7,13 @@ error of the constraints adds up.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.run.compiled import Constrained, Margins
 from eomgen.run.failure import StepFailure
 from eomgen.run.tangents import tangents
 
@@ -36,6 +37,8 @@ REMEDY = (
 )
 CLOSE = 1e-9
 """The largest residual that is left where Newton's method ends, in sizes."""
+PROJECTS = ("constraint_residuals", "project_position", "project_velocity", "constraint_margins")
+"""The functions of a module that a step onto the constraints needs."""
 
 
 class Violations:
@@ -52,6 +55,36 @@ class Violations:
         """Take account of a projection."""
         np.maximum(self.before, np.abs(before), out=self.before)
         np.maximum(self.after, np.abs(after), out=self.after)
+
+
+@dataclass
+class Seen:
+    """The least margins of a run: `here` at the last time t, and `before` at `start`, the time
+    before it; -inf if there is none.
+    """
+
+    start: float = 0.0
+    t: float = 0.0
+    before: float = float("-inf")
+    here: float = float("inf")
+
+    def begin(self, t: float, margin: float) -> None:
+        """Begin with a state at t that ends no step."""
+        self.start = self.t = t
+        self.before, self.here = float("-inf"), margin
+
+    def add(self, t: float, margin: float) -> None:
+        """Take account of the end of a step."""
+        self.start, self.t, self.before, self.here = self.t, t, self.here, margin
+
+    def turns(self, t: float, now: float) -> bool:
+        """Whether with a step to t the margins have passed a small minimum, and may be 0 in one of
+        the last two steps.
+        """
+        before, here = self.before, self.here
+        if not (here < before and here < now and here < NEAR):
+            return False
+        return not stays_away(here, (self.start, self.t, t), (before, here, now))
 
 
 Value = Callable[[float, FloatArray], FloatArray]
@@ -78,6 +111,7 @@ class Projection:
                 singular position
     quaternions indices of the components of each unit quaternion among the coordinates
     violations  to which each projection is added, if given
+    seen        the margins of the run, if they are watched
     inertia, kinetic_slopes
                 (t, y) -> the mass matrix (nv, nv), and the derivatives (nq,) of the kinetic energy
                 by the coordinates; `without` if the module has none
@@ -94,6 +128,7 @@ class Projection:
     coordinates: int
     quaternions: Sequence[tuple[int, int, int, int]] = ()
     violations: Violations | None = None
+    seen: Seen | None = None
     inertia: Value = without
     kinetic_slopes: Value = without
 
@@ -158,6 +193,17 @@ class Projection:
         return float(np.abs(residuals / self.sizes).max())
 
 
+def constrained_by(projection: Projection | None) -> Constrained | None:
+    """What compiled steps of a run are given of its constraints."""
+    if projection is None:
+        return None
+    largest, seen = projection.violations, projection.seen
+    assert largest and seen
+    margins = (seen.start, seen.before), (seen.t, seen.here)
+    given = projection.sizes, projection.quaternions
+    return Constrained(*given, largest.before, largest.after, margins)
+
+
 def jacobian_of(module: Any) -> Callable[..., FloatArray]:
     """The derivatives (nc, nv) of a module's constraint rates by the velocities, as a function of
     time, state, parameters and inputs.
@@ -209,11 +255,29 @@ class ClosedForm:
     """The constraints of a module that keeps them in closed form: nothing is projected.
 
     names    of the rows
-    margins  (t, y) -> (nc,), as of `Projection`
+    margins  (t, y) -> (nc,), or (n,), (ny, n) -> (nc, n), as of `Projection`
+    seen     the margins of the run, if they are watched
     """
 
     names: tuple[str, ...]
-    margins: Value
+    margins: Callable[[Any, FloatArray], FloatArray]
+    seen: Seen | None = None
+
+    def passed(
+        self, t: float, y: FloatArray, ends: FloatArray, states: FloatArray
+    ) -> FloatArray | None:
+        """The least margins (m + 1,) at t and at the ends (m,) of m steps from there, whose states
+        are (m, ny); None if one of these steps may pass a singular position.
+        """
+        times = np.concatenate(([t], ends))
+        found = self.margins(times, np.vstack((y, states)).T).min(axis=0)
+        assert self.seen
+        seen = replace(self.seen)
+        for end, margin in zip(ends.tolist(), found[1:].tolist(), strict=True):
+            if not margin >= IN_CLOSED_FORM or seen.turns(end, margin):
+                return None
+            seen.add(end, margin)
+        return np.asarray(found)
 
 
 def closed_form_of(module: Any, parameters: Any, inputs: Any) -> ClosedForm | None:
@@ -256,6 +320,10 @@ class Part(Protocol):
     def within(self) -> Callable[[float], FloatArray]:
         """The state at a time within it."""
 
+    @property
+    def margins(self) -> Margins | None:
+        """Of several steps that have been watched, those of the last one."""
+
 
 Steps = TypeVar("Steps", bound=Part)
 
@@ -269,53 +337,78 @@ def watched(
     within the steps around it, so that no singular position is passed over. Raises `StepFailure`
     there.
     """
-    start, margin, before, last = t, _least(projection, t, y), float("inf"), None
+    seen = projection.seen or Seen()
+    seen.begin(t, _least(projection, t, y))
+    last: Steps | None = None
     try:
         for advance in advances:
             if isinstance(projection, ClosedForm) and not np.isfinite(advance.y).all():
                 raise StepFailure("the loops cannot be closed", REMEDY)
+            if advance.margins:
+                seen.begin(advance.margins.start, advance.margins.before)
+                seen.add(advance.t, advance.margins.here)
+                last = advance
+                yield advance
+                continue
             here = _checked(projection, advance.t, advance.y)
-            if advance.t > start:
-                if margin < before and margin < here and margin < NEAR and last is not None:
-                    _search(projection, last, advance)
-                before, margin, last = margin, here, (start, advance)
-                start = advance.t
+            if advance.t > seen.t:
+                if last is not None and seen.turns(advance.t, here):
+                    _search(projection, seen.start, last, advance)
+                seen.add(advance.t, here)
+                last = advance
             else:  # a strike
-                before, margin, last = float("inf"), here, None
+                seen.begin(advance.t, here)
+                last = None
             yield advance
     except SingularPositionError:
         raise
     except StepFailure as failure:
-        if margin < (BEFORE_END if isinstance(projection, ClosedForm) else NEAR):
+        if seen.here < (BEFORE_END if isinstance(projection, ClosedForm) else NEAR):
             reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
             raise StepFailure(reason, REMEDY) from None
         raise
 
 
-def _search(projection: Projection | ClosedForm, last: tuple[float, Part], advance: Part) -> None:
-    """Look for a singular position in two steps, by golden section."""
-    begin, first = last
+def _search(projection: Projection | ClosedForm, start: float, last: Part, advance: Part) -> None:
+    """Look for a singular position in two steps, of which the first begins at `start`, by golden
+    section. It ends where none can be.
+    """
 
-    def state(t: float) -> FloatArray:
-        return (first if t < first.t else advance).within(t)
+    def margin(t: float) -> float:
+        return _least(projection, t, (last if t < last.t else advance).within(t))
 
-    a, b = begin, advance.t
+    a, b = start, advance.t
+    at_a, at_b = margin(a), margin(b)
     ratio = (5**0.5 - 1) / 2
     c, d = b - ratio * (b - a), a + ratio * (b - a)
-    at_c, at_d = _least(projection, c, state(c)), _least(projection, d, state(d))
+    at_c, at_d = margin(c), margin(d)
     for _ in range(SEARCH):
-        if at_c < at_d:
-            b, d, at_d = d, c, at_c
-            c = b - ratio * (b - a)
-            at_c = _least(projection, c, state(c))
-        else:
-            a, c, at_c = c, d, at_d
-            d = a + ratio * (b - a)
-            at_d = _least(projection, d, state(d))
-        if min(at_c, at_d) < _limit(projection):
+        least, times = min(at_c, at_d), (a, c, d, b)
+        if least < _limit(projection) or stays_away(least, times, (at_a, at_c, at_d, at_b)):
             break
+        if at_c < at_d:
+            b, at_b, d, at_d = d, at_d, c, at_c
+            c = b - ratio * (b - a)
+            at_c = margin(c)
+        else:
+            a, at_a, c, at_c = c, at_c, d, at_d
+            d = a + ratio * (b - a)
+            at_d = margin(d)
     best = c if at_c < at_d else d
-    _checked(projection, best, state(best))
+    _checked(projection, best, (last if best < last.t else advance).within(best))
+
+
+def stays_away(least: float, times: Sequence[float], margins: Sequence[float]) -> bool:
+    """Whether a margin with these values at ascending times, the least of them `least`, cannot come
+    to 0 between them: it would have to change more than twice as fast as it does from one to the
+    next. Where it comes to 0, it does so with a slope, on both sides.
+    """
+    steepest = 0.0
+    for i in range(1, len(times)):
+        if not times[i - 1] < times[i]:
+            return False
+        steepest = max(steepest, abs(margins[i] - margins[i - 1]) / (times[i] - times[i - 1]))
+    return least > 2 * steepest * (times[-1] - times[0])
 
 
 def _checked(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:

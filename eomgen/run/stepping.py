@@ -174,12 +174,9 @@ def _settings(asked: Asked, dt: float | None) -> Resume:
 
 
 def compiled_steps(problem: Problem) -> Compiled | None:
-    """The compiled steps of a problem; None if it has none, or another derivative than they, or
-    constraints: compiled steps do not project onto these.
-    """
+    """The compiled steps of a problem; None if it has none, or another derivative than they."""
     compiled = problem.compiled
-    held = problem.projection or problem.closed_form
-    if compiled is None or held or compiled.derivative is not problem.derivative:
+    if compiled is None or compiled.derivative is not problem.derivative:
         return None
     return compiled
 

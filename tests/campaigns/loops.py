@@ -1,12 +1,13 @@
 """Mechanisms with loops: 300 random ones by every route, and other engines; see the parts.
 
-    python tests/campaigns/loops.py [random | pinocchio | peaucellier] [--count N]
+    python tests/campaigns/loops.py [random | pinocchio | peaucellier | symplectic] [--count N]
 
 random       accelerations and wrenches of all joints by every route against the solver in maximal
              coordinates; 1 to 6 loops, all joint types, in the plane and in space by turns
 pinocchio    accelerations against Pinocchio's constraint dynamics, of mechanisms in space that
              balls and welds close
 peaucellier  how straight the line of Peaucellier's cell is over 1e5 steps
+symplectic   constraints and energy of a four-bar that swings, over 1e6 steps of RATTLE
 """
 
 import argparse
@@ -22,9 +23,11 @@ sys.path.append(str(Path(__file__).parent.parent))
 
 import judges
 import planar_linkages
+from conserved import conserved
 from engine import apart, engine
 from loop_routes import ROUTES, apart_by_route, model_of, solved
 from spatial_loops import random_loops
+from test_loop_runs import four_bar
 from test_loops import CLOSE, CONDITION, WELL, left_out
 
 from eomgen.run.integrate import integrate
@@ -97,10 +100,23 @@ def peaucellier(steps: int) -> int:
     return int(off > WELL or not run.finished)
 
 
+def symplectic(steps: int) -> int:
+    """Whether constraints open by more than 1e-12 m, or energy leaves its band or has a trend."""
+    text = four_bar(initial="q = { theta = 0.3 }", route="embedded")
+    start = time.perf_counter()
+    found = conserved(text, "leapfrog", 2e-3, steps)
+    print(f"{steps} steps in {time.perf_counter() - start:.1f} s: residual {found.residual:.1e} m, "
+          f"band of energy {found.band:.3e} J, that of the first tenth {found.early:.3e} J, "
+          f"trend {found.trend:.1e} J")  # fmt: skip
+    kept = found.band < 1.01 * found.early and abs(found.trend) < 0.01 * found.band
+    return int(found.residual > WELL or not kept)
+
+
 PARTS = {
     "random": (random, 300),
     "pinocchio": (pinocchio, 60),
     "peaucellier": (peaucellier, 100_000),
+    "symplectic": (symplectic, 1_000_000),
 }
 
 

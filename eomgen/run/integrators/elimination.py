@@ -38,6 +38,12 @@ def factored(jacobian: FloatArray, diagonal: float, positions: int) -> Factors |
     return (_numbers if len(jacobian) - m <= SMALL else _arrays)(jacobian, diagonal, m)
 
 
+def product(matrix: FloatArray, values: FloatArray) -> FloatArray:
+    """matrix @ values, for a vector or a matrix, summed term by term."""
+    terms = matrix[..., None] * values if values.ndim > 1 else matrix * values
+    return np.asarray(np.take(np.add.accumulate(terms, axis=1), -1, axis=1))
+
+
 @dataclass(frozen=True, eq=False)
 class _Arrays:
     """The factors of g I - J, (n, n), of which the first m rows and columns are eliminated first.

@@ -5,13 +5,12 @@ from functools import partial
 
 import numpy as np
 
-from eomgen.run.compiled import EqualSteps, EqualStride
+from eomgen.run.compiled import EqualSteps, EqualStride, Margins
+from eomgen.run.integrators.closed_strides import MOST, kept_closed
 from eomgen.run.integrators.interface import Advance, Resume
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
-
-MOST = 1024
-"""Greatest number of steps at once: between them progress is shown, and Ctrl-C is heard."""
+from eomgen.run.projection import constrained_by
 
 
 class EqualStrides:
@@ -25,7 +24,7 @@ class EqualStrides:
         self, steps: Callable[[], EqualSteps | None], t_start: float, t_end: float, dt: float
     ) -> None:
         self._steps, self._t_start, self._t_end, self._dt = steps, t_start, t_end, dt
-        self._unusual = False
+        self._unusual, self._most = False, MOST
 
     def made(
         self,
@@ -35,11 +34,12 @@ class EqualStrides:
         y: FloatArray,
         lost: FloatArray,
         monitor: StabilityMonitor | None,
+        problem: Problem,
     ) -> EqualStride | None:
-        """Make steps after step number `made`, but not the `last` one; None if Python must make the
-        next, or if there are no compiled ones yet.
+        """Make steps after step number `made`, but not the `last` one, onto constraints if there
+        are any; None if Python must make the next, or if there are no compiled ones yet.
         """
-        most = min(MOST, last - 1 - made)
+        most = min(self._most, last - 1 - made)
         if most < 1 or self._unusual:
             self._unusual = False
             return None
@@ -57,10 +57,15 @@ class EqualStrides:
             made=made,
             most=most,
             limits=limits,
+            constrained=constrained_by(problem.projection),
         )
         count = len(stride.ends)
         if not count:
             return None
+        kept, self._most = kept_closed(problem, t, y, stride, self._most)
+        if kept is None:
+            return None
+        stride = kept
         self._unusual = not stride.usual
         if monitor:
             monitor.passed(count, stride.calls, stride.rate, stride.place, stride.slope)
@@ -72,13 +77,17 @@ def advances_of(
     made: int,
     every: int,
     problem: Problem,
+    start: tuple[float, FloatArray],
+    shorter: Callable[[float, FloatArray, float], FloatArray],
     continuation: Callable[[float, FloatArray, FloatArray], Resume],
     each: bool,
 ) -> Iterator[Advance]:
-    """The steps after step number `made` as one `Advance`, or as one for each, with a sample at
-    every `every`-th.
+    """The steps after step number `made`, from `start`, as one `Advance`, or as one for each, with
+    a sample at every `every`-th.
+
+    shorter  (t, y, end) gives the state at `end` by a step from t, y
     """
-    ends, states = stride.ends.tolist(), stride.states
+    ends, states, margins = stride.ends.tolist(), stride.states, stride.margins
     count = len(ends)
     for first in range(count) if each else (0,):
         last = first if each else count - 1
@@ -86,18 +95,19 @@ def advances_of(
         derivatives = (last + 1 - first) * stride.calls
         if stride.iterations is not None:
             derivatives = int(stride.iterations[first : last + 1].sum()) * stride.calls
+        begin, from_ = (ends[last - 1], states[last - 1]) if last else start
+        seen = None
+        if margins is not None:
+            seen = Margins(begin, float(margins[last]), float(margins[last + 1]))
         yield Advance(
             ends[last],
             states[last],
             [(ends[j], states[j].copy()) for j in kept],  # not a view that keeps all in memory
             problem,
-            _unknown,
+            partial(shorter, begin, from_),
             steps=last + 1 - first,
             derivatives=derivatives,
             jacobians=0 if stride.iterations is None else derivatives,
             resume=partial(continuation, ends[last], states[last], stride.losses[last]),
+            margins=seen,
         )
-
-
-def _unknown(t: float) -> FloatArray:
-    raise AssertionError("compiled steps are not made where states within them are needed")

@@ -62,9 +62,12 @@ def advances(
     i = first - 1
     while i < steps:
         if strides and i >= first:
-            stride = strides.made(i, steps, t, y, lost, monitor if checked else None)
+            given = (monitor if checked else None), problem
+            stride = strides.made(i, steps, t, y, lost, *given)
             if stride:
-                yield from advances_of(stride, i, every, problem, _continuation, each)
+                shorter = partial(_shorter, change, problem)
+                how = (problem, (t, y), shorter, _continuation, each)
+                yield from advances_of(stride, i, every, *how)
                 i += len(stride.ends)
                 t, y, lost = float(stride.ends[-1]), stride.states[-1], stride.losses[-1]
                 continue

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.run.compiled import Margins
 from eomgen.run.failure import StepFailure
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Event
@@ -123,6 +124,7 @@ class Advance:
              this run would not have ended a step here, or if the method cannot continue so
     capped   number of steps that have the greatest length allowed
     cut      number of longer attempts that passed over a branch of the derivative
+    margins  of its last step, if compiled code has checked all of its steps
     """
 
     t: float
@@ -143,6 +145,7 @@ class Advance:
     resume: Callable[[], Resume] | None = None
     capped: int = 0
     cut: int = 0
+    margins: Margins | None = None
 
 
 def always() -> bool:

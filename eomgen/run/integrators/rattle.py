@@ -18,6 +18,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.failure import StepFailure
+from eomgen.run.integrators.elimination import Factors, factored, product
 from eomgen.run.integrators.interface import Change
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import Projection, without
@@ -49,45 +50,65 @@ def prepare(problem: Problem) -> Change:
 def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     """A step. Raises `StepFailure` if the iteration does not converge."""
     held = cast(Projection, problem.projection)
-    nq = held.coordinates
+    nq, half = held.coordinates, h / 2
     q, v = y[:nq], y[nq:]
 
-    def force(at: FloatArray) -> FloatArray:
+    def force(mass: FloatArray, at: FloatArray) -> FloatArray:
         still = np.concatenate((at, np.zeros(nq)))
-        return np.asarray(held.inertia(t, still) @ problem.derivative(t, still)[nq:])
+        return product(mass, problem.derivative(t, still)[nq:])
 
     def slopes(at: FloatArray, speed: FloatArray) -> FloatArray:
         return held.kinetic_slopes(t, np.concatenate((at, speed)))
 
-    here, jacobian = held.inertia(t, y), held.jacobian(t, y) / held.sizes[:, None]
-    begun = here @ v + h / 2 * force(q)
+    def rows(at: FloatArray) -> FloatArray:
+        return held.jacobian(t, at) / held.sizes[:, None]
+
+    here, columns = held.inertia(t, y), rows(y).T
+    mass = _factored(here)
+    ways = _solved(mass, columns)
+    begun = product(here, v) + half * force(here, q)
     a = b = v
-    multipliers, r, before = np.zeros(len(jacobian)), q + h * v, np.inf
+    multipliers, r, before = np.zeros(columns.shape[1]), q + h * v, np.inf
     for _ in range(MOST):
         there = np.concatenate((r, b))
-        middle = begun + h / 2 * slopes(q, a) + jacobian.T @ multipliers
-        after = held.jacobian(t, there) / held.sizes[:, None]
-        inverse = np.linalg.solve(here, np.column_stack((middle, jacobian.T)))
-        a = np.asarray(inverse[:, 0], dtype=np.float64)
-        b = np.asarray(np.linalg.solve(held.inertia(t, there), middle), dtype=np.float64)
-        new = q + h / 2 * (a + b)
+        middle = begun + half * slopes(q, a) + product(columns, multipliers)
+        after, last_mass = rows(there), held.inertia(t, there)
+        a, b = mass.solve(middle), _factored(last_mass).solve(middle)
+        new = q + half * (a + b)
         off = held.residuals(t, np.concatenate((new, b))) / held.sizes
-        more = np.linalg.solve(h * after @ inverse[:, 1:], off)
+        more = _factored(h * product(after, ways)).solve(off)
         multipliers = multipliers - more
-        moved = max(float(np.abs(new - r).max()), float(np.abs(h * inverse[:, 1:] @ more).max()))
+        moved = max(_largest(new - r), _largest(h * product(ways, more)))
         r = new
-        scale = float(np.abs(q).max() + np.abs(h * v).max())
+        scale = _largest(q) + _largest(h * v)
         if moved <= ROUNDOFF * scale or (moved >= 0.5 * before and moved <= NOISE * scale):
             break
         before = moved
     else:
         raise StepFailure(f"the step did not converge in {MOST} iterations", REMEDY)
-    mass = held.inertia(t, np.concatenate((r, b)))
-    last = middle + h / 2 * (force(r) + slopes(r, b))
-    responses = np.linalg.solve(mass, np.column_stack((last, after.T)))
-    w, ways = responses[:, 0], responses[:, 1:]
-    w = w - ways @ np.linalg.solve(after @ ways, after @ w)
+    there = np.concatenate((r, b))
+    last_mass = held.inertia(t, there)
+    last = middle + half * (force(last_mass, r) + slopes(r, b))
+    mass = _factored(last_mass)
+    w, ways = mass.solve(last), _solved(mass, after.T)
+    w = w - product(ways, _factored(product(after, ways)).solve(product(after, w)))
     return np.concatenate((r - q, w - v))
+
+
+def _factored(matrix: FloatArray) -> Factors:
+    factors = factored(-matrix, 0.0, 0)
+    if factors is None:
+        raise StepFailure("the mass matrix, or that of the constraints, is singular", REMEDY)
+    return factors
+
+
+def _solved(factors: Factors, columns: FloatArray) -> FloatArray:
+    """The solutions for right sides (n, k)."""
+    return np.array([factors.solve(column) for column in columns.T]).T
+
+
+def _largest(values: FloatArray) -> float:
+    return float(np.abs(values).max())
 
 
 def _refused(problem: Problem) -> str:

@@ -1,0 +1,160 @@
+"""Mechanisms with loops in compiled steps: the bits of Python's, also where steps stop or change
+over; what a symplectic method keeps.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from campaign import some
+from conserved import conserved
+from test_compiled_steps import assert_same, both, compiler
+from test_loop_runs import DEAD, START, four_bar
+
+from eomgen.run import projection
+from eomgen.run.integrators.equal_strides import EqualStrides
+from eomgen.run.integrators.strides import Strides
+
+pytestmark = compiler
+TREE = "embedded"
+"""A route on which a four-bar keeps all of its coordinates, so that it needs projection."""
+SWINGS = "q = { theta = 629.3 }\nv = { theta_dot = 6.0 }"
+BAR = four_bar(initial=SWINGS, route=TREE)
+TETHERED = """
+name = "tethered"
+dimensions = 3
+[[bodies]]
+name = "box"
+mass = 2.0
+inertia_com = [0.1, 0.2, 0.25]
+[[joints]]
+name = "floats"
+type = "free"
+parent = "world"
+child = "box"
+[[effects]]
+type = "gravity"
+g = 9.81
+[[constraints]]
+type = "distance"
+name = "rope"
+body_1 = "world"
+at_1 = [0, 0, 1]
+body_2 = "box"
+at_2 = [0.1, 0.2, 0.3]
+length = 0.8
+[initial]
+v = { box_wx = 3.0, box_wy = 1.0 }
+"""
+OTHERS = ("rattleback", "car_suspension", "differential", "bicycle", "stewart_platform")
+METHODS: tuple[dict[str, Any], ...] = (
+    {"integrator": "rk4", "dt": 2e-3},
+    {"integrator": "semi_implicit_euler", "dt": 2e-3},
+    {"integrator": "DOP853", "rtol": 1e-8, "samples": 53},
+    {"integrator": "DOP853", "rtol": 1e-3},
+    {"integrator": "Rodas5P", "rtol": 1e-5, "samples": 53},
+    *some((), ({"integrator": "euler", "dt": 2e-3},)),
+)
+RK4, _, DOP853, _, RODAS, *_ = METHODS
+
+
+@pytest.fixture
+def compiled_steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """The numbers of steps that C has made at once."""
+    made: list[int] = []
+    for kind in (EqualStrides, Strides):
+        usual = kind.made
+
+        def noted(self: Any, *given: Any, usual: Any = usual) -> Any:
+            stride = usual(self, *given)
+            made.append(len(stride.ends) if stride else 0)
+            return stride
+
+        monkeypatch.setattr(kind, "made", noted)
+    yield made
+
+
+def assert_all_same(compiled: Any, python: Any) -> None:
+    assert_same(compiled, python)
+    assert compiled.trajectory.violations == python.trajectory.violations
+
+
+@pytest.mark.parametrize(
+    ("scene", "options"),
+    [
+        *((BAR, options) for options in METHODS),
+        *((scene, options) for scene in some((), OTHERS) for options in METHODS),
+        (TETHERED, DOP853),
+    ],
+)
+def test_the_bits_are_those_of_python(
+    scene: str, options: dict[str, Any], compiled_steps: list[int]
+) -> None:
+    """Steps are projected, rows within them too, and the violations are the same."""
+    unstable = {"unstable": True} if "dt" in options else {}
+    compiled, python = both(scene, t_end=0.2, **options, **unstable)
+    assert_all_same(compiled, python)
+    largest = np.array([*python.trajectory.violations.values()])
+    assert largest[:, 0].max() > 0 and largest[:, 1].max() < 1e-12
+    steps = python.trajectory.counts["steps"]
+    # Rodas5P in C does not look for branches of the derivative, which a suspension has.
+    assert sum(compiled_steps) >= 0.8 * steps - 4 or (scene, options) == ("car_suspension", RODAS)
+
+
+@pytest.mark.parametrize("route", some((TREE,), (TREE, "aba")))
+@pytest.mark.parametrize("options", [RK4, DOP853])
+def test_singular_positions_stop_alike(
+    route: str, options: dict[str, Any], compiled_steps: list[int]
+) -> None:
+    """At a change point all routes stop; small minima of the margins are searched alike."""
+    lined = four_bar((0.5, 0.7, 0.5, 0.7), START, route=route)
+    dead = four_bar((0.5, 0.3, 0.3, 0.7), DEAD, route=route)
+    for text in some((lined,), (lined, dead)):
+        compiled, python = both(text, t_end=0.7, **options)
+        assert_all_same(compiled, python)
+    assert sum(compiled_steps) > 0
+
+
+def test_small_minima_are_left_to_python(
+    monkeypatch: pytest.MonkeyPatch, compiled_steps: list[int]
+) -> None:
+    """At a sharp minimum of the margins Python looks for a singular position in the two steps
+    around it, of which C may have made one.
+    """
+    searched: list[float] = []
+    usual = projection._search
+
+    def noted(held: Any, start: float, last: Any, advance: Any) -> None:
+        searched.append(start)
+        usual(held, start, last, advance)
+
+    monkeypatch.setattr(projection, "_search", noted)
+    spins = "q = { theta = 1.0 }\nv = { theta_dot = 8.0 }"
+    close = four_bar((0.45, 0.8, 0.6, 0.9499), spins, route=TREE)
+    compiled, python = both(close, t_end=1.0, **RK4)
+    assert_all_same(compiled, python)
+    half = len(searched) // 2
+    assert half == 2 and searched[:half] == searched[half:]
+    assert sum(compiled_steps) > 400
+
+
+def test_contacts_close_alike(compiled_steps: list[int]) -> None:
+    stop = '[[effects]]\ntype = "joint_stop"\nname = "stop"\njoint = "A"\nlow = 0.0\n'
+    text = four_bar(effects=f"{stop}restitution = 0.8\n", route=TREE)
+    compiled, python = both(text, t_end=0.8, rtol=1e-9)
+    assert_all_same(compiled, python)
+    assert python.trajectory.counts["impacts"] > 1 and sum(compiled_steps) > 5
+
+
+def test_rattle_in_c(compiled_steps: list[int]) -> None:
+    """The bits of Python's steps; and a swinging four-bar keeps its constraints and its energy,
+    which `campaigns/loops.py symplectic` shows over 1e6 steps.
+    """
+    compiled, python = both(BAR, t_end=0.1, integrator="leapfrog", dt=5e-3)
+    assert_all_same(compiled, python)
+    assert sum(compiled_steps) == 18
+    still = four_bar(initial="q = { theta = 0.3 }", route=TREE)
+    found = conserved(still, "leapfrog", 4e-3, 10_000)
+    assert found.residual < 1e-14
+    assert 1e-4 < found.band < 1.01 * found.early and abs(found.trend) < 0.02 * found.band
