@@ -8,6 +8,7 @@ jump in it.
 """
 
 import math
+import pickle
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -43,7 +44,7 @@ def with_closed_form(model: Model) -> Model:
     """
     if model.closing == "projected" or not model.constraints:
         return replace(model, groups=())
-    made, why = _found(_without_choices(model))
+    made, why = _found(_Alike(model))
     if why and model.closing == "closed":
         raise SceneError(f"loops: 'closed' cannot be: {why}; leave it out")
     if why:
@@ -53,17 +54,29 @@ def with_closed_form(model: Model) -> Model:
 
 def why_not_closed_form(model: Model) -> str:
     """Why the dependent coordinates are not found in closed form; "" if they can be."""
-    return "" if model.groups else _found(_without_choices(model))[1]
+    return "" if model.groups else _found(_Alike(model))[1]
 
 
-def _without_choices(model: Model) -> Model:
-    """The model without what its groups do not depend on."""
-    return replace(model, outputs=(), route="auto", notices=(), groups=(), closing="auto")
+class _Alike:
+    """A model without what its groups do not depend on, as the key of a cache: models themselves
+    may hold mappings.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = replace(model, outputs=(), notices=(), groups=(), route="auto", closing="auto")
+        self._key = pickle.dumps(self.model)
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Alike) and self._key == other._key
 
 
 @lru_cache(maxsize=16)
-def _found(model: Model) -> tuple[Model, str]:
+def _found(alike: _Alike) -> tuple[Model, str]:
     """The model with its groups, and their pivots in their order; why there are none."""
+    model = alike.model
     groups, why = _groups(model)
     if why:
         return model, why
