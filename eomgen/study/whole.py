@@ -77,14 +77,14 @@ class Viewed:
     """
 
     def __init__(self, module: Any, model: Model) -> None:
-        self._module, self._model = module, model
+        self.own, self._model = module, model
         self.STATES = tuple(names_of(model))
         self.POSITIONS = tuple(range(len(model.coordinates)))
         self.QUATERNIONS = model.quaternions
 
     def derivative(self, t: Any, y: FloatArray, p: Any = None, u: Any = None) -> FloatArray:
         """ẏ (n,) or (n, k)."""
-        module, model = self._module, self._model
+        module, model = self.own, self._model
         own = own_of(module, model, y)
         found = np.asarray(module.derivative(t, own, p, u))
         names = names_of(model)
@@ -102,18 +102,18 @@ class Viewed:
     def __getattr__(self, name: str) -> Any:
         if name in ("jacobian", "parameter_jacobian", "input_jacobian"):
             raise AttributeError(name)
-        found = getattr(self._module, name)
+        found = getattr(self.own, name)
         if name in ("forward_dynamics", "inverse_dynamics"):
             return lambda q, v, *extra, **more: self._split(found, q, v, *extra, **more)
         if name not in (*OUTPUTS, *OWN):
             return found
-        return lambda t, y, *given: found(t, own_of(self._module, self._model, y), *given)
+        return lambda t, y, *given: found(t, own_of(self.own, self._model, y), *given)
 
     def _split(self, function: Any, q: FloatArray, v: FloatArray, *extra: Any, **more: Any) -> Any:
         """A function of q and v apart."""
         names = names_of(self._model)
         whole = dict(zip(names, (*q, *v), strict=False))
-        parts = self._module.STATES[: len(self._module.POSITIONS)], self._module.STATES
+        parts = self.own.STATES[: len(self.own.POSITIONS)], self.own.STATES
         q = np.array([whole[name] for name in parts[0]])
         v = np.array([whole[name] for name in parts[1][len(q) :] if name in whole])
         return function(q, v, *extra, **more)
