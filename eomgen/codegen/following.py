@@ -31,6 +31,7 @@ class Following:
     inputs: set[int]
     _nodes: dict[int, Node] = field(default_factory=dict)
     _turns: list[tuple[int, Sum, Arrow]] = field(default_factory=list)
+    _open: list[int] = field(default_factory=list)
     _scanned: int = 0
 
     def put(self, given: Node, value: Node) -> None:
@@ -41,18 +42,24 @@ class Following:
         """Let an angle, a sum with one new coordinate, have a direction."""
         x, y = self.of(direction)
         self._turns.append((coordinate.index, self._sum(angle.index), (x, y)))
-        self._scanned = 0
+        self._open = [i for i in self._open if not self._turned(i)]
 
     def of(self, nodes: Sequence[Node]) -> list[Node]:
         """Nodes without inputs that follow."""
         steps = self.tape.steps
-        for i in range(self._scanned, len(steps)):
-            if steps[i].operation in ("cos", "sin") and i not in self._nodes:
-                direction = self._direction(self._sum(steps[i].operands[0]))
-                if direction is not None:
-                    self._nodes[i] = direction[steps[i].operation == "sin"]
-        self._scanned = len(steps)
+        while self._scanned < len(steps):
+            i, self._scanned = self._scanned, self._scanned + 1
+            if steps[i].operation in ("cos", "sin") and not self._turned(i):
+                self._open.append(i)
         return substituted(nodes, self._nodes)
+
+    def _turned(self, i: int) -> bool:
+        """Whether a cosine or a sine is one of a known direction, which it is replaced by."""
+        operation, (angle, *_), *_ = self.tape.steps[i]
+        direction = self._direction(self._sum(angle))
+        if direction is not None:
+            self._nodes[i] = direction[operation == "sin"]
+        return direction is not None
 
     def _direction(self, angle: Sum) -> Arrow | None:
         """The cosine and sine of a sum of angles that follow; None if it has none, or others."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from eomgen.dynamics import dyads
 from eomgen.dynamics.dyads import Arrow, along, minus, opposite, plus, turned, turned_back
 from eomgen.dynamics.frames import Frame
-from eomgen.dynamics.kinematics import TreeKinematics, still_rotation, tree_kinematics
+from eomgen.dynamics.kinematics import still_rotation
 from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.dynamics.vectors import Vec, add, constant, in_space, times, unit, zeros
 from eomgen.model.groups import Group
@@ -94,20 +94,13 @@ def angle_of(d: MechanismState, turn: Turn, cut: tuple[int, int]) -> Scalar:
     return whole - angles[parent].moving if parent >= 0 else whole
 
 
-def own_kinematics(d: MechanismState) -> TreeKinematics:
-    """Tree kinematics in the frames' own axes."""
-    if d.axes == "own":
-        return d.kinematics
-    return tree_kinematics(d.linkage, d.q, "own", d.scalars)
-
-
 class _Polygon:
     """A group at a state of its mechanism."""
 
     def __init__(self, d: MechanismState, group: Group) -> None:
         self._d, self._scalars, self._branch = d, d.scalars, group.branch
         self._frames = d.linkage.frames
-        self._own = own_kinematics(d).links
+        self._own = d.in_own_axes.links
         self._unknown = [
             k for i in group.coordinates for k, f in enumerate(self._frames) if i in f.q
         ]
