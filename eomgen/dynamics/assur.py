@@ -9,7 +9,7 @@ jump in it.
 
 import math
 import pickle
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import permutations
@@ -77,17 +77,58 @@ class _Alike:
 def _found(alike: _Alike) -> tuple[Model, str]:
     """The model with its groups, and their pivots in their order; why there are none."""
     model = alike.model
-    groups, why = _groups(model)
-    if why:
-        return model, why
-    places = (np.array(model.initial_q), *reached_positions(model))
-    groups, why = _measured(model, groups, places)
-    if why:
-        return model, why
-    pivots = _safe_pivots(model, groups, places)
-    if pivots is None:
-        return model, "dependent coordinates do not follow from the others in every position"
-    return replace(model, groups=groups, pivots=pivots), ""
+    if first := _why_not_tried(model):
+        return model, first
+    d, places = Closure.of(model).dynamics(np.array(model.initial_q)), list[Array]()
+    for dependent in _choices(model, d):
+        groups, why = _groups(d, set(dependent))
+        if not why:
+            places = places or [np.array(model.initial_q), *reached_positions(model)]
+            groups, why = _measured(model, groups, places)
+        if not why:
+            pivots = _safe_pivots(model, groups, places)
+            if pivots is not None:
+                return replace(model, groups=groups, pivots=pivots), ""
+            why = "dependent coordinates do not follow from the others in every position"
+        first = first or why
+    return model, first
+
+
+def _why_not_tried(model: Model) -> str:
+    """Why a model has no groups, whatever its loops are; "" if it may have some."""
+    if model.form != "velocity":
+        return f"the form '{model.form}' is another state"
+    if model.driven:
+        return "a coordinate is driven"
+    if timed(model):
+        return "a constraint depends on time"
+    return ""
+
+
+def _choices(model: Model, d: Dynamics) -> Iterator[frozenset[int]]:
+    """Sets of coordinates that may be the dependent ones: those of the assembly; the outer ones of
+    each loop; and with one degree of freedom all but each one in turn.
+    """
+    of = {j: i for index in model.joint_indices for i, j in index.plain}
+    columns = [column for _, column in model.pivots]
+    if not all(j in of for j in columns):  # rotations in space
+        return
+    first = frozenset(of[j] for j in columns)
+    tried = [first]
+    outer = set[int]()
+    seen = set[int]()
+    for constraint in model.constraints:
+        if (found := _loop(d, constraint)) is not None:
+            new = [i for i in found[0] if i not in seen]
+            outer |= set(new[-found[1] :])
+            seen |= set(found[0])
+    tried.append(frozenset(outer))
+    every = {of[j] for j in range(len(model.velocities)) if j in of}
+    if len(every) == len(columns) + 1:
+        tried += [frozenset(every - {i}) for i in sorted(every)]
+    for choice in dict.fromkeys(tried):
+        if len(choice) == len(columns):
+            yield choice
 
 
 def _safe_pivots(
@@ -135,21 +176,12 @@ def completed(
     return q
 
 
-def _groups(model: Model) -> tuple[tuple[Group, ...], str]:
-    """The groups of a model, in the order in which they are solved, without branches; why there are
-    none.
+def _groups(d: Dynamics, unknown: set[int]) -> tuple[tuple[Group, ...], str]:
+    """The groups that determine `unknown` coordinates, in the order in which they are solved,
+    without branches; why there are none.
     """
-    if model.form != "velocity":
-        return (), f"the form '{model.form}' is another state"
-    if model.driven:
-        return (), "a coordinate is driven"
-    if timed(model):
-        return (), "a constraint depends on time"
-    unknown = _coordinates(model, [column for _, column in model.pivots])
-    if unknown is None:
-        return (), "a dependent coordinate is a rotation in space"
     found: list[Group] = []
-    left, d = list(model.constraints), Closure.of(model).dynamics(np.array(model.initial_q))
+    left = list(d.model.constraints)
     if d.contacts:
         return (), "a rigid contact strikes"
     while left:
@@ -168,12 +200,6 @@ def _groups(model: Model) -> tuple[tuple[Group, ...], str]:
     return tuple(found), ""
 
 
-def _coordinates(model: Model, velocities: Sequence[int]) -> set[int] | None:
-    """The coordinates whose rates are these velocities; None if one is of a rotation in space."""
-    of = {j: i for index in model.joint_indices for i, j in index.plain}
-    return {of[j] for j in velocities} if all(j in of for j in velocities) else None
-
-
 def _group(d: Dynamics, constraint: Constraint, unknown: set[int]) -> Group | None:
     """The group that a constraint determines if only `unknown` coordinates are not known; None if
     it determines none.
@@ -188,6 +214,22 @@ def _group(d: Dynamics, constraint: Constraint, unknown: set[int]) -> Group | No
         if own in unknown and not used & unknown:
             return Group(constraint.name, (own,), cuts=(None,))
         return None
+    loop = _loop(d, constraint)
+    if loop is None:
+        return None
+    within, count, before = loop
+    moving = [i for i in within if i in unknown]
+    kinds = [frame.kind for frame in d.linkage.frames if {*frame.q} & {*moving}]
+    slider = isinstance(constraint, LoopJoint) and isinstance(constraint.joint, Prismatic)
+    if before & unknown or len(moving) != count or (slider and "revolute" not in kinds):
+        return None
+    return Group(constraint.name, tuple(moving), 1, (None,) * count)
+
+
+def _loop(d: Dynamics, constraint: Constraint) -> tuple[list[int], int, set[int]] | None:
+    """The coordinates in a planar loop, in the order of its frames, how many it determines, and
+    those that carry it; None if it is none.
+    """
     if d.dimensions == 3:
         return None
     if isinstance(constraint, Distance):
@@ -196,17 +238,10 @@ def _group(d: Dynamics, constraint: Constraint, unknown: set[int]) -> Group | No
         bodies, count = (constraint.joint.parent, constraint.joint.child), 2
     else:
         return None
-    paths = [_path(d, body) for body in bodies]
+    first, second = (set(_path(d, body)) for body in bodies)
     of = {k: frame.q[0] for k, frame in enumerate(d.linkage.frames) if frame.q}
-    shared, apart = set(paths[0]) & set(paths[1]), set(paths[0]) ^ set(paths[1])
-    if any(of.get(k) in unknown for k in shared):
-        return None
-    moving = sorted(k for k in apart if of.get(k) in unknown)
-    kinds = [d.linkage.frames[k].kind for k in moving]
-    slider = isinstance(constraint, LoopJoint) and isinstance(constraint.joint, Prismatic)
-    if len(moving) != count or (slider and "revolute" not in kinds):
-        return None
-    return Group(constraint.name, tuple(of[k] for k in moving), 1, (None,) * count)
+    within = [of[k] for k in sorted(first ^ second) if k in of]
+    return within, count, {of[k] for k in first & second if k in of}
 
 
 def _path(d: Dynamics, body: str) -> list[int]:
