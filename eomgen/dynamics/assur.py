@@ -49,7 +49,7 @@ def with_closed_form(model: Model) -> Model:
         raise SceneError(f"loops: 'closed' cannot be: {why}; leave it out")
     if why:
         return replace(model, groups=())
-    return replace(model, groups=made.groups, pivots=made.pivots)
+    return replace(model, groups=made.groups, pivots=made.pivots, blocks=made.blocks)
 
 
 def why_not_closed_form(model: Model) -> str:
@@ -86,9 +86,9 @@ def _found(alike: _Alike) -> tuple[Model, str]:
             places = places or [np.array(model.initial_q), *reached_positions(model)]
             groups, why = _measured(model, groups, places)
         if not why:
-            pivots = _safe_pivots(model, groups, places)
-            if pivots is not None:
-                return replace(model, groups=groups, pivots=pivots), ""
+            made = _with_pivots(model, groups, places)
+            if made is not None:
+                return made, ""
             why = "dependent coordinates do not follow from the others in every position"
         first = first or why
     return model, first
@@ -131,17 +131,15 @@ def _choices(model: Model, d: Dynamics) -> Iterator[frozenset[int]]:
             yield choice
 
 
-def _safe_pivots(
-    model: Model, groups: Sequence[Group], places: Sequence[Array]
-) -> tuple[tuple[int, int], ...] | None:
-    """Pivots by which the velocities of each group are solved for, of those that stay large and
-    keep their signs the largest; None if there are none. The rows of a group depend on no later
-    one.
+def _with_pivots(model: Model, groups: Sequence[Group], places: Sequence[Array]) -> Model | None:
+    """The model with groups and pivots by which the velocities of each are solved for: of those
+    that stay large and keep their signs the largest, or, if there are none, of both rows together;
+    None if there are none either. The rows of a group depend on no later one.
     """
     closure, names = Closure.of(model), [name for name, _ in model.rows]
     column = {i: j for index in model.joint_indices for i, j in index.plain}
     matrices = [closure.jacobian(q) for q in places]
-    found: list[tuple[int, int]] = []
+    found, blocks = list[tuple[int, int]](), list[int]()
     for group in groups:
         constraint = next(c for c in model.constraints if c.name == group.constraint)
         rows = [names.index(name) for name, _ in constraint.row_names(model.dimensions)]
@@ -156,9 +154,19 @@ def _safe_pivots(
                 if same and smallest > least:
                     best, least = pairs, smallest
         if best is None:
-            return None
+            parts = [matrix[np.ix_(rows, columns)] for matrix in matrices]
+            sizes = np.array([_together(part) for part in parts])
+            if len(rows) != 2 or np.abs(sizes).min() < SAFE or np.ptp(np.sign(sizes)):
+                return None
+            best = tuple(zip(rows, columns, strict=True))
+            blocks.append(len(found))
         found += best
-    return tuple(found)
+    return replace(model, groups=tuple(groups), pivots=tuple(found), blocks=tuple(blocks))
+
+
+def _together(part: Array) -> float:
+    """The determinant of two rows relative to the lengths of these."""
+    return float(np.linalg.det(part) / (np.linalg.norm(part, axis=1).prod() or 1.0))
 
 
 def completed(

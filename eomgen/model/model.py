@@ -179,6 +179,7 @@ class Model(Displayed):
     dropped     names of rows of constraints that follow from the others
     pivots      for each row of the constraints, in the order of elimination, its index and that of
                 the velocity that is solved for by it
+    blocks      of these, the indices of those that are eliminated together with the next
     closing     how loops are closed: "closed", in closed form; "projected"; or "auto"
     groups      what determines the coordinates that follow from the others in closed form, in the
                 order in which they are solved; () if they are states too
@@ -207,6 +208,7 @@ class Model(Displayed):
     held: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
     pivots: tuple[tuple[int, int], ...] = ()
+    blocks: tuple[int, ...] = ()
     closing: Closing = "auto"
     groups: tuple[Group, ...] = ()
 
