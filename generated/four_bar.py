@@ -92,6 +92,7 @@ JOINTS = ('motor_shaft', 'rocker_pivot', 'crank_pin', 'rocker_pin')
 POINTS = ('pen',)
 CONSTRAINTS = ('rocker_pin_x', 'rocker_pin_y')
 FOLLOWING = ('psi', 'phi', 'psi_dot', 'phi_dot')
+RANGED = ('psi', 'phi')
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 19, "sub": 26, "mul": 50, "div": 12, "sin": 1, "cos": 1, "sqrt": 1, "total": 110, "parameters": 37},
@@ -101,7 +102,7 @@ COST = {
     "accelerations": {"add": 21, "sub": 26, "mul": 52, "div": 12, "neg": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 116, "parameters": 37},
     "constraint_residuals": {"add": 6, "sub": 7, "mul": 9, "div": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 27, "parameters": 10},
     "constraint_rates": {"add": 10, "sub": 8, "mul": 20, "div": 5, "neg": 1, "sin": 1, "cos": 1, "sqrt": 1, "total": 47, "parameters": 10},
-    "constraint_margins": {"add": 10, "sub": 6, "mul": 17, "div": 5, "sin": 1, "cos": 1, "sqrt": 1, "total": 41, "parameters": 10},
+    "constraint_margins": {"add": 11, "sub": 8, "mul": 19, "div": 7, "sin": 1, "cos": 1, "sqrt": 1, "total": 48, "parameters": 10},
     "constraint_jacobian": {"add": 5, "sub": 7, "mul": 9, "div": 2, "neg": 1, "sin": 1, "cos": 1, "sqrt": 1, "total": 27, "parameters": 10},
 }
 
@@ -193,7 +194,7 @@ def _fixed(crank_length, coupler_length, rocker_length, ground_length, line, sta
         "accelerations": (ground_length, stall, no_load, g, k1, inertia_rocker_zz, moment_coupler_x, inertia_coupler_zz, k2, k3, k4, k5, k6, k7, k8),
         "constraint_residuals": (ground_length, k1, k6, k7),
         "constraint_rates": (ground_length, k1, k6, k7),
-        "constraint_margins": (ground_length, k1, k6, k7),
+        "constraint_margins": (ground_length, k1, k4, k5, k6, k7),
         "constraint_jacobian": (ground_length, k1, k6, k7),
     }
 
@@ -515,8 +516,8 @@ def _constraint_rates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
 
 
 def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
-    """41 operations: 10 add, 6 sub, 17 mul, 5 div, 1 sin, 1 cos, 1 sqrt."""
-    ground_length, k1, k6, k7 = k
+    """48 operations: 11 add, 8 sub, 19 mul, 7 div, 1 sin, 1 cos, 1 sqrt."""
+    ground_length, k1, k4, k5, k6, k7 = k
     theta, _ = y
     s1 = k1 * cos(theta)
     s2 = k1 * sin(theta)
@@ -532,10 +533,12 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s86 = s2 + s12
     s15 = s10 - s9 * (s12 / s11)
     s87 = s11 * s11
-    s88 = s86 * s86 + s10 * s10 + s12 * s12 + (s13 * s13 + s9 * s9 + s87)
+    s88 = s13 * s13 + s9 * s9 + s87 + (s86 * s86 + s10 * s10 + s12 * s12)
     return (
         s15 * s15 / s88,
         s87 / s88,
+        0.5 + 0.5 * (s10 / k4),
+        0.5 - 0.5 * ((s5 - s9) / k5),
     )
 
 
@@ -828,8 +831,8 @@ def constraint_rates(t, y, p=None, u=None):
 
 
 def constraint_margins(t, y, p=None, u=None):
-    """How far each of `CONSTRAINTS` is from following from others."""
-    return _evaluate(_constraint_margins, "constraint_margins", (2,), ('cos', 'sin', 'sqrt'), y, p, u)
+    """How far each of `CONSTRAINTS` is from following from others, and each of `RANGED` from where it jumps by a turn."""
+    return _evaluate(_constraint_margins, "constraint_margins", (4,), ('cos', 'sin', 'sqrt'), y, p, u)
 
 
 def constraint_jacobian(t, y, p=None, u=None):

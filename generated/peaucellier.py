@@ -107,6 +107,7 @@ JOINTS = ('crank_pivot', 'right_pivot', 'left_pivot', 'right_inner_pin', 'left_i
 POINTS = ('pen',)
 CONSTRAINTS = ('inner_corner_x', 'inner_corner_y', 'inner_corner_2_x', 'inner_corner_2_y', 'outer_corner_x', 'outer_corner_y')
 FOLLOWING = ('right', 'left', 'right_in', 'left_in', 'right_out', 'left_out', 'right_dot', 'left_dot', 'right_in_dot', 'left_in_dot', 'right_out_dot', 'left_out_dot')
+RANGED = ('right', 'right_in', 'left', 'left_in', 'right_out', 'left_out')
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 80, "sub": 73, "mul": 167, "div": 37, "sin": 1, "cos": 1, "sqrt": 2, "total": 361, "parameters": 42},
@@ -116,7 +117,7 @@ COST = {
     "accelerations": {"add": 86, "sub": 73, "mul": 173, "div": 37, "neg": 1, "sin": 1, "cos": 1, "sqrt": 2, "total": 374, "parameters": 41},
     "constraint_residuals": {"add": 14, "sub": 21, "mul": 15, "div": 3, "sin": 1, "cos": 1, "sqrt": 2, "total": 57, "parameters": 10},
     "constraint_rates": {"add": 28, "sub": 34, "mul": 56, "div": 20, "sin": 1, "cos": 1, "sqrt": 2, "total": 142, "parameters": 10},
-    "constraint_margins": {"add": 31, "sub": 18, "mul": 38, "div": 12, "sin": 1, "cos": 1, "sqrt": 2, "total": 103, "parameters": 10},
+    "constraint_margins": {"add": 34, "sub": 21, "mul": 44, "div": 18, "sin": 1, "cos": 1, "sqrt": 2, "total": 121, "parameters": 10},
     "constraint_jacobian": {"add": 12, "sub": 21, "mul": 15, "div": 3, "neg": 3, "sin": 1, "cos": 1, "sqrt": 2, "total": 58, "parameters": 10},
 }
 
@@ -270,7 +271,7 @@ def _fixed(a, b, c, line, g):
         "accelerations": (c, g, k1, inertia_crank_zz, moment_right_inner_x, inertia_right_inner_zz, k10, k2, k3, k4, k5, k6, k7, k8),
         "constraint_residuals": (c, k3, k4, k5, k6),
         "constraint_rates": (c, k3, k4, k5, k6),
-        "constraint_margins": (c, k3, k4, k5, k6),
+        "constraint_margins": (c, k1, k2, k3, k4, k5, k6),
         "constraint_jacobian": (c, k3, k4, k5, k6),
     }
 
@@ -1071,8 +1072,8 @@ def _constraint_rates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
 
 
 def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
-    """103 operations: 31 add, 18 sub, 38 mul, 12 div, 1 sin, 1 cos, 2 sqrt."""
-    c, k3, k4, k5, k6 = k
+    """121 operations: 34 add, 21 sub, 44 mul, 18 div, 1 sin, 1 cos, 2 sqrt."""
+    c, k1, k2, k3, k4, k5, k6 = k
     theta, _ = y
     s1 = sin(theta) * k3
     s2 = cos(theta) * k3
@@ -1086,7 +1087,8 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s11 = s9 + s10
     s12 = s5 * s7
     s13 = s1 * s8
-    s14 = s5 + (s13 - s12)
+    s301 = s13 - s12
+    s14 = s5 + s301
     s15 = s9 - s10
     s16 = s12 + s13
     s17 = s1 - s15
@@ -1125,6 +1127,12 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
         s37 * s37 / s327,
         s325 / s328,
         s51 * s51 / s328,
+        0.5 - 0.5 * (s301 / k1),
+        0.5 - 0.5 * (s14 / k2),
+        0.5 + 0.5 * (s16 / k1),
+        0.5 + 0.5 * (s18 / k2),
+        0.5 + 0.5 * (s26 / k2),
+        0.5 - 0.5 * (s24 / k2),
     )
 
 
@@ -1469,8 +1477,8 @@ def constraint_rates(t, y, p=None, u=None):
 
 
 def constraint_margins(t, y, p=None, u=None):
-    """How far each of `CONSTRAINTS` is from following from others."""
-    return _evaluate(_constraint_margins, "constraint_margins", (6,), ('cos', 'sin', 'sqrt'), y, p, u)
+    """How far each of `CONSTRAINTS` is from following from others, and each of `RANGED` from where it jumps by a turn."""
+    return _evaluate(_constraint_margins, "constraint_margins", (12,), ('cos', 'sin', 'sqrt'), y, p, u)
 
 
 def constraint_jacobian(t, y, p=None, u=None):

@@ -98,6 +98,7 @@ JOINTS = ('shaft', 'cylinder', 'crank_pin', 'piston_pin')
 POINTS = ()
 CONSTRAINTS = ('piston_pin_x', 'piston_pin_y')
 FOLLOWING = ('h', 'phi', 'h_dot', 'phi_dot')
+RANGED = ('phi',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
     "derivative": {"add": 11, "sub": 21, "mul": 42, "div": 8, "sin": 2, "cos": 1, "exp": 1, "sqrt": 1, "max": 2, "total": 89, "parameters": 11},
@@ -107,7 +108,7 @@ COST = {
     "accelerations": {"add": 12, "sub": 22, "mul": 44, "div": 8, "neg": 1, "sin": 2, "cos": 1, "exp": 1, "sqrt": 1, "max": 2, "total": 94, "parameters": 11},
     "constraint_residuals": {"total": 0, "parameters": 0},
     "constraint_rates": {"add": 2, "sub": 4, "mul": 9, "div": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 20, "parameters": 5},
-    "constraint_margins": {"add": 4, "sub": 1, "mul": 5, "div": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 15, "parameters": 5},
+    "constraint_margins": {"add": 5, "sub": 1, "mul": 6, "div": 3, "sin": 1, "cos": 1, "sqrt": 1, "total": 18, "parameters": 5},
     "constraint_jacobian": {"add": 1, "sub": 1, "mul": 3, "neg": 1, "sin": 1, "cos": 1, "sqrt": 1, "total": 9, "parameters": 5},
     "switching_functions": {"div": 1, "sin": 2, "total": 3, "parameters": 0},
 }
@@ -162,7 +163,7 @@ def _fixed(r, l, m_rod, I_rod, m_piston, m_crank, I_crank, gas, load, g):
         "accelerations": (r, m_rod, m_piston, gas, load, g, moment_rod_y, inertia_rod_zz, k1, k2, k3, k4, k5),
         "constraint_residuals": (),
         "constraint_rates": (r, k4),
-        "constraint_margins": (r, k4),
+        "constraint_margins": (r, k3, k4),
         "constraint_jacobian": (r, k4),
         "switching_functions": (),
     }
@@ -413,8 +414,8 @@ def _constraint_rates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
 
 
 def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
-    """15 operations: 4 add, 1 sub, 5 mul, 2 div, 1 sin, 1 cos, 1 sqrt."""
-    r, k4 = k
+    """18 operations: 5 add, 1 sub, 6 mul, 3 div, 1 sin, 1 cos, 1 sqrt."""
+    r, k3, k4 = k
     theta, _ = y
     s1 = r * sin(theta)
     s69 = s1 * s1
@@ -425,6 +426,7 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     return (
         s70 / s71,
         1.0 / s71,
+        0.5 + 0.5 * (s4 / k3),
     )
 
 
@@ -721,8 +723,8 @@ def constraint_rates(t, y, p=None, u=None):
 
 
 def constraint_margins(t, y, p=None, u=None):
-    """How far each of `CONSTRAINTS` is from following from others."""
-    return _evaluate(_constraint_margins, "constraint_margins", (2,), ('cos', 'sin', 'sqrt'), y, p, u)
+    """How far each of `CONSTRAINTS` is from following from others, and each of `RANGED` from where it jumps by a turn."""
+    return _evaluate(_constraint_margins, "constraint_margins", (3,), ('cos', 'sin', 'sqrt'), y, p, u)
 
 
 def constraint_jacobian(t, y, p=None, u=None):

@@ -1,5 +1,6 @@
 """Loops in closed form: positions to 50 digits, motion as by projection, and where they end."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -11,6 +12,8 @@ from gmpy2 import mpfr
 
 import eomgen
 from eomgen.api.given import check
+from eomgen.codegen.derive import derive, record
+from eomgen.codegen.system import optimised
 from eomgen.dynamics import constraints
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.assur import completed, with_closed_form
@@ -18,8 +21,9 @@ from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.pipeline import python_module
 from eomgen.run.integrate import integrate
-from eomgen.run.module import as_problem
+from eomgen.run.module import as_problem, load_module
 from eomgen.scalars.extended import Bits, sixty_digits
 from eomgen.scene.reader import parse_scene
 from eomgen.study.whole import viewed
@@ -73,6 +77,9 @@ POLYGONS = {
     "a guide, then a bar": slide("x", "world", "bar", (0.3, 0.05), (0.02, 0.01))
     + turn("elbow", "bar", "end", (0.05, 0.05), (-0.1, 0.02))
     + turn("close", "crank", "end", (0.05, 0.05), (0.3, 0.0), LOOP),
+    "a guide that turns, then a bar": slide("x", "crank", "bar", (0.05, 0.01), (0, 0), x=(1, 2))
+    + turn("elbow", "bar", "end", (0.05, 0.05), (-0.1, 0.02))
+    + turn("close", "world", "end", (-0.3, 0.05), (0.6, 0.0), LOOP),
     "a bar with a guide": BEND
     + slide("x", "bar", "end", (0.1, 0.05), (0.02, 0.01), x=(2, 1))
     + turn("close", "end", "world", (0.03, 0.05), (0.6, 0.2), LOOP),
@@ -238,6 +245,23 @@ def test_singular_positions_stop_the_run(settings: dict[str, Any]) -> None:
         run = eomgen.simulate(four_bar(), parameters=lengths, t_end=3.0, **settings)
         assert not run.finished and "singular" in run.outcome.reason
         assert "another start" in run.outcome.remedy
+
+
+def test_angles_do_not_jump_in_silence() -> None:
+    """A rocker whose angle is counted from where it comes past."""
+    model = check(four_bar(loops="closed", lengths="0.1, 0.6, 0.5, 0.45"))
+    (group,) = with_closed_form(model).groups
+    names = [model.coordinates[i].name for i in group.coordinates]
+    cuts = list(group.cuts)
+    cuts[names.index("psi")] = (-1, 1)  # from -90 to 270 degrees
+    made = replace(with_closed_form(model), groups=(replace(group, cuts=tuple(cuts)),))
+    system = optimised(record(derive(made, "independent")))
+    module: Any = load_module(python_module(system))
+    run = integrate(as_problem(module), "DOP853", 3.0, rtol=1e-9, atol=1e-9)
+    assert not run.finished and "psi, which follows" in run.outcome.reason
+    assert "loops = 'projected'" in run.outcome.remedy
+    psi = module.coordinates(0.0, run.y.T)[[c.name for c in model.coordinates].index("psi")]
+    assert np.abs(np.cos(psi[-1])) < 0.2
 
 
 def test_what_cannot_be_is_told() -> None:

@@ -21,7 +21,7 @@ def constraint_outputs(record: Recording) -> OutputNodes:
     }
     if not groups:
         nodes |= {"project_position": held.position(), "project_velocity": held.velocity()}
-    nodes["constraint_margins"] = held.margins()
+    nodes["constraint_margins"] = [*held.margins(), *record.ranges.values()]
     found: OutputNodes = {name: ((len(part),), part) for name, part in nodes.items()}
     shape = len(record.model.rows), d.nv
     if shape[0] * shape[1] <= LARGEST_JACOBIAN:

@@ -7,7 +7,7 @@ that determine them: no arc tangent is taken where nothing but these is used.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from eomgen.dynamics.closing import Turn, angle_of, solved
+from eomgen.dynamics.closing import Turn, angle_of, from_middle, solved
 from eomgen.dynamics.dyads import Arrow, turned, turned_back
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.program.differentiate import substituted
@@ -24,11 +24,14 @@ NUMBER = -1
 class Following:
     """Nodes in place of the inputs that follow from others.
 
-    inputs  indices of the inputs that follow
+    inputs   indices of the inputs that follow
+    margins  by the names of angles that follow, how far each is from where it jumps: 1 in the
+             middle of its range, 0 at the ends
     """
 
     tape: Tape
     inputs: set[int]
+    margins: dict[str, Node] = field(default_factory=dict)
     _nodes: dict[int, Node] = field(default_factory=dict)
     _turns: list[tuple[int, Sum, Arrow]] = field(default_factory=list)
     _open: list[int] = field(default_factory=list)
@@ -125,6 +128,8 @@ def positions(d: Dynamics, q: Sequence[Node], tape: Tape) -> Following:
                 _, rest = exact.quarters(angle.fixed)
                 whole = angle.moving + d.scalars.number(rest)
                 following.put_turn(q[i], whole, value.direction)
+                half, (x, _) = tape.constant(0.5), from_middle(d, value, cut)
+                following.margins[d.model.coordinates[i].name] = half + half * x
                 value = angle_of(d, value, cut)
             following.put(q[i], value)
     return following

@@ -20,7 +20,7 @@ ABOUT = {
     "constraint_residuals": "Each of `CONSTRAINTS`: how far it is from being met, m or rad.",
     "constraint_rates": "Rate of each of `CONSTRAINTS`, m/s or rad/s.",
     "constraint_jacobian": "Derivatives of `constraint_rates` by the velocities, (nc, nv).",
-    "constraint_margins": "How far each of `CONSTRAINTS` is from following from others.",
+    "constraint_margins": "How far each of `CONSTRAINTS` is from following from others{}.",
     "project_position": "Coordinates (nq,) after one Newton step towards the constraints.",
     "project_velocity": "Velocities (nv,) that meet the constraints, the nearest.",
     "switching_functions": "`derivative` changes its branch where one of these passes 0.",
@@ -92,6 +92,7 @@ class Interface:
     constraints     name and unit of the multiplier of each row of the constraints
     following       name, unit and description of each coordinate and velocity that follows from
                     others in closed form
+    ranged          names of angles among these, each within one turn
     left_out        terms that the scene leaves out of the equations, one line each
     """
 
@@ -118,6 +119,7 @@ class Interface:
     contacts: tuple[ContactLabel, ...]
     constraints: tuple[tuple[str, str], ...]
     following: tuple[tuple[str, str, str], ...]
+    ranged: tuple[str, ...]
     left_out: tuple[str, ...]
 
 
@@ -152,6 +154,7 @@ def interface_of(system: System) -> Interface:
         contacts=system.contacts,
         constraints=model.rows,
         following=_following(model),
+        ranged=model.ranged,
         left_out=tuple(left_out),
     )
 
@@ -170,7 +173,8 @@ def _quaternions(model: Model) -> tuple[tuple[int, int, int, int], ...]:
 
 
 def _function(system: System, name: str) -> Function:
-    about = ABOUT.get(name, "")
+    jumps = ", and each of `RANGED` from where it jumps by a turn" if system.model.ranged else ""
+    about = ABOUT.get(name, "").replace("{}", jumps)
     if name in OUTPUTS:
         about = OUTPUTS[name].of(system.model.dimensions)[1]
     # Forces of rigid contacts are known only during a simulation.

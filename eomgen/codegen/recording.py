@@ -71,6 +71,11 @@ class Recording:
         """Nodes as functions of the state: without coordinates and velocities that follow."""
         return self._following.of(nodes) if self._following else list(nodes)
 
+    @property
+    def ranges(self) -> dict[str, Node]:
+        """Of angles that follow, by name, how far each is from where it jumps, 1 to 0."""
+        return self._following.margins if self._following else {}
+
     def _followed(self) -> Following:
         """Coordinates and velocities that follow from others."""
         following, d = positions(self.dynamics, self.q, self.tape), self.dynamics

@@ -81,17 +81,25 @@ def angle_of(d: MechanismState, turn: Turn, cut: tuple[int, int]) -> Scalar:
     less the angles of the frames before it. See `Group.cuts`.
     """
     (reference, quarters), angles, scalars = cut, d.in_world.angles, d.scalars
-    x, y = turn.direction
+    x, y = from_middle(d, turn, cut)
     _, rest = exact.quarters(angles[turn.frame].fixed)
     whole = scalars.number(exact.quarter_turns(quarters, exact.opposite(rest)))
-    if reference >= 0:
-        base = angles[reference].moving
-        x, y = turned_back((scalars.call("cos", base), scalars.call("sin", base)), (x, y))
-        whole = whole + base
-    x, y = ((x, y), (y, -x), (-x, -y), (-y, x))[quarters % 4]
     whole = whole + scalars.call("atan2", y, x)
+    if reference >= 0:
+        whole = whole + angles[reference].moving
     parent = d.linkage.frames[turn.frame].parent
     return whole - angles[parent].moving if parent >= 0 else whole
+
+
+def from_middle(d: MechanismState, turn: Turn, cut: tuple[int, int]) -> Arrow:
+    """A direction from the middle of the range in which its angle is counted: (-1, 0) where the
+    angle jumps.
+    """
+    (reference, quarters), (x, y) = cut, turn.direction
+    if reference >= 0:
+        base = d.in_world.angles[reference].moving
+        x, y = turned_back((d.scalars.call("cos", base), d.scalars.call("sin", base)), (x, y))
+    return ((x, y), (y, -x), (-x, -y), (-y, x))[quarters % 4]
 
 
 class _Polygon:

@@ -251,6 +251,16 @@ class Model(Displayed):
         return tuple(i for i in range(len(self.coordinates)) if i not in following)
 
     @cached_property
+    def ranged(self) -> tuple[str, ...]:
+        """The names of angles that follow from others in closed form, each within one turn."""
+        return tuple(
+            self.coordinates[i].name
+            for group in self.groups
+            for i, cut in zip(group.coordinates, group.cuts, strict=True)
+            if cut is not None
+        )
+
+    @cached_property
     def state_velocities(self) -> tuple[int, ...]:
         """The indices in v of the velocities that are states."""
         following = {column for _, column in self.pivots} if self.groups else set()

@@ -255,11 +255,14 @@ class ClosedForm:
     """The constraints of a module that keeps them in closed form: nothing is projected.
 
     names    of the rows
-    margins  (t, y) -> (nc,), or (n,), (ny, n) -> (nc, n), as of `Projection`
+    angles   names of angles that jump by a turn at the end of their range
+    margins  (t, y) -> (nc + na,), or (n,), (ny, n) -> (nc + na, n), as of `Projection`; then how
+             far each angle is from there, at most 1
     seen     the margins of the run, if they are watched
     """
 
     names: tuple[str, ...]
+    angles: tuple[str, ...]
     margins: Callable[[Any, FloatArray], FloatArray]
     seen: Seen | None = None
 
@@ -286,6 +289,7 @@ def closed_form_of(module: Any, parameters: Any, inputs: Any) -> ClosedForm | No
         return None
     return ClosedForm(
         tuple(module.CONSTRAINTS),
+        tuple(getattr(module, "RANGED", ())),
         lambda t, y: module.constraint_margins(t, y, parameters, inputs),
     )
 
@@ -294,7 +298,16 @@ class SingularPositionError(StepFailure):
     """The mechanism is singular at a time."""
 
     def __init__(self, projection: Projection | ClosedForm, t: float, margins: FloatArray) -> None:
-        name = projection.names[int(np.argmin(margins))]
+        least = int(np.argmin(margins))
+        if least >= len(projection.names):
+            angle = projection.angles[least - len(projection.names)]  # type: ignore[union-attr]
+            super().__init__(
+                f"at t = {t:.6g} s {angle}, which follows from the state in closed form, leaves "
+                "the turn in which it is counted",
+                "give loops = 'projected' in the scene, or these parameters",
+            )
+            return
+        name = projection.names[least]
         super().__init__(
             f"the mechanism is singular at t = {t:.6g} s: constraint {name} follows from the "
             "others there, as at a dead point or a change point",
