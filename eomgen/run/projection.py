@@ -274,6 +274,8 @@ class ClosedForm:
         """
         times = np.concatenate(([t], ends))
         found = self.margins(times, np.vstack((y, states)).T).min(axis=0)
+        if found.min() >= NEAR:
+            return np.asarray(found)
         assert self.seen
         seen = replace(self.seen)
         for end, margin in zip(ends.tolist(), found[1:].tolist(), strict=True):
