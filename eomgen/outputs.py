@@ -73,6 +73,16 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         needs="constraints",
     ),
     "effect_powers": OutputSpec(("effects",), "Power of each of `EFFECT_NAMES` on the motion, W."),
+    "coordinates": OutputSpec(
+        ("nq",),
+        "Coordinates of all joints, (nq,): those too that follow from others and are no states.",
+        needs="constraints",
+        forms=False,
+    ),
+    "velocities": OutputSpec(("nv",), "Their velocities, (nv,).", needs="constraints", forms=False),
+    "accelerations": OutputSpec(
+        ("nv",), "Their accelerations, (nv,).", needs="constraints", forms=False, contacts=True
+    ),
     "momentum": OutputSpec(
         (3,),
         "Linear momentum x, y (kg m/s), angular momentum about the world's origin (kg m^2/s).",

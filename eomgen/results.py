@@ -14,6 +14,7 @@ from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Outcome, Trajectory, save_csv, save_npz
 from eomgen.scene.schema import Simulation
 from eomgen.study.diagnosis import joint_limits, locks
+from eomgen.study.recording import FOLLOWING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -170,8 +171,13 @@ class Run:
         return tuple(locks(self.model, self.trajectory))
 
     def __getitem__(self, state: str) -> FloatArray:
-        """One state over time, (n,). Raises `KeyError` for an unknown name."""
+        """One state over time, (n,), or a coordinate or velocity that follows from the states.
+        Raises `KeyError` for an unknown name.
+        """
         state = identifier(state)
+        following = self.trajectory.saved.get(FOLLOWING)
+        if following and state in following.columns:
+            return following.values[:, following.columns.index(state)]
         if state not in self.states:
             raise KeyError(f"no state '{state}'; known: {', '.join(self.states)}")
         return self.y[:, self.states.index(state)]

@@ -80,7 +80,7 @@ COST = {
     "derivative": {"add": 3, "sub": 1, "mul": 10, "div": 1, "sin": 1, "cos": 1, "total": 17, "parameters": 18},
     "jacobian": {"add": 3, "sub": 4, "mul": 20, "div": 3, "sin": 1, "cos": 1, "total": 32, "parameters": 24},
     "input_jacobian": {"add": 1, "mul": 5, "div": 1, "sin": 1, "cos": 1, "total": 9, "parameters": 13},
-    "parameter_jacobian": {"add": 13, "sub": 7, "mul": 41, "div": 6, "neg": 2, "sin": 1, "cos": 1, "total": 71, "parameters": 64},
+    "parameter_jacobian": {"add": 13, "sub": 7, "mul": 40, "div": 6, "neg": 2, "sin": 1, "cos": 1, "total": 70, "parameters": 63},
     "forward_dynamics": {"add": 4, "sub": 3, "mul": 12, "div": 1, "sin": 1, "cos": 1, "total": 22, "parameters": 17},
     "inverse_dynamics": {"add": 3, "sub": 2, "mul": 9, "sin": 1, "cos": 1, "total": 16, "parameters": 6},
     "mass_matrix": {"mul": 1, "cos": 1, "total": 2, "parameters": 5},
@@ -111,87 +111,86 @@ def _fixed(m_cart, m_pole, I_pole, l, g):
     if not I_pole >= 0.0:
         return "inertia_com of pole is negative"
     l_squared = l * l
-    k45 = m_pole * l_squared
-    pivot_theta_dot = I_pole + k45
-    k46 = m_cart * I_pole
-    k47 = m_pole * I_pole
-    k48 = m_cart * k45
+    k44 = m_pole * l_squared
+    pivot_theta_dot = I_pole + k44
+    k45 = m_cart * I_pole
+    k46 = m_pole * I_pole
+    k47 = m_cart * k44
     m_pole_squared = m_pole * m_pole
     k1 = l_squared * m_pole_squared
-    k2 = k47 + (k46 + k48)
+    k2 = k46 + (k45 + k47)
     k3 = 1.0 / pivot_theta_dot
     k4 = m_pole * l
     k5 = g * k1 / pivot_theta_dot
-    k35 = g * k4
-    k34 = k35 / pivot_theta_dot
+    k34 = g * k4
+    k33 = k34 / pivot_theta_dot
     k6 = k4 / pivot_theta_dot
-    k7 = -k34
-    k8 = m_pole * k45
-    k36 = m_cart + m_pole
-    k9 = k48 + I_pole * k36
-    k49 = g * l_squared
-    k10 = m_pole_squared * k49 / pivot_theta_dot
+    k7 = -k33
+    k8 = m_pole * k44
+    k35 = m_cart + m_pole
+    k9 = k47 + I_pole * k35
+    k48 = g * l_squared
+    k10 = m_pole_squared * k48 / pivot_theta_dot
     k11 = 2.0 * (m_pole * (l * (k3 * k4)))
     k12 = k4 * 2.0
     k13 = -k6
-    k50 = m_cart * m_pole
-    k14 = k47 + (k46 + l_squared * k50)
-    k15 = pivot_theta_dot * k3
-    k51 = m_pole * 2.0
-    k16 = l_squared * k51
-    k17 = I_pole + m_cart * l_squared
-    k18 = l_squared * k3 / pivot_theta_dot
-    k19 = (k49 * k51 - l_squared * k10) / pivot_theta_dot
-    k20 = (l - l_squared * k6) / pivot_theta_dot
-    k21 = -(l * g - l_squared * k34) / pivot_theta_dot
-    k22 = k3 / pivot_theta_dot
-    k23 = k3 * k36
-    k24 = k10 / pivot_theta_dot
-    k25 = k34 / pivot_theta_dot
-    k26 = k6 / pivot_theta_dot
-    k52 = l * 2.0
-    k53 = m_pole * k52
-    k27 = k50 * k52
-    k28 = m_pole_squared * k52
-    k29 = k3 * k53 / pivot_theta_dot
-    k30 = (g * k28 - k10 * k53) / pivot_theta_dot
-    k54 = m_pole * g
-    k31 = (m_pole - k6 * k53) / pivot_theta_dot
-    k32 = -(k54 - k34 * k53) / pivot_theta_dot
-    k33 = k1 / pivot_theta_dot
-    k37 = -k4
-    k38 = l * k54
-    k39 = -k38
+    k49 = m_cart * m_pole
+    k14 = k46 + (k45 + l_squared * k49)
+    k50 = m_pole * 2.0
+    k15 = l_squared * k50
+    k16 = I_pole + m_cart * l_squared
+    k17 = l_squared * k3 / pivot_theta_dot
+    k18 = (k48 * k50 - l_squared * k10) / pivot_theta_dot
+    k19 = (l - l_squared * k6) / pivot_theta_dot
+    k20 = -(l * g - l_squared * k33) / pivot_theta_dot
+    k21 = k3 / pivot_theta_dot
+    k22 = k3 * k35
+    k23 = k10 / pivot_theta_dot
+    k24 = k33 / pivot_theta_dot
+    k25 = k6 / pivot_theta_dot
+    k51 = l * 2.0
+    k52 = m_pole * k51
+    k26 = k49 * k51
+    k27 = m_pole_squared * k51
+    k28 = k3 * k52 / pivot_theta_dot
+    k29 = (g * k27 - k10 * k52) / pivot_theta_dot
+    k53 = m_pole * g
+    k30 = (m_pole - k6 * k52) / pivot_theta_dot
+    k31 = -(k53 - k33 * k52) / pivot_theta_dot
+    k32 = k1 / pivot_theta_dot
+    k36 = -k4
+    k37 = l * k53
+    k38 = -k37
     inertia_pole_zz = I_pole + l * k4
-    k40 = -m_cart
-    k41 = -m_cart * g
-    k42 = -l
-    k43 = l + l
-    k44 = -k43
+    k39 = -m_cart
+    k40 = -m_cart * g
+    k41 = -l
+    k42 = l + l
+    k43 = -k42
     return {
         "initial_state": (),
         "derivative": (k1, k2, k3, k4, k5, k6, k7),
         "jacobian": (k3, k4, k6, k7, k8, k9, k10, k11, k12, k13),
         "input_jacobian": (k2, k3, k8, k13),
-        "parameter_jacobian": (m_pole, l, k1, k3, k4, k6, k10, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33),
-        "forward_dynamics": (k1, k2, k3, k4, k5, k34, k6),
-        "inverse_dynamics": (pivot_theta_dot, k4, k35, k36),
-        "mass_matrix": (pivot_theta_dot, k4, k36),
-        "velocity_force": (k37,),
-        "gravity_force": (k38,),
+        "parameter_jacobian": (m_pole, l, k1, k3, k4, k6, k10, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32),
+        "forward_dynamics": (k1, k2, k3, k4, k5, k33, k6),
+        "inverse_dynamics": (pivot_theta_dot, k4, k34, k35),
+        "mass_matrix": (pivot_theta_dot, k4, k35),
+        "velocity_force": (k36,),
+        "gravity_force": (k37,),
         "bias_force": (g, k4),
         "applied_force": (),
         "kinetic_energy": (m_cart, m_pole, I_pole, l),
-        "potential_energy": (k39,),
-        "effect_powers": (k39,),
+        "potential_energy": (k38,),
+        "effect_powers": (k38,),
         "momentum": (m_cart, m_pole, k4, inertia_pole_zz),
-        "centre_of_mass": (m_cart, m_pole, l, k36, k37),
-        "joint_forces": (m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k34, k6, k40, k41),
-        "body_poses": (l, k42),
+        "centre_of_mass": (m_cart, m_pole, l, k35, k36),
+        "joint_forces": (m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k33, k6, k39, k40),
+        "body_poses": (l, k41),
         "body_velocities": (l,),
-        "point_positions": (k43, k44),
-        "point_velocities": (k43,),
-        "point_jacobians": (k43,),
+        "point_positions": (k42, k43),
+        "point_velocities": (k42,),
+        "point_jacobians": (k42,),
     }
 
 
@@ -297,8 +296,8 @@ def _input_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 
 def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
-    """71 operations: 13 add, 7 sub, 41 mul, 6 div, 2 neg, 1 sin, 1 cos."""
-    m_pole, l, k1, k3, k4, k6, k10, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32, k33 = k
+    """70 operations: 13 add, 7 sub, 40 mul, 6 div, 2 neg, 1 sin, 1 cos."""
+    m_pole, l, k1, k3, k4, k6, k10, k13, k14, k15, k16, k17, k18, k19, k20, k21, k22, k23, k24, k25, k26, k27, k28, k29, k30, k31, k32 = k
     _, theta, _, theta_dot = y
     push, = u
     sin_theta = sin(theta)
@@ -309,15 +308,15 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
     pivot_x_dot_2 = s7 * k3
     x_ddot_2 = (push + sin_theta * (theta_dot_squared * k4 + cos_theta * k10)) / pivot_x_dot_2
     s8 = cos_theta * x_ddot_2
-    s9 = x_ddot_2 * k15 / pivot_x_dot_2
+    s9 = x_ddot_2 / pivot_x_dot_2
     s10 = cos_theta * k6
-    s11 = sin_theta * (l * theta_dot_squared + cos_theta * k19) - x_ddot_2 * (k3 * (s6 * k16 + k17) - s7 * k18)
+    s11 = sin_theta * (l * theta_dot_squared + cos_theta * k18) - x_ddot_2 * (k3 * (s6 * k15 + k16) - s7 * k17)
     s12 = s11 / pivot_x_dot_2
     s13 = sin_theta * cos_theta
-    s14 = (k24 * s13 + x_ddot_2 * (k23 - s7 * k22)) / pivot_x_dot_2
-    s15 = sin_theta * (m_pole * theta_dot_squared + cos_theta * k30) - x_ddot_2 * (k3 * (k27 + s6 * k28) - s7 * k29)
+    s14 = (k23 * s13 + x_ddot_2 * (k22 - s7 * k21)) / pivot_x_dot_2
+    s15 = sin_theta * (m_pole * theta_dot_squared + cos_theta * k29) - x_ddot_2 * (k3 * (k26 + s6 * k27) - s7 * k28)
     s16 = s15 / pivot_x_dot_2
-    s17 = s13 * k33 / pivot_x_dot_2
+    s17 = s13 * k32 / pivot_x_dot_2
     return (
         0.0,
         0.0,
@@ -335,16 +334,16 @@ def _parameter_jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
         s16,
         s17,
         s9 * s10,
-        sin_theta * k21 - (s8 * k20 + s10 * s12),
-        sin_theta * k25 + (s8 * k26 + s10 * s14),
-        sin_theta * k32 - (s8 * k31 + s10 * s16),
+        sin_theta * k20 - (s8 * k19 + s10 * s12),
+        sin_theta * k24 + (s8 * k25 + s10 * s14),
+        sin_theta * k31 - (s8 * k30 + s10 * s16),
         k13 * (sin_theta + cos_theta * s17),
     )
 
 
 def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """22 operations: 4 add, 3 sub, 12 mul, 1 div, 1 sin, 1 cos."""
-    k1, k2, k3, k4, k5, k34, k6 = k
+    k1, k2, k3, k4, k5, k33, k6 = k
     _, theta, _, theta_dot = y
     push, = u
     tau__x_dot, tau__theta_dot = extra
@@ -355,32 +354,32 @@ def _forward_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     x_ddot_3 = (s18 - tau__theta_dot * s10) / ((sin_theta * sin_theta * k1 + k2) * k3)
     return (
         x_ddot_3,
-        k3 * tau__theta_dot - sin_theta * k34 - s10 * x_ddot_3,
+        k3 * tau__theta_dot - sin_theta * k33 - s10 * x_ddot_3,
     )
 
 
 def _inverse_dynamics(y, k, u=(), extra=(), sin=sin, cos=cos):
     """16 operations: 3 add, 2 sub, 9 mul, 1 sin, 1 cos."""
-    pivot_theta_dot, k4, k35, k36 = k
+    pivot_theta_dot, k4, k34, k35 = k
     _, theta, _, theta_dot = y
     push, = u
     vd__x_dot, vd__theta_dot = extra
     sin_theta = sin(theta)
     cos_theta = cos(theta)
-    s19 = k36 * vd__x_dot + k4 * (cos_theta * vd__theta_dot - sin_theta * (theta_dot * theta_dot))
+    s19 = k35 * vd__x_dot + k4 * (cos_theta * vd__theta_dot - sin_theta * (theta_dot * theta_dot))
     return (
         s19 - push,
-        k4 * (cos_theta * vd__x_dot) + (pivot_theta_dot * vd__theta_dot + sin_theta * k35),
+        k4 * (cos_theta * vd__x_dot) + (pivot_theta_dot * vd__theta_dot + sin_theta * k34),
     )
 
 
 def _mass_matrix(y, k, u=(), extra=(), cos=cos):
     """2 operations: 1 mul, 1 cos."""
-    pivot_theta_dot, k4, k36 = k
+    pivot_theta_dot, k4, k35 = k
     _, theta, _, _ = y
     s20 = k4 * cos(theta)
     return (
-        k36,
+        k35,
         s20,
         s20,
         pivot_theta_dot,
@@ -389,21 +388,21 @@ def _mass_matrix(y, k, u=(), extra=(), cos=cos):
 
 def _velocity_force(y, k, u=(), extra=(), sin=sin):
     """4 operations: 3 mul, 1 sin."""
-    k37, = k
+    k36, = k
     _, theta, _, theta_dot = y
     return (
-        k37 * (theta_dot * (theta_dot * sin(theta))),
+        k36 * (theta_dot * (theta_dot * sin(theta))),
         0.0,
     )
 
 
 def _gravity_force(y, k, u=(), extra=(), sin=sin):
     """2 operations: 1 mul, 1 sin."""
-    k38, = k
+    k37, = k
     _, theta, _, _ = y
     return (
         0.0,
-        sin(theta) * k38,
+        sin(theta) * k37,
     )
 
 
@@ -442,20 +441,20 @@ def _kinetic_energy(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _potential_energy(y, k, u=(), extra=(), cos=cos):
     """2 operations: 1 mul, 1 cos."""
-    k39, = k
+    k38, = k
     _, theta, _, _ = y
     return (
-        cos(theta) * k39,
+        cos(theta) * k38,
     )
 
 
 def _effect_powers(y, k, u=(), extra=(), sin=sin):
     """4 operations: 3 mul, 1 sin."""
-    k39, = k
+    k38, = k
     _, theta, x_dot, theta_dot = y
     push, = u
     return (
-        k39 * (theta_dot * sin(theta)),
+        k38 * (theta_dot * sin(theta)),
         x_dot * push,
     )
 
@@ -475,17 +474,17 @@ def _momentum(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _centre_of_mass(y, k, u=(), extra=(), sin=sin, cos=cos):
     """10 operations: 2 add, 4 mul, 2 div, 1 sin, 1 cos."""
-    m_cart, m_pole, l, k36, k37 = k
+    m_cart, m_pole, l, k35, k36 = k
     x, theta, _, _ = y
     return (
-        (m_cart * x + m_pole * (x + l * sin(theta))) / k36,
-        cos(theta) * k37 / k36,
+        (m_cart * x + m_pole * (x + l * sin(theta))) / k35,
+        cos(theta) * k36 / k35,
     )
 
 
 def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     """41 operations: 8 add, 6 sub, 22 mul, 1 div, 2 neg, 1 sin, 1 cos."""
-    m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k34, k6, k40, k41 = k
+    m_pole, I_pole, l, g, k1, k2, k3, k4, k5, k33, k6, k39, k40 = k
     x, theta, _, theta_dot = y
     push, = u
     sin_theta = sin(theta)
@@ -493,14 +492,14 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
     cos_theta = cos(theta)
     x_ddot = (push + sin_theta * (theta_dot_squared * k4 + cos_theta * k5)) / ((sin_theta * sin_theta * k1 + k2) * k3)
     s27 = l * sin_theta
-    s28 = sin_theta * k34 + k6 * (cos_theta * x_ddot)
+    s28 = sin_theta * k33 + k6 * (cos_theta * x_ddot)
     s29 = l * cos_theta
     s30 = m_pole * (x_ddot - (theta_dot_squared * s27 + s28 * s29))
     s31 = m_pole * (g + (theta_dot_squared * s29 - s28 * s27))
     s32 = I_pole * s28 - (s31 * (x + s27 - x) + s29 * s30)
     return (
-        k40 * x_ddot - s30,
-        k41 - s31,
+        k39 * x_ddot - s30,
+        k40 - s31,
         s32,
         -s30,
         -s31,
@@ -510,14 +509,14 @@ def _joint_forces(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _body_poses(y, k, u=(), extra=(), sin=sin, cos=cos):
     """5 operations: 1 add, 2 mul, 1 sin, 1 cos."""
-    l, k42 = k
+    l, k41 = k
     x, theta, _, _ = y
     return (
         x,
         0.0,
         0.0,
         x + l * sin(theta),
-        k42 * cos(theta),
+        k41 * cos(theta),
         theta,
     )
 
@@ -539,19 +538,19 @@ def _body_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _point_positions(y, k, u=(), extra=(), sin=sin, cos=cos):
     """5 operations: 1 add, 2 mul, 1 sin, 1 cos."""
-    k43, k44 = k
+    k42, k43 = k
     x, theta, _, _ = y
     return (
-        x + sin(theta) * k43,
-        cos(theta) * k44,
+        x + sin(theta) * k42,
+        cos(theta) * k43,
     )
 
 
 def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
     """6 operations: 1 add, 3 mul, 1 sin, 1 cos."""
-    k43, = k
+    k42, = k
     _, theta, x_dot, theta_dot = y
-    s33 = theta_dot * k43
+    s33 = theta_dot * k42
     return (
         x_dot + cos(theta) * s33,
         sin(theta) * s33,
@@ -560,13 +559,13 @@ def _point_velocities(y, k, u=(), extra=(), sin=sin, cos=cos):
 
 def _point_jacobians(y, k, u=(), extra=(), sin=sin, cos=cos):
     """6 operations: 1 add, 1 sub, 2 mul, 1 sin, 1 cos."""
-    k43, = k
+    k42, = k
     x, theta, _, _ = y
     return (
         1.0,
-        cos(theta) * k43,
+        cos(theta) * k42,
         0.0,
-        x + sin(theta) * k43 - x,
+        x + sin(theta) * k42 - x,
     )
 
 

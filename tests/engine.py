@@ -109,7 +109,7 @@ def engine(
     scene: str, route: str = "", *, leave_out: tuple[str, ...] = (), tangents: bool = False
 ) -> Engine:
     """Compile a scene, once, with all outputs but some, by a route or by its own; a text that names
-    none by `aba`, without judging the others.
+    none by `aba`, without judging the others, and its loops by projection unless it says otherwise.
 
     Without "jacobian" and what else is in `DERIVATIVES`, most of the work is left out. `tangents`:
     as large models have it, no matrix of derivatives is written out.
@@ -130,6 +130,8 @@ def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) 
     if not route and model.route == "auto" and model.form == "velocity":
         route = "auto" if scene in built_in_names() else "aba"
     model = replace(model, outputs=outputs, route=route or model.route)
+    if model.closing == "auto" and scene not in built_in_names():
+        model = replace(model, closing="projected")
     with pytest.MonkeyPatch.context() as patch:
         if tangents:
             patch.setattr(jacobians, "LARGEST_JACOBIAN", -1)

@@ -41,6 +41,7 @@ FLOORS = (
     "precision",
     "linear",
     "study.closing",
+    "study.whole",
     "study.diagnosis",
     "study.timing",
     "study.accuracy",

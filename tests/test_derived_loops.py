@@ -25,6 +25,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.study.whole import viewed
 
 MIXED = """
 name = "mixed"
@@ -202,7 +203,8 @@ def eliminated(
 def test_matrices_with_multipliers_against_the_module(scene: str) -> None:
     """M v̇ + V + G = F, where F contains the forces of the constraints, and v̇ by the closed form."""
     found, model = eomgen.derive(scene), model_of(scene)
-    module: Any = eomgen.load(eomgen.generate(scene, outputs=["constraint_forces"]))
+    generated = eomgen.load(eomgen.generate(scene, outputs=["constraint_forces"]))
+    module = viewed(generated, model)
     matrices = found.exposition.matrices
     assert matrices is not None
     for seed in range(3):

@@ -24,11 +24,12 @@ def four_bar(
     initial: str = "q = { theta = 0.3 }",
     effects: str = "",
     route: str = "auto",
+    loops: str = "projected",
 ) -> str:
     """A four-bar of uniform rods under gravity."""
     bars = [("crank", 1.0, "a"), ("coupler", 2.0, "b"), ("rocker", 1.5, "c")]
     named = zip("abcd", lengths, strict=True)
-    text = f'name = "four_bar"\nroute = "{route}"\n[parameters]\n'
+    text = f'name = "four_bar"\nroute = "{route}"\nloops = "{loops}"\n[parameters]\n'
     text += "".join(f'{name} = {{ value = {x}, unit = "m" }}\n' for name, x in named)
     for name, mass, length in bars:
         text += f'[[bodies]]\nname = "{name}"\nmass = {mass}\n'

@@ -80,10 +80,11 @@ def linearise(
 def linearisable(model: Model) -> Model:
     """A model in form 'velocity' with the outputs that its linearisation needs.
 
-    In the other forms the initial state depends on the parameters.
+    In the other forms the initial state depends on the parameters. All coordinates are states: an
+    equilibrium may be where those taken as independent are not.
     """
     needed = ("input_jacobian",) if model.inputs else ()
-    return replace(model, form="velocity", outputs=needed)
+    return replace(model, form="velocity", outputs=needed, closing="projected")
 
 
 def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Linearised:

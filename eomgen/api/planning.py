@@ -14,7 +14,7 @@ from eomgen.model.elaborate import available_in, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.results import Run
 from eomgen.run.inputs import InputsOfTime
-from eomgen.scene.schema import SHOWN, Scene
+from eomgen.scene.schema import SHOWN, Closing, Scene
 from eomgen.study.recording import GROUPS, SAVED
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def plan_run(
     needed = (*model.outputs, *SHOWN, *saved, *more)
     return Plan(
         scene,
-        replace(model, outputs=in_order(needed)),
+        replace(model, outputs=in_order(needed), closing=_closing(setting, model)),
         setting,
         scene.simulation.t_end if t_end is None else t_end,
         parameters,
@@ -187,6 +187,13 @@ def _check_aims(
             f"{reporter.argument('resume')}: continues with a given method; leave out "
             f"{reporter.argument('accuracy')} and {reporter.argument('budget')}"
         )
+
+
+def _closing(setting: "Setting | None", model: Model) -> Closing:
+    """How loops are closed: `leapfrog` is RATTLE on all coordinates."""
+    if setting and setting.integrator == "leapfrog" and model.closing == "auto":
+        return "projected"
+    return model.closing
 
 
 def _of_method(setting: "Setting | None", model: Model) -> tuple[str, ...]:

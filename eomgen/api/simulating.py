@@ -23,6 +23,7 @@ from eomgen.scene.schema import Form, Route
 from eomgen.study.diagnosis import problem_of
 from eomgen.study.observed import setup_of
 from eomgen.study.recording import recorded, unknown_forces
+from eomgen.study.whole import whole_of
 
 if TYPE_CHECKING:
     from eomgen.native.accelerator import Accelerator
@@ -234,7 +235,8 @@ def _problem(
                 lambda y: initial_with(model, y, plan.state, reporter, values[0]),
             )
         problem = replace(problem, origin=origin_from(problem.origin, problem.initial))
-        q, v, x = split(model, problem.initial)
+        whole = whole_of(module, model, 0.0, problem.initial, *values)
+        q, v, x = split(model, whole)
         states = (
             replace(state, initial=value) for state, value in zip(model.states, x, strict=True)
         )

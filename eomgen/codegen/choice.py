@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from eomgen.codegen.derive import Derived, derive, record
 from eomgen.derivation.supported import why_not_closed, why_not_tried
+from eomgen.dynamics.assur import with_closed_form
 from eomgen.dynamics.closed_positions import with_safe_pivots
 from eomgen.dynamics.digits import ALL, Route, digits_lost
 from eomgen.dynamics.mechanism_state import Values
@@ -29,6 +30,8 @@ MOST_DENSE = 12
 """Rows of constraints beyond which only the route whose cost grows linearly with them is tried."""
 FEWEST = 6
 """Smallest number of correct digits of v̇; a scene that would have fewer is refused."""
+DERIVATIVES_A_STEP = 4
+"""The derivatives of a step for which loops in closed form and projections are compared."""
 MOST_FACTORING = 20_000
 """Operations of factoring M from which on `ldl` is not derived for comparison only."""
 
@@ -84,8 +87,56 @@ def choose(model: Model, *, closed: bool = True) -> Choice:
     """
     if model.constraints:
         if model.route not in ("auto", "embedded"):
-            return _only(model, model.route, "named")
-        model = with_safe_pivots(model)
+            return _only(with_closed_form(model), model.route, "named")
+        made = with_closed_form(model)
+        if made.groups and model.route == "auto":
+            return _of_loops(made, model, closed)
+        model = made if made.groups else with_safe_pivots(model)
+    return _chosen(model, closed)
+
+
+def _of_loops(model: Model, other: Model, closed: bool) -> Choice:
+    """The choice between a model with loops in closed form and the `other` with a state of all
+    coordinates and projection: the one whose steps take fewer operations, unless it loses digits or
+    the scene names the other.
+    """
+    in_closed_form = _chosen(model, closed)
+    if model.closing == "closed":
+        return in_closed_form
+    projected = _chosen(with_safe_pivots(other), closed)
+    steps = [_of_step(choice) for choice in (in_closed_form, projected)]
+    loses = in_closed_form.digits is not None and projected.digits is None
+    counts = f"{steps[0]} operations a step, by projection {steps[1]}"
+    if steps[0] > steps[1] or loses:
+        why = "would lose digits" if loses else counts
+        beside = Candidate("closed form", _derivative(in_closed_form), f"of loops: {why}")
+        return replace(projected, candidates=(*projected.candidates, beside))
+    words = f"loops by projection; in closed form {counts}"
+    beside = Candidate("projection", _derivative(projected), words)
+    return replace(in_closed_form, candidates=(*in_closed_form.candidates, beside))
+
+
+def _derivative(choice: Choice) -> int:
+    assert choice.derived.alone is not None
+    return _operations(choice.derived.alone)
+
+
+def _of_step(choice: Choice) -> int:
+    """The operations of a step as of Runge and Kutta: four derivatives, and of a projection two
+    steps of Newton's method and the velocities.
+    """
+    count = DERIVATIVES_A_STEP * _derivative(choice)
+    program = record(choice.derived, jacobian=False).program
+    if "project_position" not in program.outputs:
+        return count
+    names = {"constraint_residuals": 3, "project_position": 2, "project_velocity": 1}
+    outputs = {name: program.outputs[name] for name in names}
+    alone = optimise(replace(program, outputs=outputs, checks=()))
+    return count + sum(times * cost(alone, name)["total"] for name, times in names.items())
+
+
+def _chosen(model: Model, closed: bool) -> Choice:
+    """The choice among routes."""
     if model.route != "auto":
         return _only(model, model.route, "named")
     if model.form != "velocity":
@@ -242,9 +293,10 @@ def _accepted(candidates: Sequence[Candidate]) -> list[Candidate]:
 
 def _route(model: Model, attempt: _Attempt) -> Route:
     """A route as `digits_lost` takes it: a function that computes v̇ at one state or several."""
-    run = interpreter(attempt.alone, "derivative", ArrayScalars())
+    every = attempt.derived.every
+    run = interpreter(every or attempt.alone, "derivative", ArrayScalars())
     names = [c.name for c in (*model.coordinates, *model.velocities)]
-    first = len(model.coordinates)
+    first = 0 if every else len(model.coordinates)
 
     def accelerations(values: Values) -> Sequence[float]:
         given = {**values.parameters, **values.inputs, **values.states, TIME: 0.0}

@@ -12,16 +12,16 @@ LARGEST_JACOBIAN = 2000
 
 
 def constraint_outputs(record: Recording) -> OutputNodes:
-    """What a run needs to keep the constraints."""
-    d = record.dynamics
-    held = d.constrained(record.route)
+    """What a run needs to keep the constraints; where they are kept in closed form, how well."""
+    d, groups = record.dynamics, record.model.groups
+    held = d.constrained("independent" if groups else record.route)
     nodes = {
         "constraint_residuals": constraints.residuals(d),
         "constraint_rates": constraints.rates(d),
-        "project_position": held.position(),
-        "project_velocity": held.velocity(),
-        "constraint_margins": held.margins(),
     }
+    if not groups:
+        nodes |= {"project_position": held.position(), "project_velocity": held.velocity()}
+    nodes["constraint_margins"] = [*held.margins(), *record.ranges.values()]
     found: OutputNodes = {name: ((len(part),), part) for name, part in nodes.items()}
     shape = len(record.model.rows), d.nv
     if shape[0] * shape[1] <= LARGEST_JACOBIAN:

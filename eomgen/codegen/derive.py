@@ -22,6 +22,7 @@ class Derived:
 
     recorder  makes the system of all outputs, with or without the Jacobian; see `record`
     alone     the optimised program of the derivative and nothing else; None for a symbolic route
+    every     of a model with groups, a program of all accelerations
     axes      the axes in which the recursion works; None for a symbolic route
     """
 
@@ -29,6 +30,7 @@ class Derived:
     recorder: Callable[..., System]
     alone: Program | None = None
     axes: Axes | None = None
+    every: Program | None = None
 
 
 def derive(model: Model, route: str) -> Derived:
@@ -98,8 +100,12 @@ def _recursive(model: Model, route: str, axes: Axes | None) -> Derived:
     nodes = tuple(node.index for node in recording.rates)
     outputs = {"derivative": Output((len(nodes),), nodes)}
     alone = optimise(finish(recording.tape, outputs, ()))
+    every = None
+    if model.groups:
+        found = tuple(node.index for node in recording.closed(recording.vd))
+        every = finish(recording.tape, {"derivative": Output((len(found),), found)}, ())
     recorder = partial(from_recursion, recording)
-    return Derived(route, recorder, alone, recording.dynamics.axes)
+    return Derived(route, recorder, alone, recording.dynamics.axes, every)
 
 
 def _operations(derived: Derived) -> int:

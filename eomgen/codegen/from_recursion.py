@@ -23,7 +23,7 @@ from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.reactions import reactions
 from eomgen.dynamics.vectors import Vec, in_space, zeros
 from eomgen.model.model import is_zero
-from eomgen.model.states import velocity_states
+from eomgen.model.states import initial_state, velocity_states
 from eomgen.outputs import DERIVATIVES
 from eomgen.program import differentiate
 from eomgen.program.program import Check
@@ -33,22 +33,24 @@ from eomgen.program.tape import Node
 def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
     """The system of a recorded model, with or without the Jacobian of the derivative."""
     model, tape, ny = record.model, record.tape, len(record.rates)
-    extra_states = (x.initial for x in model.states)
-    start = [tape.constant(x) for x in (*model.initial_q, *model.initial_v, *extra_states)]
+    start = [tape.constant(x) for x in initial_state(model)]
     nodes: OutputNodes = {"initial_state": ((ny,), start), "derivative": ((ny,), record.rates)}
     derivatives = matrices(record, with_jacobian=jacobian)
     nodes |= derivatives.nodes
     extra = dict(derivatives.extra)
-    for name in model.outputs:
+    following = ("coordinates", "velocities", "accelerations") if model.groups else ()
+    for name in dict.fromkeys((*model.outputs, *following)):
         if name not in DERIVATIVES:
-            nodes[name] = output(record, name, extra)
+            shape, found = output(record, name, extra)
+            nodes[name] = shape, record.closed(found)
     if record.dynamics.contacts:
         more, more_extra = contact_outputs(
             record.dynamics, tape, record.route, record.forward, record.position_rates
         )
         nodes, extra = nodes | more, extra | more_extra
     if model.constraints:
-        nodes |= constraint_outputs(record)
+        parts = constraint_outputs(record)
+        nodes |= {name: (shape, record.closed(part)) for name, (shape, part) in parts.items()}
     return recorded(
         model,
         record.route,
@@ -187,6 +189,9 @@ OF_DYNAMICS: Mapping[str, Callable[[Dynamics], list[Node]]] = {
 }
 """Outputs that are results of `Dynamics`."""
 OBSERVED: Mapping[str, Callable[[Recording], list[Node]]] = {
+    "coordinates": lambda record: list(record.q),
+    "velocities": lambda record: list(record.v),
+    "accelerations": lambda record: list(record.vd),
     "mass_matrix": _mass_matrix,
     "kinetic_slopes": _kinetic_slopes,
     "effect_powers": _powers,

@@ -8,6 +8,7 @@ from eomgen.codegen.system import ContactLabel, System
 from eomgen.language.conditions import Condition, is_of_size
 from eomgen.language.formula import written
 from eomgen.model.model import Model, Prescribed
+from eomgen.model.states import velocity_states
 from eomgen.outputs import DERIVATIVES, JACOBIAN, OUTPUTS
 
 ABOUT = {
@@ -19,7 +20,7 @@ ABOUT = {
     "constraint_residuals": "Each of `CONSTRAINTS`: how far it is from being met, m or rad.",
     "constraint_rates": "Rate of each of `CONSTRAINTS`, m/s or rad/s.",
     "constraint_jacobian": "Derivatives of `constraint_rates` by the velocities, (nc, nv).",
-    "constraint_margins": "How far each of `CONSTRAINTS` is from following from others.",
+    "constraint_margins": "How far each of `CONSTRAINTS` is from following from others{}.",
     "project_position": "Coordinates (nq,) after one Newton step towards the constraints.",
     "project_velocity": "Velocities (nv,) that meet the constraints, the nearest.",
     "switching_functions": "`derivative` changes its branch where one of these passes 0.",
@@ -80,6 +81,7 @@ class Interface:
     form            of the state: 'velocity', 'momentum', 'redundant'
     coordinates     number of coordinates in the state; `velocities` and `others`, the extra states,
                     are the numbers of those that follow
+    forces          number of generalised forces: of velocities, those too that follow from others
     conditions      conditions on parameter values that the program's own checks do not cover
     functions       the program's outputs
     quaternions     indices of each unit quaternion in the state
@@ -88,6 +90,9 @@ class Interface:
     driven, locked  prescribed coordinates
     contacts        rigid contacts
     constraints     name and unit of the multiplier of each row of the constraints
+    following       name, unit and description of each coordinate and velocity that follows from
+                    others in closed form
+    ranged          names of angles among these, each within one turn
     left_out        terms that the scene leaves out of the equations, one line each
     """
 
@@ -99,6 +104,7 @@ class Interface:
     coordinates: int
     velocities: int
     others: int
+    forces: int
     inputs: tuple[Variable, ...]
     parameters: tuple[Variable, ...]
     conditions: tuple[Condition, ...]
@@ -112,6 +118,8 @@ class Interface:
     locked: tuple[Given, ...]
     contacts: tuple[ContactLabel, ...]
     constraints: tuple[tuple[str, str], ...]
+    following: tuple[tuple[str, str, str], ...]
+    ranged: tuple[str, ...]
     left_out: tuple[str, ...]
 
 
@@ -128,14 +136,15 @@ def interface_of(system: System) -> Interface:
         form=model.form,
         dimensions=model.dimensions,
         states=tuple(Variable(s.name, s.unit, s.about, position=s.position) for s in system.states),
-        coordinates=len(model.coordinates),
-        velocities=len(model.velocities),
+        coordinates=len(model.state_coordinates),
+        velocities=len(model.state_velocities),
         others=len(model.states),
+        forces=len(model.velocities),
         inputs=tuple(Variable(i.name, i.unit, i.about, i.default) for i in model.inputs),
         parameters=tuple(Variable(p.name, p.unit, p.about, p.default) for p in model.parameters),
         conditions=tuple(dict.fromkeys(_conditions(model))),
         functions=tuple(_function(system, name) for name in system.program.outputs),
-        quaternions=tuple(model.quaternions) if model.form == "velocity" else (),
+        quaternions=_quaternions(model) if model.form == "velocity" else (),
         effects=tuple((effect.name, effect.type) for effect in model.effects),
         bodies=tuple(body.name for body in model.bodies),
         joints=model.force_joints,
@@ -144,12 +153,28 @@ def interface_of(system: System) -> Interface:
         locked=tuple(_given(c) for c in model.prescribed if c.locked),
         contacts=system.contacts,
         constraints=model.rows,
+        following=_following(model),
+        ranged=model.ranged,
         left_out=tuple(left_out),
     )
 
 
+def _following(model: Model) -> tuple[tuple[str, str, str], ...]:
+    """Coordinates and velocities that are no states."""
+    own = {s.name for s in velocity_states(model)}
+    every = (*model.coordinates, *model.velocities) if model.groups else ()
+    return tuple((c.name, c.unit, c.about) for c in every if c.name not in own)
+
+
+def _quaternions(model: Model) -> tuple[tuple[int, int, int, int], ...]:
+    """The indices in the state of each unit quaternion."""
+    place = {i: n for n, i in enumerate(model.state_coordinates)}
+    return tuple((place[w], place[x], place[y], place[z]) for w, x, y, z in model.quaternions)
+
+
 def _function(system: System, name: str) -> Function:
-    about = ABOUT.get(name, "")
+    jumps = ", and each of `RANGED` from where it jumps by a turn" if system.model.ranged else ""
+    about = ABOUT.get(name, "").replace("{}", jumps)
     if name in OUTPUTS:
         about = OUTPUTS[name].of(system.model.dimensions)[1]
     # Forces of rigid contacts are known only during a simulation.

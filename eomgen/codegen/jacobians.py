@@ -51,7 +51,7 @@ def matrices(record: Recording, *, with_jacobian: bool) -> Matrices:
 def _variables(record: Recording, name: str) -> list[Node]:
     """The variables of a matrix of derivatives: state, inputs or parameters."""
     return {
-        "jacobian": [*record.q, *record.v, *record.x],
+        "jacobian": record.state,
         "input_jacobian": list(record.inputs.values()),
         "parameter_jacobian": list(record.parameters.values()),
     }[name]

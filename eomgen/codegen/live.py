@@ -43,7 +43,7 @@ def live_system(model: Model, geometry: Sequence[Formula] = ()) -> LiveSystem:
     loads, nodes = _loads(record)
     names = {**record.parameters, TIME: record.dynamics.values.time}
     formulas = [evaluate(formula, names, record.scalars) for formula in geometry]
-    more = {"loads": nodes, "geometry": formulas}
+    more = {"loads": record.closed(nodes), "geometry": record.closed(formulas)}
     outputs = {
         **system.program.outputs,
         **{name: Output((len(part),), tuple(n.index for n in part)) for name, part in more.items()},

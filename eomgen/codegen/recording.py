@@ -1,7 +1,9 @@
 """Recording of a model's dynamics on a tape, up to the derivative of the state."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
+from eomgen.codegen.following import Following, positions
 from eomgen.dynamics.constraints import position_rates
 from eomgen.dynamics.dynamics import Forward, Values
 from eomgen.dynamics.kinematics import Axes
@@ -22,7 +24,9 @@ class Recording:
     dynamics        the recursions over these nodes
     forward         forward dynamics: v̇ under generalised forces beside the effects
     vd              v̇ under the effects alone
-    position_rates  q̇; `rates` is the derivative of the whole state, [q̇, v̇, ẋ]
+    position_rates  q̇
+    state           inputs of the state: coordinates and velocities that do not follow from others
+                    in closed form, and extra states; `rates` is its derivative
     """
 
     def __init__(
@@ -57,7 +61,34 @@ class Recording:
         self.forward = self.dynamics.forward(route) if forward is None else forward(self)
         self.vd = self.dynamics.vd = self.forward(None)
         self.position_rates = position_rates(self.dynamics)
-        self.rates = [*self.position_rates, *self.vd, *self.dynamics.state_rates]
+        self._following = self._followed() if model.groups else None
+        q, v = model.state_coordinates, model.state_velocities
+        self.state = [*(self.q[i] for i in q), *(self.v[j] for j in v), *self.x]
+        rates = [*(self.position_rates[i] for i in q), *(self.vd[j] for j in v)]
+        self.rates = self.closed([*rates, *self.dynamics.state_rates])
+
+    def closed(self, nodes: Sequence[Node]) -> list[Node]:
+        """Nodes as functions of the state: without coordinates and velocities that follow."""
+        return self._following.of(nodes) if self._following else list(nodes)
+
+    @property
+    def ranges(self) -> dict[str, Node]:
+        """Of angles that follow, by name, how far each is from where it jumps, 1 to 0."""
+        return self._following.margins if self._following else {}
+
+    def _followed(self) -> Following:
+        """Coordinates and velocities that follow from others."""
+        following, d = positions(self.dynamics, self.q, self.tape), self.dynamics
+        free, still = set(self.model.state_velocities), self.scalars.number(0.0)
+        v = [node if j in free else still for j, node in enumerate(self.v)]
+        moving = type(d)(self.model, replace(d.values, v=v), self.scalars, d.axes)
+        held = moving.by_independent_velocities
+        along = held.carried_along() if self.route == "independent" else held.velocity()
+        for j, value in enumerate(along):
+            if j not in free:
+                following.put(self.v[j], value)
+                following.inputs.add(self.v[j].index)
+        return following
 
     def input(self, name: str, stage: Stage) -> Node:
         """An input of the program."""

@@ -3,6 +3,7 @@
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import takewhile
 
 import numpy as np
 
@@ -36,6 +37,17 @@ def regular_positions(model: Model) -> tuple[Array, ...]:
     """The same without those near singular positions, where any elimination loses digits."""
     found = [part for walk in range(WALKS) for part in _walk(model, walk)]
     return tuple(q for q, matrix in found if _regularity(matrix) >= REGULAR)
+
+
+def reached_positions(model: Model) -> tuple[Array, ...]:
+    """The closed positions from the assembled one to the first singular one, where a run ends, in
+    each walk.
+    """
+    return tuple(q for walk in range(WALKS) for q, _ in _reached(model, walk))
+
+
+def _reached(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
+    return takewhile(lambda part: _regularity(part[1]) >= REGULAR, _walk(model, walk))
 
 
 def _regularity(matrix: Array) -> float:
@@ -78,17 +90,18 @@ def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
 
 def with_safe_pivots(model: Model) -> Model:
     """The model with only those `pivots` whose dependent velocities follow from the others, with
-    large pivots, in all closed positions; all pivots of a cluster or none. None where something is
-    driven: the walks know the positions at t = 0 only.
+    large pivots, in all closed positions up to the first singular ones, where a run ends; all
+    pivots of a cluster or none. None where something is driven: the walks know the positions at
+    t = 0 only.
     """
     closure = Closure.of(model)
-    if model.driven or _timed(model):
+    if model.driven or timed(model):
         return replace(model, pivots=())
-    start = _pivots(closure.jacobian(np.array(model.initial_q)), model.pivots)
+    start = relative_pivots(closure.jacobian(np.array(model.initial_q)), model.pivots)
     safe = np.abs(start) >= SAFE
     for walk in range(WALKS):
-        for _, matrix in _walk(model, walk):
-            found = _pivots(matrix, model.pivots)
+        for _, matrix in _reached(model, walk):
+            found = relative_pivots(matrix, model.pivots)
             safe &= (np.abs(found) >= SAFE) & (np.sign(found) == np.sign(start))
     fit = {row for (row, _), is_safe in zip(model.pivots, safe, strict=True) if is_safe}
     kept = [rows for rows in _rows_by_cluster(model) if rows <= fit]
@@ -101,7 +114,7 @@ def safely_dependent(model: Model) -> bool:
     return len(with_safe_pivots(model).pivots) == len(model.rows)
 
 
-def _timed(model: Model) -> bool:
+def timed(model: Model) -> bool:
     """Whether a constraint depends on time."""
     tables = [c for c in model.constraints if isinstance(c, ConstraintTable)]
     values = (getattr(c, field) for c in tables for field in type(c).model_fields)
@@ -120,7 +133,7 @@ def _rows_by_cluster(model: Model) -> list[set[int]]:
     return list(found.values())
 
 
-def _pivots(matrix: Array, order: Sequence[tuple[int, int]]) -> Array:
+def relative_pivots(matrix: Array, order: Sequence[tuple[int, int]]) -> Array:
     """The pivots of elimination in an order, each relative to the greatest entry of its row."""
     work, found = matrix.copy(), []
     for n, (i, j) in enumerate(order):

@@ -14,10 +14,14 @@ from eomgen.dynamics.forces import at_parent
 from eomgen.dynamics.kinematics import Link
 from eomgen.dynamics.loads import power_of, wrench_of
 from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.dynamics.motion import Acceleration, Twist, accelerations, velocities
+from eomgen.dynamics.observables import arm
+from eomgen.dynamics.vectors import add, in_space, sub, times, zeros
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar
-from eomgen.scene.constraints.base import Row
+from eomgen.scene.constraints import LoopJoint, Row
 from eomgen.scene.effects.base import JointLoad
+from eomgen.scene.joints import Revolute
 from eomgen.scene.joints.base import WORLD
 
 
@@ -79,10 +83,60 @@ def jacobian_of(d: MechanismState) -> list[list[Scalar]]:
 
 
 def accelerations_at_rest(d: MechanismState) -> list[Scalar]:
-    """β: the second derivative of each g at v̇ = 0, by dual numbers along q̇ and t.
+    """β: the second derivative of each g at v̇ = 0.
 
-    It is taken in world axes, where the spin of a wheel does not turn its rolling point to and fro,
-    and of the motion relative to a row's base: that of the base cancels.
+    Of a pin in the plane, between branches that meet in the world only, the difference of the
+    accelerations of two points, which shares parts with the equations of motion. Else by dual
+    numbers along q̇ and t.
+    """
+    points = _of_pins(d)
+    names = [name for name, _ in d.model.rows]
+    if all(name in points for name in names):
+        return [points[name] for name in names]
+    pairs = zip(names, _by_duals(d), strict=True)
+    return [points.get(name, by_duals) for name, by_duals in pairs]
+
+
+def _of_pins(d: MechanismState) -> dict[str, Scalar]:
+    """Those of such pins, by the names of their rows."""
+    found: dict[str, Scalar] = {}
+    if d.dimensions == 3 or d.model.driven:
+        return found
+    rows = {name: row for (name, _), row in zip(d.model.rows, rows_of(d), strict=True)}
+    frames = accelerations(d.in_world, _in_world(d), d.v, None, zeros(d.scalars), d.scalars)
+    for loop in d.model.loops:
+        own = [name for name, _ in loop.row_names(2)]
+        if isinstance(loop.joint, Revolute) and all(
+            span(d, rows[name])[0] < 0 for name in own if name in rows
+        ):
+            found.update(zip(own, _apart(d, loop, frames), strict=True))
+    return found
+
+
+def _in_world(d: MechanismState) -> tuple[Twist, ...]:
+    return d.twists if d.axes == "world" else velocities(d.in_world, d.v, d.scalars)
+
+
+def _apart(d: MechanismState, loop: LoopJoint, frames: Sequence[Acceleration]) -> list[Scalar]:
+    """The acceleration of a planar pin's point of the child minus that of the parent, (2,)."""
+    found = []
+    ends = ((loop.joint.child, loop.joint.r_child), (loop.joint.parent, loop.joint.r_parent))
+    for body, at in ends:
+        frame = -1 if body == WORLD else d.linkage.mounts[d.index[body]].frame
+        if frame < 0:
+            found.append(zeros(d.scalars))
+            continue
+        own = in_space([d.value(part) for part in at], d.scalars)
+        reach = arm(d.linkage, d.in_world, d.index[body], own, d.scalars)
+        found.append(add(frames[frame].linear, times(frames[frame].field, reach)))
+    return list(sub(*found)[:2])
+
+
+def _by_duals(d: MechanismState) -> list[Scalar]:
+    """Those of all rows, by dual numbers.
+
+    They are taken in world axes, where the spin of a wheel does not turn its rolling point to and
+    fro, and of the motion relative to a row's base: that of the base cancels.
     """
     model, values, scalars = d.model, d.values, d.scalars
     dual, one = Duals(scalars), scalars.number(1.0)

@@ -140,10 +140,40 @@ def factored(
 
 
 @dataclass(frozen=True, eq=False)
-class Square:
-    """A = L U with unit lower triangular L, in the given order; entries that are 0 are left out."""
+class Block:
+    """The inverse ((p, -q), (-r, s)) of two rows and columns that are eliminated together, and
+    their determinant.
+    """
 
-    pivots: Sequence[Scalar]
+    determinant: Scalar
+    p: Scalar
+    q: Scalar
+    r: Scalar
+    s: Scalar
+
+    @classmethod
+    def of(cls, a: Scalar, b: Scalar, c: Scalar, e: Scalar, name: str, scalars: Scalars) -> "Block":
+        """That of the rows (a, b) and (c, e)."""
+        whole = scalars.named(a * e - b * c, f"pivot_{name}")
+        return cls(whole, e / whole, b / whole, c / whole, a / whole)
+
+    def solved(self, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+        """The inverse times (x, y)."""
+        return self.p * x - self.q * y, self.s * y - self.r * x
+
+    def solved_transposed(self, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+        """(x, y) times the inverse."""
+        return self.p * x - self.r * y, self.s * y - self.q * x
+
+
+@dataclass(frozen=True, eq=False)
+class Square:
+    """A = L U with unit lower triangular L, in the given order; entries that are 0 are left out.
+    `pivots` has a number for each row, and for each two rows that are eliminated together their
+    block, twice; these have no entries for each other in L and U.
+    """
+
+    pivots: Sequence[Scalar | Block]
     lower: Sequence[dict[int, Scalar]]
     upper: Sequence[dict[int, Scalar]]
 
@@ -156,14 +186,22 @@ class Square:
         for i in reversed(range(len(x))):
             for j, entry in self.upper[i].items():
                 x[i] = x[i] - entry * x[j]
-            x[i] = x[i] / self.pivots[i]
+            pivot = self.pivots[i]
+            if not isinstance(pivot, Block):
+                x[i] = x[i] / pivot
+            elif self._first(i):
+                x[i], x[i + 1] = pivot.solved(x[i], x[i + 1])
         return x
 
     def solved_transposed(self, right: Sequence[Scalar]) -> list[Scalar]:
         """x with Aᵀ x = right."""
         x = list(right)
         for i, row in enumerate(self.upper):
-            x[i] = x[i] / self.pivots[i]
+            pivot = self.pivots[i]
+            if not isinstance(pivot, Block):
+                x[i] = x[i] / pivot
+            elif self._first(i):
+                x[i], x[i + 1] = pivot.solved_transposed(x[i], x[i + 1])
             for j, entry in row.items():
                 x[j] = x[j] - entry * x[i]
         for i in reversed(range(len(x))):
@@ -171,23 +209,58 @@ class Square:
                 x[j] = x[j] - entry * x[i]
         return x
 
+    def squares(self, sizes: Sequence[Scalar]) -> list[Scalar]:
+        """The square of each pivot, in the unit of its row, for the squares of the rows' lengths.
+        That of a block is the distance of a row from the other one's line.
+        """
+        found: list[Scalar] = []
+        for i, pivot in enumerate(self.pivots):
+            if isinstance(pivot, Block):
+                other = sizes[i + 1 if self._first(i) else i - 1]
+                found.append(pivot.determinant * pivot.determinant / other)
+            else:
+                found.append(pivot * pivot)
+        return found
+
+    def _first(self, i: int) -> bool:
+        """Whether row i is the first of its block."""
+        return i + 1 < len(self.pivots) and self.pivots[i] is self.pivots[i + 1]
+
 
 def triangular(
-    matrix: Sequence[Sequence[Scalar]], names: Sequence[str], scalars: Scalars
+    matrix: Sequence[Sequence[Scalar]],
+    names: Sequence[str],
+    scalars: Scalars,
+    blocks: Sequence[int] = (),
 ) -> Square:
-    """The factors of a matrix whose rows and columns are in the order of elimination."""
+    """The factors of a matrix whose rows and columns are in the order of elimination; the rows at
+    `blocks` and those after them are eliminated together.
+    """
     work = [list(row) for row in matrix]
-    pivots: list[Scalar] = []
+    pivots: list[Scalar | Block] = []
     lower: list[dict[int, Scalar]] = [{} for _ in work]
     upper: list[dict[int, Scalar]] = []
-    for k, row in enumerate(work):
-        pivots.append(scalars.named(row[k], f"pivot_{names[k]}"))
-        entries = {j: row[j] for j in range(k + 1, len(row)) if not scalars.is_zero(row[j])}
-        upper.append(entries)
-        for i in range(k + 1, len(work)):
-            if not scalars.is_zero(work[i][k]):
-                factor = lower[i][k] = work[i][k] / pivots[k]
-                for j, entry in entries.items():
+    while (k := len(pivots)) < len(work):
+        own = range(k, k + 2 if k in blocks else k + 1)
+        after = range(own.stop, len(work))
+        upper += [{j: work[n][j] for j in after if not scalars.is_zero(work[n][j])} for n in own]
+        if len(own) == 1:
+            pivots.append(scalars.named(work[k][k], f"pivot_{names[k]}"))
+        else:
+            (a, b), (c, e) = (work[n][k : k + 2] for n in own)
+            pivots += [Block.of(a, b, c, e, names[k], scalars)] * 2
+        for i in after:
+            parts = [work[i][j] for j in own]
+            if all(map(scalars.is_zero, parts)):
+                continue
+            pivot = pivots[k]
+            if isinstance(pivot, Block):
+                factors: Sequence[Scalar] = pivot.solved_transposed(*parts)
+            else:
+                factors = [parts[0] / pivot]
+            for n, factor in zip(own, factors, strict=True):
+                lower[i][n] = factor
+                for j, entry in upper[n].items():
                     work[i][j] = work[i][j] - factor * entry
     return Square(pivots, lower, upper)
 

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.dynamics.closed_positions import regular_positions
+from eomgen.dynamics.assur import completed
+from eomgen.dynamics.closed_positions import reached_positions, regular_positions
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.frames import Linkage
 from eomgen.dynamics.kinematics import Axes
@@ -86,7 +87,8 @@ def digits_lost(
     """
     rng = random.Random(6)
     if model.constraints:
-        closed = regular_positions(model) or (np.array(model.initial_q),)
+        positions = reached_positions if model.groups else regular_positions
+        closed = positions(model) or (np.array(model.initial_q),)
         q = [
             closed[n * len(closed) // (EACH * len(KINDS))].tolist()
             for n in range(EACH * len(KINDS))
@@ -94,6 +96,8 @@ def digits_lost(
     else:
         q = [_position(model, kind, rng) for kind in KINDS for _ in range(EACH)]
     v = [[n % 2 * rng.uniform(-1.5, 1.5) for _ in model.velocities] for n in range(len(q))]
+    if model.groups:
+        q, v = _on_constraints(model, q, v)
     pushes = [{i.name: rng.uniform(-PUSH, PUSH) for i in model.inputs} for _ in q]
     still = model
     if all(route.axes for route in routes.values()):
@@ -111,6 +115,27 @@ def digits_lost(
         for name, off in _off(acting, at, solvers, closely).items():
             worst[name] = max(worst[name], off)
     return {route: _digits(off) for route, off in worst.items()}
+
+
+def _on_constraints(
+    model: Model, q: Sequence[Sequence[float]], v: Sequence[Sequence[float]]
+) -> tuple[list[list[float]], list[list[float]]]:
+    """States with coordinates and velocities that follow from the others as the groups give them,
+    all at once.
+    """
+    names = {i.name: i.default for i in model.inputs}
+    states = {x.name: x.initial for x in model.states}
+
+    def at(q: Sequence[Any], v: Sequence[Any] | None = None) -> Dynamics:
+        still = [0.0] * len(model.velocities) if v is None else v
+        return Dynamics(model, Values(model.defaults, names, q, still, states), ArrayScalars())
+
+    closed = completed(at, model.groups, list(np.array(q).T))
+    moving = at(closed, list(np.array(v).T)).constrained("independent").velocity()
+    together = (np.array(np.broadcast_arrays(*part, np.empty(len(q)))[:-1]).T.tolist()
+                for part in (closed, moving))  # fmt: skip
+    first, second = together
+    return first, second
 
 
 def _solver(name: str, route: Route, model: Model, acting: Model) -> Accelerations:

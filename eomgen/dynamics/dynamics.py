@@ -204,7 +204,7 @@ class Dynamics(AppliedLoads):
 
     def _solver(self, recursion: str) -> RangeSpace | NullSpace:
         if recursion == "independent":
-            return NullSpace(self, self.mass_entries, self._right, self._fall)
+            return self.by_independent_velocities
         if recursion == "embedded":
             return Embedded(
                 self,
@@ -229,6 +229,11 @@ class Dynamics(AppliedLoads):
             getattr(self, f"{recursion}_{name}") for name in ("forward", "response")
         )
         return RangeSpace(self, forward, response)
+
+    @cached_property
+    def by_independent_velocities(self) -> NullSpace:
+        """The constraints, solved for dependent velocities."""
+        return NullSpace(self, self.mass_entries, self._right, self._fall)
 
     @cached_property
     def _scales(self) -> list[float]:

@@ -172,8 +172,9 @@ class Embedded(NullSpace):
         """What of each row is independent of others, relative to the rows of its kind."""
         pivots = dict.fromkeys(range(len(self._names)), self._zero)
         sizes = dict(pivots)
-        for i, pivot, row in zip(self._order, self._factors.pivots, self._jacobian, strict=True):
-            pivots[i], sizes[i] = pivot * pivot, inner(row, row, self._scalars)
+        own = [inner(row, row, self._scalars) for row in self._jacobian]
+        for i, square, size in zip(self._order, self._factors.squares(own), own, strict=True):
+            pivots[i], sizes[i] = square, size
         for joint, equation in self._held:
             for n, i in enumerate(self._rows_by_cluster[joint.cluster]):
                 pivots[i], sizes[i] = equation.small.d[n], equation.matrix[n][-1]

@@ -245,6 +245,13 @@ class MechanismState:
         return tree_kinematics(self.linkage, self.q, "world", self.scalars)
 
     @cached_property
+    def in_own_axes(self) -> TreeKinematics:
+        """Tree kinematics at q, in the frames' own axes."""
+        if self.axes == "own":
+            return self.kinematics
+        return tree_kinematics(self.linkage, self.q, "own", self.scalars)
+
+    @cached_property
     def origins(self) -> Origins:
         """Origins of the frames in the world, m."""
         return frame_origins(self.kinematics, self.scalars)

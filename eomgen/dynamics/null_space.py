@@ -64,7 +64,7 @@ class NullSpace:
         """Those of the columns of J that belong to dependent velocities."""
         square = [[row[j] for j in self._dependent] for row in self._jacobian]
         names = [self._d.model.rows[i][0] for i in self._order]
-        return triangular(square, names, self._scalars)
+        return triangular(square, names, self._scalars, self._d.model.blocks)
 
     def dependents(self, along: Sequence[Scalar]) -> list[Scalar]:
         """Velocities (nv,) with J v = -`along`, where independent ones are 0."""
@@ -140,10 +140,10 @@ class NullSpace:
         """The square of each pivot relative to the rows of J of its kind: 0 where its velocity does
         not follow from the others.
         """
-        pairs = sorted(zip(self._order, self._factors.pivots, strict=True), key=first_of)
-        rows = sorted(zip(self._order, self._jacobian, strict=True), key=first_of)
-        squares = [inner(row, row, self._scalars) for _, row in rows]
-        return relative(self._d, [pivot * pivot for _, pivot in pairs], squares)
+        sizes = [inner(row, row, self._scalars) for row in self._jacobian]
+        pairs = zip(self._order, self._factors.squares(sizes), sizes, strict=True)
+        ordered = sorted(pairs, key=lambda pair: pair[0])
+        return relative(self._d, [x for _, x, _ in ordered], [x for _, _, x in ordered])
 
     def response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """The change of the velocities by generalised impulses; the constraints stay met."""
@@ -159,6 +159,16 @@ class NullSpace:
         """v with ġ = 0; independent velocities keep their values."""
         change = self.dependents(rates(self._d))
         return [v + dv for v, dv in zip(self._d.values.v, change, strict=True)]
+
+    def carried_along(self) -> list[Scalar]:
+        """The same by N: v = N v_i, and what time alone moves."""
+        own = self._d.values.v
+        found = list(own)
+        for k, column in zip(self._independent, self._basis, strict=True):
+            for j in self._dependent:
+                if not self._scalars.is_zero(column[j]):
+                    found[j] = found[j] + column[j] * own[k]
+        return found
 
 
 def first_of(pair: tuple[int, Scalar]) -> int:

@@ -14,7 +14,7 @@ from eomgen.linear.linearise import (
     input_values,
     rate_unit,
 )
-from eomgen.linear.manifold import directions, returned
+from eomgen.linear.manifold import directions, is_constrained, returned
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.run.tangents import tangents
@@ -119,7 +119,7 @@ class _Search:
         self.free = np.flatnonzero(np.concatenate([~held, trimmed]))
         self.moving = np.flatnonzero(~held)
         self._displaced = self.moving[self.moving < self._nv]
-        self._constrained = bool(getattr(module, "CONSTRAINTS", ()))
+        self._constrained = is_constrained(module)
 
     def point(self, y: FloatArray, u: FloatArray) -> _Point:
         """The point at the positions of `y`, with velocities 0 and quaternions normalised."""

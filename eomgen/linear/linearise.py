@@ -10,7 +10,7 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.files import write_whole
-from eomgen.linear.manifold import Manifold, manifold
+from eomgen.linear.manifold import Manifold, is_constrained, manifold
 from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
@@ -143,7 +143,7 @@ def linearise(
         u=inputs,
         rates=rates,
         quaternions=module.QUATERNIONS,
-        manifold=manifold(module, y, p, inputs) if getattr(module, "CONSTRAINTS", ()) else None,
+        manifold=manifold(module, y, p, inputs) if is_constrained(module) else None,
     )
 
 

@@ -28,6 +28,11 @@ class Manifold(NamedTuple):
     independent: NDArray[np.intp]
 
 
+def is_constrained(module: Any) -> bool:
+    """Whether states of a module may be off its constraints."""
+    return bool(getattr(module, "CONSTRAINTS", ())) and not getattr(module, "FOLLOWING", ())
+
+
 def directions(module: Any, y: FloatArray, p: Any, u: Any, free: NDArray[np.intp]) -> FloatArray:
     """The projection (nf, nf) of the `free` displacements, three for a quaternion, onto those that
     keep the constraints.

@@ -85,6 +85,7 @@ def elaborate(scene: Scene) -> Model:
         outputs=(),
         form=scene.form,
         route=scene.route,
+        closing=scene.loops,
         locked=tuple(locked.items()),
         # A locked coordinate is given by its own name, or else in degrees.
         locked_deg=tuple(

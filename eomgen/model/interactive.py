@@ -95,7 +95,8 @@ class Pull(EffectTable):
 
 
 def interactive(model: Model) -> Model:
-    """The model of form [q, v] with a switch for each effect and a wrench on each body.
+    """The model of form [q, v] with a switch for each effect and a wrench on each body. All
+    coordinates are states: a pull may lead anywhere.
 
     Parameters that are switches follow those of the scene: 1 is on, 0 is off. Inputs of the pulls
     follow those of the scene, body by body: force, then torque, in world axes.
@@ -115,6 +116,7 @@ def interactive(model: Model) -> Model:
         outputs=OUTPUTS,
         form="velocity",
         route=model.route if model.route != "closed" else "auto",
+        closing="projected",
     )
 
 

@@ -11,6 +11,7 @@ from eomgen.displays import Displayed
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import Constant, Formula, evaluate
 from eomgen.language.quantity import Parameter
+from eomgen.model.groups import Group
 from eomgen.scalars.exact import Real, radians
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.constraints import Constraint, ConstraintTable, LoopJoint
@@ -18,7 +19,7 @@ from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import ExtraState, Input
 from eomgen.scene.joints import Free, Joint, Revolute
 from eomgen.scene.joints.base import Coordinate
-from eomgen.scene.schema import Form, LeftOut, Route
+from eomgen.scene.schema import Closing, Form, LeftOut, Route
 
 
 @dataclass(frozen=True)
@@ -178,6 +179,10 @@ class Model(Displayed):
     dropped     names of rows of constraints that follow from the others
     pivots      for each row of the constraints, in the order of elimination, its index and that of
                 the velocity that is solved for by it
+    blocks      of these, the indices of those that are eliminated together with the next
+    closing     how loops are closed: "closed", in closed form; "projected"; or "auto"
+    groups      what determines the coordinates that follow from the others in closed form, in the
+                order in which they are solved; () if they are states too
     """
 
     name: str
@@ -203,6 +208,9 @@ class Model(Displayed):
     held: tuple[str, ...] = ()
     dropped: tuple[str, ...] = ()
     pivots: tuple[tuple[int, int], ...] = ()
+    blocks: tuple[int, ...] = ()
+    closing: Closing = "auto"
+    groups: tuple[Group, ...] = ()
 
     @cached_property
     def every_row(self) -> tuple[tuple[str, str], ...]:
@@ -235,6 +243,28 @@ class Model(Displayed):
     def velocities(self) -> tuple[Coordinate, ...]:
         """The velocities of the state, in the order of `v`."""
         return velocities_of(self.bodies, self.prescribed)
+
+    @cached_property
+    def state_coordinates(self) -> tuple[int, ...]:
+        """The indices in q of the coordinates that are states: those of no group."""
+        following = {i for group in self.groups for i in group.coordinates}
+        return tuple(i for i in range(len(self.coordinates)) if i not in following)
+
+    @cached_property
+    def ranged(self) -> tuple[str, ...]:
+        """The names of angles that follow from others in closed form, each within one turn."""
+        return tuple(
+            self.coordinates[i].name
+            for group in self.groups
+            for i, cut in zip(group.coordinates, group.cuts, strict=True)
+            if cut is not None
+        )
+
+    @cached_property
+    def state_velocities(self) -> tuple[int, ...]:
+        """The indices in v of the velocities that are states."""
+        following = {column for _, column in self.pivots} if self.groups else set()
+        return tuple(j for j in range(len(self.velocities)) if j not in following)
 
     @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:

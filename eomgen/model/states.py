@@ -18,10 +18,23 @@ class State:
 
 
 def velocity_states(model: Model) -> tuple[State, ...]:
-    """The states of the form [q, v, x]: coordinates, velocities, extra states of effects."""
+    """The states of the form [q, v, x]: coordinates, velocities, extra states of effects; without
+    coordinates and velocities that follow from others in closed form.
+    """
+    positions = (model.coordinates[i] for i in model.state_coordinates)
+    velocities = (model.velocities[j] for j in model.state_velocities)
     mechanical = (
         State(c.name, c.unit, c.about, position)
-        for group, position in ((model.coordinates, True), (model.velocities, False))
+        for group, position in ((positions, True), (velocities, False))
         for c in group
     )
     return (*mechanical, *(State(x.name, x.unit, x.about, False) for x in model.states))
+
+
+def initial_state(model: Model) -> tuple[float, ...]:
+    """The initial state of the form [q, v, x], in the order of `velocity_states`."""
+    return (
+        *(model.initial_q[i] for i in model.state_coordinates),
+        *(model.initial_v[j] for j in model.state_velocities),
+        *(x.initial for x in model.states),
+    )

@@ -60,14 +60,17 @@ def reader_of(module: Any, name: str, size: int) -> Reader:
         return _impact(ny, len(module.CONTACTS))
     if name == "held":
         return _held(ny, len(module.CONTACTS))
-    sizes = len(module.POSITIONS), size, ny - len(module.POSITIONS) - size
-    return _dynamics(sizes, "tau" if name == "forward_dynamics" else "vd")
+    nq, nv = len(module.POSITIONS), size
+    if getattr(module, "FOLLOWING", ()):  # a velocity for each constraint
+        nv = size - len(module.CONSTRAINTS)
+    return _dynamics((nq, nv, ny - nq - nv), size, "tau" if name == "forward_dynamics" else "vd")
 
 
-def _dynamics(sizes: tuple[int, int, int], beside: str) -> Reader:
-    """Coordinates, velocities and further states of these sizes, and forces or accelerations."""
-    _, nv, nx = sizes
-    no_force, at_rest = np.zeros(nv), np.zeros(nx)
+def _dynamics(sizes: tuple[int, int, int], forces: int, beside: str) -> Reader:
+    """Coordinates, velocities and further states of these sizes, and `forces` forces or
+    accelerations.
+    """
+    no_force, at_rest = np.zeros(forces), np.zeros(sizes[2])
 
     def read(values: Mapping[str, Any]) -> Given | None:
         q, v, t = values["q"], values["v"], values.get("t", 0.0)
@@ -75,7 +78,7 @@ def _dynamics(sizes: tuple[int, int, int], beside: str) -> Reader:
         extra, x = no_force if extra is None else extra, at_rest if x is None else x
         if not (isinstance(t, float) and _are_plain(q, v, x, extra)):
             return None
-        if (len(q), len(v), len(x)) != sizes or len(extra) != nv:
+        if (len(q), len(v), len(x)) != sizes or len(extra) != forces:
             return None
         return Given(t, np.concatenate((q, v, x)), extra)
 

@@ -254,6 +254,14 @@ def _fold_mul(tape: Tape, a: int, b: int) -> int | None:
         return tape.applied("neg", tape.applied("mul", minus_a, b))
     if minus_b is not None:
         return tape.applied("neg", tape.applied("mul", minus_b, a))
+    for quotient, factor in ((a, b), (b, a)):  # (x / k) k, k of parameters
+        step = tape.steps[quotient]
+        if (
+            step.operation == "div"
+            and step.operands[1] == factor
+            and tape.steps[factor].stage == Stage.PARAMETERS
+        ):
+            return step.operands[0]
     return None
 
 

@@ -118,6 +118,8 @@ def integrate(
         violations = Violations(len(problem.projection.names))
         projection = replace(problem.projection, violations=violations, seen=Seen())
         counted = replace(counted, projection=projection)
+    if problem.closed_form:
+        counted = replace(counted, closed_form=replace(problem.closed_form, seen=Seen()))
     if tally:
         counted = tally.counting(counted)
     remarks: list[str] = []
@@ -285,8 +287,9 @@ def _advances(
             max_steps=asked.max_steps,
             resume=resume,
         )
-    if problem.projection:
-        advances = watched(problem.projection, advances, t_start, problem.initial)
+    held = problem.projection or problem.closed_form
+    if held:
+        advances = watched(held, advances, t_start, problem.initial)
     return monitored(monitor, advances, t_start, problem.initial) if monitor else advances
 
 

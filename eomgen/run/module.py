@@ -13,7 +13,7 @@ from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
 from eomgen.run.origin import Origin
 from eomgen.run.problem import Contacts, Explain, FloatArray, Problem, Switching, unexplained
-from eomgen.run.projection import projection_of
+from eomgen.run.projection import closed_form_of, projection_of
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 
@@ -115,7 +115,12 @@ def as_problem(
             return exactly(t, y)
         except FloatingPointError:  # y is too large; with nan a method rejects the step
             return np.full(len(y), np.nan)
+        except ValueError:  # loops that are closed in closed form cannot be closed there
+            if closed_form is None:
+                raise
+            return np.full(len(y), np.nan)
 
+    closed_form = closed_form_of(module, parameters, inputs)
     try:
         initial = module.initial_state(parameters)
         initial = start(initial) if start else initial
@@ -150,6 +155,7 @@ def as_problem(
         columns=hasattr(module, "_along"),
         timed=_depends_on_time(module),
         projection=projection,
+        closed_form=closed_form,
     )
 
 

@@ -12,7 +12,7 @@ from eomgen.errors import RunError
 from eomgen.run.compiled import Compiled, Series
 from eomgen.run.intervals import Interval
 from eomgen.run.origin import Origin
-from eomgen.run.projection import Projection
+from eomgen.run.projection import ClosedForm, Projection
 
 FloatArray = NDArray[np.float64]
 """An array of 64-bit floats, such as a state."""
@@ -117,6 +117,7 @@ class Problem:
     series      makes the Taylor series of the solutions, by the name of the method that takes them;
                 raises `RunError` where that is not possible
     projection  onto the constraints; None if there are none
+    closed_form the constraints that are kept in closed form; None if there are none
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
     quaternion in it is 0.
@@ -142,6 +143,7 @@ class Problem:
     compiled: Compiled | None = None
     series: Mapping[str, Callable[[], Series]] = field(default_factory=dict)
     projection: Projection | None = None
+    closed_form: ClosedForm | None = None
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

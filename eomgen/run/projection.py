@@ -7,7 +7,7 @@ error of the constraints adds up.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
@@ -24,6 +24,10 @@ MET = 1e-15
 """A residual relative to the mechanism's size that is rounding, beside the last one."""
 SINGULAR, NEAR = 1e-9, 0.05
 """A margin that counts as 0; and one below which the least margin is searched between steps."""
+IN_CLOSED_FORM = 1e-7
+"""A margin that counts as 0 in closed form, which turns back on the same branch at a dead point."""
+BEFORE_END = 0.3
+"""A margin from which, in closed form, a step may lead to where the loops cannot be closed."""
 SEARCH = 60
 """Evaluations of that search."""
 REMEDY = (
@@ -198,7 +202,7 @@ def jacobian_of(module: Any) -> Callable[..., FloatArray]:
 def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Projection | None:
     """The projection of a module of this size, m; None if it has no constraints."""
     names = getattr(module, "CONSTRAINTS", None)
-    if not names:
+    if not names or not hasattr(module, "project_position"):
         return None
 
     jacobian = jacobian_of(module)
@@ -223,11 +227,66 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
     )
 
 
+@dataclass(frozen=True, eq=False)
+class ClosedForm:
+    """The constraints of a module that keeps them in closed form: nothing is projected.
+
+    names    of the rows
+    angles   names of angles that jump by a turn at the end of their range
+    margins  (t, y) -> (nc + na,), or (n,), (ny, n) -> (nc + na, n), as of `Projection`; then how
+             far each angle is from there, at most 1
+    seen     the margins of the run, if they are watched
+    """
+
+    names: tuple[str, ...]
+    angles: tuple[str, ...]
+    margins: Callable[[Any, FloatArray], FloatArray]
+    seen: Seen | None = None
+
+    def passed(
+        self, t: float, y: FloatArray, ends: FloatArray, states: FloatArray
+    ) -> FloatArray | None:
+        """The least margins (m + 1,) at t and at the ends (m,) of m steps from there, whose states
+        are (m, ny); None if one of these steps may pass a singular position.
+        """
+        times = np.concatenate(([t], ends))
+        found = self.margins(times, np.vstack((y, states)).T).min(axis=0)
+        if found.min() >= NEAR:
+            return np.asarray(found)
+        assert self.seen
+        seen = replace(self.seen)
+        for end, margin in zip(ends.tolist(), found[1:].tolist(), strict=True):
+            if not margin >= IN_CLOSED_FORM or seen.turns(end, margin):
+                return None
+            seen.add(end, margin)
+        return np.asarray(found)
+
+
+def closed_form_of(module: Any, parameters: Any, inputs: Any) -> ClosedForm | None:
+    """The constraints of a module that keeps them in closed form; None if it does not."""
+    if not getattr(module, "FOLLOWING", None):
+        return None
+    return ClosedForm(
+        tuple(module.CONSTRAINTS),
+        tuple(getattr(module, "RANGED", ())),
+        lambda t, y: module.constraint_margins(t, y, parameters, inputs),
+    )
+
+
 class SingularPositionError(StepFailure):
     """The mechanism is singular at a time."""
 
-    def __init__(self, projection: Projection, t: float, margins: FloatArray) -> None:
-        name = projection.names[int(np.argmin(margins))]
+    def __init__(self, projection: Projection | ClosedForm, t: float, margins: FloatArray) -> None:
+        least = int(np.argmin(margins))
+        if least >= len(projection.names):
+            angle = projection.angles[least - len(projection.names)]  # type: ignore[union-attr]
+            super().__init__(
+                f"at t = {t:.6g} s {angle}, which follows from the state in closed form, leaves "
+                "the turn in which it is counted",
+                "give loops = 'projected' in the scene, or these parameters",
+            )
+            return
+        name = projection.names[least]
         super().__init__(
             f"the mechanism is singular at t = {t:.6g} s: constraint {name} follows from the "
             "others there, as at a dead point or a change point, or has no direction, as where a "
@@ -263,7 +322,7 @@ Steps = TypeVar("Steps", bound=Part)
 
 
 def watched(
-    projection: Projection, advances: Iterator[Steps], t: float, y: FloatArray
+    projection: Projection | ClosedForm, advances: Iterator[Steps], t: float, y: FloatArray
 ) -> Iterator[Steps]:
     """The steps of a run from (t, y), which ends where the mechanism is singular.
 
@@ -276,6 +335,8 @@ def watched(
     last: Steps | None = None
     try:
         for advance in advances:
+            if isinstance(projection, ClosedForm) and not np.isfinite(advance.y).all():
+                raise StepFailure("the loops cannot be closed", REMEDY)
             if advance.margins:
                 seen.begin(advance.margins.start, advance.margins.before)
                 seen.add(advance.t, advance.margins.here)
@@ -295,13 +356,13 @@ def watched(
     except SingularPositionError:
         raise
     except StepFailure as failure:
-        if seen.here < NEAR:
+        if seen.here < (BEFORE_END if isinstance(projection, ClosedForm) else NEAR):
             reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
             raise StepFailure(reason, REMEDY) from None
         raise
 
 
-def _search(projection: Projection, start: float, last: Part, advance: Part) -> None:
+def _search(projection: Projection | ClosedForm, start: float, last: Part, advance: Part) -> None:
     """Look for a singular position in two steps, of which the first begins at `start`, by golden
     section. It ends where none can be.
     """
@@ -316,7 +377,7 @@ def _search(projection: Projection, start: float, last: Part, advance: Part) -> 
     at_c, at_d = margin(c), margin(d)
     for _ in range(SEARCH):
         least, times = min(at_c, at_d), (a, c, d, b)
-        if least < SINGULAR or stays_away(least, times, (at_a, at_c, at_d, at_b)):
+        if least < _limit(projection) or stays_away(least, times, (at_a, at_c, at_d, at_b)):
             break
         if at_c < at_d:
             b, at_b, d, at_d = d, at_d, c, at_c
@@ -343,14 +404,18 @@ def stays_away(least: float, times: Sequence[float], margins: Sequence[float]) -
     return least > 2 * steepest * (times[-1] - times[0])
 
 
-def _checked(projection: Projection, t: float, y: FloatArray) -> float:
+def _checked(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:
     """The least margin. Raises `SingularPositionError` if it counts as 0."""
     margins = projection.margins(t, y)
     least = float(margins.min())
-    if least < SINGULAR:
+    if least < _limit(projection):
         raise SingularPositionError(projection, t, margins)
     return least
 
 
-def _least(projection: Projection, t: float, y: FloatArray) -> float:
+def _least(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:
     return float(projection.margins(t, y).min())
+
+
+def _limit(projection: Projection | ClosedForm) -> float:
+    return IN_CLOSED_FORM if isinstance(projection, ClosedForm) else SINGULAR

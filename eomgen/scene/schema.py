@@ -60,6 +60,8 @@ ModuleName = Annotated[Identifier, AfterValidator(_no_module)]
 
 
 Form = Literal["velocity", "momentum", "redundant"]
+Closing = Literal["auto", "closed", "projected"]
+"""How the loops of a mechanism are closed."""
 LeftOut = Literal["velocity_forces"]
 """Terms of the equations that a scene may leave out."""
 
@@ -269,6 +271,11 @@ class Scene(Table, Displayed):
     )
     dimensions: Literal[2, 3] = Field(default=2, description="2 in the plane, 3 in space")
     route: Route = Field(default="auto", description="route to the equations")
+    loops: Closing = Field(
+        default="auto",
+        description="closed: dependent coordinates follow in closed form and are no states; "
+        "projected: all coordinates are states; auto: closed where that is possible",
+    )
     bodies: Annotated[tuple[BodyTable, ...], Field(max_length=MOST)] = Field(
         default=(), description="bodies"
     )

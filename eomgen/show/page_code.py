@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
+import numpy as np
+
 from eomgen.codegen.backends.javascript import mechanism
 from eomgen.errors import EomgenError
 from eomgen.language.formula import Formula
@@ -16,6 +18,8 @@ from eomgen.show.live import live_table, velocity_rows
 from eomgen.show.motion import Array, Motion
 from eomgen.show.page import PageCode
 from eomgen.store import LiveCode, interfaced_program_of, live_code
+from eomgen.study.recording import FOLLOWING
+from eomgen.study.whole import names_of
 
 LONGEST = 1_500_000
 """A page with longer functions than these characters is live only on request."""
@@ -94,8 +98,19 @@ def _going_on(run: Ran, code: LiveCode) -> PageCode:
         inputs=run.inputs,
         mean_step=float(t[-1] - t[0]) / steps if steps else None,
     )
-    rows = None if run.model.form == "velocity" else _velocity_rows(run)
+    rows = _all_coordinates(run) if run.model.form == "velocity" else _velocity_rows(run)
     return PageCode(code.source, table, live=True, y=rows)
+
+
+def _all_coordinates(run: Ran) -> Array | None:
+    """The rows of a run with what follows from its states; None if nothing does."""
+    ran = run.trajectory
+    following = ran.saved.get(FOLLOWING)
+    if following is None:
+        return None
+    columns = dict(zip(ran.states, ran.y.T, strict=True))
+    columns |= dict(zip(following.columns, following.values.T, strict=True))
+    return np.column_stack([columns[name] for name in names_of(run.model)])
 
 
 def _velocity_rows(run: Ran) -> Array:

@@ -18,6 +18,7 @@ from eomgen.run.trajectory import Trajectory
 from eomgen.scene.effects import JointStop
 from eomgen.scene.joints.base import Geared
 from eomgen.study.closing import closed
+from eomgen.study.whole import has_all, initial_of, names_of, on_branch, whole_of
 
 GROWN = 1e9
 """Growth of an effect, relative to its size at the start, that is reported."""
@@ -39,7 +40,7 @@ def problem_of(
 ) -> Problem:
     """The initial-value problem of a module, as from `as_problem`. With the `model` of the module,
     its messages name the part of the model that has no finite value, and its initial state meets
-    the constraints at these parameters. `start` is as there.
+    the constraints at these parameters. `start` is as there, of all coordinates of the model.
 
     Raises `RunError` if the module refuses parameters or inputs, or has no derivative at its
     initial state.
@@ -47,14 +48,19 @@ def problem_of(
     if model is None:
         return as_problem(module, parameters, inputs, start=start)
     given = given_values(module, parameters, inputs)
-    first = start or (lambda y: y)
+
+    def started(_: FloatArray) -> FloatArray:
+        y = initial_of(module, model, parameters)
+        whole = closed(model, given[0], start(y) if start else y)
+        return on_branch(module, model, whole, *given)
+
     return as_problem(
         module,
         parameters,
         inputs,
-        explain=explained(model, *given),
+        explain=explained(model, *given, module),
         origin=origin_of(model, *given),
-        start=lambda y: closed(model, given[0], first(y)),
+        start=started,
     )
 
 
@@ -100,9 +106,10 @@ def locks(model: Model, trajectory: Trajectory) -> list[str]:
     has almost no inertia there.
     """
     known = model.form == "velocity" and not (model.driven or model.locked)
-    if not known or model.dimensions != 3:
+    if not known or model.dimensions != 3 or len(trajectory.states) < len(names_of(model)):
         return []
-    felt = relative_pivots(model, trajectory.y[:, : len(model.coordinates)])
+    whole = trajectory.y.T
+    felt = relative_pivots(model, whole[: len(model.coordinates)].T)
     lines = []
     for i in sorted(felt):
         row = int(np.argmin(felt[i]))
@@ -113,15 +120,25 @@ def locks(model: Model, trajectory: Trajectory) -> list[str]:
 
 
 def explained(
-    model: Model, parameters: Mapping[str, float], inputs: Mapping[str, float]
+    model: Model, parameters: Mapping[str, float], inputs: Mapping[str, float], module: Any
 ) -> Explain:
     """`Problem.explain` for a model of form 'velocity'; for other forms it explains nothing."""
     if model.form != "velocity":
         return unexplained
+    given = parameters, inputs
 
     def explain(t: float, y: FloatArray, initial: FloatArray) -> Explanation | None:
         if not np.isfinite(y).all():
             return None
+        try:
+            states = (whole_of(module, model, at, x, *given) for at, x in ((t, y), (0.0, initial)))
+            return of_whole(t, *states)
+        except (ArithmeticError, ValueError):
+            if has_all(module):
+                raise
+            return None
+
+    def of_whole(t: float, y: FloatArray, initial: FloatArray) -> Explanation | None:
         values = values_at(model, t, y.tolist(), parameters, inputs)
         sizes = effect_sizes(model, values)
         endless = [name for name, size in sizes.items() if size == float("inf")]

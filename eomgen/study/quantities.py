@@ -1,6 +1,6 @@
 """Named quantities along a run: states, energies, outputs and their components.
 
-theta                  a state; t is the time
+theta                  a state, or what follows from the states; t is the time
 energy                 kinetic, potential and total energy
 joint_forces           an output: all its components
 joint_forces.hinge     those of one joint, body, point or effect
@@ -20,7 +20,8 @@ from eomgen.outputs import OUTPUTS
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.study.observed import Observed
-from eomgen.study.recording import GROUPS, SAVED, held_rows, labels_of
+from eomgen.study.recording import FOLLOWING, GROUPS, SAVED, held_rows, labels_of
+from eomgen.study.whole import following
 
 ENERGIES: Mapping[str, str] = {
     "kinetic": "kinetic_energy",
@@ -86,7 +87,9 @@ def outputs_of(names: Sequence[str], trajectory: Trajectory, argument: str) -> t
     found: list[str] = []
     for name in names:
         head = name.partition(".")[0]
-        if head in (*trajectory.states, *("t", "energy", "works", "inputs")):
+        if head in (*trajectory.states, *following_in(trajectory)):
+            continue
+        if head in ("t", "energy", "works", "inputs"):
             continue
         known = (*GROUPS, *SAVED)
         if head not in known:
@@ -95,6 +98,12 @@ def outputs_of(names: Sequence[str], trajectory: Trajectory, argument: str) -> t
             raise RunError(f"{argument}: no state or output '{head}'{hint}")
         found += GROUPS.get(head, (head,))
     return tuple(found)
+
+
+def following_in(trajectory: Trajectory) -> tuple[str, ...]:
+    """The names of coordinates and velocities that follow from the states of a run."""
+    saved = trajectory.saved.get(FOLLOWING)
+    return saved.columns if saved else ()
 
 
 def quantities(
@@ -124,6 +133,12 @@ def _found(
         alike = [k for k, other in enumerate(states) if units[other] == units[name]]
         size = float(np.abs(run.trajectory.y[:, alike]).max())
         yield Quantity(name, name, "", units[name], y[:, states.index(name)], size)
+    elif name in following_in(run.trajectory):
+        own = following_in(run.trajectory)
+        rows = following(run.functions, run.model, t, y.T, *run.values(t))
+        alike = [k for k, other in enumerate(own) if units[other] == units[name]]
+        size = float(np.abs(run.trajectory.saved[FOLLOWING].values[:, alike]).max())
+        yield Quantity(name, name, "", units[name], rows[own.index(name)], size)
     elif name == "t":
         yield Quantity(name, name, "", "s", t, float(np.abs(t).max()))
     elif head in states or head == "t":

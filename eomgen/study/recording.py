@@ -8,6 +8,7 @@ import numpy as np
 from eomgen.model.model import Model
 from eomgen.outputs import DERIVATIVES, OUTPUTS, Size
 from eomgen.run.trajectory import Saved, Trajectory
+from eomgen.study.whole import following
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "energy": ("kinetic_energy", "potential_energy"),
@@ -19,6 +20,8 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
 """Words for what is saved, with the outputs that they need; `works` are integrated with the run."""
 SAVED = tuple(name for name in OUTPUTS if not (name.endswith("_dynamics") or name in DERIVATIVES))
 """The outputs that a state determines."""
+FOLLOWING = "following"
+"""The name under which coordinates and velocities that follow from the states are kept."""
 FORCES = {3: ("fx", "fy", "mz"), 6: ("fx", "fy", "fz", "mx", "my", "mz")}
 PARTS: Mapping[str, Mapping[int, tuple[str, ...]]] = {
     "joint_forces": FORCES,
@@ -41,9 +44,12 @@ def recorded(
     values  parameters and constant inputs
 
     Where a rigid contact is held, forces that depend on its force, which is not known afterwards,
-    are nan.
+    are nan. Coordinates and velocities that follow from the states in closed form are saved always.
     """
     found: dict[str, Saved] = {}
+    if names_following := getattr(module, "FOLLOWING", ()):
+        columns = following(module, model, trajectory.t, trajectory.y.T, *values)
+        found[FOLLOWING] = Saved(columns.T, tuple(names_following))
     for name in names:
         if name == "inputs":
             found[name] = _inputs(module, trajectory, values[1])

@@ -23,6 +23,7 @@ from eomgen.run.trajectory import Trajectory
 from eomgen.store import key_of
 from eomgen.study.closing import closed
 from eomgen.study.diagnosis import explained
+from eomgen.study.whole import initial_of, names_of, on_branch
 from eomgen.sweep.counter import Counter
 
 Arrays = dict[str, NDArray[Any]]
@@ -187,15 +188,17 @@ class _Prepared:
     def _problem(
         self, module: Any, states: Mapping[str, float], values: Values, own: Accelerator | None
     ) -> Problem:
-        explain = explained(self.task.model, *given_values(module, *values))
+        model, given = self.task.model, given_values(module, *values)
+        explain = explained(model, *given, module)
 
-        def start(y: FloatArray) -> FloatArray:
+        def start(y: FloatArray, names: Sequence[str] = self.module.STATES) -> FloatArray:
             for name, value in states.items():
-                y[self.module.STATES.index(name)] = value
+                y[names.index(name)] = value
             return y
 
-        def assembled(y: FloatArray) -> FloatArray:
-            return closed(self.task.model, values[0], start(y), states)
+        def assembled(_: FloatArray) -> FloatArray:
+            y = start(initial_of(module, model, values[0]), names_of(model))
+            return on_branch(module, model, closed(model, values[0], y, states), *values)
 
         loops = bool(self.task.model.constraints)
         problem = as_problem(module, *values, explain=explain, start=assembled if loops else None)

@@ -106,6 +106,7 @@ def module(program: Program, interface: Interface) -> str:
         "nq": interface.coordinates,
         "nv": interface.velocities,
         "nx": interface.others,
+        "forces": interface.forces,
         "positions": repr(tuple(i for i, s in enumerate(interface.states) if s.position)),
         "quaternions": repr(interface.quaternions),
         "parameters": interface.parameters,
@@ -124,6 +125,10 @@ def module(program: Program, interface: Interface) -> str:
         "contacts": [(c.name, c.effect) for c in interface.contacts],
         "constraints": repr(tuple(n for n, _ in interface.constraints)),
         "constrained": bool(interface.constraints),
+        "ranged": repr(interface.ranged) if interface.ranged else "",
+        "following": repr(tuple(n for n, _, _ in interface.following))
+        if interface.following
+        else "",
         "impact": written.get("impact"),
         "held": written.get("held"),
         "costs": [(name, json.dumps(counts)) for name, counts in costs.items()],
@@ -258,7 +263,8 @@ def units(interface: Interface) -> list[tuple[str, str]]:
     entries += [(p.name, plain(p.unit)) for p in interface.parameters]
     # Of a contact and a parameter of the same name, UNITS has the unit of the parameter.
     taken = {name for name, _ in entries}
-    others = [(c.name, c.unit) for c in interface.contacts] + list(interface.constraints)
+    others = [(c.name, c.unit) for c in interface.contacts]
+    others += [*interface.constraints, *((n, unit) for n, unit, _ in interface.following)]
     return entries + [pair for pair in others if pair[0] not in taken]
 
 
@@ -284,6 +290,9 @@ def document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
             ]
         )
     lines += _given(interface)
+    if interface.following:
+        lines += ["", "What follows from the state in closed form: `coordinates` and `velocities`."]
+        lines += _table(list(interface.following))
     effects = ", ".join(kind for _, kind in interface.effects) or "none"
     lines += ["", f"Effects: {effects}."]
     if interface.contacts:

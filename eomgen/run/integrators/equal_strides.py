@@ -6,13 +6,11 @@ from functools import partial
 import numpy as np
 
 from eomgen.run.compiled import EqualSteps, EqualStride, Margins
+from eomgen.run.integrators.closed_strides import MOST, kept_closed
 from eomgen.run.integrators.interface import Advance, Resume
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
-from eomgen.run.projection import Projection, constrained_by
-
-MOST = 1024
-"""Greatest number of steps at once: between them progress is shown, and Ctrl-C is heard."""
+from eomgen.run.projection import constrained_by
 
 
 class EqualStrides:
@@ -26,7 +24,7 @@ class EqualStrides:
         self, steps: Callable[[], EqualSteps | None], t_start: float, t_end: float, dt: float
     ) -> None:
         self._steps, self._t_start, self._t_end, self._dt = steps, t_start, t_end, dt
-        self._unusual = False
+        self._unusual, self._most = False, MOST
 
     def made(
         self,
@@ -36,12 +34,12 @@ class EqualStrides:
         y: FloatArray,
         lost: FloatArray,
         monitor: StabilityMonitor | None,
-        projection: Projection | None,
+        problem: Problem,
     ) -> EqualStride | None:
         """Make steps after step number `made`, but not the `last` one, onto constraints if there
         are any; None if Python must make the next, or if there are no compiled ones yet.
         """
-        most = min(MOST, last - 1 - made)
+        most = min(self._most, last - 1 - made)
         if most < 1 or self._unusual:
             self._unusual = False
             return None
@@ -59,11 +57,15 @@ class EqualStrides:
             made=made,
             most=most,
             limits=limits,
-            constrained=constrained_by(projection),
+            constrained=constrained_by(problem.projection),
         )
         count = len(stride.ends)
         if not count:
             return None
+        kept, self._most = kept_closed(problem, t, y, stride, self._most)
+        if kept is None:
+            return None
+        stride = kept
         self._unusual = not stride.usual
         if monitor:
             monitor.passed(count, stride.calls, stride.rate, stride.place, stride.slope)

@@ -62,7 +62,7 @@ def advances(
     i = first - 1
     while i < steps:
         if strides and i >= first:
-            given = (monitor if checked else None), problem.projection
+            given = (monitor if checked else None), problem
             stride = strides.made(i, steps, t, y, lost, *given)
             if stride:
                 shorter = partial(_shorter, change, problem)

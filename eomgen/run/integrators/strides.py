@@ -9,12 +9,11 @@ import numpy as np
 
 from eomgen.run.branches import BranchMonitor
 from eomgen.run.compiled import Margins, Steps, Stride, Watched
+from eomgen.run.integrators.closed_strides import MOST, kept_closed
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import PROJECTS, constrained_by
 
-MOST = 1024
-"""Greatest number of steps at once: between them progress is shown, and Ctrl-C is heard."""
 OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates")
 """Functions of a module that steps are checked with."""
 
@@ -68,7 +67,7 @@ class Strides:
         self._sizes = None
         if contacts:
             self._sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
-        self._unusual = False
+        self._unusual, self._most = False, MOST
 
     def made(self, stepper: Stepper, sampled: int, most: int) -> Stride | None:
         """Make at most `most` steps and put the stepper at their end; None if Python must make the
@@ -80,7 +79,7 @@ class Strides:
         if self._unusual:  # the last stride ended before a step that Python must make
             self._unusual = False
             return None
-        solver, branches, most = stepper.solver, stepper.branches, min(most, MOST)
+        solver, branches, most = stepper.solver, stepper.branches, min(most, self._most)
         watched = branches.watched(solver.t, solver.h_abs, most) if branches else None
         if branches and not watched:
             return None
@@ -96,12 +95,16 @@ class Strides:
             most=most,
             watched=watched,
             sizes=self._sizes,
-            dense=self._dense,
+            dense=self._dense or self._problem.closed_form is not None,
             constrained=constrained_by(self._problem.projection),
         )
         count = len(stride.ends)
         if not count:
             return None
+        kept, self._most = kept_closed(self._problem, solver.t, solver.y, stride, self._most)
+        if kept is None:
+            return None
+        stride = kept
         self._unusual = not stride.usual
         self._start, self._longest, self._watched = solver.t, stepper.longest, watched
         self._until = stepper.until if stepper.until < stepper.t_end else np.inf

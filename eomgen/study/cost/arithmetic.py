@@ -125,12 +125,13 @@ def arithmetic(
     which is made as `wanted`. With `single`, compare them in float32, too, at the same states
     rounded to float32.
 
-    A model in momentum form is replaced by its velocity form.
+    A model in momentum form is replaced by its velocity form, and loops are closed by projection: v̇
+    of all joints is compared.
 
     Raises `SceneError` or `RunError` if no route gives an acceleration at the initial state, or if
     60 digits are not enough for a reference.
     """
-    model = replace(model, form="velocity", outputs=())
+    model = replace(model, form="velocity", outputs=(), closing="projected")
     check_nonsingular(model)
     taken = compile_program(model, jacobian=False).system
     others, missing = compiled(model, but=taken.route)

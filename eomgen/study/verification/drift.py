@@ -18,6 +18,7 @@ from eomgen.study.diagnosis import problem_of
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.laws import AXES, Kept, kept
 from eomgen.study.verification.sampled import ENOUGH
+from eomgen.study.whole import whole_of
 
 METHOD, RTOL = "DOP853", 1e-11
 MOST_OPERATIONS = 10_000_000
@@ -91,7 +92,7 @@ def drift(
         raise KeyboardInterrupt
     kinetic = _along(full.kinetic_energy, run.t, run.y)
     total = kinetic + _along(full.potential_energy, run.t, run.y)
-    keeps = kept(model, [*states, *_beside_change(run, total)])
+    keeps = kept(model, [*states, *_beside_change(run, total, full, model)])
     lost: dict[str, float] = {}
     if keeps.energy and problem.contacts is None:
         lost["energy"] = _lost(total, max(np.max(kinetic), np.ptp(total - kinetic)))
@@ -112,12 +113,13 @@ def drift(
     return Drift(float(run.t[-1]), run.counts["steps"], stopped, keeps, lost, books, unit)
 
 
-def _beside_change(run: Trajectory, total: FloatArray) -> list[State]:
+def _beside_change(run: Trajectory, total: FloatArray, module: Any, model: Model) -> list[State]:
     """The rows before and after the greatest change of energy."""
     if len(run.t) < 2:
         return []
     k = int(np.argmax(np.abs(np.diff(total))))
-    return [State("short run", i, float(run.t[i]), run.y[i], {}) for i in (k, k + 1)]
+    rows = [(i, float(run.t[i]), run.y[i]) for i in (k, k + 1)]
+    return [State("short run", i, t, whole_of(module, model, t, y), {}) for i, t, y in rows]
 
 
 def _operations(module: GeneratedModule) -> int:

@@ -11,6 +11,7 @@ from eomgen.run.failure import StepFailure
 from eomgen.run.module import GeneratedModule, as_problem
 from eomgen.run.problem import FloatArray
 from eomgen.study.verification.states import random_state
+from eomgen.study.whole import own_of, viewed, whole_of
 
 Random = np.random.Generator
 Angle = Callable[[Random, int], float]
@@ -81,20 +82,22 @@ def closed_states(
     """`count` states of each kind of `CLOSED` that meet the constraints of a model, at positions
     along its motion, without those near singular positions.
     """
-    problem, found, nq = as_problem(module), [], len(module.POSITIONS)
+    problem, found, nq = as_problem(module), [], len(model.coordinates)
+    seen, held = viewed(module, model), problem.projection or problem.closed_form
     positions = closed_positions(model) or (np.array(model.initial_q),)
     for index, kind in enumerate(CLOSED):
         for number in range(count):
             rng = np.random.default_rng([seed, index, number])
-            y, t = random_state(module, rng), float(rng.uniform(0.0, t_end))
+            y, t = random_state(seen, rng), float(rng.uniform(0.0, t_end))
             y[:nq] = positions[int(rng.integers(len(positions)))]
             u = {name: float(rng.uniform(-1.0, 1.0)) for name in module.INPUTS}
-            y = _made(kind, module, len(model.velocities), y, rng)
+            y = _made(kind, seen, len(model.velocities), y, rng)
             try:
-                y = problem.projected(t, y)
-            except StepFailure:
+                own = problem.projected(t, own_of(module, model, y))
+                y = whole_of(module, model, t, own, None, u)
+            except (StepFailure, ValueError):
                 continue  # too far from where the constraints are met at this time
-            if problem.projection is None or problem.projection.margins(t, y).min() >= FAR:
+            if held is None or held.margins(t, own).min() >= FAR:
                 found.append(State(kind, number, t, y, u))
     return found
 

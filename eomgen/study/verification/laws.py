@@ -7,22 +7,31 @@ external forces. The module's Jacobian is compared with differences of the indep
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.extended import NOTHING, Array, extended, extended_digits, zeros
+from eomgen.precision.extended import (
+    NOTHING,
+    Array,
+    extended,
+    extended_digits,
+    solved,
+    zeros,
+)
 from eomgen.precision.precise import Extended
 from eomgen.run.module import GeneratedModule
 from eomgen.scene.constraints import Constraint, Distance, LoopJoint
 from eomgen.scene.effects import Driven
 from eomgen.scene.effects.base import JointLoad
 from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import WORLD
+from eomgen.scene.joints.base import WORLD, Coordinate
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.judging import ulps
 from eomgen.study.verification.virtual_work import FreeBodies
+from eomgen.study.whole import Viewed, names_of, own_of
 
 _STEP = mpfr(2) ** -66
 """Step of central differences, s, for rates of order 1; their error is its square, about 1e-40."""
@@ -118,10 +127,11 @@ def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -
     there are two derivatives.
     """
     model = free.model
+    if isinstance(module, Viewed):
+        return _slopes_in_closed_form(module, state, y, free)
     if not hasattr(module, "jacobian"):
         return None
-    rng = np.random.default_rng(1)
-    direction = extended(rng.uniform(0.5, 1.0, len(y)) * rng.choice((-1.0, 1.0), len(y)))
+    direction = _some_direction(len(y))
     for indices in map(list, model.quaternions):  # tangent to the sphere of unit quaternions
         direction[indices] = direction[indices] - y[indices] * (direction[indices] @ y[indices])
     ahead, behind, step = _beside(model, state, y, direction, still=True)
@@ -133,15 +143,82 @@ def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -
     given = module.jacobian(state.t, state.y, None, state.u or None)
     if not np.isfinite(given).all():
         return float("inf")
-    slopes = extended(given)
-    nq, nv = len(model.coordinates), len(model.velocities)
+    return _ulps_of(extended(given), direction, change, len(model.coordinates), model.velocities)
+
+
+def _some_direction(count: int) -> Array:
+    rng = np.random.default_rng(1)
+    return extended(rng.uniform(0.5, 1.0, count) * rng.choice((-1.0, 1.0), count))
+
+
+def _ulps_of(
+    slopes: Array,
+    direction: Array,
+    change: Array,
+    nq: int,
+    velocities: Sequence[Coordinate],
+    least: Any = 0.0,
+) -> float:
+    """The error of slopes along a direction, in ulps of their terms, those of velocities of a unit
+    together; `least` is a size of the terms of these, which may cancel.
+    """
     scale = abs(slopes) @ abs(direction) + abs(change)
-    rows = [c.unit for c in model.velocities]
+    scale[nq : nq + len(velocities)] += mpfr(least)
+    rows = [c.unit for c in velocities]
     for unit in dict.fromkeys(rows):
         group = [nq + i for i, other in enumerate(rows) if other == unit]
         scale[group] = max(scale[group])
-    assert len(rows) == nv
     return ulps(slopes @ direction - change, scale)
+
+
+def _slopes_in_closed_form(
+    module: Viewed, state: State, y: Array, free: FreeBodies
+) -> float | None:
+    """The same of a module of fewer states: along a direction of these, the others follow so that
+    J dq = 0 and J dv + dJ v = 0.
+    """
+    model, own = free.model, module.own
+    if not hasattr(own, "jacobian"):
+        return None
+    names = names_of(model)
+    kept = [names.index(name) for name in own.STATES]
+    direction, nq = _some_direction(len(kept)), len(model.coordinates)
+    whole, at = zeros(len(y)), slice(nq, nq + free.nv)
+    whole[kept] = direction
+    place = {j: i for index in model.joint_indices for i, j in index.plain}
+    plain = extended([whole[place[j]] if j in place else mpfr(0) for j in range(free.nv)])
+    plain = _following(free, own.FOLLOWING, plain, zeros(len(free.model.rows)))
+    for j, i in place.items():
+        whole[i] = plain[j]
+    still = whole.copy()
+    still[at] = mpfr(0)
+    ahead, behind, step = _beside(model, state, y, still, still=True)
+    turned = (ahead.constraint_jacobian - behind.constraint_jacobian) / step
+    whole[at] = _following(
+        free, own.FOLLOWING, whole[at], turned[:, : free.nv] @ free.rates[: free.nv]
+    )
+    ahead, behind, step = _beside(model, state, y, whole, still=True)
+    bend = ahead.state_rates - 2 * free.state_rates + behind.state_rates
+    change = ahead.state_rates - behind.state_rates
+    if max(abs(bend)) > SMOOTH * max(abs(change)):
+        return None
+    given = own.jacobian(state.t, own_of(own, model, state.y), None, state.u or None)
+    if not np.isfinite(given).all():
+        return float("inf")
+    velocities = [c for c in model.velocities if c.name in own.STATES]
+    # The size of terms of ω v, which may cancel: β is a second difference of positions.
+    least = max(abs(free.rates)) * (max(abs(free.rates)) + max(abs(whole[at])))
+    found = extended(given), direction, change[kept] / step
+    return _ulps_of(*found, len(own.POSITIONS), velocities, least)
+
+
+def _following(free: FreeBodies, names: Sequence[str], v: Array, more: Array) -> Array:
+    """v (nv,) with the velocities of these names such that J v + `more` = 0."""
+    own = [j for j, c in enumerate(free.model.velocities) if c.name in names]
+    found, J = v.copy(), free.constraint_jacobian[:, : free.nv]
+    found[own] = mpfr(0)
+    found[own] = solved(J[:, own], -(J @ found + more))
+    return found
 
 
 def _beside(

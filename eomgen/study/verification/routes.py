@@ -49,5 +49,6 @@ def loaded(system: System) -> Made:
 
 def velocities(made: Made) -> slice:
     """The slice of v̇ in the derivative."""
-    first = len(made.system.model.coordinates)
-    return slice(first, first + len(made.system.model.velocities))
+    model = made.system.model
+    first = len(model.state_coordinates)
+    return slice(first, first + len(model.state_velocities))

@@ -37,6 +37,7 @@ from eomgen.study.verification.laws import broken, why_no_energy_law, why_no_mom
 from eomgen.study.verification.routes import compiled
 from eomgen.study.verification.sampled import SampledRun, sampled
 from eomgen.study.verification.truth import Truth
+from eomgen.study.whole import viewed, whole_of
 
 OUTPUTS = (
     "inverse_dynamics",
@@ -117,7 +118,9 @@ def verify(
     form, model = model.form, replace(model, form="velocity")
     check_nonsingular(model)
     taken, modules, full, missing = _modules(model, module, progress)
-    module = modules[taken]
+    module, given = modules[taken], full
+    modules = {route: viewed(each, model) for route, each in modules.items()}
+    full, seen = viewed(full, model), modules[taken]
     bare = replace(model, outputs=())
     truth, count = Truth(bare), states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
     if model.constraints:
@@ -125,7 +128,7 @@ def verify(
     else:
         asked = hard_states(module, len(model.velocities), count, seed, wanted.t_end)
     run = sampled(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
-    asked += _states(run, module)
+    asked += _states(run, module, model)
     found: list[Judged | None] = []
     stopped = ""
     try:
@@ -142,10 +145,10 @@ def verify(
     lawful, ran = list[Check](), None
     if not stopped:
         firsts = [one for one in there if one.state.number == 0]
-        laws = [broken(bare, module, one.state) for one in firsts if _has(one, taken)]
+        laws = [broken(bare, seen, one.state) for one in firsts if _has(one, taken)]
         progress(0.85)
         shown = _of_conservation(there, firsts)
-        ran = drift(model, wanted, module, full, shown, lambda x: progress(0.88 + 0.12 * x))
+        ran = drift(model, wanted, module, given, shown, lambda x: progress(0.88 + 0.12 * x))
         lawful = [*law_checks(bare, laws), *drift_checks(ran)]
     ulps = {route: forward_ulps(there, route, bare) for route in modules}
     data = in_ulps(np.array([one.data for one in there]), there, bare)
@@ -162,8 +165,8 @@ def verify(
         name=model.name,
         taken=taken,
         seed=seed,
-        states=module.STATES,
-        units=tuple(module.UNITS[state] for state in module.STATES),
+        states=seen.STATES,
+        units=tuple(module.UNITS[state] for state in seen.STATES),
         judged=tuple(there),
         checks=checks,
         notes=(*notes, *(_notes(ran, bare) if ran else (stopped,))),
@@ -205,12 +208,12 @@ def _modules(
     return taken, {r: modules[r] for r in ROUTES if r in modules}, full, missing
 
 
-def _states(run: SampledRun, module: GeneratedModule) -> list[State]:
+def _states(run: SampledRun, module: GeneratedModule, model: Model) -> list[State]:
     """The states sampled from the scene's own run."""
     unit = as_problem(module).unit  # within a step, quaternions are not of unit length
     inputs = dict.fromkeys(module.INPUTS, 0.0)
     return [
-        State(OWN, k, float(t), unit(y), inputs)
+        State(OWN, k, float(t), whole_of(module, model, float(t), unit(y)), inputs)
         for k, (t, y) in enumerate(zip(run.t, run.y, strict=True))
     ]
 
