@@ -98,10 +98,15 @@ def choose(model: Model, *, closed: bool = True) -> Choice:
 def _of_loops(model: Model, other: Model, closed: bool) -> Choice:
     """The choice between a model with loops in closed form and the `other` with a state of all
     coordinates and projection: the one whose steps take fewer operations, unless it loses digits or
-    the scene names the other.
+    the scene names the other. With many loops they are not compared: that would take as long again.
     """
-    in_closed_form = _chosen(model, closed)
-    if model.closing == "closed":
+    try:
+        in_closed_form = _chosen(model, closed)
+    except SceneError:  # too few digits
+        if model.closing == "closed":
+            raise
+        return _chosen(with_safe_pivots(other), closed)
+    if model.closing == "closed" or len(model.rows) > MOST_DENSE:
         return in_closed_form
     projected = _chosen(with_safe_pivots(other), closed)
     steps = [_of_step(choice) for choice in (in_closed_form, projected)]

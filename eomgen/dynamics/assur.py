@@ -33,6 +33,10 @@ from eomgen.scene.joints.base import WORLD
 
 SAME = 1e-4
 """The largest difference, in sizes, of coordinates found in closed form from those of a start."""
+MOST = 60
+"""Rows of constraints from which on closed forms are not tried unless a scene asks for them: to
+find them takes a time that grows faster than the mechanism.
+"""
 FROM_JUMP = 0.1
 """How near, rad, an angle may come to where its values jump."""
 
@@ -43,6 +47,8 @@ def with_closed_form(model: Model) -> Model:
     Raises `SceneError` if the model asks for that and they do not.
     """
     if model.closing == "projected" or not model.constraints:
+        return replace(model, groups=())
+    if len(model.rows) > MOST and model.closing == "auto":
         return replace(model, groups=())
     made, why = _found(_Alike(model))
     if why and model.closing == "closed":
