@@ -327,22 +327,22 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     theta_dot_squared = theta_dot * theta_dot
     s1 = sin_theta * k3
     s2 = cos(theta) * k3
-    s3 = theta_dot_squared * s1
-    s4 = theta_dot_squared * s2
-    s5 = c + s2
-    s6 = s1 * s1 + s5 * s5
+    s3 = c + s2
+    s4 = theta_dot_squared * s1
+    s5 = theta_dot_squared * s2
+    s6 = s1 * s1 + s3 * s3
     s7 = 0.5 + k6 / s6
     s8 = sqrt(k4 / s6 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
-    s14 = s5 + (s13 - s12)
+    s14 = s3 + (s13 - s12)
     s15 = s9 - s10
     s16 = s12 + s13
     s17 = s1 - s15
-    s18 = s16 - s5
+    s18 = s16 - s3
     s19 = s12 - s13
     s20 = s11 - s15
     s21 = s16 - s19
@@ -417,10 +417,10 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s90 = s61 * s83 + s62 * s81
     s91 = s15 / k1 * k8 + (s90 - (s15 * (s62 * s86) + s16 * (s61 * s86))) + (s88 - (s15 * (s58 * s84) + s16 * (s57 * s84)))
     s92 = s11 / k1 * k8 + (s11 * (s60 * s85) + s19 * (s59 * s85) - s89) + (s11 * (s56 * s80) - s19 * (s55 * s80) - s87)
-    s93 = s3 + (s27 * s80 - s77)
-    s94 = s81 + s17 * s84 - s3
-    s95 = s4 - (s78 + s14 * s80) + s29 * s93
-    s96 = s4 - (s82 - s18 * s84) - s36 * s94
+    s93 = s4 + (s27 * s80 - s77)
+    s94 = s81 + s17 * s84 - s4
+    s95 = s5 - (s78 + s14 * s80) + s29 * s93
+    s96 = s5 - (s82 - s18 * s84) - s36 * s94
     s97 = s81 + s23 * s86 + (s25 * s85 - s77) - s42 * s93 + s44 * s95 - s46 * s94 - s48 * s96
     s98 = s78 + s26 * s85 - (s82 - s24 * s86) + s43 * s93 - s45 * s95 - s47 * s94 - s49 * s96
     s99 = (s98 + s50 * s97) / s51
@@ -450,24 +450,24 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     theta_dot_squared = theta_dot * theta_dot
     s1 = sin_theta * k3
     s2 = cos_theta * k3
-    s3 = theta_dot_squared * s1
-    s4 = theta_dot_squared * s2
-    s5 = c + s2
-    s6 = s1 * s1 + s5 * s5
+    s3 = c + s2
+    s4 = theta_dot_squared * s1
+    s5 = theta_dot_squared * s2
+    s6 = s1 * s1 + s3 * s3
     s111 = k6 / s6
     s7 = 0.5 + s111
     s112 = k4 / s6
     s8 = sqrt(s112 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
-    s14 = s5 + (s13 - s12)
+    s14 = s3 + (s13 - s12)
     s15 = s9 - s10
     s16 = s12 + s13
     s17 = s1 - s15
-    s18 = s16 - s5
+    s18 = s16 - s3
     s19 = s12 - s13
     s20 = s11 - s15
     s21 = s16 - s19
@@ -558,10 +558,10 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s90 = s61 * s83 + s62 * s81
     s91 = s15 / k1 * k8 + (s90 - (s15 * s130 + s16 * s129)) + (s88 - (s15 * s126 + s16 * s125))
     s92 = s11 / k1 * k8 + (s11 * s128 + s19 * s127 - s89) + (s11 * s124 - s19 * s123 - s87)
-    s93 = s3 + (s27 * s80 - s77)
-    s94 = s81 + s17 * s84 - s3
-    s95 = s4 - (s78 + s14 * s80) + s29 * s93
-    s96 = s4 - (s82 - s18 * s84) - s36 * s94
+    s93 = s4 + (s27 * s80 - s77)
+    s94 = s81 + s17 * s84 - s4
+    s95 = s5 - (s78 + s14 * s80) + s29 * s93
+    s96 = s5 - (s82 - s18 * s84) - s36 * s94
     s97 = s81 + s23 * s86 + (s25 * s85 - s77) - s42 * s93 + s44 * s95 - s46 * s94 - s48 * s96
     s98 = s78 + s26 * s85 - (s82 - s24 * s86) + s43 * s93 - s45 * s95 - s47 * s94 - s49 * s96
     s99 = (s98 + s50 * s97) / s51
@@ -585,13 +585,13 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s107 = inertia_crank_zz + (s33 * s137 + s40 * s138) - s32 * s139 + s39 * s140 - s54 * s141
     s143 = s107 + s53 * s142
     s144 = sin_theta * k10 + s33 * s131 + s40 * s132 + s32 * s133 + s39 * s134 + s54 * s135
-    s145 = 2.0 * (s1 * s2 - s1 * s5)
+    s145 = 2.0 * (s1 * s2 - s1 * s3)
     s146 = s111 * s145 / s6
     s147 = (2.0 * (s7 * s146) - s112 * s145 / s6) / (2.0 * s8)
     s148 = s2 * s7 - s1 * s146
-    s149 = s5 * s147 - s13
+    s149 = s3 * s147 - s13
     s150 = s148 + s149
-    s151 = s9 + s5 * s146
+    s151 = s9 + s3 * s146
     s152 = s2 * s8 + s1 * s147
     s153 = s151 + s152
     s154 = s153 - s1
@@ -675,10 +675,10 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s232 = s128 * s150 + s11 * (s85 * s202 + s60 * s224) + (s19 * (s85 * s201 + s59 * s224) - s127 * s153)
     s233 = s126 * s155 + s15 * (s84 * s200 + s58 * s222) + (s125 * s156 + s16 * (s84 * s199 + s57 * s222))
     s234 = s124 * s150 + s11 * (s80 * s198 + s56 * s218) - (s19 * (s80 * s197 + s55 * s218) - s123 * s153)
-    s235 = s4 + (s80 * s166 + s27 * s218 - s215)
-    s236 = s219 + (s84 * s157 + s17 * s222) - s4
-    s237 = s93 * s168 + s29 * s235 - (s3 + (s216 + (s80 * s154 + s14 * s218)))
-    s238 = s3 + (s220 - (s84 * s158 + s18 * s222)) + (s94 * s175 + s36 * s236)
+    s235 = s5 + (s80 * s166 + s27 * s218 - s215)
+    s236 = s219 + (s84 * s157 + s17 * s222) - s5
+    s237 = s93 * s168 + s29 * s235 - (s4 + (s216 + (s80 * s154 + s14 * s218)))
+    s238 = s4 + (s220 - (s84 * s158 + s18 * s222)) + (s94 * s175 + s36 * s236)
     s239 = s219 + (s86 * s162 + s23 * s226) + (s85 * s164 + s25 * s224 - s215) - (s93 * s181 + s42 * s235)
     s240 = s239 + (s95 * s183 + s44 * s237) - (s94 * s185 + s46 * s236) - (s96 * s187 - s48 * s238)
     s241 = s216 + (s85 * s165 + s26 * s224) - (s220 - (s86 * s163 + s24 * s226)) + (s93 * s182 + s43 * s235)
@@ -754,14 +754,14 @@ def _coordinates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt, atan2=atan2)
     c, k1, k2, k3, k4, k5, k6, k12, k13 = k
     theta, _ = y
     s1 = sin(theta) * k3
-    s5 = c + cos(theta) * k3
-    s6 = s1 * s1 + s5 * s5
+    s3 = c + cos(theta) * k3
+    s6 = s1 * s1 + s3 * s3
     s7 = 0.5 + k6 / s6
     s8 = sqrt(k4 / s6 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
     s301 = s13 - s12
     s15 = s9 - s10
@@ -777,8 +777,8 @@ def _coordinates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt, atan2=atan2)
         theta,
         s302,
         s303,
-        -1.171115928088195 + atan2((s1 - s11) / k13, (s5 + s301) / k13) - s302,
-        1.171115928088195 + atan2((s1 - s15) / k13, (s16 - s5) / k2) - s303,
+        -1.171115928088195 + atan2((s1 - s11) / k13, (s3 + s301) / k13) - s302,
+        1.171115928088195 + atan2((s1 - s15) / k13, (s16 - s3) / k2) - s303,
         1.171115928088195 + atan2((s20 - s23) / k13, (s21 - s24) / k2) - s302,
         -1.1711159280881953 + atan2(s23 / k2, s24 / k13) - s303,
     )
@@ -790,20 +790,20 @@ def _velocities(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     theta, theta_dot = y
     s1 = sin(theta) * k3
     s2 = cos(theta) * k3
-    s5 = c + s2
-    s6 = s1 * s1 + s5 * s5
+    s3 = c + s2
+    s6 = s1 * s1 + s3 * s3
     s7 = 0.5 + k6 / s6
     s8 = sqrt(k4 / s6 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
-    s14 = s5 + (s13 - s12)
+    s14 = s3 + (s13 - s12)
     s15 = s9 - s10
     s16 = s12 + s13
     s17 = s1 - s15
-    s18 = s16 - s5
+    s18 = s16 - s3
     s19 = s12 - s13
     s20 = s11 - s15
     s21 = s16 - s19
@@ -850,22 +850,22 @@ def _accelerations(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     theta_dot_squared = theta_dot * theta_dot
     s1 = sin_theta * k3
     s2 = cos(theta) * k3
-    s3 = theta_dot_squared * s1
-    s4 = theta_dot_squared * s2
-    s5 = c + s2
-    s6 = s1 * s1 + s5 * s5
+    s3 = c + s2
+    s4 = theta_dot_squared * s1
+    s5 = theta_dot_squared * s2
+    s6 = s1 * s1 + s3 * s3
     s7 = 0.5 + k6 / s6
     s8 = sqrt(k4 / s6 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
-    s14 = s5 + (s13 - s12)
+    s14 = s3 + (s13 - s12)
     s15 = s9 - s10
     s16 = s12 + s13
     s17 = s1 - s15
-    s18 = s16 - s5
+    s18 = s16 - s3
     s19 = s12 - s13
     s20 = s11 - s15
     s21 = s16 - s19
@@ -940,10 +940,10 @@ def _accelerations(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s90 = s61 * s83 + s62 * s81
     s91 = s15 / k1 * k8 + (s90 - (s15 * (s62 * s86) + s16 * (s61 * s86))) + (s88 - (s15 * (s58 * s84) + s16 * (s57 * s84)))
     s92 = s11 / k1 * k8 + (s11 * (s60 * s85) + s19 * (s59 * s85) - s89) + (s11 * (s56 * s80) - s19 * (s55 * s80) - s87)
-    s93 = s3 + (s27 * s80 - s77)
-    s94 = s81 + s17 * s84 - s3
-    s95 = s4 - (s78 + s14 * s80) + s29 * s93
-    s96 = s4 - (s82 - s18 * s84) - s36 * s94
+    s93 = s4 + (s27 * s80 - s77)
+    s94 = s81 + s17 * s84 - s4
+    s95 = s5 - (s78 + s14 * s80) + s29 * s93
+    s96 = s5 - (s82 - s18 * s84) - s36 * s94
     s97 = s81 + s23 * s86 + (s25 * s85 - s77) - s42 * s93 + s44 * s95 - s46 * s94 - s48 * s96
     s98 = s78 + s26 * s85 - (s82 - s24 * s86) + s43 * s93 - s45 * s95 - s47 * s94 - s49 * s96
     s99 = (s98 + s50 * s97) / s51
@@ -975,14 +975,14 @@ def _constraint_residuals(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     c, k3, k4, k5, k6 = k
     theta, _ = y
     s1 = sin(theta) * k3
-    s5 = c + cos(theta) * k3
-    s6 = s1 * s1 + s5 * s5
+    s3 = c + cos(theta) * k3
+    s6 = s1 * s1 + s3 * s3
     s7 = 0.5 + k6 / s6
     s8 = sqrt(k4 / s6 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
     s15 = s9 - s10
     s16 = s12 + s13
@@ -994,9 +994,9 @@ def _constraint_residuals(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s24 = 0.5 * s21 - s20 * s22
     return (
         s11 - (s11 - s1) - s1,
-        s5 - (s5 + (s13 - s12) + s19),
+        s3 - (s3 + (s13 - s12) + s19),
         s15 + (s1 - s15) - s1,
-        s5 + (s16 - s5 - s16),
+        s3 + (s16 - s3 - s16),
         s15 + s23 - (s11 - (s20 - s23)),
         s19 + (s21 - s24) + (s24 - s16),
     )
@@ -1008,20 +1008,20 @@ def _constraint_rates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     theta, theta_dot = y
     s1 = sin(theta) * k3
     s2 = cos(theta) * k3
-    s5 = c + s2
-    s6 = s1 * s1 + s5 * s5
+    s3 = c + s2
+    s6 = s1 * s1 + s3 * s3
     s7 = 0.5 + k6 / s6
     s8 = sqrt(k4 / s6 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
-    s14 = s5 + (s13 - s12)
+    s14 = s3 + (s13 - s12)
     s15 = s9 - s10
     s16 = s12 + s13
     s17 = s1 - s15
-    s18 = s16 - s5
+    s18 = s16 - s3
     s19 = s12 - s13
     s20 = s11 - s15
     s21 = s16 - s19
@@ -1077,22 +1077,22 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     theta, _ = y
     s1 = sin(theta) * k3
     s2 = cos(theta) * k3
-    s5 = c + s2
+    s3 = c + s2
     s315 = s1 * s1
-    s6 = s315 + s5 * s5
+    s6 = s315 + s3 * s3
     s7 = 0.5 + k6 / s6
     s8 = sqrt(k4 / s6 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
     s301 = s13 - s12
-    s14 = s5 + s301
+    s14 = s3 + s301
     s15 = s9 - s10
     s16 = s12 + s13
     s17 = s1 - s15
-    s18 = s16 - s5
+    s18 = s16 - s3
     s19 = s12 - s13
     s20 = s11 - s15
     s21 = s16 - s19
@@ -1142,16 +1142,16 @@ def _constraint_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     theta, _ = y
     s1 = sin(theta) * k3
     s2 = cos(theta) * k3
-    s5 = c + s2
-    s6 = s1 * s1 + s5 * s5
+    s3 = c + s2
+    s6 = s1 * s1 + s3 * s3
     s7 = 0.5 + k6 / s6
     s8 = sqrt(k4 / s6 - s7 * s7)
     s9 = s1 * s7
-    s10 = s5 * s8
+    s10 = s3 * s8
     s11 = s9 + s10
-    s12 = s5 * s7
+    s12 = s3 * s7
     s13 = s1 * s8
-    s14 = s5 + (s13 - s12)
+    s14 = s3 + (s13 - s12)
     s15 = s9 - s10
     s16 = s12 + s13
     s17 = s1 - s15
@@ -1183,9 +1183,9 @@ def _constraint_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
         0.0,
         s331,
         0.0,
-        s16 - (s16 - s5),
+        s16 - (s16 - s3),
         0.0,
-        s5 - s16,
+        s3 - s16,
         0.0,
         0.0,
         s332,
