@@ -616,7 +616,8 @@ def test_adaptive_run_stops_after_max_steps():
             "rk5",
             {},
             "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
-            "semi_implicit_euler, leapfrog, rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
+            "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
+            "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
             "DOP853, taylor, heyoka, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
@@ -624,7 +625,8 @@ def test_adaptive_run_stops_after_max_steps():
             "radau",
             {},
             "integrator: unknown name 'radau' (did you mean 'Radau'?); known: euler, "
-            "semi_implicit_euler, leapfrog, rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
+            "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
+            "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
             "DOP853, taylor, heyoka, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
@@ -643,7 +645,8 @@ def test_adaptive_run_stops_after_max_steps():
             "BDF",
             {"dt": 0.1},
             "dt: BDF chooses its own steps; leave --dt out, or take one of euler, "
-            "semi_implicit_euler, leapfrog, rk4, implicit_midpoint, gauss_4, gauss_6",
+            "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
+            "rk4, implicit_midpoint, gauss_4, gauss_6",
         ),
         ("BDF", {"t_start": 1.0}, "t_end: 1 is not after t_start = 1"),
         ("BDF", {"t_start": -math.inf}, "t_start: -inf is not a finite time"),

@@ -12,7 +12,7 @@ from scaled_trees import apart, found, size_of, taken
 from spatial_loops import random_loops
 
 from eomgen.dynamics.closed_positions import regular_positions
-from eomgen.dynamics.closure import Closure
+from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.errors import SceneError
 from eomgen.language.formula import Constant
@@ -104,11 +104,14 @@ def _errors(
 def _states(model: Model, seed: int) -> list[State]:
     """q, v and inputs: the scene's start, and positions along its motion with seeded velocities."""
     rng = np.random.default_rng(seed)
-    positions = regular_positions(model)
+    mechanism = Closure.of(model)
+    everything = np.ones(len(model.velocities), dtype=bool)
+    near = (newton(mechanism, q, everything) for q in regular_positions(model)[::7])
+    positions = [q for q in near if q is not None]
     states = [(list(model.initial_q), list(model.initial_v))]
     for _ in range(STATES - 1 if positions else 0):
         q = positions[int(rng.integers(len(positions)))]
-        matrix = Closure.of(model).jacobian(q) / Closure.of(model).lengths
+        matrix = mechanism.jacobian(q) / mechanism.lengths
         v = rng.uniform(-3.0, 3.0, len(model.velocities))
         v -= np.linalg.lstsq(matrix, matrix @ v, rcond=1e-12)[0]
         states.append((q.tolist(), v.tolist()))
