@@ -4,6 +4,7 @@ import sys
 from functools import cache
 from typing import Any
 
+import jax
 import numpy as np
 import pytest
 from campaign import some
@@ -12,7 +13,6 @@ import eomgen
 from eomgen.errors import RunError
 from eomgen.study.verification.states import random_state
 
-jax = pytest.importorskip("jax")
 jnp = jax.numpy
 SCENES = ("two_body_forced", "tumbling_body", "human_figure")
 """Of the last one the kernel is long."""
