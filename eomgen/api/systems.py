@@ -78,7 +78,7 @@ def nonlinear_system(source: Source, *, outputs: Sequence[str] = ()) -> Any:
 
     outputs  as for `state_space`
 
-    x is [q, v] and the states of controllers. The scene's parameters, by name, are the `params` of
+    x is the state of the module: [q, v] and the states of controllers. The scene's parameters, by name, are the `params` of
     python-control. Forces of rigid contacts that are held are left out.
     Raises `SceneError`, or `RunError` for an unknown output or if python-control is not installed.
     """
@@ -88,12 +88,13 @@ def nonlinear_system(source: Source, *, outputs: Sequence[str] = ()) -> Any:
     _, module = compiled(replace(model, form="velocity", outputs=wanted))
     states = list(module.STATES)
     chosen = list(_chosen(outputs or states, model, module))
+    needed = dict.fromkeys(f for f, *_ in chosen if f)
 
     def rates(t: float, x: FloatArray, u: FloatArray, params: Mapping[str, float]) -> FloatArray:
         return module.derivative(t, x, params or None, u)
 
     def observed(t: float, x: FloatArray, u: FloatArray, params: Mapping[str, float]) -> FloatArray:
-        arrays = {f: np.ravel(getattr(module, f)(t, x, params or None, u)) for f in wanted}
+        arrays = {f: np.ravel(getattr(module, f)(t, x, params or None, u)) for f in needed}
         return np.array([arrays[f][i] if f else x[i] for f, i, _ in chosen])
 
     return control.nlsys(
@@ -138,10 +139,22 @@ def _chosen(
         if name in module.STATES:
             found.append(("", module.STATES.index(name), name))
             continue
+        if name in getattr(module, "FOLLOWING", ()):
+            found.append((*_following(name, model), name))
+            continue
         shape = np.shape(getattr(module, head)(0.0, y, None, u))
         for i, whole in components(name, shape, model, module, "outputs"):
             found.append((head, i, whole.replace(".", "_")))
     return found
+
+
+def _following(name: str, model: Model) -> tuple[str, int]:
+    """The output with a coordinate or velocity that follows from the state, and its place there."""
+    for output, parts in (("coordinates", model.coordinates), ("velocities", model.velocities)):
+        for i, part in enumerate(parts):
+            if part.name == name:
+                return output, i
+    raise AssertionError(name)
 
 
 def _observed(

@@ -122,6 +122,11 @@ class Interface:
     ranged: tuple[str, ...]
     left_out: tuple[str, ...]
 
+    @property
+    def projected(self) -> bool:
+        """Whether runs move states onto the constraints. In closed form they cannot leave them."""
+        return any(function.name == "project_position" for function in self.functions)
+
 
 def interface_of(system: System) -> Interface:
     """The interface of a system's program."""

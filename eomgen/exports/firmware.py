@@ -62,7 +62,7 @@ def files(model: Model, options: Options) -> Written:
         "farthest": FARTHEST[number],
         "sine_error": ERRORS[number],
         "quaternions": interface.quaternions,
-        "constrained": bool(interface.constraints),
+        "constrained": interface.projected,
         "coordinates": interface.coordinates,
         "velocities": interface.velocities,
     }

@@ -120,7 +120,7 @@ def _structure(unit: Unit) -> Structure:
         yield "Output", first["output"] + i, on(node)
     for i, node in enumerate(rates):
         yield "ContinuousStateDerivative", first["rate"] + i, None if touching else on(node)
-    closed = touching or interface.constraints or interface.quaternions
+    closed = touching or interface.projected or interface.quaternions
     for i, node in enumerate(observed):
         needed = None if closed else on(node, parameters=True)
         yield "InitialUnknown", first["output"] + i, needed

@@ -70,7 +70,7 @@ def _observed(parts: Sequence[Observed], start: int) -> list[tuple[str, int, int
 
 def _closure(unit: Unit) -> dict[str, object]:
     interface = unit.interface
-    rows = interface.constraints if unit.function("constraint_residuals") else ()
+    rows = interface.constraints if interface.projected else ()
     return {
         "rows": len(rows),
         "row_sizes": [repr(unit.size if force == "N" else 1.0) for _, force in rows],

@@ -105,9 +105,9 @@ def unit_of(model: Model, simulation: Simulation) -> Unit:
             f"form: an FMU has the state [q, v], not the form '{model.form}'; leave it out"
         )
     program, interface = interfaced_program_of(replace(model, outputs=(*ENERGIES, POSES)))
+    starts = tuple(interpret(program, "initial_state", _defaults(interface), FloatScalars()))
     names = [name for name in KERNELS if name in program.outputs]
     program, interface = restricted(program, interface, names)
-    starts = (*model.initial_q, *model.initial_v, *(x.initial for x in model.states))
     size, nominals = _sizes(program, interface, starts)
     outputs = (*_energies(), *_positions(interface))
     gaps = _gaps(interface)
@@ -128,18 +128,23 @@ def _sizes(
     variables = (*interface.states, *interface.inputs, *interface.parameters)
     names = [state.name for state in interface.states]
     units = {v.name: v.unit for v in variables}
-    parameters = {p.name: p.default for p in interface.parameters}
     first = dict(zip(names, starts, strict=True))
-    given = {**{i.name: i.default for i in interface.inputs}, **parameters, **first, TIME: 0.0}
+    given = {**{i.name: i.default for i in interface.inputs}, **_defaults(interface), **first}
+    given[TIME] = 0.0
     try:
         slope = interpret(program, "derivative", given, FloatScalars())
     except (ArithmeticError, ValueError):
         slope = [math.nan]
     if not all(map(math.isfinite, slope)):
         raise RunError("the equations have no solution at the initial state; change that state")
-    size = float(mechanism_size(units, parameters, dict(first)))
+    size = float(mechanism_size(units, _defaults(interface), dict(first)))
     sizes = state_sizes(names, units, np.array(starts), np.array(slope), size)
     return size, tuple(sizes.tolist())
+
+
+def _defaults(interface: Interface) -> dict[str, float]:
+    """The scene's values of the parameters, by name."""
+    return {p.name: p.default for p in interface.parameters}
 
 
 def _energies() -> Iterator[Observed]:
