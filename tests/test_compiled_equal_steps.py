@@ -67,6 +67,7 @@ def test_each_step_is_followed() -> None:
     ("scene", "dt", "t_end"),
     [("stiff_beam", 2e-4, 0.2), ("double_pendulum", 0.05, 20.0), ("double_pendulum", 0.2, 50.0)],
 )
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", METHODS)
 def test_steps_that_jump_are_checked_alike(
     scene: str, dt: float, t_end: float, method: str, monkeypatch: pytest.MonkeyPatch

@@ -261,6 +261,7 @@ def test_a_rod_of_little_inertia_sticks() -> None:
         assert found[3] - arm[1] * found[5] == pytest.approx(after * share, abs=1e-11)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @pytest.mark.parametrize("name", list(MODELS))
 def test_impacts_against_dense_algebra(name: str, route: str) -> None:

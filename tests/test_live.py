@@ -133,6 +133,7 @@ def test_functions_equal_those_of_the_module(name: str) -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "method", "dt"), RUNS)
 def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) -> None:
     """Same method, same step; scenes that are not chaotic within the time."""

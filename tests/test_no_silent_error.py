@@ -57,7 +57,7 @@ def case(number: int) -> tuple[int, int, list[float], bool]:
 
 
 @settings(
-    max_examples=some(20, 100_000),
+    max_examples=some(12, 100_000),
     deadline=None,
     derandomize=True,
     database=None,

@@ -325,6 +325,7 @@ def test_module_at_other_parameters(dimensions: int, seed: int, route: str) -> N
     assert_as_solved(other, e.module, y, motion, few, u)
 
 
+@pytest.mark.every(2)
 @by_module
 def test_columns_are_one_by_one(dimensions: int, seed: int, route: str) -> None:
     """Many states at once, inputs for each or for all: what each state gives alone."""

@@ -197,6 +197,7 @@ def test_derivatives_are_exact(name: str, route: str) -> None:
             assert apart(getattr(e.module, output)(0.0, y, p, u), expected) < ROUNDING, output
 
 
+@pytest.mark.every(2)
 @every_case
 def test_entries_are_exact_one_by_one(name: str, route: str) -> None:
     """Small entries beside large ones too: each to 1e-12 of the largest in its own row."""
