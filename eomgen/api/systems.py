@@ -78,8 +78,8 @@ def nonlinear_system(source: Source, *, outputs: Sequence[str] = ()) -> Any:
 
     outputs  as for `state_space`
 
-    x is the state of the module: [q, v] and the states of controllers. The scene's parameters, by name, are the `params` of
-    python-control. Forces of rigid contacts that are held are left out.
+    x is the state of the module: [q, v] and the states of controllers. The scene's parameters, by
+    name, are the `params` of python-control. Forces of rigid contacts that are held are left out.
     Raises `SceneError`, or `RunError` for an unknown output or if python-control is not installed.
     """
     control = library()
