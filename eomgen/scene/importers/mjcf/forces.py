@@ -6,9 +6,8 @@ from typing import Any
 
 from eomgen.scene.importers.mjcf.compiled import Compiled
 from eomgen.scene.importers.mjcf.mechanism import BALL, FREE, SINGLE, Mechanism, Names
+from eomgen.scene.importers.parts import SLIDING_SPEED
 
-SLIDING_SPEED = "friction_speed"
-"""The parameter of the speed at which Coulomb friction is smoothed, rad/s or m/s."""
 NO_FRICTION, NO_SPRING, NO_DAMPER, NO_GRAVITY = (1 << n for n in (2, 5, 6, 7))
 """MuJoCo's disable flags (mjtDisableBit) of what is imported."""
 IDENTITY = [1.0, 0.0, 0.0, 0.0]

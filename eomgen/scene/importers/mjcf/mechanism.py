@@ -3,9 +3,9 @@
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
-Tables = list[dict[str, Any]]
+from eomgen.scene.importers.parts import Parts
+
 LONGEST = 300
 """Longest sum that is written as one formula; the reader takes formulas of 500 characters."""
 FREE, BALL, SLIDE, HINGE = range(4)
@@ -34,17 +34,9 @@ class Names:
 
 
 @dataclass
-class Mechanism:
-    """The tables of a scene. `lost` counts what has no counterpart, `remarks` are other remarks."""
+class Mechanism(Parts):
+    """The parts of a scene. `lost` counts what has no counterpart, `remarks` are other remarks."""
 
-    inputs: Tables = field(default_factory=list)
-    definitions: dict[str, str] = field(default_factory=dict)
-    bodies: Tables = field(default_factory=list)
-    joints: Tables = field(default_factory=list)
-    effects: Tables = field(default_factory=list)
-    constraints: Tables = field(default_factory=list)
-    locked: dict[str, float] = field(default_factory=dict)
-    start: dict[str, float] = field(default_factory=dict)
     lost: Counter[str] = field(default_factory=Counter)
     remarks: dict[str, None] = field(default_factory=dict)
 

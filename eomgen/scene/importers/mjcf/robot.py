@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from eomgen.errors import listed
 from eomgen.scene.importers.imported import Imported, Wishes
@@ -11,17 +10,15 @@ from eomgen.scene.importers.mjcf.bodies import add_bodies, is_split, joints_of
 from eomgen.scene.importers.mjcf.compiled import Compiled, compiled
 from eomgen.scene.importers.mjcf.equalities import add_equalities
 from eomgen.scene.importers.mjcf.files import check_files
-from eomgen.scene.importers.mjcf.forces import SLIDING_SPEED, add_gravity, add_passive
+from eomgen.scene.importers.mjcf.forces import add_gravity, add_passive
 from eomgen.scene.importers.mjcf.mechanism import BALL, FREE, Mechanism, Names
 from eomgen.scene.importers.mjcf.tendons import add_tendon
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
+from eomgen.scene.importers.parts import SLIDING_SPEED, SPEED
 from eomgen.scene.importers.stops import stops
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
-from eomgen.text import brief
 
-SPEED = 0.01
-"""Speed at which Coulomb friction is smoothed, rad/s or m/s."""
 COUNTED = {
     "nsensor": "sensors",
     "ncam": "cameras",
@@ -52,7 +49,7 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
     beside = ", ".join(f"{what} ({model[key]})" for key, what in COUNTED.items() if model[key])
     lost += [f"left out: {beside}"] if beside else []
     remarks = (*lost, *made.remarks, *model.warnings)
-    return Imported(_tables(name, path.name, made), remarks)
+    return Imported(made.tables(name, path.name), remarks)
 
 
 def names_of(model: Compiled) -> tuple[Names, list[str]]:
@@ -96,26 +93,6 @@ def mechanism_of(model: Compiled, names: Names) -> Mechanism:
     add_actuators(model, names, made, off)
     add_equalities(model, names, made, off)
     return made
-
-
-def _tables(name: str, file: str, made: Mechanism) -> dict[str, Any]:
-    """All tables of the scene, in the order of a file."""
-    tables: dict[str, Any] = {"name": name, "title": brief(f"{name}, from {file}"), "dimensions": 3}
-    if made.inputs:
-        tables["inputs"] = made.inputs
-    if any("coulomb" in effect for effect in made.effects):
-        about = "speed at which Coulomb friction is smoothed, rad/s or m/s"
-        tables["parameters"] = {SLIDING_SPEED: {"value": SPEED, "about": about}}
-    if made.definitions:
-        tables["definitions"] = made.definitions
-    tables |= {"bodies": made.bodies, "joints": made.joints, "effects": made.effects}
-    if made.constraints:
-        tables["constraints"] = made.constraints
-    if made.locked:
-        tables["locked"] = made.locked
-    if made.start:
-        tables["initial"] = {"q": made.start}
-    return tables
 
 
 def _remarks(model: Compiled, made: Mechanism, wishes: Wishes) -> Iterable[str]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from eomgen.scene.importers.attributes import Vector
+from eomgen.scene.importers.parts import SLIDING_SPEED, Parts
 from eomgen.scene.importers.rotations import (
     EYE,
     angles_of,
@@ -17,10 +18,6 @@ from eomgen.scene.importers.rotations import (
 )
 from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved
 from eomgen.scene.joints.base import WORLD
-
-Tables = list[dict[str, Any]]
-SLIDING_SPEED = "friction_speed"
-"""The parameter of the speed at which Coulomb friction is smoothed, rad/s or m/s."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +33,9 @@ class Names:
 
 
 @dataclass
-class Mechanism:
-    """Tables of a scene, and what remarks are about."""
+class Mechanism(Parts):
+    """The parts of a scene, and what remarks are about."""
 
-    bodies: Tables = field(default_factory=list)
-    joints: Tables = field(default_factory=list)
-    effects: Tables = field(default_factory=list)
-    constraints: Tables = field(default_factory=list)
-    locked: dict[str, float] = field(default_factory=dict)
-    start: dict[str, float] = field(default_factory=dict)
     unlimited: list[str] = field(default_factory=list)
     clipped: list[str] = field(default_factory=list)
     held: list[str] = field(default_factory=list)

@@ -3,16 +3,15 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from eomgen.errors import listed
 from eomgen.scene.importers.imported import Imported, Wishes
 from eomgen.scene.importers.meshes import ELSEWHERE
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
+from eomgen.scene.importers.parts import SLIDING_SPEED, SPEED
 from eomgen.scene.importers.rotations import is_slight
 from eomgen.scene.importers.stops import stops
 from eomgen.scene.importers.urdf.joints import (
-    SLIDING_SPEED,
     Mechanism,
     Names,
     add_joints,
@@ -27,8 +26,6 @@ from eomgen.scene.joints.base import WORLD
 from eomgen.text import brief
 
 GRAVITY = 9.81
-SPEED = 0.01
-"""Speed at which Coulomb friction is smoothed, rad/s or m/s."""
 OF_JOINTS = ("_dot", "_ddot", "_motor")
 """Endings of names that are made from those of joints."""
 OF_BODIES = ("mass", *(f"com_{axis}" for axis in "xyz"), *(f"inertia_com_{e[1:]}" for e in ENTRIES))
@@ -49,7 +46,7 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     if wishes.floating:
         tree = _without_world(tree)
     names = _names(tree)
-    made, remarks = Mechanism(), list[str]()
+    made, remarks = Mechanism(effects=[{"type": "gravity", "g": GRAVITY}]), list[str]()
     meshes = Meshes((path.parent, *wishes.allowed))
     inertials, changes = read_inertials(tree)
     _add_bodies(tree, inertials, names, made, meshes, colours_of(robot))
@@ -67,7 +64,7 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     remarks += _remarks(robot, tree, names, made)
     remarks += _remarks_on_bodies(tree, meshes, changes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
-    return Imported(_tables(name, path.name, made), tuple(remarks))
+    return Imported(made.tables(name, path.name), tuple(remarks))
 
 
 def _without_world(tree: Tree) -> Tree:
@@ -121,24 +118,6 @@ def _add_bodies(
         if shapes := shapes_of(element, f"link '{brief(name)}'", colours, meshes):
             table["shapes"] = shapes
         made.bodies.append(table)
-
-
-def _tables(name: str, file: str, made: Mechanism) -> dict[str, Any]:
-    """All tables of the scene, in the order of a file."""
-    tables: dict[str, Any] = {"name": name, "title": brief(f"{name}, from {file}"), "dimensions": 3}
-    if any("coulomb" in effect for effect in made.effects):
-        about = "speed at which Coulomb friction is smoothed, rad/s or m/s"
-        tables["parameters"] = {SLIDING_SPEED: {"value": SPEED, "about": about}}
-    tables |= {"bodies": made.bodies, "joints": made.joints}
-    gravity = {"type": "gravity", "g": GRAVITY}
-    tables["effects"] = [gravity, *made.effects]
-    if made.constraints:
-        tables["constraints"] = made.constraints
-    if made.locked:
-        tables["locked"] = made.locked
-    if made.start:
-        tables["initial"] = {"q": made.start}
-    return tables
 
 
 def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Iterator[str]:
