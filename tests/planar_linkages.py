@@ -112,7 +112,7 @@ BAR_MASSES, BAR_INERTIAS = (1.2, 2.2, 1.6), (0.008, 0.11, 0.04)
 
 
 def four_bar_scene(angle: float, rate: float) -> str:
-    """A crank at the origin, a coupler, and a rocker at (GROUND, 0)."""
+    """A crank at the origin, a coupler, and a rocker at (GROUND, 0), on the open branch."""
     names = ("crank", "coupler", "rocker")
     bodies = [body(*each) for each in zip(names, BAR_MASSES, BAR_INERTIAS, strict=True)]
     a, b, c = BARS
@@ -122,7 +122,9 @@ def four_bar_scene(angle: float, rate: float) -> str:
         pin("gamma", "world", (GROUND, 0), "rocker", (-c / 2, 0)),
         pin("close", "coupler", (b / 2, 0), "rocker", (c / 2, 0), loop=True),
     ]
+    _, bend, gamma = four_bar(angle, rate).q.tolist()
     start = f"[initial]\nq = {{ theta = {angle!r} }}\nv = {{ theta_dot = {rate!r} }}\n"
+    start += f"guess = {{ bend = {bend!r}, gamma = {gamma!r} }}\n"
     return "\n".join([head("four_bar"), *bodies, *joints, start])
 
 

@@ -12,6 +12,7 @@ from campaign import some
 import eomgen
 from eomgen.errors import RunError
 from eomgen.study.verification.states import random_state
+from eomgen.sweep import execute
 
 jnp = jax.numpy
 SCENES = ("two_body_forced", "tumbling_body", "human_figure")
@@ -200,3 +201,8 @@ def test_without_jax_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setitem(sys.modules, "jax", None)
     with pytest.raises(RunError, match=r"backend 'jax': jax .*pip install 'eomgen\[jax\]'"):
         eomgen.load(module)
+
+
+def test_a_sweep_beside_jax_copies_no_threads() -> None:
+    """A process in which JAX runs is not forked: its threads would be missing in the copy."""
+    assert execute._start().get_start_method() == "spawn"

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 
 from eomgen.codegen.backends import c
 from eomgen.exports.fmu_unit import Observed, Unit
+from eomgen.native.dop853 import constants, written_out
 from eomgen.run import complementarity, contacts, events, projection
-from eomgen.run.integrators import dormand_prince_8 as dop853
-from eomgen.run.integrators.dop853_coefficients import NODES, Row
 from eomgen.templating import render, templates_folder
 
 HEADERS = ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h")
@@ -54,7 +53,7 @@ def _main(unit: Unit, token: str) -> str:
         "switching": [(n, s) for n, s, _, _ in _observed(unit.switches, len(interface.contacts))],
         **_closure(unit),
         **_contacts(unit),
-        **_steps(),
+        **constants(written_out),
     }
     return render("fmu", "unit.c.jinja", context)
 
@@ -105,27 +104,3 @@ def _contacts(unit: Unit) -> dict[str, object]:
         "consistent": repr(complementarity.CONSISTENT),
         "most_events": events.MOST_EVENTS,
     }
-
-
-def _steps() -> dict[str, object]:
-    return {
-        "slopes": dop853.SLOPES,
-        "nodes": [repr(node) for node in NODES],
-        "stages": [(i, _sum(dop853.SUMS[i])) for i in range(1, 12)],
-        "end_sum": _sum(dop853.SUMS[dop853.AT_END]),
-        "long_error": _sum(dop853.SUMS[dop853.LONG_ERROR]),
-        "short_error": _sum(dop853.SUMS[dop853.SHORT_ERROR]),
-        "dense_stages": [
-            (i, _sum(dop853.SUMS[dop853.AT_DENSE + i - 13])) for i in range(13, dop853.SLOPES)
-        ],
-        "dense": [_sum(row) for row in dop853.SUMS[dop853.IN_DENSE :]],
-        "safety": repr(dop853.SAFETY),
-        "power": repr(dop853.POWER),
-        "smallest": repr(dop853.SMALLEST),
-        "greatest": repr(dop853.GREATEST),
-        "short_weight": repr(dop853.SHORT_WEIGHT),
-    }
-
-
-def _sum(row: Row) -> str:
-    return " + ".join(f"{row[j]!r} * k[{j}][j]" for j in sorted(row))

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from eomgen.codegen.backends import c, c_lanes
 from eomgen.codegen.interface import Interface
 from eomgen.native import lanes
+from eomgen.native.dop853 import constants
 from eomgen.native.lanes import Columns, Lanes, columns_of
 from eomgen.program.program import Program
-from eomgen.run.integrators import dormand_prince_8 as dop853
-from eomgen.run.integrators.dop853_coefficients import NODES, Row
+from eomgen.run.integrators.dop853_coefficients import Row
 from eomgen.run.problem import FloatArray
 from eomgen.templating import render
 
@@ -33,24 +33,12 @@ def sources(
     program: Program, interface: Interface, outputs: tuple[str, ...] = ()
 ) -> Mapping[str, str]:
     """The C sources of `native.lanes`, and of runs by DOP853."""
+    values = constants(_terms)
+    del values["power"]  # the template has its root by square roots
     context = {
         "main": c_lanes.MAIN,
-        "slopes": dop853.SLOPES,
-        "nodes": [repr(node) for node in NODES],
-        "stages": [(i, _terms(dop853.SUMS[i])) for i in range(1, 12)],
-        "ends": [
-            ("end_sum", _terms(dop853.SUMS[dop853.AT_END])),
-            ("long_error", _terms(dop853.SUMS[dop853.LONG_ERROR])),
-            ("short_error", _terms(dop853.SUMS[dop853.SHORT_ERROR])),
-        ],
-        "dense_stages": [
-            (i, _terms(dop853.SUMS[dop853.AT_DENSE + i - 13])) for i in range(13, dop853.SLOPES)
-        ],
-        "dense": [_terms(row) for row in dop853.SUMS[dop853.IN_DENSE :]],
-        "safety": repr(dop853.SAFETY),
-        "smallest": repr(dop853.SMALLEST),
-        "greatest": repr(dop853.GREATEST),
-        "short_weight": repr(dop853.SHORT_WEIGHT),
+        "ends": [(name, values.pop(name)) for name in ("end_sum", "long_error", "short_error")],
+        **values,
         "paces": PACES,
         "most_steps": MOST_STEPS,
     }

@@ -12,12 +12,12 @@ from eomgen.codegen.interface import Interface
 from eomgen.native import checked, equal_steps
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
+from eomgen.native.dop853 import constants, written_out
 from eomgen.native.functions import restricted
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators import dormand_prince_8 as dop853
-from eomgen.run.integrators.dop853_coefficients import NODES, Row
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.templating import render
@@ -38,31 +38,12 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "slopes": dop853.SLOPES,
-        "nodes": [repr(node) for node in NODES],
-        "stages": [(i, _sum(dop853.SUMS[i])) for i in range(1, 12)],
-        "end_sum": _sum(dop853.SUMS[dop853.AT_END]),
-        "long_error": _sum(dop853.SUMS[dop853.LONG_ERROR]),
-        "short_error": _sum(dop853.SUMS[dop853.SHORT_ERROR]),
-        "dense_stages": [
-            (i, _sum(dop853.SUMS[dop853.AT_DENSE + i - 13])) for i in range(13, dop853.SLOPES)
-        ],
-        "dense": [_sum(row) for row in dop853.SUMS[dop853.IN_DENSE :]],
-        "safety": repr(dop853.SAFETY),
-        "power": repr(dop853.POWER),
-        "smallest": repr(dop853.SMALLEST),
-        "greatest": repr(dop853.GREATEST),
-        "short_weight": repr(dop853.SHORT_WEIGHT),
+        **constants(written_out),
         **checked.context(),
         **of_constraints(),
     }
     main = render(c.TEMPLATES, "runs.c.jinja", context) + equal_steps.source(interface)
     return {**c.library(program, interface), MAIN: main}
-
-
-def _sum(row: Row) -> str:
-    """A sum over slopes. It begins with 0 and so is never -0, as where all factors are added."""
-    return " + ".join(["0.0", *(f"{row[j]!r} * k[{j}][j]" for j in sorted(row))])
 
 
 class _Settings(ctypes.Structure):

@@ -3,6 +3,7 @@
 import math
 import multiprocessing
 import signal
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -15,6 +16,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from importlib import import_module
 from itertools import islice
+from multiprocessing.context import BaseContext
 from typing import Any, Protocol
 
 import numpy as np
@@ -158,9 +160,18 @@ def _pool(task: Task, workers: int) -> tuple[Executor, Counter, Run]:
     if task.together:
         counter = Counter()
         return ThreadPoolExecutor(workers), counter, lambda t, values: run_chunk(t, values, counter)
-    memory = multiprocessing.Array("q", SIZE)
-    pool = ProcessPoolExecutor(workers, initializer=_begin_worker, initargs=(memory,))
+    start = _start()
+    memory = start.Array("q", SIZE)
+    pool = ProcessPoolExecutor(workers, start, initializer=_begin_worker, initargs=(memory,))
     return pool, Counter(memory.get_obj(), memory.get_lock()), _in_worker
+
+
+def _start() -> BaseContext:
+    """How processes are started: as is usual, but not as copies of one in which JAX runs, whose
+    threads would be missing there.
+    """
+    usual = multiprocessing.get_start_method()
+    return multiprocessing.get_context("spawn" if "jax" in sys.modules else usual)
 
 
 _of_worker = Counter()

@@ -243,6 +243,7 @@ def joined(words: Sequence[str]) -> str:
 
 
 def operations(counts: Mapping[str, int]) -> str:
+    """The number of operations, and how many of each kind, as a docstring has them."""
     kinds = ", ".join(f"{n} {kind}" for kind, n in counts.items() if kind not in _SUMS)
     return f"{counts['total']} operations" + (f": {kinds}" if kinds else "")
 
@@ -259,6 +260,7 @@ def plain(text: str) -> str:
 
 
 def units(interface: Interface) -> list[tuple[str, str]]:
+    """The entries of `UNITS`: names of all variables with their units."""
     entries = [(s.name, s.unit) for s in (*interface.states, *interface.inputs)]
     entries += [(p.name, plain(p.unit)) for p in interface.parameters]
     # Of a contact and a parameter of the same name, UNITS has the unit of the parameter.
