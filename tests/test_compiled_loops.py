@@ -12,7 +12,7 @@ from test_compiled_steps import assert_same, both, compiler
 from test_loop_runs import four_bar
 
 import eomgen
-from eomgen.run import projection
+from eomgen.run import singular
 from eomgen.run.integrators.equal_strides import EqualStrides
 from eomgen.run.integrators.strides import Strides
 
@@ -127,13 +127,13 @@ def test_small_minima_are_left_to_python(
     around it, of which C may have made one.
     """
     searched: list[float] = []
-    usual = projection._search
+    usual = singular._search
 
     def noted(held: Any, start: float, last: Any, advance: Any) -> None:
         searched.append(start)
         usual(held, start, last, advance)
 
-    monkeypatch.setattr(projection, "_search", noted)
+    monkeypatch.setattr(singular, "_search", noted)
     near = {"a": 0.45, "d": 0.9499}
     start = {"theta": 1.0, "theta_dot": 8.0}
     compiled, python = both(BAR, t_end=1.0, parameters=near, state=start, **RK4)

@@ -100,6 +100,7 @@ effects = [{ type = "joint_spring", name = "k", joint = "j", stiffness = 0.5 }]
     assert apart(run.y[:4], expected) < 1e-10
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("several", "one_by_one"),
     [

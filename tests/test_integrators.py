@@ -213,6 +213,7 @@ def test_symmetric_methods_run_backwards(name):
     assert y == pytest.approx(PENDULUM.initial, abs=1e-13)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["semi_implicit_euler", *LEAPFROGS, *GAUSS])
 def test_symplectic_energy_is_bounded_without_trend(name):
     trajectory = run(PENDULUM, name, 200.0, dt=0.05)

@@ -169,6 +169,7 @@ def test_columns_are_the_python_modules_to_rounding(scene: str) -> None:
             assert np.array_equal(start[:, j], module.initial_state(p[:, j]))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", FEW)
 def test_a_lane_has_the_same_bits_at_every_width_and_beside_any_others(scene: str) -> None:
     """Outputs and runs; one neighbour overflows, another is huge, and the order is reversed."""

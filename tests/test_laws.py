@@ -536,6 +536,7 @@ def test_momentum_changes_by_the_forces_from_outside(m: Moment) -> None:
 FLOATING = ("two_body", "tumbling_body", "quadruped", "human_figure")
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", FLOATING)
 def test_momentum_is_constant_when_nothing_acts_from_outside(name: str) -> None:
     """Trees that nothing holds keep all their momentum without gravity."""
@@ -596,6 +597,7 @@ def test_newton_and_euler_for_each_body(m: Moment) -> None:
 ROUND = (*FIGURES, "spinning_top", "tumbling_body", *(name for name in TREES if "space" in name))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "route"), [case for case in CASES if case[0] in ROUND])
 def test_length_of_quaternions(name: str, route: str) -> None:
     """It stays as it is, and nothing depends on it."""

@@ -13,7 +13,8 @@ from eomgen.api.given import check
 from eomgen.cli import main
 from eomgen.dynamics.assembly import closed_start
 from eomgen.errors import RunError, SceneError
-from eomgen.run.projection import jacobian_of, stays_away
+from eomgen.run.margins import stays_away
+from eomgen.run.projection import jacobian_of
 
 A, B, C, D = 0.3, 0.8, 0.6, 0.7
 """Lengths of a crank-rocker: crank, coupler, rocker and ground, m."""

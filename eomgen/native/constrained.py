@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.native.checked import Function, FunctionStructure
-from eomgen.run import projection
+from eomgen.run import margins, projection
 from eomgen.run.compiled import Array, Constrained
 from eomgen.run.problem import USUAL_LENGTH
 
@@ -41,8 +41,8 @@ def context() -> dict[str, Any]:
         "most_projections": projection.MOST,
         "met": repr(projection.MET),
         "close": repr(projection.CLOSE),
-        "near": repr(projection.NEAR),
-        "singular": repr(projection.SINGULAR),
+        "near": repr(margins.NEAR),
+        "singular": repr(margins.SINGULAR),
     }
 
 

@@ -14,9 +14,11 @@ from eomgen.run.checks import check_repairs, check_rest_speed, numbers
 from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, repaired
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
+from eomgen.run.margins import Seen
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
-from eomgen.run.projection import Seen, Violations, watched
+from eomgen.run.projection import Violations
+from eomgen.run.singular import watched
 from eomgen.run.stepping import (
     ANEW,
     Asked,

@@ -9,11 +9,12 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.loading import load_source
+from eomgen.run.closed_form import closed_form_of
 from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
 from eomgen.run.origin import Origin
 from eomgen.run.problem import Contacts, Explain, FloatArray, Problem, Switching, unexplained
-from eomgen.run.projection import closed_form_of, projection_of
+from eomgen.run.projection import projection_of
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.run.works import Powers
 

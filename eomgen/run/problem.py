@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.errors import RunError
+from eomgen.run.closed_form import ClosedForm
 from eomgen.run.compiled import Compiled, Series
 from eomgen.run.intervals import Interval
 from eomgen.run.origin import Origin
-from eomgen.run.projection import ClosedForm, Projection
+from eomgen.run.projection import Projection
 
 FloatArray = NDArray[np.float64]
 """An array of 64-bit floats, such as a state."""

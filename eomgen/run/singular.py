@@ -1,0 +1,159 @@
+"""Singular positions of a mechanism with constraints, at which a run stops."""
+
+from collections.abc import Callable, Iterator
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.run.closed_form import ClosedForm
+from eomgen.run.compiled import Margins
+from eomgen.run.failure import StepFailure
+from eomgen.run.margins import IN_CLOSED_FORM, NEAR, SINGULAR, Seen, stays_away
+from eomgen.run.projection import Projection
+
+FloatArray = NDArray[np.float64]
+
+BEFORE_END = 0.3
+"""A margin from which, in closed form, a step may lead to where the loops cannot be closed."""
+SEARCH = 60
+"""Evaluations of that search."""
+REMEDY = (
+    "take another start, lengths that do not line up, or --route aba at a dead point of the "
+    "coordinates that were taken as independent"
+)
+
+
+class SingularPositionError(StepFailure):
+    """The mechanism is singular at a time."""
+
+    def __init__(self, projection: Projection | ClosedForm, t: float, margins: FloatArray) -> None:
+        least = int(np.argmin(margins))
+        if least >= len(projection.names):
+            angle = projection.angles[least - len(projection.names)]  # type: ignore[union-attr]
+            super().__init__(
+                f"at t = {t:.6g} s {angle}, which follows from the state in closed form, leaves "
+                "the turn in which it is counted",
+                "give loops = 'projected' in the scene, or these parameters",
+            )
+            return
+        name = projection.names[least]
+        super().__init__(
+            f"the mechanism is singular at t = {t:.6g} s: constraint {name} follows from the "
+            "others there, as at a dead point or a change point, or has no direction, as where a "
+            "disc lies flat",
+            REMEDY,
+        )
+
+    def __reduce__(self) -> tuple[type, tuple[str, ...]]:
+        return StepFailure, (self.reason, self.remedy)
+
+
+class Part(Protocol):
+    """A step, as far as it is watched."""
+
+    @property
+    def t(self) -> float:
+        """Its end."""
+
+    @property
+    def y(self) -> FloatArray:
+        """The state there."""
+
+    @property
+    def within(self) -> Callable[[float], FloatArray]:
+        """The state at a time within it."""
+
+    @property
+    def margins(self) -> Margins | None:
+        """Of several steps that have been watched, those of the last one."""
+
+
+Steps = TypeVar("Steps", bound=Part)
+
+
+def watched(
+    projection: Projection | ClosedForm, advances: Iterator[Steps], t: float, y: FloatArray
+) -> Iterator[Steps]:
+    """The steps of a run from (t, y), which ends where the mechanism is singular.
+
+    The margins are evaluated after each step. Where their least has a small minimum it is searched
+    within the steps around it, so that no singular position is passed over. Raises `StepFailure`
+    there.
+    """
+    seen = projection.seen or Seen()
+    seen.begin(t, _least(projection, t, y))
+    last: Steps | None = None
+    try:
+        for advance in advances:
+            if isinstance(projection, ClosedForm) and not np.isfinite(advance.y).all():
+                raise StepFailure("the loops cannot be closed", REMEDY)
+            if advance.margins:
+                seen.begin(advance.margins.start, advance.margins.before)
+                seen.add(advance.t, advance.margins.here)
+                last = advance
+                yield advance
+                continue
+            here = _checked(projection, advance.t, advance.y)
+            if advance.t > seen.t:
+                if last is not None and seen.turns(advance.t, here):
+                    _search(projection, seen.start, last, advance)
+                seen.add(advance.t, here)
+                last = advance
+            else:  # a strike
+                seen.begin(advance.t, here)
+                last = None
+            yield advance
+    except SingularPositionError:
+        raise
+    except StepFailure as failure:
+        if seen.here < (BEFORE_END if isinstance(projection, ClosedForm) else NEAR):
+            reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
+            raise StepFailure(reason, REMEDY) from None
+        raise
+
+
+def _search(projection: Projection | ClosedForm, start: float, last: Part, advance: Part) -> None:
+    """Look for a singular position in two steps, of which the first begins at `start`, by golden
+    section. It ends where none can be.
+    """
+
+    def margin(t: float) -> float:
+        return _least(projection, t, (last if t < last.t else advance).within(t))
+
+    a, b = start, advance.t
+    at_a, at_b = margin(a), margin(b)
+    ratio = (5**0.5 - 1) / 2
+    c, d = b - ratio * (b - a), a + ratio * (b - a)
+    at_c, at_d = margin(c), margin(d)
+    for _ in range(SEARCH):
+        least, times = min(at_c, at_d), (a, c, d, b)
+        if least < _limit(projection) or stays_away(least, times, (at_a, at_c, at_d, at_b)):
+            break
+        if at_c < at_d:
+            b, at_b, d, at_d = d, at_d, c, at_c
+            c = b - ratio * (b - a)
+            at_c = margin(c)
+        else:
+            a, at_a, c, at_c = c, at_c, d, at_d
+            d = a + ratio * (b - a)
+            at_d = margin(d)
+    best = c if at_c < at_d else d
+    _checked(projection, best, (last if best < last.t else advance).within(best))
+
+
+def _checked(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:
+    """The least margin. Raises `SingularPositionError` if it counts as 0."""
+    margins = projection.margins(t, y)
+    least = float(margins.min())
+    if least < _limit(projection):
+        raise SingularPositionError(projection, t, margins)
+    return least
+
+
+def _least(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:
+    return float(projection.margins(t, y).min())
+
+
+def _limit(projection: Projection | ClosedForm) -> float:
+    return IN_CLOSED_FORM if isinstance(projection, ClosedForm) else SINGULAR
