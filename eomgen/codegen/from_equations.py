@@ -10,9 +10,10 @@ from eomgen.derivation.closed import Equations, written_out_forces
 from eomgen.derivation.forms import state_form
 from eomgen.derivation.free_bodies import SymbolicMechanism
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
+from eomgen.derivation.supported import off_centre
 from eomgen.derivation.symbols import Vec, rotate
-from eomgen.language.formula import evaluate
-from eomgen.model.model import Point, is_zero, off_centre
+from eomgen.language.formula import evaluate, is_zero
+from eomgen.model.model import Point
 from eomgen.outputs import OUTPUTS
 from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering

@@ -22,7 +22,7 @@ from eomgen.dynamics.composite import full
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.reactions import reactions
 from eomgen.dynamics.vectors import Vec, in_space, zeros
-from eomgen.model.model import is_zero
+from eomgen.language.formula import is_zero
 from eomgen.model.states import initial_state, velocity_states
 from eomgen.outputs import DERIVATIVES
 from eomgen.program import differentiate

@@ -1,10 +1,11 @@
 """Which models have a closed form, and by which of the two derivations."""
 
 from collections import Counter
+from typing import TypeGuard
 
-from eomgen.language.formula import ZERO
-from eomgen.model.model import Model, off_centre
-from eomgen.scene.joints import Free, Revolute
+from eomgen.language.formula import ZERO, is_zero
+from eomgen.model.model import Model
+from eomgen.scene.joints import Free, Joint, Revolute
 
 MOST_BODIES = 12
 """Bodies of one tree of pins in the plane; twelve take about a minute, one more a third more."""
@@ -86,3 +87,10 @@ def why_not_pins(model: Model) -> str:
     if size > MOST_BODIES:
         return f"it is for trees of up to {MOST_BODIES} bodies, and one has {size}"
     return ""
+
+
+def off_centre(joint: Joint) -> TypeGuard[Revolute]:
+    """Whether a revolute joint's axis passes beside its child's centre of mass: `r_child` is not
+    the bare number 0.
+    """
+    return isinstance(joint, Revolute) and not all(is_zero(r) for r in joint.r_child)

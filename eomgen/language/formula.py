@@ -266,6 +266,11 @@ def names_in(formula: Formula) -> Iterator[str]:
                 yield from names_in(operand)
 
 
+def is_zero(formula: Formula) -> bool:
+    """Whether a quantity is the bare number 0, which is not a parameter."""
+    return isinstance(formula, Constant) and formula.value == 0.0
+
+
 def calls_function(formula: Formula) -> bool:
     """Whether a formula contains a function."""
     match formula:

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import TypeGuard
 
 from eomgen.displays import Displayed
 from eomgen.language.conditions import Condition, require
@@ -17,7 +16,7 @@ from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.constraints import Constraint, ConstraintTable, LoopJoint
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import ExtraState, Input
-from eomgen.scene.joints import Free, Joint, Revolute
+from eomgen.scene.joints import Free, Joint
 from eomgen.scene.joints.base import Coordinate
 from eomgen.scene.schema import Closing, Form, LeftOut, Route
 
@@ -415,15 +414,3 @@ def _formulas(value: object) -> Iterator[Formula]:
             yield from _formulas(part)
     elif isinstance(value, Formula):
         yield value
-
-
-def off_centre(joint: Joint) -> TypeGuard[Revolute]:
-    """Whether a revolute joint's axis passes beside its child's centre of mass: `r_child` is not
-    the bare number 0.
-    """
-    return isinstance(joint, Revolute) and not all(is_zero(r) for r in joint.r_child)
-
-
-def is_zero(formula: Formula) -> bool:
-    """Whether a quantity is the bare number 0, which is not a parameter."""
-    return isinstance(formula, Constant) and formula.value == 0.0
