@@ -115,7 +115,7 @@ def tilted(n: int, tilt: float | None = None) -> str:
     )
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", some((2,), (2, 3)))
 def test_an_orientation_of_parameters_follows_them(n: int) -> None:
     """A module at another value is the one of a scene with the numbers of that value, by every
     route; its derivative with respect to the parameter is that of its values.

@@ -351,6 +351,7 @@ def test_the_same_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
         assert name == "few" or np.array_equal(one, two)
 
 
+@pytest.mark.full
 def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What rounding does not allow is said in one line; the best run is kept."""
     assert main(["simulate", "pendulum", "--accuracy", "1e-16", "-o", str(tmp_path)]) == 1

@@ -103,6 +103,7 @@ v = [0.2, -1.0]
 """Two masses on straight wires: forces depend on positions and time."""
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("rtol", [1e-3, 1e-7])
 @pytest.mark.parametrize(
     "scene", some((STIFF, "spinning_top", "two_body_forced"), (STIFF, *built_in_names()))
@@ -162,6 +163,7 @@ def test_aims_are_met_by_the_same_runs() -> None:
     assert_same(compiled, python)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", GAUSS)
 @pytest.mark.parametrize(
     "scene", some((STIFF, "spinning_top", "pendulum"), (STIFF, *built_in_names()))

@@ -40,12 +40,13 @@ def blocks(text: str) -> list[tuple[str, str]]:
     return re.findall(r"^```(\w+)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.every(2)
 @pytest.mark.usefixtures("blank_figures")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_page_does_what_it_says(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Files are written, commands run, and Python prints what it says. Every line of a text block
+    """Every page in a full run. Files are written, commands run, and Python prints what it says. Every line of a text block
     is printed by the commands before it, in order.
     """
     monkeypatch.chdir(tmp_path)

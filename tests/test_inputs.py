@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import some
 from scipy.integrate import solve_ivp
 
 import eomgen
@@ -169,7 +170,7 @@ def test_inputs_of_time_go_wherever_a_motion_is_computed(tmp_path: Path) -> None
     table = tmp_path / "inputs.csv"
     table.write_text("t, push\n0, 1\n0.3, -2\n1.7, 3\n")
     ways = ({"push": "m*sin(3*t) - x", "thrust": 0.5}, str(table))
-    for inputs in ways:
+    for inputs in some(ways[1:], ways):
         members = eomgen.ensemble(CART, {"m": [1.0, 2.5]}, inputs=inputs, t_end=2.0)
         for m, final in zip((1.0, 2.5), members.final, strict=True):
             run = eomgen.simulate(CART, inputs=inputs, parameters={"m": m}, t_end=2.0)

@@ -712,6 +712,7 @@ def test_operations_of_a_jacobian() -> None:
     assert costs["jacobian"]["total"] <= 12 * costs["derivative"]["total"]
 
 
+@pytest.mark.full
 def test_the_figures_are_figures() -> None:
     """As many segments and degrees of freedom as were asked for; everything is covered here."""
     for name in ("human_figure", "hanging_figure"):

@@ -190,6 +190,7 @@ def check(errors: Sequence[float], *sort: object, bound: float = AT_RANDOM) -> N
         assert error < MISSED.get(sort, {}).get(seed, bound), (seed, error)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize("masses", MASSES)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
@@ -255,6 +256,7 @@ ALIGNMENTS = [
 ]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("masses", MASSES)
 @pytest.mark.parametrize(("dimensions", "kind"), ALIGNMENTS)
 def test_every_digit_of_aligned_chains(dimensions: int, kind: str, masses: str) -> None:
