@@ -46,8 +46,8 @@ def blocks(text: str) -> list[tuple[str, str]]:
 def test_a_page_does_what_it_says(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every page in a full run. Files are written, commands run, and Python prints what it says. Every line of a text block
-    is printed by the commands before it, in order.
+    """Every page in a full run. Files are written, commands run, and Python prints what it says.
+    Every line of a text block is printed by the commands before it, in order.
     """
     monkeypatch.chdir(tmp_path)
     printed = ""
