@@ -154,7 +154,7 @@ def energy(steps: int, methods: Sequence[str] = ("leapfrog_4", "leapfrog_6")) ->
         means = np.array([block.mean() for block in np.array_split(off, 20)])
         fit, spread = np.polyfit(np.arange(20), means, 1, cov=True)
         slope, error = 20 * fit[0], 20 * float(np.sqrt(spread[0, 0]))
-        module = eomgen.load(eomgen.generate(scene))
+        module = eomgen.load(eomgen.generate(eomgen.read(scene).replaced(loops="projected")))
         gaps = np.abs(module.constraint_residuals(0.0, run.y.T)).max()
         band = np.abs(off).max()
         print(f"{method}: {steps} steps, energy {run.energy[0]:.3g} J within {band:.1e}; trend "
