@@ -19,12 +19,14 @@ class IntegratorSpec:
     kind    by which tables and figures group it
     method  "module:attribute" in `eomgen.run.integrators`: its `FixedStep` or `Adaptive`
     extra   whether it needs an extra of this program
+    rattle  whether its steps with constraints are those of RATTLE, on all coordinates
     """
 
     about: str
     kind: Kind
     method: str
     extra: bool = False
+    rattle: bool = False
 
 
 INTEGRATORS: Mapping[str, IntegratorSpec] = {
@@ -32,12 +34,20 @@ INTEGRATORS: Mapping[str, IntegratorSpec] = {
     "semi_implicit_euler": IntegratorSpec(
         "symplectic Euler, order 1", "symplectic", "semi_implicit_euler:INTEGRATOR"
     ),
-    "leapfrog": IntegratorSpec("Störmer-Verlet, order 2", "symplectic", "leapfrog:INTEGRATOR"),
+    "leapfrog": IntegratorSpec(
+        "Störmer-Verlet, order 2", "symplectic", "leapfrog:INTEGRATOR", rattle=True
+    ),
     "leapfrog_4": IntegratorSpec(
-        "leapfrog composed to order 4, by Suzuki", "symplectic", "composed:LEAPFROG_4"
+        "leapfrog composed to order 4, by Suzuki",
+        "symplectic",
+        "composed:LEAPFROG_4",
+        rattle=True,
     ),
     "leapfrog_6": IntegratorSpec(
-        "leapfrog composed to order 6, by Kahan and Li", "symplectic", "composed:LEAPFROG_6"
+        "leapfrog composed to order 6, by Kahan and Li",
+        "symplectic",
+        "composed:LEAPFROG_6",
+        rattle=True,
     ),
     "rk4": IntegratorSpec(
         "classical Runge-Kutta method, order 4", "explicit", "runge_kutta_4:INTEGRATOR"

@@ -150,6 +150,14 @@ def test_composed_rattle_has_its_order(method: str, order: int) -> None:
     assert back.y[-1][0] == pytest.approx(1.0, abs=1e-11)
 
 
+@pytest.mark.parametrize("method", ["leapfrog", "leapfrog_4", "leapfrog_6"])
+def test_rattle_takes_all_coordinates(method: str) -> None:
+    """Where other methods have the independent ones as their state."""
+    scene = four_bar(loops="auto")
+    assert len(eomgen.simulate(scene, t_end=0.01, integrator="rk4", dt=0.01).states) == 2
+    assert len(eomgen.simulate(scene, t_end=0.01, integrator=method, dt=0.01).states) == 6
+
+
 def test_given_states_are_kept_and_the_others_found() -> None:
     """Coordinates and velocities that are given stay; other parameters are assembled too."""
     run = eomgen.simulate(four_bar(), state={"psi_deg": -90, "theta_dot": 2.0}, t_end=0.01)

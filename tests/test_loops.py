@@ -352,6 +352,10 @@ BAD = {
         bars(constraint("equation", 'position = "1"')),
         "rule stays open by 1 rad",
     ),
+    "numbers overflow": (
+        bars(constraint("coupling", 'coordinate = "theta"', 'equals = "1e300*gamma**2 + 1e300"')),
+        "rule stays open by",
+    ),
     "a name is taken": (
         bars(constraint("equation", 'position = "theta"').replace("rule", "pin_close")),
         "constraints[0].name: 'pin_close' is also the name of joints[3]; give each its own",

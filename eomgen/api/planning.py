@@ -10,6 +10,7 @@ from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import setting_of
 from eomgen.api.states import values_by_index
 from eomgen.errors import RunError, nearest
+from eomgen.integrators import INTEGRATORS
 from eomgen.model.elaborate import available_in, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.results import Run
@@ -190,15 +191,17 @@ def _check_aims(
 
 
 def _closing(setting: "Setting | None", model: Model) -> Closing:
-    """How loops are closed: `leapfrog` is RATTLE on all coordinates."""
-    if setting and setting.integrator == "leapfrog" and model.closing == "auto":
-        return "projected"
-    return model.closing
+    """How loops are closed: with all coordinates as states where a method needs them."""
+    return "projected" if _is_rattle(setting) and model.closing == "auto" else model.closing
+
+
+def _is_rattle(setting: "Setting | None") -> bool:
+    return setting is not None and INTEGRATORS[setting.integrator].rattle
 
 
 def _of_method(setting: "Setting | None", model: Model) -> tuple[str, ...]:
     """The outputs that a method needs."""
-    if setting and setting.integrator.startswith("leapfrog") and model.constraints:
+    if _is_rattle(setting) and model.constraints:
         return ("mass_matrix", "kinetic_slopes")
     return ()
 

@@ -122,6 +122,7 @@ def closed_start(
     return tuple(found.tolist()), speeds, (*notices, *more)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # residuals may be of any size
 def _position(mechanism: Closure) -> tuple[Array, list[str]]:
     """The closed position nearest to a model's initial one, with notices; what it holds is kept,
     unless it holds all. Raises `SceneError` if there is none.

@@ -58,11 +58,6 @@ def with_closed_form(model: Model) -> Model:
     return replace(model, groups=made.groups, pivots=made.pivots, blocks=made.blocks)
 
 
-def why_not_closed_form(model: Model) -> str:
-    """Why the dependent coordinates are not found in closed form; "" if they can be."""
-    return "" if model.groups else _found(_Alike(model))[1]
-
-
 class _Alike:
     """A model without what its groups do not depend on, as the key of a cache: models themselves
     may hold mappings.

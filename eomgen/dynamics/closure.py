@@ -139,6 +139,8 @@ def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | Non
         last = size
         matrix = np.where(free, mechanism.holding(q), 0.0)
         normal = matrix @ matrix.T + damping * np.eye(len(g))
+        if not np.isfinite(normal).all():
+            return None
         step = -matrix.T @ np.linalg.lstsq(normal, g, rcond=1e-14)[0]
         length = float(np.abs(step).max())
         step *= min(1.0, 0.5 / length) if length else 1.0
