@@ -198,10 +198,11 @@ def test_equal_steps_fail_alike(method: str) -> None:
 
 @pytest.mark.parametrize("scene", [PLANE, FALL, "pendulum"])
 @pytest.mark.parametrize("unstable", [False, True])
-def test_leapfrog_has_the_bits_of_python(scene: str, unstable: bool) -> None:
+@pytest.mark.parametrize("method", ["leapfrog", "leapfrog_4", "leapfrog_6"])
+def test_leapfrog_has_the_bits_of_python(scene: str, unstable: bool, method: str) -> None:
     """The stability of its steps is judged alike, too."""
     for dt in (1e-3, 0.2):
-        options: dict[str, Any] = {"integrator": "leapfrog", "dt": dt, "unstable": unstable}
+        options: dict[str, Any] = {"integrator": method, "dt": dt, "unstable": unstable}
         compiled, python = both(scene, t_end=1.03, **options)
         assert_same(compiled, python)
 

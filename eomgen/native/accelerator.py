@@ -22,7 +22,7 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import functions, heyoka, implicit, rattle, runs, taylor
+from eomgen.native import equal_steps, functions, heyoka, implicit, rattle, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.program.program import Program
 from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
@@ -131,7 +131,6 @@ class Accelerator:
         origin, module = module and self._module, module or self._module
         made: dict[tuple[str, ...], runs.CompiledSteps] = {}
         stiff: dict[tuple[str, ...], implicit.CompiledImplicit] = {}
-        by_rattle: list[EqualSteps | None] = []
         projects = PROJECTS if problem.projection else ()
         symmetric = implicit.SYMMETRIC if problem.projection else ()
         problem = self._compilable(module, origin).problem(problem)
@@ -156,10 +155,13 @@ class Accelerator:
                 stiff[needed] = implicit.CompiledImplicit(problem, *given)
             return stiff.get(needed)
 
-        def rattle_steps() -> EqualSteps | None:
-            if not by_rattle and (libraries := self._implicit(rattle.NEEDED)):
-                by_rattle.append(rattle.steps(problem, module, libraries, *self._values))
-            return by_rattle[0] if by_rattle else None
+        by_rattle: dict[str, EqualSteps | None] = {}
+
+        def rattle_steps(name: str) -> EqualSteps | None:
+            if name not in by_rattle and (libraries := self._implicit(rattle.NEEDED)):
+                given = (problem, module, libraries, *self._values)
+                by_rattle[name] = rattle.steps(name, *given)
+            return by_rattle.get(name)
 
         def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
             if name == "taylor":  # its steps are not checked
@@ -173,8 +175,8 @@ class Accelerator:
             return found
 
         def equal(name: str) -> EqualSteps | None:
-            if problem.projection and name == "leapfrog":
-                found = rattle_steps()
+            if problem.projection and name in equal_steps.LEAPFROGS:
+                found = rattle_steps(name)
             elif name in implicit.GAUSS:
                 found = other.equal(name) if (other := implicit_steps(symmetric)) else None
             else:

@@ -12,13 +12,15 @@ from eomgen.codegen.interface import Interface
 from eomgen.native.checked import Function
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.run.compiled import Array, Constrained, EqualSteps, EqualStride
+from eomgen.run.integrators.composed import PARTS
 from eomgen.run.integrators.leapfrog import rates_of
 from eomgen.run.integrators.runge_kutta_4 import TABLEAU
 from eomgen.run.integrators.tableau import terms
 from eomgen.run.problem import Problem
 from eomgen.templating import render
 
-METHODS = {"euler": 1, "semi_implicit_euler": 2, "runge_kutta_4": len(TABLEAU.b), "leapfrog": 1}
+LEAPFROGS = {"leapfrog": 1, **{name: len(parts) for name, parts in PARTS.items()}}
+METHODS = {"euler": 1, "semi_implicit_euler": 2, "runge_kutta_4": len(TABLEAU.b), **LEAPFROGS}
 """The derivatives in a step, by the name of the method."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _MADE_ALL = 0
@@ -47,6 +49,7 @@ def source(interface: Interface) -> str:
     context = {
         "prefix": interface.name,
         "methods": list(METHODS),
+        "compositions": compositions(),
         "unit": "unit(",
         "positions": [i for i, state in states if state.position],
         "others": [i for i, state in states if not state.position],
@@ -55,6 +58,11 @@ def source(interface: Interface) -> str:
         "end_sum": _sum(TABLEAU.b),
     }
     return render(c.TEMPLATES, "equal_steps.c.jinja", context)
+
+
+def compositions() -> list[tuple[str, list[str]]]:
+    """The parts of each method that is composed of leapfrog steps."""
+    return [(name, [repr(part) for part in parts]) for name, parts in PARTS.items()]
 
 
 def _sum(row: Sequence[float]) -> str:
@@ -72,7 +80,7 @@ def steps(
     """The steps of a method, at the constants of parameters and at inputs; `functions` keep
     constraints.
     """
-    more = np.ascontiguousarray(rates_of(problem)) if name == "leapfrog" else None
+    more = np.ascontiguousarray(rates_of(problem)) if name in LEAPFROGS else None
     held = ctypes.cast(constants, _POINTER), inputs, more, functions
     return partial(made, library[f"steps_{name}"], METHODS[name], *held)
 

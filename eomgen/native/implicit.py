@@ -75,6 +75,8 @@ def sources() -> Mapping[str, str]:
         "negligible": repr(rodas_5p.NEGLIGIBLE),
         "least_error": repr(rodas_5p.LEAST_ERROR),
         "unit": "unit(((const iteration *)run->more)->of, ",
+        "methods_of_rattle": list(equal_steps.LEAPFROGS),
+        "compositions": equal_steps.compositions(),
         "most_of_rattle": rattle.MOST,
         "rattle_roundoff": repr(rattle.ROUNDOFF),
         "rattle_noise": repr(rattle.NOISE),

@@ -21,7 +21,7 @@ from eomgen.run.projection import PROJECTS
 NEEDED = ("derivative", "mass_matrix", "kinetic_slopes", "constraint_jacobian", *PROJECTS)
 """The functions that a step calls."""
 DERIVATIVES = 2
-"""Derivatives in a step."""
+"""Derivatives in a step of RATTLE."""
 
 
 class _Iteration(ctypes.Structure):
@@ -35,10 +35,15 @@ class _Iteration(ctypes.Structure):
 
 
 def steps(
-    problem: Problem, module: Any, libraries: Mapping[str, ctypes.CDLL], p: Any, u: Any
+    name: str,
+    problem: Problem,
+    module: Any,
+    libraries: Mapping[str, ctypes.CDLL],
+    p: Any,
+    u: Any,
 ) -> EqualSteps | None:
-    """The steps of a problem of a module at given parameters and inputs; None if there are none for
-    these.
+    """The steps of a method, leapfrog or one composed of it, for a problem of a module at given
+    parameters and inputs; None if there are none for these.
     """
     functions = checked.functions(module, {name: libraries[name] for name in NEEDED}, p)
     inputs = Kernels(module, libraries["derivative"]).given(u)
@@ -53,5 +58,6 @@ def steps(
     iteration = Iteration(ctypes.addressof(system), reals.ctypes.data, wholes.ctypes.data, rows)
     more = _Iteration(iteration, *called)
     more.kept = system, reals, wholes, inputs, libraries
-    call = libraries[METHODS_LIBRARY].steps_rattle
-    return partial(equal_steps.made, call, DERIVATIVES, None, inputs, more, functions)
+    call = libraries[METHODS_LIBRARY][f"steps_{name}"]
+    count = DERIVATIVES * equal_steps.LEAPFROGS[name]
+    return partial(equal_steps.made, call, count, None, inputs, more, functions)

@@ -7,8 +7,6 @@ those of `rattle`, and a composition of such is symplectic too (Reich, SIAM J. N
 (1996) 475-491).
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from eomgen.run.integrators import leapfrog
@@ -23,8 +21,13 @@ SIX = (*_KAHAN_LI, 1 - 2 * sum(_KAHAN_LI), *reversed(_KAHAN_LI))
 """The γ_i."""
 
 
-def composed(parts: Sequence[float], order: int) -> FixedStep:
-    """The method whose steps are leapfrog steps of these parts."""
+PARTS = {"leapfrog_4": FOUR, "leapfrog_6": SIX}
+"""Those of each method."""
+
+
+def composed(name: str, order: int) -> FixedStep:
+    """A method of `PARTS`, whose steps are leapfrog steps of these parts."""
+    parts = PARTS[name]
 
     def prepare(problem: Problem) -> Change:
         """As for `leapfrog`."""
@@ -39,8 +42,8 @@ def composed(parts: Sequence[float], order: int) -> FixedStep:
 
         return change
 
-    return FixedStep(prepare, order=order, solves=True)
+    return FixedStep(prepare, order=order, compiled=name, solves=True)
 
 
-LEAPFROG_4 = composed(FOUR, 4)
-LEAPFROG_6 = composed(SIX, 6)
+LEAPFROG_4 = composed("leapfrog_4", 4)
+LEAPFROG_6 = composed("leapfrog_6", 6)
