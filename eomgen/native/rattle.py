@@ -52,7 +52,7 @@ def steps(
     states, coordinates = len(problem.states), len(problem.positions)
     system = System(inputs=inputs.ctypes.data, states=states, positions=coordinates)
     square = coordinates * coordinates
-    reals = np.empty(13 * square + 10 * coordinates)
+    reals = np.empty(13 * square + 11 * coordinates)
     wholes = np.empty(2 * square + 4 * coordinates, np.int64)
     *called, rows = (FunctionStructure(*functions[name]) for name in NEEDED[:4])
     iteration = Iteration(ctypes.addressof(system), reals.ctypes.data, wholes.ctypes.data, rows)

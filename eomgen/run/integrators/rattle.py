@@ -27,7 +27,8 @@ MOST = 60
 """Most iterations of a step; they converge linearly, by about h times the fastest rate."""
 ROUNDOFF = 4 * float(np.finfo(np.float64).eps)
 NOISE = 1e-12
-"""A change below this fraction that does not shrink is rounding."""
+"""A change below this fraction of the coordinates is rounding if it is not smaller than that of two
+iterations before. From one to the next it may grow while the iteration converges."""
 CHECKS, STEP, SAME = 3, 1e-5, 1e-6
 """States at which forces are checked, the step of differences, and what counts as equal."""
 REMEDY = "take a smaller --dt or an adaptive method (--integrator DOP853)"
@@ -65,31 +66,32 @@ def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
     ways = _solved(mass, columns)
     begun = product(here, v) + half * force(here, q)
     a = b = v
-    multipliers, r, before = np.zeros(columns.shape[1]), q + h * v, np.inf
+    multipliers, step, before = np.zeros(columns.shape[1]), h * v, [np.inf, np.inf]
     for _ in range(MOST):
-        there = np.concatenate((r, b))
+        there = np.concatenate((q + step, b))
         middle = begun + half * slopes(q, a) + product(columns, multipliers)
         after, last_mass = held.scaled_jacobian(t, there), held.inertia(t, there)
         a, b = mass.solve(middle), _factored(last_mass).solve(middle)
-        new = q + half * (a + b)
-        off = held.residuals(t, np.concatenate((new, b))) / held.sizes
+        new = half * (a + b)
+        off = held.residuals(t, np.concatenate((q + new, b))) / held.sizes
         more = _factored(h * product(after, ways)).solve(off)
         multipliers = multipliers - more
-        moved = max(_largest(new - r), _largest(h * product(ways, more)))
-        r = new
-        scale = _largest(q) + _largest(h * v)
-        if moved <= ROUNDOFF * scale or (moved >= 0.5 * before and moved <= NOISE * scale):
+        moved = max(_largest(new - step), _largest(h * product(ways, more)))
+        step, size = new, _largest(new)
+        stalls = before[-2] <= moved <= NOISE * (_largest(q) + size)
+        if moved <= ROUNDOFF * size or stalls:
             break
-        before = moved
+        before.append(moved)
     else:
         raise StepFailure(f"the step did not converge in {MOST} iterations", REMEDY)
+    r = q + step
     there = np.concatenate((r, b))
     last_mass = held.inertia(t, there)
     last = middle + half * (force(last_mass, r) + slopes(r, b))
     mass = _factored(last_mass)
     w, ways = mass.solve(last), _solved(mass, after.T)
     w = w - product(ways, _factored(product(after, ways)).solve(product(after, w)))
-    return np.concatenate((r - q, w - v))
+    return np.concatenate((step, w - v))
 
 
 def _factored(matrix: FloatArray) -> Factors:
