@@ -15,6 +15,7 @@ from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, re
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.margins import Seen
+from eomgen.run.passage import Passage
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.projection import Violations
@@ -131,19 +132,27 @@ def integrate(
         checked = None if unstable or repairs or not method.steps_explicitly(problem) else problem
         plain = not (monitor or powers or problem.contacts)
         compiled = compiled_steps(problem) if plain else None
-        begin, settings = equal_steps(
+        begin, rows, settings = equal_steps(
             asked, method, counted, checked, compiled=compiled, each=tally is not None
         )
     else:
         compiled = None if monitor else compiled_steps(problem)
         each, dense = bool(tally or powers), powers is not None
-        begin, settings = adaptive_steps(
+        begin, rows, settings = adaptive_steps(
             asked, method, problem, remarks.append, compiled=compiled, each=each, dense=dense
         )
 
     gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else events.GAP_CHECKS
     stepper = events.Stepper(begin, gap_checks, calls.derivatives.of)
-    advances = _advances(stepper, counted, asked, monitor, rest_speed)
+    passage = None
+    if counted.projection and counted.contacts is None and not repairs:
+        passage = Passage(
+            counted,
+            lambda t, y, made: begin(replace(counted, initial=y), t, made),
+            rows,
+            asked.t_end,
+        )
+    advances = _advances(stepper, counted, asked, monitor, rest_speed, passage)
     account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
     run = _Run(asked.t_start, problem.initial, account)
     if can_go_on(method) and not repairs:
@@ -153,7 +162,8 @@ def integrate(
     report = progress or _ignore
     outcome, trouble = _follow(run, advances, calls, problem, method, asked.t_end, report, tally)
     kept = _kept(run, problem, {**settings, **numbers(rest_speed=rest_speed)})
-    notes = (trouble, monitor.words() if monitor else "", *dict.fromkeys(remarks))
+    through = passage.words() if passage else ""
+    notes = (trouble, monitor.words() if monitor else "", through, *dict.fromkeys(remarks))
     message = " ".join("; ".join(filter(None, notes)).split())
     found = _trajectory(run, problem, integrator, calls, outcome, message, kept)
     if problem.projection is None or violations is None:
@@ -272,6 +282,7 @@ def _advances(
     asked: Asked,
     monitor: RoundingMonitor | None,
     rest_speed: float | None,
+    passage: Passage | None,
 ) -> Iterator[Advance]:
     """The steps of a run, with event location if it has contacts, checked by its guard."""
     t_start, resume = asked.t_start, asked.resume
@@ -291,7 +302,7 @@ def _advances(
         )
     held = problem.projection or problem.closed_form
     if held:
-        advances = watched(held, advances, t_start, problem.initial)
+        advances = watched(held, advances, t_start, problem.initial, passage)
     return monitored(monitor, advances, t_start, problem.initial) if monitor else advances
 
 

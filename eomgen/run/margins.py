@@ -29,6 +29,10 @@ class Seen:
         """Take account of the end of a step."""
         self.start, self.t, self.before, self.here = self.t, t, self.here, margin
 
+    def nears(self, now: float) -> bool:
+        """Whether a step ends with a margin that has fallen, and may come to 0 in the next step."""
+        return now < self.here and (now < NEAR or now < self.here - now)
+
     def turns(self, t: float, now: float) -> bool:
         """Whether with a step to t the margins have passed a small minimum, and may be 0 in one of
         the last two steps.

@@ -1,6 +1,6 @@
 """Singular positions of a mechanism with constraints, at which a run stops."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -73,9 +73,14 @@ Steps = TypeVar("Steps", bound=Part)
 
 
 def watched(
-    projection: Projection | ClosedForm, advances: Iterator[Steps], t: float, y: FloatArray
+    projection: Projection | ClosedForm,
+    advances: Iterator[Steps],
+    t: float,
+    y: FloatArray,
+    passage: "Passing[Steps] | None" = None,
 ) -> Iterator[Steps]:
-    """The steps of a run from (t, y), which ends where the mechanism is singular.
+    """The steps of a run from (t, y), which ends where the mechanism is singular, unless a
+    `passage` leads on from there.
 
     The margins are evaluated after each step. Where their least has a small minimum it is searched
     within the steps around it, so that no singular position is passed over. Raises `StepFailure`
@@ -83,34 +88,84 @@ def watched(
     """
     seen = projection.seen or Seen()
     seen.begin(t, _least(projection, t, y))
-    last: Steps | None = None
-    try:
-        for advance in advances:
-            if isinstance(projection, ClosedForm) and not np.isfinite(advance.y).all():
-                raise StepFailure("the loops cannot be closed", REMEDY)
-            if advance.margins:
-                seen.begin(advance.margins.start, advance.margins.before)
-                seen.add(advance.t, advance.margins.here)
-                last = advance
+    watch = _Watch(projection, seen)
+    while True:
+        beyond = None
+        try:
+            for advance in advances:
+                if passage and not advance.margins:
+                    beyond = passage.beyond(seen, (t, y), advance)
+                    if beyond:
+                        break
+                watch.take(advance)
+                t, y = advance.t, advance.y
                 yield advance
-                continue
-            here = _checked(projection, advance.t, advance.y)
-            if advance.t > seen.t:
-                if last is not None and seen.turns(advance.t, here):
-                    _search(projection, seen.start, last, advance)
-                seen.add(advance.t, here)
-                last = advance
-            else:  # a strike
-                seen.begin(advance.t, here)
-                last = None
+        except SingularPositionError:
+            raise
+        except StepFailure as failure:
+            beyond = passage.beyond(seen, (t, y), None) if passage else None
+            if beyond is None:
+                raise watch.explained(failure) from None
+        if beyond is None:
+            return
+        steps, advances = beyond
+        for advance in steps:
+            t, y = advance.t, advance.y
             yield advance
-    except SingularPositionError:
-        raise
-    except StepFailure as failure:
-        if seen.here < (BEFORE_END if isinstance(projection, ClosedForm) else NEAR):
-            reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
-            raise StepFailure(reason, REMEDY) from None
-        raise
+        watch.begin(t, y)
+
+
+class Passing(Protocol[Steps]):
+    """What leads through singular positions where the motion is determined."""
+
+    def beyond(
+        self, seen: Seen, start: tuple[float, FloatArray], advance: Steps | None
+    ) -> tuple[Sequence[Steps], Iterator[Steps]] | None:
+        """The steps that take the place of the one from `start`, `advance`, or of one that failed,
+        and lead through a singular position, and those of the run that follow; None if there is no
+        such position, or no way through.
+        """
+
+
+class _Watch:
+    """The margins of a run, as its steps are taken."""
+
+    def __init__(self, projection: Projection | ClosedForm, seen: Seen) -> None:
+        self._projection, self._seen = projection, seen
+        self._last: Part | None = None
+
+    def begin(self, t: float, y: FloatArray) -> None:
+        """Begin with a state that ends no step."""
+        self._seen.begin(t, _least(self._projection, t, y))
+        self._last = None
+
+    def take(self, advance: Part) -> None:
+        """Take account of a step. Raises `StepFailure` if it ends or passes where the mechanism is
+        singular.
+        """
+        projection, seen = self._projection, self._seen
+        if isinstance(projection, ClosedForm) and not np.isfinite(advance.y).all():
+            raise StepFailure("the loops cannot be closed", REMEDY)
+        if advance.margins:
+            seen.begin(advance.margins.start, advance.margins.before)
+            seen.add(advance.t, advance.margins.here)
+        else:
+            here = _checked(projection, advance.t, advance.y)
+            if not advance.t > seen.t:  # a strike
+                self.begin(advance.t, advance.y)
+                return
+            if self._last is not None and seen.turns(advance.t, here):
+                _search(projection, seen.start, self._last, advance)
+            seen.add(advance.t, here)
+        self._last = advance
+
+    def explained(self, failure: StepFailure) -> StepFailure:
+        """The failure of a step, which the margins may explain."""
+        near = BEFORE_END if isinstance(self._projection, ClosedForm) else NEAR
+        if self._seen.here >= near:
+            return failure
+        reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
+        return StepFailure(reason, REMEDY)
 
 
 def _search(projection: Projection | ClosedForm, start: float, last: Part, advance: Part) -> None:

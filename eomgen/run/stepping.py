@@ -1,8 +1,10 @@
 """The steps of a run, from its arguments."""
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import cast
 
 import numpy as np
 
@@ -23,6 +25,8 @@ from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_s
 from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume, always
 from eomgen.run.problem import Problem
 
+Rows = Callable[[float, float], Sequence[float]]
+"""(a, b) -> the times of the rows of a run after a, up to b, s."""
 ADAPTIVE_SAMPLES = 1001
 ANEW = "anew"
 """The key in a `Resume` of a run that made no whole step: a later run then begins as that one did.
@@ -68,8 +72,9 @@ def equal_steps(
     *,
     compiled: Compiled | None = None,
     each: bool = True,
-) -> tuple[Begin, Resume]:
-    """A function that begins equal steps, and the settings that a later run compares.
+) -> tuple[Begin, Rows, Resume]:
+    """A function that begins equal steps, one that gives the times of rows, and the settings that a
+    later run compares.
 
     checked   the problem by whose Jacobian the stability of steps is checked; None for no check
     compiled  compiled steps of the problem, if it has some
@@ -105,7 +110,13 @@ def equal_steps(
             each=each,
         )
 
-    return begin, _settings(asked, dt)
+    def rows(a: float, b: float) -> list[float]:
+        first, last = (math.floor((t - asked.grid) / dt) for t in (a, b))
+        marks = (asked.grid + i * dt for i in range(first, last + 2) if i % every == 0)
+        found = [mark for mark in marks if a < mark <= b and mark < asked.t_end]
+        return [*found, b] if b == asked.t_end else found
+
+    return begin, rows, _settings(asked, dt)
 
 
 def adaptive_steps(
@@ -117,8 +128,9 @@ def adaptive_steps(
     compiled: Compiled | None = None,
     each: bool = True,
     dense: bool = True,
-) -> tuple[Begin, Resume]:
-    """A function that begins adaptive steps, and the settings that a later run compares.
+) -> tuple[Begin, Rows, Resume]:
+    """A function that begins adaptive steps, one that gives the times of rows, and the settings that
+    a later run compares.
 
     remark    called with the method's remarks
     compiled  compiled steps of the problem, if it has some
@@ -165,7 +177,11 @@ def adaptive_steps(
             dense=dense,
         )
 
-    return begin, {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
+    def rows(a: float, b: float) -> list[float]:
+        first, last = np.searchsorted(times, (a, b), side="right")
+        return cast(list[float], times[first:last].tolist())
+
+    return begin, rows, {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
 
 
 def _settings(asked: Asked, dt: float | None) -> Resume:
