@@ -31,28 +31,32 @@ PARTS = 8
 MOST, SETTLED = 40, 1e-14
 """Most iterations, and a change relative to the motion after which they end."""
 SMOOTH, MET = 1e-10, 1e-11
-"""The largest contribution of the last power to the state, relative to its change; the largest
-residual of the polynomial, in sizes."""
-SAFE = 1e-3
-"""A margin of the rank from which on steps keep their digits."""
+"""The largest contribution of the last power to positions, relative to the change of the state; the
+largest residual of the polynomial, in sizes."""
+SAFE, AWAY = 1e-3, 0.3
+"""A margin of the rank from which on steps keep their digits; and behind a change point, in parts of
+that before it: nearer, another one may follow."""
 ZERO, NARROW = 1e-5, 1e-7
 """A margin of the rank that is 0 at the change point, which is found within this part of a
 polynomial."""
 LOOK, FALLS, WITHIN = 0.05, 0.5, 65
 """How far ahead the change point is looked for, in times to it; the part of the margin that may be
 left at 0.8 of the way; and the number of times at which the polynomial is checked."""
-_LENGTHS = np.array([2.0, 3.4, 0.6, 0.3])
+_LENGTHS = np.array([2.0, 3.4, 1.5, 0.6, 0.3])
 """Lengths that are tried, in times to the change point, or to a time beyond it: the points of the
 first two keep away from it."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a motion: its end, s, the state there, and the state (ny,) at any time in it."""
+    """A part of a motion: its end, s, the state there, the state (ny,) at any time in it, and the time
+    of a change point that it goes through; None if there is none.
+    """
 
     end: float
     y: FloatArray
     within: Callable[[float], FloatArray]
+    at: float | None
 
 
 @dataclass(frozen=True)
@@ -101,9 +105,8 @@ def crossing(
                 if part is None:
                     return None
                 parts.append(part)
-                at = _lowest(problem, part, t)
-                if at is not None:
-                    return Crossing(at, parts)
+                if part.at is not None:
+                    return Crossing(part.at, parts)
                 t, y = part.end, part.y
                 if until is not None and t >= until:
                     return None
@@ -161,18 +164,17 @@ def _ahead(problem: Problem, t: float, y: FloatArray, motion: _Motion) -> float 
     return zero
 
 
-def _lowest(problem: Problem, part: Part, t: float) -> float | None:
-    """The time of the change point in a part that begins at t, by golden section; None if there is
-    none.
-    """
-    held, ratio = _held(problem), (5**0.5 - 1) / 2
-    a, b = t, part.end
-    while b - a > NARROW * (part.end - t):
+def _change_point(
+    held: Projection, within: Callable[[float], FloatArray], a: float, b: float
+) -> float | None:
+    """The time of a change point between two times, by golden section; None if there is none."""
+    ratio, narrow = (5**0.5 - 1) / 2, NARROW * (b - a)
+    while b - a > narrow:
         c, d = b - ratio * (b - a), a + ratio * (b - a)
-        at_c, at_d = (rank_margin(held, at, part.within(at)) for at in (c, d))
+        at_c, at_d = (rank_margin(held, at, within(at)) for at in (c, d))
         a, b = (a, d) if at_c < at_d else (c, b)
     at = (a + b) / 2
-    return at if rank_margin(held, at, part.within(at)) < ZERO else None
+    return at if rank_margin(held, at, within(at)) < ZERO else None
 
 
 def _collocated(
@@ -192,22 +194,30 @@ def _collocated(
             return None
         if change <= SETTLED * size or change >= last:
             break
-    coefficients = _COEFFICIENTS @ slopes
-    if not length * np.abs(coefficients[-1]).max() <= SMOOTH * size:
+    # Accelerations have lost digits, but across the constraints only, where velocities are put on
+    # them: those at the points have not.
+    nq, coefficients = held.coordinates, _COEFFICIENTS @ slopes
+    if not length * np.abs(coefficients[-1, :nq]).max() <= SMOOTH * size:
         return None
     integrals = legendre.legint(coefficients, lbnd=-1, axis=0) * (length / 2)
 
     def within(time: float) -> FloatArray:
-        return np.asarray(y + legendre.legval(2 * (time - t) / length - 1, integrals))
+        x = 2 * (time - t) / length - 1
+        state = y + legendre.legval(x, integrals)
+        if not held.quaternions:
+            state[nq : 2 * nq] = legendre.legval(x, coefficients[:, :nq])
+        return np.asarray(state)
 
     for time in np.linspace(t, t + length, WITHIN).tolist():
         if not np.abs(held.residuals(time, within(time)) / held.sizes).max() <= MET:
             return None
-    end = problem.projected(t + length, within(t + length))
+    end = problem.projected(t + length, y + legendre.legval(1.0, integrals))
     margins = [rank_margin(held, *pair) for pair in zip(times, states, strict=True)]
-    if min(margins) < SAFE / 10 or rank_margin(held, t + length, end) < SAFE:
+    at = _change_point(held, within, t, t + length)
+    least = SAFE if at is None else AWAY * rank_margin(held, t, y)
+    if min(margins) < SAFE / 10 or rank_margin(held, t + length, end) < least:
         return None
-    return Part(t + length, end, within)
+    return Part(t + length, end, within, at)
 
 
 _POINTS, _WEIGHTS = legendre.leggauss(STAGES)
