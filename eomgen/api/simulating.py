@@ -128,7 +128,31 @@ def simulate(
 
 
 def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
-    """Run a plan. Raises `RunError` if the run cannot start."""
+    """Run a plan. Where the coordinates or velocities that were taken as independent have a dead
+    point, the run is made again with others, if it does not continue an earlier one.
+
+    Raises `RunError` if the run cannot start.
+    """
+    run = _run(plan, follow, reporter)
+    if not run.outcome.dead or plan.resume is not None:
+        return run
+    # Imported here, since few runs need it.
+    from eomgen.codegen.choice import without_dead_points
+
+    model = without_dead_points(plan.model)
+    if compiled(model, reporter=reporter)[0].source == run.module.source:
+        return run
+    notice = (
+        f"at t = {run.t[-1]:.6g} s the run came to a dead point of the coordinates that were taken "
+        "as independent; it was made again with all coordinates as states"
+    )
+    reporter.note(notice)
+    again = _run(replace(plan, model=model), follow, reporter)
+    return replace(again, warnings=(*again.warnings, notice))
+
+
+def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
+    """Run a plan with the coordinates of its model."""
     # Imported here: plans are checked without SciPy.
     from eomgen.native.accelerator import without_compiler
     from eomgen.show.observe import observe

@@ -32,6 +32,8 @@ FEWEST = 6
 """Smallest number of correct digits of v̇; a scene that would have fewer is refused."""
 DERIVATIVES_A_STEP = 4
 """The derivatives of a step for which loops in closed form and projections are compared."""
+BY_INDEPENDENT = ("independent", "embedded")
+"""Routes that take velocities as independent."""
 MOST_FACTORING = 20_000
 """Operations of factoring M from which on `ldl` is not derived for comparison only."""
 
@@ -93,6 +95,20 @@ def choose(model: Model, *, closed: bool = True) -> Choice:
             return _of_loops(made, model, closed)
         model = made if made.groups else with_safe_pivots(model)
     return _chosen(model, closed)
+
+
+def without_dead_points(model: Model) -> Model:
+    """The model with all coordinates as its state, by a route that takes no velocities as
+    independent, so that it has no dead points: the one it names, or what `choose` takes then.
+    """
+    model = replace(model, closing="projected")
+    if model.route not in ("auto", *BY_INDEPENDENT):
+        return model
+    candidates = choose(replace(model, route="auto"), closed=False).candidates
+    others = [c for c in _accepted(candidates) if c.route not in BY_INDEPENDENT]
+    last = next(name for name, spec in ROUTES.items() if spec.last)
+    best = min(others, key=lambda c: c.operations or 0).route if others else last
+    return replace(model, route=best)
 
 
 def _of_loops(model: Model, other: Model, closed: bool) -> Choice:

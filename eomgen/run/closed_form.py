@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.run.margins import IN_CLOSED_FORM, NEAR, Seen
+from eomgen.run.projection import without
 
 FloatArray = NDArray[np.float64]
 
@@ -20,12 +21,15 @@ class ClosedForm:
     angles   names of angles that jump by a turn at the end of their range
     margins  (t, y) -> (nc + na,), or (n,), (ny, n) -> (nc + na, n), as of `Projection`; then how
              far each angle is from there, at most 1
+    jacobian (t, y) -> (nc, nv), the derivatives of the constraints' rates by all velocities;
+             `without` if the module has none, as that of a large mechanism
     seen     the margins of the run, if they are watched
     """
 
     names: tuple[str, ...]
     angles: tuple[str, ...]
     margins: Callable[[Any, FloatArray], FloatArray]
+    jacobian: Callable[[float, FloatArray], FloatArray]
     seen: Seen | None = None
 
     def passed(
@@ -55,4 +59,7 @@ def closed_form_of(module: Any, parameters: Any, inputs: Any) -> ClosedForm | No
         tuple(module.CONSTRAINTS),
         tuple(getattr(module, "RANGED", ())),
         lambda t, y: module.constraint_margins(t, y, parameters, inputs),
+        (lambda t, y: module.constraint_jacobian(t, y, parameters, inputs))
+        if hasattr(module, "constraint_jacobian")
+        else without,
     )

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from eomgen.run.failure import StepFailure
+from eomgen.run.margins import rank_margin
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import Projection
 
@@ -77,12 +78,9 @@ class Crossing:
         return part.y if t == part.end else part.within(t)
 
 
-def rank_margin(held: Projection, t: float, y: FloatArray) -> float:
-    """How far the constraints are from following from each other: the least singular value of their
-    matrix, in parts of the largest. It is about the distance from a change point.
-    """
-    values = np.linalg.svd(held.scaled_jacobian(t, y), compute_uv=False)
-    return float(values[-1] / values[0]) if values[0] else 0.0
+def distance(held: Projection, t: float, y: FloatArray) -> float:
+    """The margin of the rank of the constraints."""
+    return rank_margin(held.scaled_jacobian(t, y))
 
 
 def crossing(
@@ -135,7 +133,7 @@ def _motion(problem: Problem, t: float, y: FloatArray) -> _Motion:
     """The motion from a state on, by a difference over a small part of the way."""
     held, slope = _held(problem), problem.derivative(t, y)
     fastest = np.abs(slope[: held.coordinates]).max()
-    look = LOOK * rank_margin(held, t, y) / fastest if fastest else np.inf
+    look = LOOK * distance(held, t, y) / fastest if fastest else np.inf
     after = problem.projected(t + look, y + look * slope)
     return _Motion(slope, (problem.derivative(t + look, after) - slope) / look)
 
@@ -151,9 +149,9 @@ def _ahead(problem: Problem, t: float, y: FloatArray, motion: _Motion) -> float 
 
     def margin(at: float) -> float:
         state = motion.states(y, held.coordinates, np.array([at]))[0]
-        return rank_margin(held, t + at, problem.projected(t + at, state))
+        return distance(held, t + at, problem.projected(t + at, state))
 
-    before = rank_margin(held, t, y)
+    before = distance(held, t, y)
     at, last = LOOK * before / float(np.abs(motion.slope[: held.coordinates]).max()), 0.0
     for left in (1.0, FALLS, FALLS):
         now = margin(at)
@@ -171,10 +169,10 @@ def _change_point(
     ratio, narrow = (5**0.5 - 1) / 2, NARROW * (b - a)
     while b - a > narrow:
         c, d = b - ratio * (b - a), a + ratio * (b - a)
-        at_c, at_d = (rank_margin(held, at, within(at)) for at in (c, d))
+        at_c, at_d = (distance(held, at, within(at)) for at in (c, d))
         a, b = (a, d) if at_c < at_d else (c, b)
     at = (a + b) / 2
-    return at if rank_margin(held, at, within(at)) < ZERO else None
+    return at if distance(held, at, within(at)) < ZERO else None
 
 
 def _collocated(
@@ -212,10 +210,10 @@ def _collocated(
         if not np.abs(held.residuals(time, within(time)) / held.sizes).max() <= MET:
             return None
     end = problem.projected(t + length, y + legendre.legval(1.0, integrals))
-    margins = [rank_margin(held, *pair) for pair in zip(times, states, strict=True)]
+    margins = [distance(held, *pair) for pair in zip(times, states, strict=True)]
     at = _change_point(held, within, t, t + length)
-    least = SAFE if at is None else AWAY * rank_margin(held, t, y)
-    if min(margins) < SAFE / 10 or rank_margin(held, t + length, end) < least:
+    least = SAFE if at is None else AWAY * distance(held, t, y)
+    if min(margins) < SAFE / 10 or distance(held, t + length, end) < least:
         return None
     return Part(t + length, end, within, at)
 

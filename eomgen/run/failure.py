@@ -6,6 +6,9 @@ from eomgen.errors import RunError
 class StepFailure(RunError):
     """A step that cannot be made: the `reason`, and the `remedy`, what to change, or ""."""
 
+    dead = False
+    """See `trajectory.Outcome`."""
+
     def __init__(self, reason: str, remedy: str = "") -> None:
         super().__init__("; ".join(filter(None, (reason, remedy))))
         self.reason, self.remedy = reason, remedy

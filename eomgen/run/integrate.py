@@ -340,9 +340,9 @@ def _follow(
     except StepFailure as failure:
         why = problem.explain(run.t, run.y, problem.initial)
         outcome = (
-            Outcome("stopped", f"{failure.reason}: {why.reason}", why.remedy)
+            Outcome("stopped", f"{failure.reason}: {why.reason}", why.remedy, failure.dead)
             if why
-            else Outcome("stopped", failure.reason, failure.remedy)
+            else Outcome("stopped", failure.reason, failure.remedy, failure.dead)
         )
     # Python's floats raise where NumPy would give inf or nan: math.exp(1000), 1 / 0.0,
     # math.sqrt(-1). SciPy's factorisations raise a ValueError for a nan.

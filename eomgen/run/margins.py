@@ -3,10 +3,21 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 SINGULAR, NEAR = 1e-9, 0.05
 """A margin that counts as 0; and one below which the least margin is searched between steps."""
 IN_CLOSED_FORM = 1e-7
 """A margin that counts as 0 in closed form, which turns back on the same branch at a dead point."""
+
+
+def rank_margin(matrix: NDArray[np.float64]) -> float:
+    """How far the rows (nc, nv) are from following from each other: the least singular value, in parts
+    of the largest. For those of constraints it is about the distance from a change point.
+    """
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return float(values[-1] / values[0]) if values[0] else 0.0
 
 
 @dataclass

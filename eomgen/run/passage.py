@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from eomgen.run.crossing import SAFE, Crossing, crossing, rank_margin
+from eomgen.run.crossing import SAFE, Crossing, crossing, distance
 from eomgen.run.integrators.interface import Advance
 from eomgen.run.margins import Seen
 from eomgen.run.problem import FloatArray, Problem
@@ -45,7 +45,7 @@ class Passage:
             here = float(held.margins(advance.t, advance.y).min())
             if not seen.nears(here):
                 return None
-            margin = rank_margin(held, advance.t, advance.y)
+            margin = distance(held, advance.t, advance.y)
             if margin >= FAR:
                 self._tried = math.inf
             if margin >= FAR or margin > self._tried / AGAIN:

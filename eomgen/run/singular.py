@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from eomgen.run.closed_form import ClosedForm
 from eomgen.run.compiled import Margins
 from eomgen.run.failure import StepFailure
-from eomgen.run.margins import IN_CLOSED_FORM, NEAR, SINGULAR, Seen, stays_away
-from eomgen.run.projection import Projection
+from eomgen.run.margins import IN_CLOSED_FORM, NEAR, SINGULAR, Seen, rank_margin, stays_away
+from eomgen.run.projection import Projection, without
 
 FloatArray = NDArray[np.float64]
 
@@ -18,32 +18,41 @@ BEFORE_END = 0.3
 """A margin from which, in closed form, a step may lead to where the loops cannot be closed."""
 SEARCH = 60
 """Evaluations of that search."""
-REMEDY = (
-    "take another start, lengths that do not line up, or --route aba at a dead point of the "
-    "coordinates that were taken as independent"
-)
+REGULAR = 1e-4
+"""A margin of the rank where margins are 0 that shows that the mechanism is not singular, but what
+was taken as independent."""
+ELSEWHERE = "take another start, or lengths that do not line up"
+OTHERS = "take other coordinates: loops = 'projected' in the scene, and --route aba"
+"""Remedies."""
 
 
 class SingularPositionError(StepFailure):
-    """The mechanism is singular at a time."""
+    """The mechanism, or what was taken as independent, is singular at a time."""
 
-    def __init__(self, projection: Projection | ClosedForm, t: float, margins: FloatArray) -> None:
-        least = int(np.argmin(margins))
-        if least >= len(projection.names):
-            angle = projection.angles[least - len(projection.names)]  # type: ignore[union-attr]
-            super().__init__(
+    def __init__(
+        self, held: Projection | ClosedForm, t: float, y: FloatArray, margins: FloatArray
+    ) -> None:
+        least, closed = int(np.argmin(margins)), isinstance(held, ClosedForm)
+        if isinstance(held, ClosedForm) and least >= len(held.names):
+            angle = held.angles[least - len(held.names)]
+            reason = (
                 f"at t = {t:.6g} s {angle}, which follows from the state in closed form, leaves "
-                "the turn in which it is counted",
-                "give loops = 'projected' in the scene, or these parameters",
+                "the turn in which it is counted"
             )
-            return
-        name = projection.names[least]
-        super().__init__(
-            f"the mechanism is singular at t = {t:.6g} s: constraint {name} follows from the "
-            "others there, as at a dead point or a change point, or has no direction, as where a "
-            "disc lies flat",
-            REMEDY,
-        )
+        elif held.jacobian is without or rank_margin(held.jacobian(t, y)) > REGULAR:
+            reason = (
+                f"at t = {t:.6g} s what was taken as independent is at a dead point: the other "
+                f"coordinates do not follow from it by constraint {held.names[least]}"
+            )
+            closed = True
+        else:
+            reason = (
+                f"the mechanism is singular at t = {t:.6g} s: constraint {held.names[least]} "
+                "follows from the others there, as at a change point, or has no direction, as "
+                "where a disc lies flat"
+            )
+        super().__init__(reason, OTHERS if closed else ELSEWHERE)
+        self.dead = closed
 
     def __reduce__(self) -> tuple[type, tuple[str, ...]]:
         return StepFailure, (self.reason, self.remedy)
@@ -145,7 +154,7 @@ class _Watch:
         """
         projection, seen = self._projection, self._seen
         if isinstance(projection, ClosedForm) and not np.isfinite(advance.y).all():
-            raise StepFailure("the loops cannot be closed", REMEDY)
+            raise StepFailure("the loops cannot be closed", OTHERS)
         if advance.margins:
             seen.begin(advance.margins.start, advance.margins.before)
             seen.add(advance.t, advance.margins.here)
@@ -161,11 +170,13 @@ class _Watch:
 
     def explained(self, failure: StepFailure) -> StepFailure:
         """The failure of a step, which the margins may explain."""
-        near = BEFORE_END if isinstance(self._projection, ClosedForm) else NEAR
-        if self._seen.here >= near:
+        bound = BEFORE_END if isinstance(self._projection, ClosedForm) else NEAR
+        if self._seen.here >= bound:
             return failure
         reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
-        return StepFailure(reason, REMEDY)
+        near = StepFailure(reason, f"{ELSEWHERE}, or {OTHERS}")
+        near.dead = True
+        return near
 
 
 def _search(projection: Projection | ClosedForm, start: float, last: Part, advance: Part) -> None:
@@ -202,7 +213,7 @@ def _checked(projection: Projection | ClosedForm, t: float, y: FloatArray) -> fl
     margins = projection.margins(t, y)
     least = float(margins.min())
     if least < _limit(projection):
-        raise SingularPositionError(projection, t, margins)
+        raise SingularPositionError(projection, t, y, margins)
     return least
 
 

@@ -41,11 +41,14 @@ class Outcome:
             follows it; "stopped": by an error
     reason  why it did not finish
     remedy  what to change; "" if that is not known
+    dead    whether coordinates or velocities that were taken as independent are not there, so that
+            others may carry on; not kept in files
     """
 
     kind: Ending = "finished"
     reason: str = ""
     remedy: str = ""
+    dead: bool = False
 
     def __str__(self) -> str:
         return "; ".join(filter(None, (self.reason, self.remedy)))
