@@ -110,13 +110,13 @@ def test_the_bits_are_those_of_python(
 
 
 @pytest.mark.parametrize("options", [RK4, DOP853])
-def test_singular_positions_stop_alike(options: dict[str, Any], compiled_steps: list[int]) -> None:
+def test_change_points_are_passed_alike(options: dict[str, Any], compiled_steps: list[int]) -> None:
     """At the change point of a parallelogram."""
     lengths = {"a": 0.5, "b": 0.7, "c": 0.5, "d": 0.7}
     start = {"theta": 1.0, "psi": 1.0, "phi": -1.0, "theta_dot": 6.0}
     compiled, python = both(BAR, t_end=0.7, parameters=lengths, state=start, **options)
     assert_all_same(compiled, python)
-    assert "singular" in python.outcome.reason
+    assert "went through 2 change points" in python.message
     assert sum(compiled_steps) > 0
 
 
@@ -140,7 +140,7 @@ def test_small_minima_are_left_to_python(
     assert_all_same(compiled, python)
     half = len(searched) // 2
     assert half == 2 and searched[:half] == searched[half:]
-    assert sum(compiled_steps) > 400
+    assert sum(compiled_steps) > 300
 
 
 def test_contacts_close_alike(compiled_steps: list[int]) -> None:

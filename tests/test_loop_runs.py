@@ -13,7 +13,9 @@ from eomgen.api.given import check
 from eomgen.cli import main
 from eomgen.dynamics.assembly import closed_start
 from eomgen.errors import RunError, SceneError
+from eomgen.run.crossing import crossing
 from eomgen.run.margins import stays_away
+from eomgen.run.module import as_problem
 from eomgen.run.projection import jacobian_of
 
 A, B, C, D = 0.3, 0.8, 0.6, 0.7
@@ -261,23 +263,75 @@ def test_a_driven_crank_moves_the_loop() -> None:
     assert np.abs(gap(y) - 0.2).max() < 1e-13
 
 
+START = "q = { theta = 1.0, psi = 1.0, phi = -1.0 }\nv = { theta_dot = 6.0 }"
+DEAD = "q = { theta = 0.2 }\nv = { theta_dot = 3.0 }"
+PARALLELOGRAM = (0.5, 0.7, 0.5, 0.7)
+SETTINGS: tuple[dict[str, Any], ...] = ({"integrator": "DOP853"}, {"integrator": "rk4", "dt": 0.01})
+
+
 @pytest.mark.parametrize("route", ["independent", "aba", "orthogonal"])
-@pytest.mark.parametrize("settings", [{"integrator": "DOP853"}, {"integrator": "rk4", "dt": 0.01}])
-def test_singular_positions_stop_the_run(route: str, settings: dict[str, Any]) -> None:
-    """At the change point of a parallelogram every route stops, where all bars are in line. At the
-    dead point of a crank the route that takes it as independent does, and others go through.
+@pytest.mark.parametrize("settings", [*SETTINGS, {"integrator": "leapfrog", "dt": 0.005}])
+def test_change_points_are_passed(route: str, settings: dict[str, Any]) -> None:
+    """A parallelogram goes twice through where all bars are in line, and stays one;
+    `campaigns/change_points.py` shows it for a hundred turns, and for chains.
     """
-    lined = four_bar((0.5, 0.7, 0.5, 0.7), START, route=route)
-    run = eomgen.simulate(lined, t_end=3.0, **settings)
-    assert not run.finished and "singular" in run.outcome.reason
-    assert "change point" in run.outcome.reason and "another start" in run.outcome.remedy
-    assert abs(run["theta"][-1] - np.pi) < 0.15 and run["theta"].max() < np.pi
-    dead = four_bar((0.5, 0.3, 0.3, 0.7), DEAD, route=route)
-    run = eomgen.simulate(dead, t_end=1.0, **settings)
-    assert run.finished == (route != "independent")
-    assert run.finished or "singular" in run.outcome.reason
-    if run.finished:  # nothing is lost there: the constraints are independent
-        assert np.ptp(run.energy) < (1e-6 if settings["integrator"] == "DOP853" else 1e-2)
+    run = eomgen.simulate(
+        four_bar(PARALLELOGRAM, START, route=route), t_end=1.0, backend="numpy", **settings
+    )
+    assert run.finished and run["theta"][-1] > 2.5 * np.pi
+    assert "2 change points at t = 0.34" in run.message
+    assert np.abs(run["theta"] - run["psi"]).max() < 1e-12
+    assert max(after for _, after in run.trajectory.violations.values()) < 1e-14
+    loose = {"DOP853": 1e-6, "rk4": 1e-5, "leapfrog": 0.05}
+    assert np.ptp(run.energy) < loose[settings["integrator"]]
+
+
+@pytest.mark.parametrize("longer", [1e-3, -1e-5, 1e-7])
+def test_near_change_points_nothing_jumps(longer: float) -> None:
+    """Where the bars of a four-bar come nearly into line, no change point is passed: the motion is
+    continuous, and the other way of closing the loop is not taken.
+    """
+    scene = four_bar((0.5, 0.7, 0.5, 0.7 + longer), START, route="aba")
+    run = eomgen.simulate(scene, t_end=1.0, samples=20_001, backend="numpy")
+    assert "went through" not in run.message
+    assert np.ptp(run.energy) < 1e-5
+    steps = np.diff(run["psi"]) - np.diff(run.t) * (run["psi_dot"][1:] + run["psi_dot"][:-1]) / 2
+    assert np.abs(steps).max() < 1e-3
+
+
+def test_change_points_where_the_motion_is_not_determined() -> None:
+    """At rest nothing leads on, and none is found where there is none."""
+    for lengths, initial in (
+        (PARALLELOGRAM, "q = { theta = 3.0, psi = 3.0, phi = -3.0 }"),
+        ((0.5, 0.7, 0.5, 0.7 + 1e-8), START.replace("1.0", "3.0")),
+        ((A, B, C, D), DEAD),
+    ):
+        module = eomgen.load(eomgen.generate(four_bar(lengths, initial, route="aba")))
+        problem = as_problem(module)
+        assert crossing(problem, 0.0, problem.initial) is None
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+@pytest.mark.parametrize(("route", "loops"), [("independent", "projected"), ("aba", "closed")])
+def test_dead_points_change_coordinates(route: Any, loops: str, settings: dict[str, Any]) -> None:
+    """At a dead point of the crank, which was taken as independent, a run goes on with all
+    coordinates: it is that of a route that takes none. A run that continues an earlier one has the
+    coordinates of that.
+    """
+    lengths = {"a": 0.5, "b": 0.3, "c": 0.3}
+    given: dict[str, Any] = {"parameters": lengths, "backend": "numpy", **settings}
+    dead, all_of_them = (
+        four_bar(initial=DEAD, route=of, loops=how)
+        for of, how in ((route, loops), ("aba", "projected"))
+    )
+    run, other = (eomgen.simulate(text, t_end=1.0, **given) for text in (dead, all_of_them))
+    assert run.finished and "dead point" in run.warnings[-1]
+    assert len(run.states) == 6 and not other.warnings
+    np.testing.assert_allclose(run.y[-1], other.y[-1], atol=1e-4)
+    begun = eomgen.simulate(dead, t_end=0.4, **given)
+    longer = eomgen.simulate(dead, t_end=1.0, resume=begun, **given)
+    assert longer.states == begun.states
+    assert longer.finished
 
 
 def test_margins_that_stay_away_from_0() -> None:
@@ -292,10 +346,6 @@ def test_margins_that_stay_away_from_0() -> None:
         near = width * (times - 0.4)
         smooth = 0.01 + near**2
         assert stays_away(float(smooth.min()), near, smooth) == away
-
-
-START = "q = { theta = 1.0, psi = 1.0, phi = -1.0 }\nv = { theta_dot = 6.0 }"
-DEAD = "q = { theta = 0.2 }\nv = { theta_dot = 3.0 }"
 
 
 def test_sweeps_close_each_member() -> None:

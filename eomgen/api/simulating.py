@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from eomgen.run.guard import Guard
     from eomgen.run.resume import Start
     from eomgen.run.tally import Follow
+    from eomgen.run.trajectory import Trajectory
     from eomgen.run.works import Powers
     from eomgen.study.accuracy.search import Choice
     from eomgen.study.accuracy.trial import Case, Tried
@@ -129,18 +130,20 @@ def simulate(
 
 def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
     """Run a plan. Where the coordinates or velocities that were taken as independent have a dead
-    point, the run is made again with others, if it does not continue an earlier one.
+    point, the run is made again with others; one that continues an earlier one has its coordinates.
 
     Raises `RunError` if the run cannot start.
     """
+    states = _earlier(plan)[0].states if plan.resume is not None else None
+    known = states is None or not plan.model.constraints
+    if not known and states != compiled(plan.model, reporter=reporter)[1].STATES:
+        plan = replace(plan, model=_other(plan.model))
     run = _run(plan, follow, reporter)
-    if not run.outcome.dead or plan.resume is not None:
+    if not run.outcome.dead:
         return run
-    # Imported here, since few runs need it.
-    from eomgen.codegen.choice import without_dead_points
-
-    model = without_dead_points(plan.model)
-    if compiled(model, reporter=reporter)[0].source == run.module.source:
+    model = _other(plan.model)
+    module, functions = compiled(model, reporter=reporter)
+    if module.source == run.module.source or states not in (None, functions.STATES):
         return run
     notice = (
         f"at t = {run.t[-1]:.6g} s the run came to a dead point of the coordinates that were taken "
@@ -149,6 +152,14 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     reporter.note(notice)
     again = _run(replace(plan, model=model), follow, reporter)
     return replace(again, warnings=(*again.warnings, notice))
+
+
+def _other(model: Model) -> Model:
+    """The model with coordinates and a route that have no dead points."""
+    # Imported here, since it takes long and few runs need it.
+    from eomgen.codegen.choice import without_dead_points
+
+    return without_dead_points(model)
 
 
 def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
@@ -336,14 +347,18 @@ def _start(plan: Plan, problem: Problem) -> "Start | None":
     if plan.resume is None:
         return None
     from eomgen.run.resume import going_on
-    from eomgen.run.trajectory import load_npz
 
     assert plan.setting is not None
-    if isinstance(plan.resume, Run):
-        path = Path(f"the run of {plan.resume.model.name}")
-        ended = plan.resume.trajectory
-    else:
-        path = Path(plan.resume)
-        ended = load_npz(path)
+    ended, path = _earlier(plan)
     limits = {"max_step": plan.max_step, "rest_speed": plan.scene.simulation.rest_speed}
     return going_on(ended, path, problem, plan.setting, **limits)
+
+
+def _earlier(plan: Plan) -> "tuple[Trajectory, Path]":
+    """The run that a plan continues, and where it is from."""
+    from eomgen.run.trajectory import load_npz
+
+    assert plan.resume is not None
+    if isinstance(plan.resume, Run):
+        return plan.resume.trajectory, Path(f"the run of {plan.resume.model.name}")
+    return load_npz(Path(plan.resume)), Path(plan.resume)

@@ -35,8 +35,8 @@ SMOOTH, MET = 1e-10, 1e-11
 """The largest contribution of the last power to positions, relative to the change of the state; the
 largest residual of the polynomial, in sizes."""
 SAFE, AWAY = 1e-3, 0.3
-"""A margin of the rank from which on steps keep their digits; and behind a change point, in parts of
-that before it: nearer, another one may follow."""
+"""A margin of the rank from which on steps keep their digits; and the least behind a change point,
+in parts of that before it: where it is less, another one may follow."""
 ZERO, NARROW = 1e-5, 1e-7
 """A margin of the rank that is 0 at the change point, which is found within this part of a
 polynomial."""
@@ -50,8 +50,8 @@ first two keep away from it."""
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a motion: its end, s, the state there, the state (ny,) at any time in it, and the time
-    of a change point that it goes through; None if there is none.
+    """A part of a motion: its end, s, the state there, the state (ny,) at any time in it, and the
+    time of a change point that it goes through; None if there is none.
     """
 
     end: float
@@ -144,7 +144,7 @@ def _held(problem: Problem) -> Projection:
 
 
 def _ahead(problem: Problem, t: float, y: FloatArray, motion: _Motion) -> float | None:
-    """The time until the margin of the rank comes to 0; None if it does not fall in a straight line."""
+    """The time until the margin of the rank comes to 0; None if it does not fall straight to it."""
     held = _held(problem)
 
     def margin(at: float) -> float:

@@ -13,8 +13,8 @@ IN_CLOSED_FORM = 1e-7
 
 
 def rank_margin(matrix: NDArray[np.float64]) -> float:
-    """How far the rows (nc, nv) are from following from each other: the least singular value, in parts
-    of the largest. For those of constraints it is about the distance from a change point.
+    """How far the rows (nc, nv) are from following from each other: the least singular value, in
+    parts of the largest. For those of constraints it is about the distance from a change point.
     """
     values = np.linalg.svd(matrix, compute_uv=False)
     return float(values[-1] / values[0]) if values[0] else 0.0

@@ -129,8 +129,8 @@ def adaptive_steps(
     each: bool = True,
     dense: bool = True,
 ) -> tuple[Begin, Rows, Resume]:
-    """A function that begins adaptive steps, one that gives the times of rows, and the settings that
-    a later run compares.
+    """A function that begins adaptive steps, one that gives the times of rows, and the settings
+    that a later run compares.
 
     remark    called with the method's remarks
     compiled  compiled steps of the problem, if it has some

@@ -13,7 +13,10 @@ import eomgen
 CASES = (
     ("four_bar", {"integrator": "rk4", "dt": 1e-3}),
     ("four_bar", {"integrator": "gauss_4", "dt": 1e-3}),
-    *(("peaucellier", {"integrator": f"leapfrog{order}", "dt": 1e-3}) for order in ("", "_4", "_6")),
+    *(
+        ("peaucellier", {"integrator": f"leapfrog{order}", "dt": 1e-3})
+        for order in ("", "_4", "_6")
+    ),
     ("rattleback", {"integrator": "DOP853", "rtol": 1e-10}),
 )
 LEAST = 3

@@ -51,7 +51,9 @@ def linkage(loops: int, phase: float, speed: float = 10.0) -> str:
         for name, crank, end, more in (
             ("pin", k, -half, f'coordinate = "phi_{k}"'), ("close", k + 1, half, "loop = true"),
         ):  # fmt: skip
-            text += f'[[joints]]\nname = "{name}_{k}"\ntype = "revolute"\nparent = "crank_{crank}"\n'
+            text += (
+                f'[[joints]]\nname = "{name}_{k}"\ntype = "revolute"\nparent = "crank_{crank}"\n'
+            )
             text += f'child = "rod_{k}"\nr_parent = {at}\nr_child = [{end}, 0]\n{more}\n'
     text += '[[effects]]\ntype = "gravity"\ng = 9.81\n[initial]\n'
     guesses = [f"theta_{k} = 0.5" for k in range(1, loops + 1)]
@@ -67,7 +69,9 @@ def tried(case: str, method: str, turns: float) -> bool:
     text = linkage(loops, phase, speed)
     run = eomgen.simulate(text, t_end=2 * pi * turns / speed, integrator=method, **METHODS[method])
     made = (run["theta_0"][-1] - run["theta_0"][0]) / (2 * pi)
-    apart = max(float(np.abs(run["theta_0"] - run[f"theta_{k}"]).max()) for k in range(1, loops + 1))
+    apart = max(
+        float(np.abs(run["theta_0"] - run[f"theta_{k}"]).max()) for k in range(1, loops + 1)
+    )
     energy = run.energy - run.energy[0]
     drift = float(energy[-100:].mean() - energy[:100].mean())
     open_ = max(after for _, after in run.trajectory.violations.values())
