@@ -80,7 +80,7 @@ def test_the_store_is_the_users_own(folder: Path, tmp_path: Path) -> None:
     assert folder.stat().st_mode & 0o777 == 0o700
     entry = entry_of(folder, "pendulum")
     assert entry in [*folder.iterdir()]
-    assert [path.stat().st_mode & 0o777 for path in folder.iterdir()] == [0o600] * 2
+    assert [path.stat().st_mode & 0o777 for path in folder.iterdir()] == [0o600] * 3
     wrong(entry)  # which only the owner can, who could change this program as well
     assert b"9.91" in generated(tmp_path)
 
