@@ -18,7 +18,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields, replace
-from functools import cache, lru_cache
+from functools import cache
 from importlib.util import MAGIC_NUMBER
 from pathlib import Path
 from types import CodeType
@@ -159,7 +159,6 @@ def _live_code(content: bytes | None) -> LiveCode | None:
     return None
 
 
-@lru_cache(maxsize=8)
 def bytecode_of(source: str) -> CodeType:
     """The source of a generated module, compiled by Python: from the store, or compiled and stored,
     since to compile a large one takes longer than a short run.
