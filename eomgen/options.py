@@ -86,11 +86,8 @@ def add_sweep(parser: argparse.ArgumentParser) -> None:
         help="also write mean, deviation and quantiles over the members, at each kept time",
     )
     parser.add_argument("--outputs", metavar="A,B,…", help="functions of the module to compute")
-    parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
-    parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
-    parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
-    parser.add_argument("--atol", metavar="X", type=float, help="absolute tolerance (adaptive)")
-    parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
+    _add_method(parser)
+    _add_unstable(parser)
     parser.add_argument("--t-end", metavar="S", type=float, help="end time")
     parser.add_argument(
         "--samples",
@@ -139,6 +136,14 @@ def _add_method(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-step", metavar="S", type=float, help="longest step (adaptive)")
 
 
+def _add_unstable(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--unstable",
+        action="store_true",
+        help="allow steps of an explicit method that are too long for stability",
+    )
+
+
 def _add_backend(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--backend",
@@ -163,11 +168,7 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
 def add_simulation(parser: argparse.ArgumentParser) -> None:
     """The options of `simulate` and `view`."""
     _add_method(parser)
-    parser.add_argument(
-        "--unstable",
-        action="store_true",
-        help="allow steps of an explicit method that are too long for stability",
-    )
+    _add_unstable(parser)
     parser.add_argument(
         "--accuracy",
         metavar="X",

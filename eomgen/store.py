@@ -11,6 +11,7 @@ used only if this program wrote it.
 import hashlib
 import importlib.metadata
 import json
+import marshal
 import os
 import pickle
 import platform
@@ -18,7 +19,9 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields, replace
 from functools import cache
+from importlib.util import MAGIC_NUMBER
 from pathlib import Path
+from types import CodeType
 from typing import TYPE_CHECKING
 
 import platformdirs
@@ -156,6 +159,25 @@ def _live_code(content: bytes | None) -> LiveCode | None:
     return None
 
 
+def bytecode_of(source: str) -> CodeType:
+    """The source of a generated module, compiled by Python: from the store, or compiled and stored,
+    since to compile a large one takes longer than a short run.
+
+    A store that cannot be used is no obstacle.
+    """
+    directory = folder()
+    text = b"bytecode " + MAGIC_NUMBER + source.encode()
+    key = hashlib.sha256(text).hexdigest()[:32]
+    if directory and (content := Entries(directory).get(key)):
+        with suppress(ValueError, EOFError, TypeError):
+            if isinstance(kept := marshal.loads(content), CodeType):
+                return kept
+    new = compile(source, "<string>", "exec", dont_inherit=True)
+    if directory:
+        Entries(directory).put(key, marshal.dumps(new))
+    return new
+
+
 def program_of(model: Model) -> Program:
     """The program of a model's code, from the store, or recorded and stored."""
     return interfaced_program_of(model)[0]
@@ -226,9 +248,7 @@ def _code(content: bytes | None) -> Code | None:
 
 def key_of(model: Model) -> str:
     """The key of a model's code: a digest of all that determines it."""
-    digest = hashlib.sha256(_generator_digest())
-    digest.update(repr(replace(model, notices=())).encode())
-    return digest.hexdigest()[:32]
+    return hashlib.sha256(_generator_digest() + model.digest).hexdigest()[:32]
 
 
 @cache

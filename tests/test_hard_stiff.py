@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from bookkeeping import light
 
+import eomgen
 from eomgen.cli import main
+from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
 from eomgen.run.problem import Problem
 from eomgen.run.trajectory import Trajectory
+from eomgen.scene.reader import parse_scene
 
 SLIDE = """
 name = "slide"
@@ -58,6 +61,26 @@ target = 0.5
 stiffness = 1e8
 damping = 1e7
 """
+DROPPED = """
+name = "dropped"
+bodies = [{ name = "rod", mass = 1.0, inertia_com = 0.02 }]
+joints = [{ name = "free", type = "free", parent = "world", child = "rod" }]
+initial = { q = { rod_y = 0.6, rod_angle = 0.7 }, v = { rod_x_dot = 1.0 } }
+[[effects]]
+type = "gravity"
+g = 9.81
+[[effects]]
+type = "contact"
+name = "floor"
+law = "hunt_crossley"
+body = "rod"
+corners = [0.25, 0.02]
+stiffness = 1e4
+dissipation = 0.5
+friction = 0.8
+slip_speed = 0.01
+"""
+"""Friction damps the points of the rod at 10,000/s while they stick, for a few steps a bounce."""
 SCENES = {"spring": SPRING, "wall": WALL, "servo": SERVO}
 EXPLICIT = ["euler", "semi_implicit_euler", "rk4"]
 
@@ -131,6 +154,36 @@ def test_what_holds_is_left_alone() -> None:
     assert run.finished
     energy = 0.5 * run.y[-1, 1] ** 2 + 9.81 * run.y[-1, 0]
     assert abs(energy - 0.5 * 9.81) < 0.02 * energy
+
+
+@pytest.mark.parametrize("method", ["semi_implicit_euler", "rk4"])
+def test_what_could_grow_but_does_not_is_left_alone(method: str) -> None:
+    """Steps that are too long for the friction of a bounce, which saturates; much longer ones
+    are refused.
+    """
+    asked = as_problem(light(DROPPED).module)
+    right = integrate(asked, "DOP853", 1.5, rtol=1e-9)
+    run = integrate(asked, method, 1.5, dt=1e-3)
+    assert run.finished, run.message
+    assert np.abs(run.y[-1] - right.y[-1]).max() < 3e-3
+    stopped(integrate(asked, method, 1.5, dt=0.02))
+
+
+def test_a_sweep_may_have_steps_that_are_too_long() -> None:
+    """Members together in C, and one by one in Python; until they overflow they are kept."""
+    scene, vary = parse_scene(SPRING), {"j_slide": [0.1] * 20}
+    asked: dict[str, Any] = {"integrator": "rk4", "dt": 1e-5, "t_end": 2e-4}
+    refused = eomgen.ensemble(scene, vary, backend="numpy", **asked)
+    assert not refused.finished.any() and "take --dt" in refused.messages[0]
+    one, other = (
+        eomgen.ensemble(scene, vary, backend=backend, unstable=True, **asked)
+        for backend in ("c", "numpy")
+    )
+    assert one.finished.all() and other.finished.all()
+    assert np.allclose(one.final, other.final, rtol=1e-9)
+    assert np.abs(one.final).max() > 1e10
+    with pytest.raises(RunError, match=r"unstable: Radau is stable at any step"):
+        eomgen.ensemble(scene, vary, integrator="Radau", unstable=True)
 
 
 @pytest.mark.parametrize("method", ["euler", "semi_implicit_euler", "rk4"])

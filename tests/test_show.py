@@ -59,7 +59,7 @@ def swinging(n: int = 201, duration: float = 4.0, **changes: Any) -> Motion:
         kinetic_energy=kinetic,
         potential_energy=5.0 + 1e-9 * t / duration - kinetic,
         joint_drift=np.column_stack([zero, 1e-12 * t]),
-        camera=View(height=3.0, follow="pole"),
+        framing=View(height=3.0, follow="pole"),
         integrator="rk4, dt = 0.02 s",
         finished=True,
         message="",

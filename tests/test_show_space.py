@@ -58,7 +58,7 @@ def sliding(n: int = 31, **changes: Any) -> Motion:
         kinetic_energy=1 + t,
         potential_energy=1 - t,
         joint_drift=np.zeros((n, 1)),
-        camera=View(center=(0.0, 0.0, 1.0), height=3.0),
+        framing=View(center=(0.0, 0.0, 1.0), height=3.0),
         integrator="made up",
         finished=True,
         message="",
@@ -93,7 +93,7 @@ def chain(count: int = 100, n: int = 40) -> Motion:
         kinetic_energy=t,
         potential_energy=-t,
         joint_drift=1e-14 * (1 + np.outer(t, np.arange(count))),
-        camera=View(height=12.0),
+        framing=View(height=12.0),
         integrator="made up",
         finished=True,
         message="",
@@ -316,7 +316,7 @@ def test_the_floor_is_under_the_motion(lift: float, z: float) -> None:
     motion = sliding()
     motion.poses[..., 2, 3] += lift
     if lift > 1:
-        motion = replace(motion, camera=View(center=(0.0, 0.0, 51.0), height=3.0))
+        motion = replace(motion, framing=View(center=(0.0, 0.0, 51.0), height=3.0))
     floor = floor_under(motion, cast_of(solids(motion.shapes, 3.0, 1000)))
     assert floor.z == pytest.approx(z, abs=1e-3)
     lines = floor.lines()

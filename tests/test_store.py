@@ -1,14 +1,17 @@
 """The store attacked: whatever lies in it, only what this program wrote for this scene is used."""
 
+import builtins
 import errno
 import hashlib
 import json
+import marshal
 import os
 import pickle
 import random
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +19,7 @@ from typing import Any
 import pytest
 from campaign import some
 
+import eomgen
 import eomgen.entries
 from eomgen import store
 from eomgen.cli import main
@@ -80,7 +84,7 @@ def test_the_store_is_the_users_own(folder: Path, tmp_path: Path) -> None:
     assert folder.stat().st_mode & 0o777 == 0o700
     entry = entry_of(folder, "pendulum")
     assert entry in [*folder.iterdir()]
-    assert [path.stat().st_mode & 0o777 for path in folder.iterdir()] == [0o600] * 2
+    assert [path.stat().st_mode & 0o777 for path in folder.glob("*.entry")] == [0o600] * 3
     wrong(entry)  # which only the owner can, who could change this program as well
     assert b"9.91" in generated(tmp_path)
 
@@ -433,7 +437,8 @@ def test_a_store_that_cannot_be_made(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("EOMGEN_CACHE", "relative")
     assert generated(tmp_path) == RIGHT
-    assert len(list((tmp_path / "relative").iterdir())) == 2, "the code and its program"
+    made = list((tmp_path / "relative").glob("*.entry"))
+    assert len(made) == 3, "the code, its bytecode and its program"
 
 
 def test_old_entries_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -542,3 +547,46 @@ def test_references_are_kept_as_safely(folder: Path, tmp_path: Path) -> None:
         path.write_bytes(b"")
     assert made(0.1).t[-1] == short.t[-1]
     assert [path.read_bytes() for path in paths] == [b"", b""]
+
+
+def test_a_warm_run_computes_only_what_is_asked_for(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No view of a picture, no module compiled by Python, and one digest of the model."""
+    asked: dict[str, Any] = {"t_end": 0.1, "backend": "numpy"}
+    before = eomgen.simulate("cart_pole", **asked)
+    compiling, printing, counts = builtins.compile, Model.__repr__, Counter[str]()
+
+    def compiles(source: Any, *given: Any, **named: Any) -> Any:
+        counts["compile"] += "def derivative(" in str(source)
+        return compiling(source, *given, **named)
+
+    def prints(model: Model) -> str:
+        counts["digest"] += 1
+        return printing(model)
+
+    def frames(*_: Any) -> None:
+        counts["view"] += 1
+        raise AssertionError("asked for")
+
+    monkeypatch.setattr(builtins, "compile", compiles)
+    monkeypatch.setattr(Model, "__repr__", prints)
+    monkeypatch.setattr("eomgen.show.framing.bounds_of", frames)
+    run = eomgen.simulate("cart_pole", **asked)
+    assert counts == {"compile": 0, "digest": 1}
+    assert run.y.tobytes() == before.y.tobytes()
+    with pytest.raises(AssertionError, match="asked for"):
+        run.figure()
+
+
+@pytest.mark.parametrize("content", [b"", b"no bytecode", marshal.dumps((1, "x"))])
+def test_an_entry_that_is_no_bytecode_is_compiled_anew(content: bytes, folder: Path) -> None:
+    """Also one with the right digest, which only this user could write."""
+    source = "x = 1 + 1\n"
+    store.bytecode_of(source)
+    (entry,) = folder.iterdir()
+    right = entry.read_bytes()
+    signed(entry, content)
+    names: dict[str, Any] = {}
+    exec(store.bytecode_of(source), names)
+    assert names["x"] == 2 and entry.read_bytes() == right

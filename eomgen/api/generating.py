@@ -15,7 +15,7 @@ from eomgen.model.model import Model
 from eomgen.results import Module
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scene.schema import Form, Route
-from eomgen.store import Code, generated_code, interfaced_program_of
+from eomgen.store import Code, bytecode_of, generated_code, interfaced_program_of
 from eomgen.study.diagnosis import problem_of
 
 LARGEST = 2**30
@@ -131,7 +131,7 @@ def compiled(
         reporter.note(code.notice)
         for notice in code.notices:
             reporter.note_scene(notice)
-        functions = load_module(code.module, model.name)
+        functions = load_module(code.module, model.name, bytecode_of(code.module))
         problem_of(functions, model=model)
         for name in asked:
             if not hasattr(functions, name):

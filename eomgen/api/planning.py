@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from eomgen.api.given import Values, values_of
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.api.settings import setting_of
+from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import values_by_index
 from eomgen.errors import RunError, nearest
 from eomgen.integrators import INTEGRATORS
@@ -120,7 +120,7 @@ def plan_run(
             "take --integrator DOP853 for tables and functions of time"
         )
     if unstable:
-        _check_unstable(setting, reporter)
+        check_unstable(setting, reporter)
     works = works or "works" in save
     saved = wanted_outputs(save, model, reporter)
     more = (*(("effect_powers",) if works else ()), *_of_method(setting, model))
@@ -212,21 +212,3 @@ def _takes_series(integrator: str) -> bool:
 
     method = find_integrator(integrator)
     return isinstance(method, Adaptive) and bool(method.series)
-
-
-def _check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
-    """Raise `RunError` for `unstable` unless the method is explicit with a given step."""
-    from eomgen.run.integrators import FixedStep, find_integrator
-
-    asked = reporter.argument("unstable")
-    if setting is None:
-        raise RunError(
-            f"{asked}: is for a given step; leave out "
-            f"{reporter.argument('accuracy')} and {reporter.argument('budget')}"
-        )
-    method = find_integrator(setting.integrator)
-    if not (isinstance(method, FixedStep) and method.explicit):
-        raise RunError(
-            f"{asked}: {setting.integrator} is stable at any step or chooses its own; leave "
-            f"it out, or take {reporter.argument('integrator')} euler, leapfrog or rk4"
-        )

@@ -40,3 +40,21 @@ def setting_of(
             f"{rtol_name}, {atol_name}: {name} takes equal steps; give {dt_name} instead"
         )
     return Setting(name, dt=simulation.dt if dt is None else dt)
+
+
+def check_unstable(setting: "Setting | None", reporter: Reporter) -> None:
+    """Raise `RunError` for `unstable` unless the method is explicit with a given step."""
+    from eomgen.run.integrators import FixedStep, find_integrator
+
+    asked = reporter.argument("unstable")
+    if setting is None:
+        raise RunError(
+            f"{asked}: is for a given step; leave out "
+            f"{reporter.argument('accuracy')} and {reporter.argument('budget')}"
+        )
+    method = find_integrator(setting.integrator)
+    if not (isinstance(method, FixedStep) and method.explicit):
+        raise RunError(
+            f"{asked}: {setting.integrator} is stable at any step or chooses its own; leave "
+            f"it out, or take {reporter.argument('integrator')} euler, leapfrog or rk4"
+        )

@@ -14,7 +14,7 @@ from eomgen.api.given import Source, Values, check_name, check_time, model_of, r
 from eomgen.api.inputs import Inputs, for_members
 from eomgen.api.planning import Backend
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.api.settings import setting_of
+from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import state_names
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
@@ -69,6 +69,7 @@ class SweepPlan:
     outputs: tuple[str, ...]
     samples: int
     max_step: float | None
+    unstable: bool
     backend: Backend
 
 
@@ -86,6 +87,7 @@ def ensemble(
     outputs: Sequence[str] = (),
     samples: int = 2,
     max_step: float | None = None,
+    unstable: bool = False,
     backend: Backend = "auto",
     workers: int = 1,
     scheduler: str = "",
@@ -95,7 +97,7 @@ def ensemble(
 
     vary        lists of values by name of a parameter, a state or an input, one for each member,
                 `<name>_deg` of an angle in degrees; or `grid(...)` or `sampled(...)`
-    t_end, integrator, dt, rtol, atol, max_step  as for `simulate`
+    t_end, integrator, dt, rtol, atol, max_step, unstable  as for `simulate`
     parameters, inputs  values that all members have; inputs may also be formulas of t, the motion
                 and parameters, or the path of a table, as for `simulate`; with a table nothing is
                 compiled
@@ -127,6 +129,7 @@ def ensemble(
         outputs=outputs,
         samples=samples,
         max_step=max_step,
+        unstable=unstable,
         backend=backend,
     )
     kept = None if folder is None else Path(folder)
@@ -149,6 +152,7 @@ def plan_sweep(
     outputs: Sequence[str] = (),
     samples: int = 2,
     max_step: float | None = None,
+    unstable: bool = False,
     backend: Backend = "auto",
     reporter: Reporter = SILENT,
 ) -> SweepPlan:
@@ -164,6 +168,8 @@ def plan_sweep(
     setting = setting_of(
         scene.simulation, integrator, dt=dt, rtol=rtol, atol=atol, reporter=reporter
     )
+    if unstable:
+        check_unstable(setting, reporter)
     fixed = values_of(model, parameters, inputs, reporter)
     design = in_radians(design, _degrees(model))
     if varying is not None and backend == "c":
@@ -186,6 +192,7 @@ def plan_sweep(
         tuple(outputs),
         samples,
         max_step,
+        unstable,
         backend,
     )
 
@@ -238,6 +245,7 @@ def run_sweep(
             "dt": plan.setting.dt,
             **plan.setting.tolerances,
             "max_step": plan.max_step,
+            "unstable": plan.unstable,
             "rest_speed": plan.scene.simulation.rest_speed,
         },
         dt=dt,

@@ -70,6 +70,7 @@ def sweep(given: Arguments) -> int:
         outputs=outputs or (),
         samples=given.samples,
         max_step=given.max_step,
+        unstable=given.unstable,
         backend=given.backend,
         reporter=reporter,
     )

@@ -1,5 +1,6 @@
 """The model: a mechanism with all names resolved and its bodies in a tree, parents first."""
 
+import hashlib
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -210,6 +211,11 @@ class Model(Displayed):
     blocks: tuple[int, ...] = ()
     closing: Closing = "auto"
     groups: tuple[Group, ...] = ()
+
+    @cached_property
+    def digest(self) -> bytes:
+        """A digest of all but the notices: of a large model it takes longer than a short run."""
+        return hashlib.sha256(repr(replace(self, notices=())).encode()).digest()
 
     @cached_property
     def every_row(self) -> tuple[tuple[str, str], ...]:

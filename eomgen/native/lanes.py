@@ -38,6 +38,8 @@ int width(void) {
     return 2;
 }
 """
+STREAK = 4.0
+"""Number of steps in a row that look unstable before a run is given up."""
 _POINTER, _LONG, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_int64
 
 
@@ -69,7 +71,7 @@ class Columns(ctypes.Structure):
 
 class _Times(ctypes.Structure):
     _fields_ = (
-        *((name, _REAL) for name in ("t_start", "t_end", "dt", "last")),
+        *((name, _REAL) for name in ("t_start", "t_end", "dt", "last", "streak")),
         *((name, _WHOLE) for name in ("steps", "every")),
         *((name, _POINTER) for name in ("done", "stop")),
     )
@@ -135,11 +137,12 @@ class Lanes:
         t_end: float,
         dt: float,
         every: int,
+        unstable: bool = False,
         addresses: tuple[int, int] | None = None,
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Runs from states (ny, n) at 0 to `t_end` by the classical Runge-Kutta method, with steps
         of `dt`: rows (r, ny, n) after each `every`-th step and at the end, and which runs are
-        valid: finite, and with steps that look short enough for stability.
+        valid: finite and, unless `unstable`, with steps that look short enough for stability.
 
         Of two 64-bit integers at `addresses`, members that have ended are counted in the first, and
         all runs end early once the second is not 0.
@@ -152,7 +155,9 @@ class Lanes:
         sound = np.zeros(n, dtype=np.int8)
         idle = np.zeros(2, dtype=np.int64)
         shared = addresses or (idle.ctypes.data, idle.ctypes.data + 8)
-        times = _Times(0.0, t_end, dt, last, steps, every, *shared)
+        times = _Times(
+            0.0, t_end, dt, last, math.inf if unstable else STREAK, steps, every, *shared
+        )
         call = self.library.rk4
         call.argtypes, call.restype = [_POINTER, _LONG, *[Columns] * 3, *[_POINTER] * 2], None
         call(

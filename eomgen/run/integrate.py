@@ -14,6 +14,7 @@ from eomgen.run.checks import check_repairs, check_rest_speed, numbers
 from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, repaired
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
+from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.margins import Seen
 from eomgen.run.passage import Passage
 from eomgen.run.problem import Explanation, FloatArray, Problem
@@ -338,7 +339,9 @@ def _follow(
         run.end()
         return Outcome("ended", end.reason), f"stopped at {_place(problem, run)}: {end}"
     except StepFailure as failure:
-        why = problem.explain(run.t, run.y, problem.initial)
+        # A shorter step mends one that is too long, whatever effect makes the motion fast.
+        unstable = isinstance(failure, UnstableStepError) and isinstance(method, FixedStep)
+        why = None if unstable else problem.explain(run.t, run.y, problem.initial)
         outcome = (
             Outcome("stopped", f"{failure.reason}: {why.reason}", why.remedy, failure.dead)
             if why

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache, partial
+from types import CodeType
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -45,14 +46,17 @@ class GeneratedModule(Protocol):
     body_poses: Callable[..., FloatArray]
 
 
-def load_module(source: str, name: str = "generated") -> GeneratedModule:
-    """Load a generated module from its source, which must be written by this program.
+def load_module(
+    source: str, name: str = "generated", code: CodeType | None = None
+) -> GeneratedModule:
+    """Load a generated module from its source, which must be written by this program; `code` is the
+    same compiled, if it is at hand.
 
     Raises `RunError` if the equations have no solution at the scene's parameters, or if JAX is not
     installed, which a module of the backend "jax" imports.
     """
     try:
-        module = load_source(source, name)
+        module = load_source(source, name, code)
     except ModuleNotFoundError as error:
         raise RunError(
             f"backend 'jax': {error.name} is not installed; run: pip install 'eomgen[jax]'"

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -101,20 +102,20 @@ def bounds_of(
         count = min(len(poses), SOUNDINGS, max(most, FEWEST))
         rows = np.linspace(0, len(poses) - 1, count).round().astype(int).tolist()
     at = poses[list(rows)]
-    places = []
+    if dimensions == 2:
+        c, s = np.cos(at[..., 2]), np.sin(at[..., 2])
+        # Right and up in the picture, along the axes of each body: (n, nb, 2, dimensions).
+        axes = np.stack([c, -s, s, c], axis=-1).reshape(*c.shape, 2, 2)
+        centres = at[..., :2]
+    else:
+        axes, centres = eye[:2] @ at[..., :3], at[..., 3] @ eye[:2].T
+    # One body after another: the points of all of them take much memory.
+    low, high = np.empty_like(centres), np.empty_like(centres)
     for body, points in enumerate(points_of):
-        pose = at[:, body]
-        if poses.ndim == 3:
-            c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-            x, y = points.T
-            turned = [np.outer(c, x) - np.outer(s, y), np.outer(s, x) + np.outer(c, y)]
-            places.append(np.stack(turned, axis=-1) + pose[:, np.newaxis, :2])
-        else:
-            world = np.einsum("nij,kj->nki", pose[..., :3], points) + pose[:, np.newaxis, :, 3]
-            places.append((world @ eye.T)[..., :2])
-    every = np.concatenate(places, axis=1)
-    centres = at[..., :2] if poses.ndim == 3 else (at[..., 3] @ eye.T)[..., :2]
-    return Bounds(every.min(axis=1), every.max(axis=1), centres)
+        turned = axes[:, body] @ points.T
+        low[:, body] = centres[:, body] + turned.min(axis=2)
+        high[:, body] = centres[:, body] + turned.max(axis=2)
+    return Bounds(low.min(axis=1), high.max(axis=1), centres)
 
 
 def framed(
@@ -173,6 +174,27 @@ def framed(
         seen = np.array(camera.center) if dimensions == 2 else (eye @ camera.center)[:2]
         size = size + 2 * np.abs(middle - seen)
     return _sized(given, camera, mode, center, size, None)
+
+
+@dataclass(frozen=True, eq=False)
+class Framing:
+    """The arguments of `framed`. The view is found when it is first asked for: that takes longer
+    than many a run.
+    """
+
+    camera: Camera
+    bodies: Sequence[str]
+    leading: Sequence[int]
+    shapes: Sequence[Sequence[Shape]]
+    poses: Array
+    eye: Array
+    fixed: Array
+
+    @cached_property
+    def view(self) -> View:
+        """The view of the motion."""
+        given = (self.leading, self.shapes, self.poses, self.eye, self.fixed)
+        return framed(self.camera, self.bodies, *given)
 
 
 def _near(bounds: Bounds, points: Array) -> Array:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from eomgen.errors import RunError
 from eomgen.scene.look import BARE, Shape, numbers
-from eomgen.show.framing import View
+from eomgen.show.framing import Framing, View
 from eomgen.show.of_run import world_points
 from eomgen.show.picture import Picture
 
@@ -61,6 +61,7 @@ class Motion:
     anchors       points to mark as joints
     works         done since the start by each effect, or by all of a type; None if not asked for
     planes, balls fixed obstacles that bodies touch or avoid
+    framing       the view of a picture of it, or what determines it
     keeps_energy  whether exact motion conserves energy
     picture       of which the shapes are a part; its numbers are formulas of parameters
     drawn         the picture with the values of these formulas
@@ -80,7 +81,7 @@ class Motion:
     kinetic_energy: Array  # (n,) J
     potential_energy: Array  # (n,) J
     joint_drift: Array  # (n, nj) m
-    camera: View
+    framing: View | Framing
     integrator: str
     finished: bool
     message: str
@@ -109,6 +110,11 @@ class Motion:
     def dimensions(self) -> int:
         """2 in the plane, 3 in space."""
         return self.poses.ndim - 1
+
+    @property
+    def camera(self) -> View:
+        """The view of a picture of it."""
+        return self.framing.view if isinstance(self.framing, Framing) else self.framing
 
     @property
     def places(self) -> Array:

@@ -13,7 +13,7 @@ from eomgen.run.trajectory import Trajectory
 from eomgen.scene.appearance import Appearance
 from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.show.balance import keeps_energy, works_by_type
-from eomgen.show.framing import framed
+from eomgen.show.framing import Framing
 from eomgen.show.motion import Anchor, Motion
 from eomgen.show.of_run import fixed_points, leading_bodies, spread, with_run
 from eomgen.show.picture import picture_of
@@ -74,7 +74,7 @@ def observe(
         kinetic_energy=kinetic,
         potential_energy=potential,
         joint_drift=drift,
-        camera=framed(camera, module.BODIES, leading, shapes, poses, eye, fixed_points(drawn)),
+        framing=Framing(camera, module.BODIES, leading, shapes, poses, eye, fixed_points(drawn)),
         integrator=trajectory.integrator,
         finished=trajectory.finished,
         message=trajectory.message,

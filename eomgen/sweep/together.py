@@ -46,6 +46,7 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
             t_end=task.t_end,
             dt=task.dt,
             every=task.every,
+            unstable=task.settings["unstable"],
             addresses=counter.addresses,
         )
     counter.check()

@@ -22,9 +22,8 @@ DIALECT = replace(c.VECTORS, fused=("plus_product", "product_minus", "minus_prod
 LIMIT = 2.78
 """Greatest h|λ| at which the classical Runge-Kutta method is stable, for real λ; 2.83 if λ is
 imaginary."""
-STREAK, NOISE = 4.0, 1e-9
-"""Number of steps in a row that look unstable before a run is given up, and the least change of
-slopes times h, relative to the state, that counts."""
+NOISE = 1e-9
+"""The least change of slopes times h, relative to the state, by which a step looks unstable."""
 
 
 def files(
@@ -54,7 +53,6 @@ def files(
         "longest": repr(usual_length[1]),
         "positions": [int(state.position) for state in interface.states],
         "limit": LIMIT,
-        "streak": STREAK,
         "noise": NOISE,
     }
     return {**c.files_of(context, interface), MAIN: render(c.TEMPLATES, "lanes.c.jinja", values)}

@@ -82,7 +82,7 @@ def advances(
         if checked:
             monitor.check(checked, t, y, step, length)
             if i == steps:
-                monitor.finish(checked)
+                monitor.finish(checked, t, y, step, length)
         y, lost = _sum(y, step + lost)
         y = problem.projected(end, y)
         t, regular = end, True

@@ -5,6 +5,10 @@ than |exp(hλ)| and than 1, errors grow from step to step (Hairer, Wanner, Solvi
 IV.2). For a Runge-Kutta method R is a polynomial; for other methods the factors are found by making
 a step on the linear problem.
 
+That a mode could grow does not say that it does: a contact may close and open again within a few
+steps, and friction that saturates bounds it. So a step that looks too long is tried: some steps of
+h, and as many pairs of h/2, are made from there. Only if they part does the run stop.
+
 A Jacobian costs as much as many steps. It is evaluated only where the rates y' jump, which they do
 soon after a step becomes unstable, and where the derivatives that the step has evaluated anyway
 show a rate that is large compared with 1/h (ibid., section IV.2, on the detection of stiffness).
@@ -27,6 +31,10 @@ motion itself: then a few steps do harm."""
 
 STABLE = 1.001
 """The same factor for the step that a message recommends."""
+
+TRIED, HARM = 40, 0.1
+"""A step is too long if after up to this many steps of h and pairs of h/2 any state differs by more
+than this, relative to its size: the slowest mode that `UNSTABLE` finds has grown by 7500 then."""
 
 LEAST = 1e-9
 """If a stable step would be shorter than this fraction of the step, the solution itself blows up,
@@ -76,6 +84,7 @@ class StabilityMonitor:
     _calls: int = 0
     _spent: float = 0.0
     _highest: float = 0.0
+    _doubtful: bool = False
     _skipped: tuple[float, tuple[float, FloatArray, FloatArray, float] | None] = (0.0, None)
 
     def recording(self, problem: Problem) -> Problem:
@@ -109,7 +118,8 @@ class StabilityMonitor:
         self._update(earlier)
         jumps = first or not (np.abs(rate - earlier) <= self._allowed).all()
         self._update(rate)
-        if not jumps:
+        # Rates have doubled here, if they do not jump. A mode that could grow may now do so.
+        if not (jumps or self._doubtful):
             return
         if not np.isfinite(step).all():
             self._check_at(problem, [(t, y)], h)
@@ -145,14 +155,17 @@ class StabilityMonitor:
         self._count(steps, steps * (len(self._evaluated) + calls))
         self._last, self._evaluated[:] = rate, [(place, slope)]
 
-    def finish(self, problem: Problem) -> None:
-        """At the end of a run, check the step with the largest jump that was not checked.
+    def finish(self, problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float) -> None:
+        """At the end of a run, check the step with the largest jump that was not checked and, if
+        modes could grow when a step was last checked, its last step, from `y` at `t`.
 
-        Raises `UnstableStepError` if it is too long.
+        Raises `UnstableStepError` if one of them is too long.
         """
         _, skipped = self._skipped
         if skipped:
             self._check_at(problem, _states_in(problem, *skipped), skipped[3])
+        if self._doubtful:
+            self._check_at(problem, _states_in(problem, t, y, step, h), h)
 
     def _is_affordable(
         self,
@@ -180,27 +193,61 @@ class StabilityMonitor:
     def _check_at(
         self, problem: Problem, points: Sequence[tuple[float, FloatArray]], h: float
     ) -> None:
-        """Check a step of h with the Jacobians at times and states."""
+        """Check a step of h from the first of some times and states with the Jacobians at each."""
         for time, state in points:
             self._spent += len(state) / 2 + 60 / len(state)
             jacobian = _jacobian(problem, time, state)
-            if jacobian is not None:
-                self._check_modes(problem, jacobian, h)
+            found = None if jacobian is None else self._too_long(problem, jacobian, h)
+            if found and self._parts(problem, *points[0], h):
+                raise found
+            self._doubtful = found is not None
+            if found:
+                return
 
-    def _check_modes(self, problem: Problem, jacobian: FloatArray, h: float) -> None:
+    def _too_long(
+        self, problem: Problem, jacobian: FloatArray, h: float
+    ) -> UnstableStepError | None:
+        """The error that says that modes of y' = J y grow with a step of h; None if they do not."""
         log_growth = growth(self.change, self.stability, problem, jacobian)
         if not log_growth(h) > math.log(UNSTABLE):
-            return
+            return None
         rates = np.abs(np.linalg.eigvals(jacobian))
         dt = stable_step(log_growth, h)
         if dt < LEAST * h:
-            return
-        raise UnstableStepError(
+            return None
+        return UnstableStepError(
             f"the step of {h:g} s is too long for an explicit method: modes at a rate of up to "
             f"{rates.max():.2g}/s grow without bound",
             f"take --dt {dt:g} or less, or an implicit method (--integrator implicit_midpoint, or "
             "Radau, which chooses its steps)",
         )
+
+    def _parts(self, problem: Problem, t: float, y: FloatArray, h: float) -> bool:
+        """Whether steps of h and of h/2 from y at t come to different states."""
+        sizes = np.array(problem.sizes) if problem.sizes else np.ones(len(y))
+        evaluations = 0
+
+        def derivative(t: float, y: FloatArray) -> FloatArray:
+            nonlocal evaluations
+            evaluations += 1
+            return problem.derivative(t, y)
+
+        counted, whole, halved = replace(problem, derivative=derivative), y, y
+        try:
+            for i in range(TRIED):
+                start = t + i * h
+                whole = self._stepped(counted, start, whole, h)
+                halved = self._stepped(counted, start, halved, h / 2)
+                halved = self._stepped(counted, start + h / 2, halved, h / 2)
+                sizes = np.maximum(sizes, np.abs(halved))
+        except (ArithmeticError, ValueError, StepFailure):
+            return True
+        finally:
+            self._spent += evaluations
+        return not (np.abs(whole - halved) <= HARM * sizes).all()
+
+    def _stepped(self, problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
+        return problem.projected(t + h, y + self.change(problem, t, y, h))
 
 
 def _states_in(
