@@ -97,6 +97,28 @@ def test_accelerations_are_those_of_pinocchio(tmp_path: Path, floating: bool) ->
     assert max(robot.difference(rng) for _ in range(5)) < 1e-12
 
 
+def test_states_are_in_the_order_of_the_file(tmp_path: Path) -> None:
+    """Joints depth first, those of one link as the file has them; bodies as a scene has them, but
+    each after its parent.
+    """
+    path = written(
+        tmp_path,
+        *(link(name) for name in ("toe", "base", "leg", "foot", "arm", "hand")),
+        joint("wrist", "revolute", "arm", "hand"),
+        joint("shoulder", "revolute", "base", "arm"),
+        joint("tip", "revolute", "foot", "toe"),
+        joint("hip", "revolute", "base", "leg"),
+        joint("ankle", "revolute", "leg", "foot"),
+    )
+    model = eomgen.check(path)
+    assert [c.name for c in model.coordinates] == ["shoulder", "wrist", "hip", "ankle", "tip"]
+    names = ("hand", "leg", "base", "arm", "toe", "foot")
+    tables = eomgen.import_robot(path).tables
+    named = {body["name"]: body for body in tables["bodies"]}
+    model = eomgen.check({**tables, "bodies": [named[name] for name in names]})
+    assert [body.name for body in model.bodies] == ["base", "arm", "hand", "leg", "foot", "toe"]
+
+
 @pytest.mark.parametrize("axis", ["0 0 1", "1 0 0", "1 -2 0.5"])
 def test_a_planar_joint_is_two_slides_and_a_hinge(tmp_path: Path, axis: str) -> None:
     """Perpendicular to its axis, and about it."""
