@@ -11,7 +11,7 @@ from robot_files import GOOD_URDF
 
 import eomgen
 from eomgen.cli import main
-from eomgen.scene.importers.rotations import angles_of, rotation, to_axis
+from eomgen.scene.importers.rotations import angles_of, rotation, squared, to_axis
 
 LINK = """<link name="{name}"><inertial>
   <origin xyz="{com}" rpy="0.3 -0.2 0.5"/><mass value="1.5"/>
@@ -347,7 +347,9 @@ def test_a_root_named_world_is_the_world(tmp_path: Path) -> None:
 
 
 def test_angles_of_a_rotation() -> None:
-    """Also where the angle about y is a right angle."""
+    """Also where the angle about y is a right angle. What is nearer than 1e-10 to one is one."""
+    assert (squared(1.57079632679), squared(-3.14159265359)) == (np.pi / 2, -np.pi)
+    assert squared(1.570796327) == 1.570796327
     for angles in ((0.1, -1.2, 2.5), (0.7, np.pi / 2, 0.0), (-3.0, -np.pi / 2, 1.0)):
         turned = rotation(angles)
         assert np.allclose(rotation(angles_of(turned)), turned, atol=1e-14)
