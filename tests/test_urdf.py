@@ -254,6 +254,22 @@ def test_limits_are_stops_on_wish(tmp_path: Path) -> None:
     """
     path = written(
         tmp_path,
+def test_an_inertia_that_cannot_move_is_left_out(tmp_path: Path) -> None:
+    """Of a link without mass that is fixed to the world; on a floating base it is refused."""
+    ring = '<inertial><mass value="0"/><inertia ixx="1" iyy="2" izz="3"/></inertial>'
+    joints = joint("turn", "continuous", "base", "arm"), joint("on", "fixed", "base", "plate")
+    found = []
+    for inertial in ("", ring):
+        links = (f'<link name="{name}">{inertial}</link>' for name in ("base", "plate"))
+        path = written(tmp_path, *links, link("arm"), *joints)
+        found.append(eomgen.import_robot(path))
+    plain, imported = found
+    assert imported.tables == plain.tables
+    assert "left out: inertias of links that cannot move: 'plate', 'base'" in imported.remarks
+    with pytest.raises(eomgen.SceneError, match="'base': has an inertia but no mass; give it"):
+        eomgen.import_robot(path, floating=True)
+
+
         *('<link name="base"/>', *(link(name) for name in ("arm", "a", "b"))),
         joint("turn", "revolute", "base", "arm"),
         joint("first", "revolute", "arm", "a", more=MIMIC.replace("grip", "turn")),

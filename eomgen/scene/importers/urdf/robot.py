@@ -48,7 +48,7 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     names = _names(tree)
     made, remarks = Mechanism(effects=[{"type": "gravity", "g": GRAVITY}]), list[str]()
     meshes = Meshes((path.parent, *wishes.allowed))
-    inertials, changes = read_inertials(tree)
+    inertials, changes = read_inertials(tree, floating=wishes.floating)
     _add_bodies(tree, inertials, names, made, meshes, colours_of(robot))
     if names.bodies[tree.root] != WORLD:
         base = floating_base if wishes.floating else fixed_base
@@ -173,8 +173,8 @@ def _remarks_on_bodies(tree: Tree, meshes: Meshes, changes: Changes) -> Iterator
     if changes.lent:
         lent = _listed(changes.lent)
         yield f"inertias of links without mass count with what carries them: {lent}"
-    if tree.root == WORLD and tree.links[WORLD].first("inertial"):
-        yield f"left out: the inertia of the root link '{WORLD}', which cannot move"
+    if changes.still:
+        yield f"left out: inertias of links that cannot move: {_listed(changes.still)}"
     if any(link.first("collision") for link in tree.links.values()):
         yield "left out: collision geometry; contacts are effects that a scene adds"
     if meshes.drawn:
