@@ -193,6 +193,20 @@ def test_welds_are_poses(tmp_path: Path) -> None:
     data.qpos[:] = mj.qpos0 + rng.normal(size=mj.nq)
     mujoco.mj_forward(mj, data)
     bodies = [[data.body(joint[side]) for side in ("parent", "child")] for joint in loops]
+def test_nothing_starts_inside_a_stop(tmp_path: Path) -> None:
+    """A joint whose pose in the file is beyond its limits starts between them; without stops it
+    starts where MuJoCo starts it.
+    """
+    path = written(tmp_path, EVERYTHING.replace('range="-1 1"', 'range="0.6 1"'))
+    starts = [
+        import_file(path, Wishes(stops=stops)).tables["initial"]["q"]["roll"]
+        for stops in (False, True)
+    ]
+    assert starts == [0.4, 0.8]
+    said = "the file's pose is beyond the limits of 'roll', which start between them"
+    assert said in import_file(path, Wishes(stops=True)).remarks
+
+
     at = [
         body.xpos + body.xmat.reshape(3, 3) @ loops[0][f"r_{side}"]
         for side, body in zip(("parent", "child"), bodies[0], strict=True)

@@ -15,7 +15,7 @@ from eomgen.scene.importers.mjcf.mechanism import BALL, FREE, Mechanism, Names
 from eomgen.scene.importers.mjcf.tendons import add_tendon
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
 from eomgen.scene.importers.parts import SLIDING_SPEED, SPEED
-from eomgen.scene.importers.stops import stops
+from eomgen.scene.importers.stops import add_stops
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
 
@@ -38,9 +38,11 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
         raise root.error("nothing can move: the file has no joints")
     names, changed = names_of(model)
     made = mechanism_of(model, names)
-    if wishes.stops:
-        following = {c["coordinate"] for c in made.constraints if "coordinate" in c}
-        made.effects += stops(made.joints, following | set(made.locked))
+    if wishes.stops and (moved := add_stops(made)):
+        made.remark(
+            f"the file's pose is beyond the limits of {listed(map(repr, moved))}, which start "
+            "between them"
+        )
     made.remarks |= dict.fromkeys(_remarks(model, made, wishes))
     if changed:
         made.remark(f"renamed: {listed(changed)}")

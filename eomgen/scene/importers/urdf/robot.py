@@ -10,7 +10,7 @@ from eomgen.scene.importers.meshes import ELSEWHERE
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
 from eomgen.scene.importers.parts import SLIDING_SPEED, SPEED
 from eomgen.scene.importers.rotations import is_slight
-from eomgen.scene.importers.stops import stops
+from eomgen.scene.importers.stops import add_stops
 from eomgen.scene.importers.urdf.joints import (
     Mechanism,
     Names,
@@ -59,8 +59,7 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     if not (driven or loose or wishes.floating):
         raise robot.error("nothing can move; let the root move freely with --floating")
     if wishes.stops:
-        following = {constraint["coordinate"] for constraint in made.constraints}
-        made.effects += stops(made.joints, following | set(made.locked))
+        add_stops(made)  # all start between their limits
     remarks += _remarks(robot, tree, names, made)
     remarks += _remarks_on_bodies(tree, meshes, changes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
