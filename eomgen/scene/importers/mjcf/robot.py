@@ -1,9 +1,10 @@
 """An MJCF file as the tables of a scene."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from eomgen.errors import listed
+from eomgen.scene.importers.conventions import JointStates, convention, suffixed
 from eomgen.scene.importers.imported import Imported, Wishes
 from eomgen.scene.importers.mjcf.actuators import add_actuators
 from eomgen.scene.importers.mjcf.bodies import add_bodies, is_split, joints_of
@@ -51,7 +52,24 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
     beside = ", ".join(f"{what} ({model[key]})" for key, what in COUNTED.items() if model[key])
     lost += [f"left out: {beside}"] if beside else []
     remarks = (*lost, *made.remarks, *model.warnings)
-    return Imported(made.tables(name, path.name), remarks)
+    states = convention("MuJoCo", list(_states(model, names)), made.locked)
+    return Imported(made.tables(name, path.name), remarks, states)
+
+
+def _states(model: Compiled, names: Names) -> Iterator[JointStates]:
+    """The numbers of each joint."""
+    for j, kind in enumerate(model["jnt_type"]):
+        name, k = names.joints[j], model["jnt_bodyid"][j]
+        if kind == BALL:
+            turns, spins = suffixed(name, "qw qx qy qz"), suffixed(name, "wx wy wz")
+            yield JointStates(turns, spins, "quaternion")
+        elif kind == FREE and j in names.split:
+            yield JointStates.free(names.between[k, j], name, "quaternion")
+        elif kind == FREE:
+            body, com = names.bodies[k], tuple(model["body_ipos"][k])
+            yield JointStates.free(body, body, "origin in the world", body, com)
+        else:
+            yield JointStates.single(name)
 
 
 def names_of(model: Compiled) -> tuple[Names, list[str]]:
@@ -130,5 +148,6 @@ def _remarks(model: Compiled, made: Mechanism, wishes: Wishes) -> Iterable[str]:
         yield f"friction of joints is smoothed within {SPEED:g} rad/s or m/s: {SLIDING_SPEED}"
     if FREE in model["jnt_type"]:
         yield (
-            "coordinates of a free body are those of its centre of mass, in MuJoCo of its origin"
+            "coordinates of a free body are those of its centre of mass, in MuJoCo of its origin; "
+            "import_robot(...).mujoco(module) converts them"
         )

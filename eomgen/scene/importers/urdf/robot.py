@@ -20,6 +20,7 @@ from eomgen.scene.importers.urdf.joints import (
 )
 from eomgen.scene.importers.urdf.links import ENTRIES, Changes, Inertial, read_inertials
 from eomgen.scene.importers.urdf.shapes import Meshes, colours_of, shapes_of
+from eomgen.scene.importers.urdf.states import convention_of
 from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved, read_tree
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
@@ -42,9 +43,8 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     """The scene of a robot. Raises `SceneError`, one line with the line of the file."""
     if any("xacro" in element.namespace for element in robot.walk()):
         raise robot.error("has xacro macros; expand them first: xacro robot.xacro > robot.urdf")
-    tree = read_tree(robot)
-    if wishes.floating:
-        tree = _without_world(tree)
+    read = read_tree(robot)
+    tree = _without_world(read) if wishes.floating else read
     names = _names(tree)
     made, remarks = Mechanism(effects=[{"type": "gravity", "g": GRAVITY}]), list[str]()
     meshes = Meshes((path.parent, *wishes.allowed))
@@ -63,7 +63,8 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     remarks += _remarks(robot, tree, names, made)
     remarks += _remarks_on_bodies(tree, meshes, changes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
-    return Imported(made.tables(name, path.name), tuple(remarks))
+    states = convention_of(read, tree, names, made)
+    return Imported(made.tables(name, path.name), tuple(remarks), states)
 
 
 def _without_world(tree: Tree) -> Tree:
