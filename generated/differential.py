@@ -144,8 +144,8 @@ UNITS = {
 }
 EFFECTS = ('gravity', 'motor', 'joint_friction', 'joint_friction')
 EFFECT_NAMES = ('gravity', 'engine', 'on_ice', 'on_asphalt')
-BODIES = ('pinion', 'carrier', 'left', 'right', 'bevel_gear')
-JOINTS = ('drive_shaft', 'case_bearing', 'left_bearing', 'right_bearing', 'gear_pin')
+BODIES = ('pinion', 'carrier', 'bevel_gear', 'left', 'right')
+JOINTS = ('drive_shaft', 'case_bearing', 'gear_pin', 'left_bearing', 'right_bearing')
 POINTS = ()
 CONSTRAINTS = ('crown_wheel', 'left_mesh', 'right_mesh')
 FOLLOWING = ('drive', 'left_angle', 'right_angle', 'drive_dot', 'left_angle_dot', 'right_angle_dot')
@@ -157,8 +157,8 @@ COST = {
     "velocities": {"add": 1, "sub": 1, "mul": 2, "total": 4, "parameters": 0},
     "accelerations": {"add": 3, "sub": 5, "mul": 7, "div": 4, "sin": 1, "tanh": 2, "total": 22, "parameters": 15},
     "constraint_residuals": {"total": 0, "parameters": 0},
-    "constraint_rates": {"add": 2, "sub": 4, "mul": 1, "total": 7, "parameters": 0},
-    "constraint_margins": {"total": 0, "parameters": 6},
+    "constraint_rates": {"add": 1, "sub": 2, "mul": 1, "total": 4, "parameters": 0},
+    "constraint_margins": {"total": 0, "parameters": 7},
     "constraint_jacobian": {"total": 0, "parameters": 2},
 }
 
@@ -170,23 +170,23 @@ def _refused(final_drive, I_pinion, m_case, I_case, I_across, m_gear, I_gear, I_
     k3 = I_case + I_across
     k4 = 5e-10 * (I_across + k3)
     k5 = k3 + k4 - I_across
-    k6 = I_wheel + I_wheel_across
-    k7 = 5e-10 * (I_wheel_across + k6)
-    k8 = k6 + k7 - I_wheel_across
-    k9 = min(min(k8, k7 + (I_wheel_across + I_wheel_across) - I_wheel), k8)
-    k10 = I_gear_across + I_gear_across
-    k11 = 5e-10 * (I_gear + k10)
-    k12 = I_gear + I_gear_across + k11 - I_gear_across
+    k6 = I_gear_across + I_gear_across
+    k7 = 5e-10 * (I_gear + k6)
+    k8 = I_gear + I_gear_across + k7 - I_gear_across
+    k9 = I_wheel + I_wheel_across
+    k10 = 5e-10 * (I_wheel_across + k9)
+    k11 = k9 + k10 - I_wheel_across
+    k12 = min(min(k11, k10 + (I_wheel_across + I_wheel_across) - I_wheel), k11)
     if not min(min(k2, k2), k2) >= 0.0:
         return "parameters I_pinion: bodies[0].inertia_com: body 'pinion' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_pinion, I_pinion, I_pinion)
     if not min(min(k5, k4 + (I_across + I_across) - I_case), k5) >= 0.0:
         return "parameters I_case, I_across: bodies[1].inertia_com: body 'carrier' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_across, I_case, I_across)
-    if not k9 >= 0.0:
-        return "parameters I_wheel, I_wheel_across: bodies[3].inertia_com: body 'left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_wheel_across, I_wheel, I_wheel_across)
-    if not k9 >= 0.0:
-        return "parameters I_wheel, I_wheel_across: bodies[4].inertia_com: body 'right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_wheel_across, I_wheel, I_wheel_across)
-    if not min(min(k12, k12), k10 + k11 - I_gear) >= 0.0:
+    if not min(min(k8, k8), k6 + k7 - I_gear) >= 0.0:
         return "parameters I_gear_across, I_gear: bodies[2].inertia_com: body 'bevel_gear' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_gear_across, I_gear_across, I_gear)
+    if not k12 >= 0.0:
+        return "parameters I_wheel, I_wheel_across: bodies[3].inertia_com: body 'left' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_wheel_across, I_wheel, I_wheel_across)
+    if not k12 >= 0.0:
+        return "parameters I_wheel, I_wheel_across: bodies[4].inertia_com: body 'right' has principal moments {:.6g}, {:.6g}, {:.6g}; no body has one larger than the other two together: change xx, yy or zz".format(I_wheel_across, I_wheel, I_wheel_across)
     if not ice >= 0.0:
         return 'parameters ice: effects[2].coulomb: {:g} is negative; give a number >= 0 in N m'.format(ice)
     if not on_ice_speed > 0.0:
@@ -216,6 +216,14 @@ def _fixed(final_drive, I_pinion, m_case, I_case, I_across, m_gear, I_gear, I_ge
         return "inertia_com yy of carrier is negative"
     if not I_across >= 0.0:
         return "inertia_com zz of carrier is negative"
+    if not m_gear > 0.0:
+        return "mass of bevel_gear is not positive"
+    if not I_gear_across >= 0.0:
+        return "inertia_com xx of bevel_gear is negative"
+    if not I_gear_across >= 0.0:
+        return "inertia_com yy of bevel_gear is negative"
+    if not I_gear >= 0.0:
+        return "inertia_com zz of bevel_gear is negative"
     if not m_wheel > 0.0:
         return "mass of left is not positive"
     if not I_wheel_across >= 0.0:
@@ -232,20 +240,12 @@ def _fixed(final_drive, I_pinion, m_case, I_case, I_across, m_gear, I_gear, I_ge
         return "inertia_com yy of right is negative"
     if not I_wheel_across >= 0.0:
         return "inertia_com zz of right is negative"
-    if not m_gear > 0.0:
-        return "mass of bevel_gear is not positive"
-    if not I_gear_across >= 0.0:
-        return "inertia_com xx of bevel_gear is negative"
-    if not I_gear_across >= 0.0:
-        return "inertia_com yy of bevel_gear is negative"
-    if not I_gear >= 0.0:
-        return "inertia_com zz of bevel_gear is negative"
     moment_bevel_gear_z = m_gear * r_gear
     k1 = g * moment_bevel_gear_z
     k12 = I_case + (I_gear_across + r_gear * moment_bevel_gear_z) + final_drive * (final_drive * I_pinion)
     pivot_turn_dot = I_wheel + (I_wheel + k12)
     k13 = teeth * (teeth * I_wheel)
-    pivot_planet_dot = I_gear + (k13 + k13)
+    pivot_planet_dot = k13 + (I_gear + k13)
     k2 = final_drive * torque
     k3 = 1.0 / on_ice_speed
     k4 = 1.0 / on_asphalt_speed
@@ -254,7 +254,7 @@ def _fixed(final_drive, I_pinion, m_case, I_case, I_across, m_gear, I_gear, I_ge
     k7 = teeth / on_asphalt_speed
     k8 = -teeth
     k9 = 1.0 / (1.0 + final_drive * final_drive)
-    k10 = 1.0 / (2.0 + teeth * teeth)
+    k10 = 1.0 / (1.0 + (1.0 + teeth * teeth))
     k11 = -final_drive
     return {
         "initial_state": (),
@@ -371,9 +371,9 @@ def _coordinates(y, k, u=(), extra=()):
     return (
         final_drive * turn,
         turn,
+        planet,
         turn + s12,
         turn - s12,
-        planet,
     )
 
 
@@ -385,9 +385,9 @@ def _velocities(y, k, u=(), extra=()):
     return (
         final_drive * turn_dot,
         turn_dot,
+        planet_dot,
         turn_dot + s1,
         turn_dot - s1,
-        planet_dot,
     )
 
 
@@ -404,9 +404,9 @@ def _accelerations(y, k, u=(), extra=(), sin=sin, tanh=tanh):
     return (
         final_drive * s13,
         s13,
+        s14,
         s13 + s15,
         s13 - s15,
-        s14,
     )
 
 
@@ -420,14 +420,14 @@ def _constraint_residuals(y, k, u=(), extra=()):
 
 
 def _constraint_rates(y, k, u=(), extra=()):
-    """7 operations: 2 add, 4 sub, 1 mul."""
+    """4 operations: 1 add, 2 sub, 1 mul."""
     teeth, = k
     _, _, turn_dot, planet_dot = y
     s1 = teeth * planet_dot
     return (
         0.0,
-        turn_dot + s1 - turn_dot - s1,
-        s1 + (turn_dot - s1 - turn_dot),
+        0.0,
+        turn_dot - s1 + (s1 - turn_dot),
     )
 
 
@@ -452,14 +452,14 @@ def _constraint_jacobian(y, k, u=(), extra=()):
         0.0,
         0.0,
         -1.0,
+        k8,
         1.0,
         0.0,
-        k8,
         0.0,
         -1.0,
+        teeth,
         0.0,
         1.0,
-        teeth,
     )
 
 

@@ -17,10 +17,10 @@ Parameters p, with the scene's values:
     g = 9.81               m/s^2  gravitational acceleration
 
 What follows from the state in closed form: `coordinates` and `velocities`.
-    psi      rad    angle of rocker from the world's x axis
     phi      rad    angle of coupler from crank
-    psi_dot  rad/s  rate of psi
+    psi      rad    angle of rocker from the world's x axis
     phi_dot  rad/s  rate of phi
+    psi_dot  rad/s  rate of psi
 
 Effects: gravity, motor.
 
@@ -28,7 +28,7 @@ Constraints, each with the unit of its force:
     rocker_pin_x  N
     rocker_pin_y  N
 
-One call of `derivative` takes 110 operations: 19 add, 26 sub, 50 mul, 12 div, 1 sin, 1 cos, 1 sqrt;
+One call of `derivative` takes 109 operations: 20 add, 25 sub, 49 mul, 12 div, 1 sin, 1 cos, 1 sqrt;
 37 more depend on parameters alone and are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -80,26 +80,26 @@ UNITS = {
     "g": "m/s^2",
     "rocker_pin_x": "N",
     "rocker_pin_y": "N",
-    "psi": "rad",
     "phi": "rad",
-    "psi_dot": "rad/s",
+    "psi": "rad",
     "phi_dot": "rad/s",
+    "psi_dot": "rad/s",
 }
 EFFECTS = ('gravity', 'motor')
 EFFECT_NAMES = ('gravity', 'drive')
-BODIES = ('crank', 'rocker', 'coupler')
-JOINTS = ('motor_shaft', 'rocker_pivot', 'crank_pin', 'rocker_pin')
+BODIES = ('crank', 'coupler', 'rocker')
+JOINTS = ('motor_shaft', 'crank_pin', 'rocker_pivot', 'rocker_pin')
 POINTS = ('pen',)
 CONSTRAINTS = ('rocker_pin_x', 'rocker_pin_y')
-FOLLOWING = ('psi', 'phi', 'psi_dot', 'phi_dot')
-RANGED = ('psi', 'phi')
+FOLLOWING = ('phi', 'psi', 'phi_dot', 'psi_dot')
+RANGED = ('phi', 'psi')
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 19, "sub": 26, "mul": 50, "div": 12, "sin": 1, "cos": 1, "sqrt": 1, "total": 110, "parameters": 37},
-    "jacobian": {"add": 55, "sub": 75, "mul": 149, "div": 27, "sin": 1, "cos": 1, "sqrt": 1, "total": 309, "parameters": 39},
+    "derivative": {"add": 20, "sub": 25, "mul": 49, "div": 12, "sin": 1, "cos": 1, "sqrt": 1, "total": 109, "parameters": 37},
+    "jacobian": {"add": 56, "sub": 74, "mul": 148, "div": 27, "sin": 1, "cos": 1, "sqrt": 1, "total": 308, "parameters": 39},
     "coordinates": {"add": 3, "sub": 6, "mul": 9, "div": 6, "sin": 1, "cos": 1, "sqrt": 1, "atan2": 2, "total": 29, "parameters": 12},
     "velocities": {"add": 6, "sub": 7, "mul": 14, "div": 5, "neg": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 37, "parameters": 10},
-    "accelerations": {"add": 21, "sub": 26, "mul": 52, "div": 12, "neg": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 116, "parameters": 37},
+    "accelerations": {"add": 22, "sub": 25, "mul": 51, "div": 12, "neg": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 115, "parameters": 37},
     "constraint_residuals": {"add": 6, "sub": 7, "mul": 9, "div": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 27, "parameters": 10},
     "constraint_rates": {"add": 10, "sub": 8, "mul": 20, "div": 5, "neg": 1, "sin": 1, "cos": 1, "sqrt": 1, "total": 47, "parameters": 10},
     "constraint_margins": {"add": 11, "sub": 8, "mul": 19, "div": 7, "sin": 1, "cos": 1, "sqrt": 1, "total": 48, "parameters": 10},
@@ -113,13 +113,13 @@ def _refused(crank_length, coupler_length, rocker_length, ground_length, line, s
     k2 = line * (crank_length * (crank_length * crank_length)) / 12.0
     k3 = crank_length / 2.0
     k4 = -k3
-    k5 = rocker_length * line
-    k6 = line * (rocker_length * (rocker_length * rocker_length)) / 12.0
-    k7 = rocker_length / 2.0
+    k5 = coupler_length * line
+    k6 = line * (coupler_length * (coupler_length * coupler_length)) / 12.0
+    k7 = coupler_length / 2.0
     k8 = -k7
-    k9 = coupler_length * line
-    k10 = line * (coupler_length * (coupler_length * coupler_length)) / 12.0
-    k11 = coupler_length / 2.0
+    k9 = rocker_length * line
+    k10 = line * (rocker_length * (rocker_length * rocker_length)) / 12.0
+    k11 = rocker_length / 2.0
     k12 = -k11
     if not -1e+100 <= k1 <= 1e+100:
         return 'parameters line, crank_length: bodies[0].mass: {:g} is larger than 1e+100; choose other units'.format(k1)
@@ -128,57 +128,57 @@ def _refused(crank_length, coupler_length, rocker_length, ground_length, line, s
     if not -1e+100 <= k4 <= 1e+100:
         return 'parameters crank_length: joints[0].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k4)
     if not -1e+100 <= k5 <= 1e+100:
-        return 'parameters line, rocker_length: bodies[2].mass: {:g} is larger than 1e+100; choose other units'.format(k5)
+        return 'parameters line, coupler_length: bodies[1].mass: {:g} is larger than 1e+100; choose other units'.format(k5)
     if not -1e+100 <= k6 <= 1e+100:
-        return 'parameters line, rocker_length: bodies[2].inertia_com: {:g} is larger than 1e+100; choose other units'.format(k6)
-    if not -1e+100 <= k8 <= 1e+100:
-        return 'parameters rocker_length: joints[2].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k8)
-    if not -1e+100 <= k9 <= 1e+100:
-        return 'parameters line, coupler_length: bodies[1].mass: {:g} is larger than 1e+100; choose other units'.format(k9)
-    if not -1e+100 <= k10 <= 1e+100:
-        return 'parameters line, coupler_length: bodies[1].inertia_com: {:g} is larger than 1e+100; choose other units'.format(k10)
+        return 'parameters line, coupler_length: bodies[1].inertia_com: {:g} is larger than 1e+100; choose other units'.format(k6)
     if not -1e+100 <= k3 <= 1e+100:
         return 'parameters crank_length: joints[1].r_parent[0]: {:g} is larger than 1e+100; choose other units'.format(k3)
+    if not -1e+100 <= k8 <= 1e+100:
+        return 'parameters coupler_length: joints[1].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k8)
+    if not -1e+100 <= k9 <= 1e+100:
+        return 'parameters line, rocker_length: bodies[2].mass: {:g} is larger than 1e+100; choose other units'.format(k9)
+    if not -1e+100 <= k10 <= 1e+100:
+        return 'parameters line, rocker_length: bodies[2].inertia_com: {:g} is larger than 1e+100; choose other units'.format(k10)
     if not -1e+100 <= k12 <= 1e+100:
-        return 'parameters coupler_length: joints[1].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k12)
-    if not -1e+100 <= k11 <= 1e+100:
-        return 'parameters coupler_length: joints[3].r_parent[0]: {:g} is larger than 1e+100; choose other units'.format(k11)
+        return 'parameters rocker_length: joints[2].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k12)
     if not -1e+100 <= k7 <= 1e+100:
-        return 'parameters rocker_length: joints[3].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k7)
+        return 'parameters coupler_length: joints[3].r_parent[0]: {:g} is larger than 1e+100; choose other units'.format(k7)
+    if not -1e+100 <= k11 <= 1e+100:
+        return 'parameters rocker_length: joints[3].r_child[0]: {:g} is larger than 1e+100; choose other units'.format(k11)
     return None
 
 
 def _fixed(crank_length, coupler_length, rocker_length, ground_length, line, stall, no_load, g):
     """The constants of each kernel, which depend on parameters only; or what is wrong, as text."""
     mass_crank = crank_length * line
-    mass_rocker = rocker_length * line
     mass_coupler = coupler_length * line
+    mass_rocker = rocker_length * line
     if not mass_crank > 0.0:
         return "mass of crank is not positive"
     if not mass_crank * (crank_length * crank_length) / 12.0 >= 0.0:
         return "inertia_com of crank is negative"
-    if not mass_rocker > 0.0:
-        return "mass of rocker is not positive"
-    if not mass_rocker * (rocker_length * rocker_length) / 12.0 >= 0.0:
-        return "inertia_com of rocker is negative"
     if not mass_coupler > 0.0:
         return "mass of coupler is not positive"
     if not mass_coupler * (coupler_length * coupler_length) / 12.0 >= 0.0:
         return "inertia_com of coupler is negative"
+    if not mass_rocker > 0.0:
+        return "mass of rocker is not positive"
+    if not mass_rocker * (rocker_length * rocker_length) / 12.0 >= 0.0:
+        return "inertia_com of rocker is negative"
     k12 = crank_length / 2.0
-    k13 = rocker_length / 2.0
     k1 = k12 + k12
-    k14 = coupler_length / 2.0
+    k13 = coupler_length / 2.0
+    k14 = rocker_length / 2.0
     moment_crank_x = k12 * mass_crank
-    moment_rocker_x = k13 * mass_rocker
-    inertia_rocker_zz = mass_rocker * (rocker_length * rocker_length) / 12.0 + k13 * moment_rocker_x
-    moment_coupler_x = k14 * mass_coupler
-    inertia_coupler_zz = mass_coupler * (coupler_length * coupler_length) / 12.0 + k14 * moment_coupler_x
+    moment_coupler_x = k13 * mass_coupler
+    inertia_coupler_zz = mass_coupler * (coupler_length * coupler_length) / 12.0 + k13 * moment_coupler_x
+    moment_rocker_x = k14 * mass_rocker
+    inertia_rocker_zz = mass_rocker * (rocker_length * rocker_length) / 12.0 + k14 * moment_rocker_x
     k15 = k1 * mass_coupler
     k2 = mass_crank * (crank_length * crank_length) / 12.0 + k12 * moment_crank_x + k1 * k15
     k3 = g * (moment_crank_x + k15)
-    k4 = k13 + k13
-    k5 = k14 + k14
+    k4 = k14 + k14
+    k5 = k13 + k13
     k6 = k4 * k4
     k7 = 0.5 * (k6 - k5 * k5)
     k8 = g * moment_rocker_x
@@ -187,11 +187,11 @@ def _fixed(crank_length, coupler_length, rocker_length, ground_length, line, sta
     k11 = -k5
     return {
         "initial_state": (),
-        "derivative": (ground_length, stall, no_load, g, k1, inertia_rocker_zz, moment_coupler_x, inertia_coupler_zz, k2, k3, k4, k5, k6, k7, k8),
-        "jacobian": (ground_length, stall, no_load, g, k1, inertia_rocker_zz, moment_coupler_x, inertia_coupler_zz, k2, k3, k4, k5, k6, k7, k8, k9),
+        "derivative": (ground_length, stall, no_load, g, k1, moment_coupler_x, inertia_coupler_zz, inertia_rocker_zz, k2, k3, k4, k5, k6, k7, k8),
+        "jacobian": (ground_length, stall, no_load, g, k1, moment_coupler_x, inertia_coupler_zz, inertia_rocker_zz, k2, k3, k4, k5, k6, k7, k8, k9),
         "coordinates": (ground_length, k1, k4, k6, k7, k10, k11),
         "velocities": (ground_length, k1, k6, k7),
-        "accelerations": (ground_length, stall, no_load, g, k1, inertia_rocker_zz, moment_coupler_x, inertia_coupler_zz, k2, k3, k4, k5, k6, k7, k8),
+        "accelerations": (ground_length, stall, no_load, g, k1, moment_coupler_x, inertia_coupler_zz, inertia_rocker_zz, k2, k3, k4, k5, k6, k7, k8),
         "constraint_residuals": (ground_length, k1, k6, k7),
         "constraint_rates": (ground_length, k1, k6, k7),
         "constraint_margins": (ground_length, k1, k4, k5, k6, k7),
@@ -243,8 +243,8 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
-    """110 operations: 19 add, 26 sub, 50 mul, 12 div, 1 sin, 1 cos, 1 sqrt."""
-    ground_length, stall, no_load, g, k1, inertia_rocker_zz, moment_coupler_x, inertia_coupler_zz, k2, k3, k4, k5, k6, k7, k8 = k
+    """109 operations: 20 add, 25 sub, 49 mul, 12 div, 1 sin, 1 cos, 1 sqrt."""
+    ground_length, stall, no_load, g, k1, moment_coupler_x, inertia_coupler_zz, inertia_rocker_zz, k2, k3, k4, k5, k6, k7, k8 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
     s1 = k1 * cos_theta
@@ -264,31 +264,30 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s14 = s12 / s11
     s15 = s10 - s9 * s14
     s16 = (s13 * s14 - (s2 + s12)) / s15
-    s17 = theta_dot * s16
-    s18 = (s13 + s9 * s16) / s11
+    s17 = (s13 + s9 * s16) / s11
+    s18 = theta_dot * s16
     s19 = moment_coupler_x * ((s5 - s9) / k5)
     s20 = moment_coupler_x * ((s2 - s10) / k5)
     s21 = inertia_coupler_zz - (s1 * s19 + s2 * s20)
-    s22 = theta_dot - theta_dot * s18
-    s23 = s17 * s17
-    s24 = s22 * s22
+    s22 = theta_dot - theta_dot * s17
+    s23 = s22 * s22
+    s24 = s18 * s18
     s25 = (g - s4) * s19 + s3 * s20
-    s26 = stall * (1.0 - theta_dot / no_load) - (cos_theta * k3 + (s1 * (s20 * s24) - s2 * (s19 * s24) - s25))
-    s27 = s10 * s23 - (s4 + s12 * s24)
-    s28 = (s14 * s27 - (s3 + s11 * s24 - s9 * s23)) / s15
+    s26 = stall * (1.0 - theta_dot / no_load) - (cos_theta * k3 + (s1 * (s20 * s23) - s2 * (s19 * s23) - s25))
+    s27 = s10 * s24 - (s4 + s12 * s23)
+    s28 = (s14 * s27 - (s3 + s11 * s23 - s9 * s24)) / s15
     s29 = (s27 + s9 * s28) / s11
-    s30 = k2 + (inertia_coupler_zz - (s1 * (s19 + s19) + s2 * (s20 + s20))) - s18 * s21
-    s31 = s30 + s16 * (inertia_rocker_zz * s16) - s18 * (s21 - inertia_coupler_zz * s18)
-    s32 = s26 + s21 * s29 - s16 * (inertia_rocker_zz * s28 - s9 / k4 * k8) - s18 * (s25 + inertia_coupler_zz * s29)
+    s30 = k2 + (inertia_coupler_zz - (s1 * (s19 + s19) + s2 * (s20 + s20))) - s17 * (s21 + (s21 - inertia_coupler_zz * s17))
+    s31 = s26 + s21 * s29 - s17 * (s25 + inertia_coupler_zz * s29) - s16 * (inertia_rocker_zz * s28 - s9 / k4 * k8)
     return (
         theta_dot,
-        s32 / s31,
+        s31 / (s30 + s16 * (inertia_rocker_zz * s16)),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
-    """309 operations: 55 add, 75 sub, 149 mul, 27 div, 1 sin, 1 cos, 1 sqrt."""
-    ground_length, stall, no_load, g, k1, inertia_rocker_zz, moment_coupler_x, inertia_coupler_zz, k2, k3, k4, k5, k6, k7, k8, k9 = k
+    """308 operations: 56 add, 74 sub, 148 mul, 27 div, 1 sin, 1 cos, 1 sqrt."""
+    ground_length, stall, no_load, g, k1, moment_coupler_x, inertia_coupler_zz, inertia_rocker_zz, k2, k3, k4, k5, k6, k7, k8, k9 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
     sin_theta = sin(theta)
@@ -300,87 +299,87 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     bias_coupler_y = g - s4
     s5 = s1 - ground_length
     s6 = s5 * s5 + s2 * s2
-    s33 = k7 / s6
-    s7 = 0.5 + s33
-    s34 = k6 / s6
-    s8 = sqrt(s34 - s7 * s7)
-    s35 = s2 * s8
-    s9 = s5 * s7 + s35
-    s36 = s2 * s7
-    s10 = s36 - s5 * s8
+    s32 = k7 / s6
+    s7 = 0.5 + s32
+    s33 = k6 / s6
+    s8 = sqrt(s33 - s7 * s7)
+    s34 = s2 * s8
+    s9 = s5 * s7 + s34
+    s35 = s2 * s7
+    s10 = s35 - s5 * s8
     s11 = s9 - s5
     s12 = s10 - s2
     s13 = s1 + s11
     s14 = s12 / s11
     s15 = s10 - s9 * s14
     s16 = (s13 * s14 - (s2 + s12)) / s15
-    s17 = theta_dot * s16
-    s18 = (s13 + s9 * s16) / s11
+    s17 = (s13 + s9 * s16) / s11
+    s18 = theta_dot * s16
     s19 = moment_coupler_x * ((s5 - s9) / k5)
     s20 = moment_coupler_x * ((s2 - s10) / k5)
-    s37 = s19 + s19
-    s38 = s20 + s20
+    s36 = s19 + s19
+    s37 = s20 + s20
     s21 = inertia_coupler_zz - (s1 * s19 + s2 * s20)
-    s22 = theta_dot - theta_dot * s18
-    s23 = s17 * s17
-    s24 = s22 * s22
-    s39 = s19 * s24
-    s40 = s20 * s24
+    s22 = theta_dot - theta_dot * s17
+    s23 = s22 * s22
+    s24 = s18 * s18
+    s38 = s19 * s23
+    s39 = s20 * s23
     s25 = bias_coupler_y * s19 + s3 * s20
-    s26 = stall * (1.0 - theta_dot / no_load) - (cos_theta * k3 + (s1 * s40 - s2 * s39 - s25))
-    s27 = s10 * s23 - (s4 + s12 * s24)
-    s28 = (s14 * s27 - (s3 + s11 * s24 - s9 * s23)) / s15
+    s26 = stall * (1.0 - theta_dot / no_load) - (cos_theta * k3 + (s1 * s39 - s2 * s38 - s25))
+    s27 = s10 * s24 - (s4 + s12 * s23)
+    s28 = (s14 * s27 - (s3 + s11 * s23 - s9 * s24)) / s15
     s29 = (s27 + s9 * s28) / s11
+    s40 = s25 + inertia_coupler_zz * s29
     s41 = inertia_rocker_zz * s28 - s9 / k4 * k8
-    s42 = s25 + inertia_coupler_zz * s29
+    s42 = s21 - inertia_coupler_zz * s17
     s43 = inertia_rocker_zz * s16
-    s44 = s21 - inertia_coupler_zz * s18
-    s45 = k2 + (inertia_coupler_zz - (s1 * s37 + s2 * s38)) - s18 * s21 + s16 * s43
-    s31 = s45 - s18 * s44
-    s46 = theta_dot * 2.0
-    s47 = 2.0 * (s2 * (s1 - s5))
-    s48 = s33 * s47 / s6
-    s49 = (2.0 * (s7 * s48) - s34 * s47 / s6) / (2.0 * s8)
-    s50 = s1 * s8 + s2 * s49 - (s36 + s5 * s48)
-    s51 = s1 * s7 - s2 * s48 - (s5 * s49 - s35)
-    s52 = s2 + s50
-    s53 = s51 - s1
-    s54 = s52 - s2
-    s55 = (s53 - s14 * s52) / s11
-    s56 = s51 - (s14 * s50 + s9 * s55)
-    s57 = (s14 * s54 + s13 * s55 - (s1 + s53) - s16 * s56) / s15
-    s58 = (s54 + (s16 * s50 + s9 * s57) - s18 * s52) / s11
-    s59 = moment_coupler_x * (s52 / k5)
-    s60 = moment_coupler_x * ((s1 - s51) / k5)
-    s61 = s2 * s19
-    s62 = s1 * s20
-    s63 = s61 + s1 * s59 - (s62 + s2 * s60)
-    s64 = s57 * (s46 * s17)
-    s65 = s58 * (s46 * s22)
-    s66 = s3 * s60 - s4 * s20 - (s3 * s19 + bias_coupler_y * s59)
-    s67 = s1 * (s24 * s60 - s20 * s65) - s2 * s40 - (s1 * s39 - s2 * (s24 * s59 + s19 * s65))
-    s68 = s23 * s51 + s10 * s64 - (s3 + (s24 * s53 - s12 * s65))
-    s69 = s27 * s55 + s14 * s68 - (s24 * s52 - s11 * s65 - s4 - (s23 * s50 + s9 * s64))
-    s70 = (s69 - s28 * s56) / s15
-    s71 = (s68 + (s28 * s50 + s9 * s70) - s29 * s52) / s11
-    s72 = s2 * s37 + s1 * (s59 + s59) - (s1 * s38 + s2 * (s60 + s60)) - (s21 * s58 + s18 * s63)
-    s73 = s43 * s57
-    s74 = sin_theta * k3 - (s67 - s66) + (s29 * s63 + s21 * s71) - (s41 * s57 + s16 * (inertia_rocker_zz * s70 - k8 * (s50 / k4)))
-    s75 = (s26 + s21 * s29 - s16 * s41 - s18 * s42) / s31 * (s72 + (s73 + s73) - (s44 * s58 + s18 * (s63 - inertia_coupler_zz * s58)))
-    s76 = s1 * s46
-    s77 = s2 * s46
-    s78 = s16 * (2.0 * s17)
-    s79 = (1.0 - s18) * (2.0 * s22)
+    s44 = k2 + (inertia_coupler_zz - (s1 * s36 + s2 * s37)) - s17 * (s21 + s42) + s16 * s43
+    s45 = theta_dot * 2.0
+    s46 = 2.0 * (s2 * (s1 - s5))
+    s47 = s32 * s46 / s6
+    s48 = (2.0 * (s7 * s47) - s33 * s46 / s6) / (2.0 * s8)
+    s49 = s1 * s8 + s2 * s48 - (s35 + s5 * s47)
+    s50 = s1 * s7 - s2 * s47 - (s5 * s48 - s34)
+    s51 = s2 + s49
+    s52 = s50 - s1
+    s53 = s51 - s2
+    s54 = (s52 - s14 * s51) / s11
+    s55 = s50 - (s14 * s49 + s9 * s54)
+    s56 = (s14 * s53 + s13 * s54 - (s1 + s52) - s16 * s55) / s15
+    s57 = (s53 + (s16 * s49 + s9 * s56) - s17 * s51) / s11
+    s58 = moment_coupler_x * (s51 / k5)
+    s59 = moment_coupler_x * ((s1 - s50) / k5)
+    s60 = s2 * s19
+    s61 = s1 * s20
+    s62 = s60 + s1 * s58 - (s61 + s2 * s59)
+    s63 = s57 * (s45 * s22)
+    s64 = s56 * (s45 * s18)
+    s65 = s3 * s59 - s4 * s20 - (s3 * s19 + bias_coupler_y * s58)
+    s66 = s1 * (s23 * s59 - s20 * s63) - s2 * s39 - (s1 * s38 - s2 * (s23 * s58 + s19 * s63))
+    s67 = s24 * s50 + s10 * s64 - (s3 + (s23 * s52 - s12 * s63))
+    s68 = s27 * s54 + s14 * s67 - (s23 * s51 - s11 * s63 - s4 - (s24 * s49 + s9 * s64))
+    s69 = (s68 - s28 * s55) / s15
+    s70 = (s67 + (s28 * s49 + s9 * s69) - s29 * s51) / s11
+    s71 = s2 * s36 + s1 * (s58 + s58) - (s1 * s37 + s2 * (s59 + s59)) - (s21 * s57 + s17 * s62)
+    s72 = s43 * s56
+    s73 = sin_theta * k3 - (s66 - s65) + (s29 * s62 + s21 * s70) - (s40 * s57 + s17 * (s65 + inertia_coupler_zz * s70))
+    s74 = (s26 + s21 * s29 - s17 * s40 - s16 * s41) / s44 * (s71 - (s42 * s57 + s17 * (s62 - inertia_coupler_zz * s57)) + (s72 + s72))
+    s75 = s73 - (s41 * s56 + s16 * (inertia_rocker_zz * s69 - k8 * (s49 / k4))) - s74
+    s76 = s1 * s45
+    s77 = s2 * s45
+    s78 = (1.0 - s17) * (2.0 * s22)
+    s79 = s16 * (2.0 * s18)
     s80 = s20 * s76 - s19 * s77
-    s81 = s10 * s78 - (s77 + s12 * s79)
-    s82 = (s14 * s81 - (s76 + s11 * s79 - s9 * s78)) / s15
+    s81 = s10 * s79 - (s77 + s12 * s78)
+    s82 = (s14 * s81 - (s76 + s11 * s78 - s9 * s79)) / s15
     s83 = (s81 + s9 * s82) / s11
-    s84 = s21 * s83 - (k9 + (s79 * (s62 - s61) - s80)) - s43 * s82 - s18 * (s80 + inertia_coupler_zz * s83)
+    s84 = s21 * s83 - (k9 + (s78 * (s61 - s60) - s80)) - s17 * (s80 + inertia_coupler_zz * s83)
     return (
         0.0,
         1.0,
-        (s74 - (s42 * s58 + s18 * (s66 + inertia_coupler_zz * s71)) - s75) / s31,
-        s84 / s31,
+        s75 / s44,
+        (s84 - s43 * s82) / s44,
     )
 
 
@@ -397,8 +396,8 @@ def _coordinates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt, atan2=atan2)
     s10 = s2 * s7 - s5 * s8
     return (
         theta,
-        atan2(s9 / k10, s10 / k4),
         atan2((s2 - s10) / k11, (s5 - s9) / k11) - theta,
+        atan2(s9 / k10, s10 / k4),
     )
 
 
@@ -421,14 +420,14 @@ def _velocities(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s16 = (s13 * s14 - (s2 + s12)) / (s10 - s9 * s14)
     return (
         theta_dot,
-        -theta_dot * s16,
         -theta_dot * ((s13 + s9 * s16) / s11),
+        -theta_dot * s16,
     )
 
 
 def _accelerations(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
-    """116 operations: 21 add, 26 sub, 52 mul, 12 div, 2 neg, 1 sin, 1 cos, 1 sqrt."""
-    ground_length, stall, no_load, g, k1, inertia_rocker_zz, moment_coupler_x, inertia_coupler_zz, k2, k3, k4, k5, k6, k7, k8 = k
+    """115 operations: 22 add, 25 sub, 51 mul, 12 div, 2 neg, 1 sin, 1 cos, 1 sqrt."""
+    ground_length, stall, no_load, g, k1, moment_coupler_x, inertia_coupler_zz, inertia_rocker_zz, k2, k3, k4, k5, k6, k7, k8 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
     s1 = k1 * cos_theta
@@ -448,27 +447,26 @@ def _accelerations(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s14 = s12 / s11
     s15 = s10 - s9 * s14
     s16 = (s13 * s14 - (s2 + s12)) / s15
-    s17 = theta_dot * s16
-    s18 = (s13 + s9 * s16) / s11
+    s17 = (s13 + s9 * s16) / s11
+    s18 = theta_dot * s16
     s19 = moment_coupler_x * ((s5 - s9) / k5)
     s20 = moment_coupler_x * ((s2 - s10) / k5)
     s21 = inertia_coupler_zz - (s1 * s19 + s2 * s20)
-    s22 = theta_dot - theta_dot * s18
-    s23 = s17 * s17
-    s24 = s22 * s22
+    s22 = theta_dot - theta_dot * s17
+    s23 = s22 * s22
+    s24 = s18 * s18
     s25 = (g - s4) * s19 + s3 * s20
-    s26 = stall * (1.0 - theta_dot / no_load) - (cos_theta * k3 + (s1 * (s20 * s24) - s2 * (s19 * s24) - s25))
-    s27 = s10 * s23 - (s4 + s12 * s24)
-    s28 = (s14 * s27 - (s3 + s11 * s24 - s9 * s23)) / s15
+    s26 = stall * (1.0 - theta_dot / no_load) - (cos_theta * k3 + (s1 * (s20 * s23) - s2 * (s19 * s23) - s25))
+    s27 = s10 * s24 - (s4 + s12 * s23)
+    s28 = (s14 * s27 - (s3 + s11 * s23 - s9 * s24)) / s15
     s29 = (s27 + s9 * s28) / s11
-    s30 = k2 + (inertia_coupler_zz - (s1 * (s19 + s19) + s2 * (s20 + s20))) - s18 * s21
-    s31 = s30 + s16 * (inertia_rocker_zz * s16) - s18 * (s21 - inertia_coupler_zz * s18)
-    s32 = s26 + s21 * s29 - s16 * (inertia_rocker_zz * s28 - s9 / k4 * k8) - s18 * (s25 + inertia_coupler_zz * s29)
-    s85 = s32 / s31
+    s30 = k2 + (inertia_coupler_zz - (s1 * (s19 + s19) + s2 * (s20 + s20))) - s17 * (s21 + (s21 - inertia_coupler_zz * s17))
+    s31 = s26 + s21 * s29 - s17 * (s25 + inertia_coupler_zz * s29) - s16 * (inertia_rocker_zz * s28 - s9 / k4 * k8)
+    s85 = s31 / (s30 + s16 * (inertia_rocker_zz * s16))
     return (
         s85,
+        -(s29 + s17 * s85),
         -(s28 + s16 * s85),
-        -(s29 + s18 * s85),
     )
 
 
@@ -507,11 +505,11 @@ def _constraint_rates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s13 = s1 + s11
     s14 = s12 / s11
     s16 = (s13 * s14 - (s2 + s12)) / (s10 - s9 * s14)
-    s17 = theta_dot * s16
+    s18 = theta_dot * s16
     s22 = theta_dot - theta_dot * ((s13 + s9 * s16) / s11)
     return (
-        s10 * s17 + (theta_dot * s2 + s12 * s22),
-        -(s9 * s17 + (theta_dot * s1 + s11 * s22)),
+        s10 * s18 + (theta_dot * s2 + s12 * s22),
+        -(s9 * s18 + (theta_dot * s1 + s11 * s22)),
     )
 
 
@@ -533,12 +531,12 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s86 = s2 + s12
     s15 = s10 - s9 * (s12 / s11)
     s87 = s11 * s11
-    s88 = s13 * s13 + s9 * s9 + s87 + (s86 * s86 + s10 * s10 + s12 * s12)
+    s88 = s13 * s13 + s87 + s9 * s9 + (s86 * s86 + s12 * s12 + s10 * s10)
     return (
         s15 * s15 / s88,
         s87 / s88,
-        0.5 + 0.5 * (s10 / k4),
         0.5 - 0.5 * ((s5 - s9) / k5),
+        0.5 + 0.5 * (s10 / k4),
     )
 
 
@@ -553,16 +551,16 @@ def _constraint_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s7 = 0.5 + k7 / s6
     s8 = sqrt(k6 / s6 - s7 * s7)
     s9 = s5 * s7 + s2 * s8
-    s36 = s2 * s7
+    s35 = s2 * s7
     s89 = s5 * s8
-    s12 = s36 - s89 - s2
+    s12 = s35 - s89 - s2
     return (
         s2 + s12,
-        s89 - s36,
         s12,
+        s89 - s35,
         -(s1 + (s9 - s5)),
-        s9,
         s5 - s9,
+        s9,
     )
 
 

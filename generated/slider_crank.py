@@ -19,10 +19,10 @@ Parameters p, with the scene's values:
     g = 9.81         m/s^2      gravitational acceleration
 
 What follows from the state in closed form: `coordinates` and `velocities`.
-    h        m      displacement of piston relative to the world
     phi      rad    angle of rod from crank
-    h_dot    m/s    rate of h
+    h        m      displacement of piston relative to the world
     phi_dot  rad/s  rate of phi
+    h_dot    m/s    rate of h
 
 Effects: gravity, motor, joint_friction.
 
@@ -30,7 +30,7 @@ Constraints, each with the unit of its force:
     piston_pin_x  N
     piston_pin_y  N
 
-One call of `derivative` takes 89 operations: 11 add, 21 sub, 42 mul, 8 div, 2 sin, 1 cos, 1 exp, 1
+One call of `derivative` takes 88 operations: 12 add, 20 sub, 41 mul, 8 div, 2 sin, 1 cos, 1 exp, 1
 sqrt, 2 max; 11 more depend on parameters alone and are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -86,26 +86,26 @@ UNITS = {
     "g": "m/s^2",
     "piston_pin_x": "N",
     "piston_pin_y": "N",
-    "h": "m",
     "phi": "rad",
-    "h_dot": "m/s",
+    "h": "m",
     "phi_dot": "rad/s",
+    "h_dot": "m/s",
 }
 EFFECTS = ('gravity', 'motor', 'joint_friction')
 EFFECT_NAMES = ('gravity', 'gas_force', 'driven_load')
-BODIES = ('crank', 'piston', 'rod')
-JOINTS = ('shaft', 'cylinder', 'crank_pin', 'piston_pin')
+BODIES = ('crank', 'rod', 'piston')
+JOINTS = ('shaft', 'crank_pin', 'cylinder', 'piston_pin')
 POINTS = ()
 CONSTRAINTS = ('piston_pin_x', 'piston_pin_y')
-FOLLOWING = ('h', 'phi', 'h_dot', 'phi_dot')
+FOLLOWING = ('phi', 'h', 'phi_dot', 'h_dot')
 RANGED = ('phi',)
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 11, "sub": 21, "mul": 42, "div": 8, "sin": 2, "cos": 1, "exp": 1, "sqrt": 1, "max": 2, "total": 89, "parameters": 11},
-    "jacobian": {"add": 41, "sub": 55, "mul": 122, "div": 18, "neg": 2, "sin": 2, "cos": 2, "exp": 1, "sqrt": 1, "max": 2, "select": 2, "total": 248, "parameters": 11},
+    "derivative": {"add": 12, "sub": 20, "mul": 41, "div": 8, "sin": 2, "cos": 1, "exp": 1, "sqrt": 1, "max": 2, "total": 88, "parameters": 11},
+    "jacobian": {"add": 42, "sub": 54, "mul": 121, "div": 18, "neg": 2, "sin": 2, "cos": 2, "exp": 1, "sqrt": 1, "max": 2, "select": 2, "total": 247, "parameters": 11},
     "coordinates": {"add": 1, "sub": 2, "mul": 3, "div": 2, "sin": 1, "cos": 1, "sqrt": 1, "atan2": 1, "total": 12, "parameters": 6},
     "velocities": {"add": 1, "sub": 1, "mul": 6, "div": 2, "neg": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 15, "parameters": 5},
-    "accelerations": {"add": 12, "sub": 22, "mul": 44, "div": 8, "neg": 1, "sin": 2, "cos": 1, "exp": 1, "sqrt": 1, "max": 2, "total": 94, "parameters": 11},
+    "accelerations": {"add": 13, "sub": 21, "mul": 43, "div": 8, "neg": 1, "sin": 2, "cos": 1, "exp": 1, "sqrt": 1, "max": 2, "total": 93, "parameters": 11},
     "constraint_residuals": {"total": 0, "parameters": 0},
     "constraint_rates": {"add": 2, "sub": 4, "mul": 9, "div": 2, "sin": 1, "cos": 1, "sqrt": 1, "total": 20, "parameters": 5},
     "constraint_margins": {"add": 5, "sub": 1, "mul": 6, "div": 3, "sin": 1, "cos": 1, "sqrt": 1, "total": 18, "parameters": 5},
@@ -139,12 +139,12 @@ def _fixed(r, l, m_rod, I_rod, m_piston, m_crank, I_crank, gas, load, g):
         return "mass of crank is not positive"
     if not I_crank >= 0.0:
         return "inertia_com of crank is negative"
-    if not m_piston > 0.0:
-        return "mass of piston is not positive"
     if not m_rod > 0.0:
         return "mass of rod is not positive"
     if not I_rod >= 0.0:
         return "inertia_com of rod is negative"
+    if not m_piston > 0.0:
+        return "mass of piston is not positive"
     k7 = l / 3.0
     moment_rod_y = m_rod * k7
     inertia_rod_zz = I_rod + k7 * moment_rod_y
@@ -213,7 +213,7 @@ def _initial_state(y, k, u=(), extra=()):
 
 
 def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, exp=exp):
-    """89 operations: 11 add, 21 sub, 42 mul, 8 div, 2 sin, 1 cos, 1 exp, 1 sqrt, 2 max."""
+    """88 operations: 12 add, 20 sub, 41 mul, 8 div, 2 sin, 1 cos, 1 exp, 1 sqrt, 2 max."""
     r, m_rod, m_piston, gas, load, g, moment_rod_y, inertia_rod_zz, k1, k2, k3, k4, k5 = k
     theta, theta_dot = y
     sin_theta = sin(theta)
@@ -225,29 +225,29 @@ def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, exp=
     bias_rod_y = g - s3
     s4 = sqrt(k4 - s1 * s1)
     s5 = s2 + s4
-    s6 = s1 / s4
-    s7 = s5 * s6
-    s8 = s5 / s4
+    s6 = s5 / s4
+    s7 = s1 / s4
+    s8 = s5 * s7
     s9 = moment_rod_y * (s1 / k3)
     s10 = moment_rod_y * (s4 / k3)
     s11 = inertia_rod_zz + (s2 * s10 - s1 * s9)
-    s12 = theta_dot - theta_dot * s8
+    s12 = theta_dot - theta_dot * s6
     s13 = s12 * s12
     s14 = bias_rod_x * s10 - bias_rod_y * s9
     s15 = gas * max(0.0, sin(theta / 2.0)) * max(0.0, sin_theta) * exp((s5 - k2) / r)
     s16 = s1 * (m_rod * bias_rod_y - s10 * s13) + s2 * (m_rod * bias_rod_x - s9 * s13)
     s17 = bias_rod_x - s1 * s13
     s18 = s17 / s4
-    s19 = s1 * (m_rod * s1 - s9 - s9) + s2 * (s10 + (m_rod * s2 + s10)) + k5 - s8 * s11
-    s20 = s14 + s16 - load * theta_dot - s11 * s18 - s7 * (m_piston * (s3 + s4 * s13 - s6 * s17) - (k1 + s15))
+    s19 = s1 * (m_rod * s1 - s9 - s9) + s2 * (s10 + (m_rod * s2 + s10)) + k5 - s6 * (s11 + (s11 - inertia_rod_zz * s6))
+    s20 = s14 + s16 - load * theta_dot - s11 * s18 - s6 * (s14 - inertia_rod_zz * s18)
     return (
         theta_dot,
-        (s20 - s8 * (s14 - inertia_rod_zz * s18)) / (s19 + s7 * (m_piston * s7) - s8 * (s11 - inertia_rod_zz * s8)),
+        (s20 - s8 * (m_piston * (s3 + s4 * s13 - s7 * s17) - (k1 + s15))) / (s19 + s8 * (m_piston * s8)),
     )
 
 
 def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, exp=exp, select=select):
-    """248 operations: 41 add, 55 sub, 122 mul, 18 div, 2 neg, 2 sin, 2 cos, 1 exp, 1 sqrt, 2 max, 2 select."""
+    """247 operations: 42 add, 54 sub, 121 mul, 18 div, 2 neg, 2 sin, 2 cos, 1 exp, 1 sqrt, 2 max, 2 select."""
     r, m_rod, m_piston, gas, load, g, moment_rod_y, inertia_rod_zz, k1, k2, k3, k4, k5 = k
     theta, theta_dot = y
     cos_theta = cos(theta)
@@ -267,15 +267,15 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, exp=ex
     s27 = max(0.0, sin_theta)
     s4 = sqrt(k4 - s1 * s1)
     s5 = s2 + s4
-    s6 = s1 / s4
-    s7 = s5 * s6
-    s8 = s5 / s4
+    s6 = s5 / s4
+    s7 = s1 / s4
+    s8 = s5 * s7
     s9 = moment_rod_y * (s1 / k3)
     s10 = moment_rod_y * (s4 / k3)
     s28 = s21 - s9 - s9
     s29 = s10 + (s22 + s10)
     s11 = inertia_rod_zz + (s2 * s10 - s1 * s9)
-    s12 = theta_dot - theta_dot * s8
+    s12 = theta_dot - theta_dot * s6
     s13 = s12 * s12
     s30 = s23 - s9 * s13
     s31 = m_rod * bias_rod_y - s10 * s13
@@ -284,45 +284,46 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, exp=ex
     s15 = s26 * s27 * s32
     s17 = bias_rod_x - s1 * s13
     s18 = s17 / s4
-    s33 = m_piston * (s3 + s4 * s13 - s6 * s17) - (k1 + s15)
-    s34 = s14 - inertia_rod_zz * s18
-    s35 = m_piston * s7
-    s36 = s11 - inertia_rod_zz * s8
-    s37 = s1 * s28 + s2 * s29 + k5 - s8 * s11 + s7 * s35 - s8 * s36
-    s38 = s14 + (s1 * s31 + s2 * s30) - load * theta_dot - s11 * s18 - s7 * s33 - s8 * s34
+    s33 = s14 - inertia_rod_zz * s18
+    s34 = m_piston * (s3 + s4 * s13 - s7 * s17) - (k1 + s15)
+    s35 = s11 - inertia_rod_zz * s6
+    s36 = m_piston * s8
+    s37 = s1 * s28 + s2 * s29 + k5 - s6 * (s11 + s35) + s8 * s36
+    s38 = s14 + (s1 * s31 + s2 * s30) - load * theta_dot - s11 * s18 - s6 * s33 - s8 * s34
     s39 = theta_dot * 2.0
     s40 = s27 * (gas * select(-s25, 0.0, 0.5 * cos(s24))) + s26 * select(-sin_theta, 0.0, cos_theta)
     s41 = 2.0 * (s1 * s2) / (2.0 * s4)
     s42 = s1 + s41
-    s43 = (s2 + s6 * s41) / s4
-    s44 = s5 * s43 - s6 * s42
-    s45 = (s8 * s41 - s42) / s4
+    s43 = (s6 * s41 - s42) / s4
+    s44 = (s2 + s7 * s41) / s4
+    s45 = s5 * s44 - s7 * s42
     s46 = moment_rod_y * (s2 / k3)
     s47 = moment_rod_y * (s41 / k3)
     s48 = s2 * s28 + s1 * (s22 - s46 - s46) - (s1 * s29 + s2 * (s47 + (s21 + s47)))
     s49 = s2 * s9 + s1 * s46 + (s1 * s10 + s2 * s47)
-    s50 = s45 * (s39 * s12)
+    s50 = s43 * (s39 * s12)
     s51 = s3 * s10 - bias_rod_x * s47 - (bias_rod_x * s9 + bias_rod_y * s46)
     s52 = s2 * s31 + s1 * (s23 + (s13 * s47 + s10 * s50)) + (s2 * (m_rod * s3 - (s13 * s46 - s9 * s50)) - s1 * s30)
     s53 = s3 - (s2 * s13 - s1 * s50)
     s54 = (s53 + s18 * s41) / s4
-    s55 = m_piston * (bias_rod_x + (s13 * s41 + s4 * s50) + (s17 * s43 + s6 * s53))
-    s56 = s35 * s44
-    s57 = s48 - (s11 * s45 - s8 * s49) + (s56 + s56) - (s36 * s45 - s8 * (s49 + inertia_rod_zz * s45))
-    s58 = s51 + s52 - (s11 * s54 - s18 * s49) - (s33 * s44 - s7 * (s32 * s40 - s15 * (s42 / r) + s55))
-    s59 = s1 * s39
-    s60 = s2 * s39
-    s61 = (1.0 - s8) * (2.0 * s12)
-    s62 = s9 * s60 + s10 * s59
-    s63 = s62 + (s2 * (m_rod * s59 - s9 * s61) - s1 * (m_rod * s60 + s10 * s61)) - load
-    s64 = s59 - s1 * s61
-    s65 = s64 / s4
-    s66 = s63 - s11 * s65 - s35 * (s60 + s4 * s61 - s6 * s64) - s8 * (s62 - inertia_rod_zz * s65)
+    s55 = m_piston * (bias_rod_x + (s13 * s41 + s4 * s50) + (s17 * s44 + s7 * s53))
+    s56 = s48 - (s11 * s43 - s6 * s49) - (s35 * s43 - s6 * (s49 + inertia_rod_zz * s43))
+    s57 = s36 * s45
+    s58 = s51 + s52 - (s11 * s54 - s18 * s49) - (s33 * s43 + s6 * (s51 - inertia_rod_zz * s54))
+    s59 = s58 - (s34 * s45 - s8 * (s32 * s40 - s15 * (s42 / r) + s55)) - s38 / s37 * (s56 + (s57 + s57))
+    s60 = s1 * s39
+    s61 = s2 * s39
+    s62 = (1.0 - s6) * (2.0 * s12)
+    s63 = s9 * s61 + s10 * s60
+    s64 = s63 + (s2 * (m_rod * s60 - s9 * s62) - s1 * (m_rod * s61 + s10 * s62)) - load
+    s65 = s60 - s1 * s62
+    s66 = s65 / s4
+    s67 = s64 - s11 * s66 - s6 * (s63 - inertia_rod_zz * s66) - s36 * (s61 + s4 * s62 - s7 * s65)
     return (
         0.0,
         1.0,
-        (s58 - (s34 * s45 + s8 * (s51 - inertia_rod_zz * s54)) - s38 / s37 * s57) / s37,
-        s66 / s37,
+        s59 / s37,
+        s67 / s37,
     )
 
 
@@ -334,8 +335,8 @@ def _coordinates(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt, atan2=atan2)
     s4 = sqrt(k4 - s1 * s1)
     return (
         theta,
-        r * cos(theta) + s4,
         atan2(s1 / k6, s4 / k3) - theta,
+        r * cos(theta) + s4,
     )
 
 
@@ -348,13 +349,13 @@ def _velocities(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s5 = r * cos(theta) + s4
     return (
         theta_dot,
-        -theta_dot * (s5 * (s1 / s4)),
         -theta_dot * (s5 / s4),
+        -theta_dot * (s5 * (s1 / s4)),
     )
 
 
 def _accelerations(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, exp=exp):
-    """94 operations: 12 add, 22 sub, 44 mul, 8 div, 1 neg, 2 sin, 1 cos, 1 exp, 1 sqrt, 2 max."""
+    """93 operations: 13 add, 21 sub, 43 mul, 8 div, 1 neg, 2 sin, 1 cos, 1 exp, 1 sqrt, 2 max."""
     r, m_rod, m_piston, gas, load, g, moment_rod_y, inertia_rod_zz, k1, k2, k3, k4, k5 = k
     theta, theta_dot = y
     sin_theta = sin(theta)
@@ -366,27 +367,27 @@ def _accelerations(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt, e
     bias_rod_y = g - s3
     s4 = sqrt(k4 - s1 * s1)
     s5 = s2 + s4
-    s6 = s1 / s4
-    s7 = s5 * s6
-    s8 = s5 / s4
+    s6 = s5 / s4
+    s7 = s1 / s4
+    s8 = s5 * s7
     s9 = moment_rod_y * (s1 / k3)
     s10 = moment_rod_y * (s4 / k3)
     s11 = inertia_rod_zz + (s2 * s10 - s1 * s9)
-    s12 = theta_dot - theta_dot * s8
+    s12 = theta_dot - theta_dot * s6
     s13 = s12 * s12
     s14 = bias_rod_x * s10 - bias_rod_y * s9
     s15 = gas * max(0.0, sin(theta / 2.0)) * max(0.0, sin_theta) * exp((s5 - k2) / r)
     s16 = s1 * (m_rod * bias_rod_y - s10 * s13) + s2 * (m_rod * bias_rod_x - s9 * s13)
     s17 = bias_rod_x - s1 * s13
-    s67 = s3 + s4 * s13 - s6 * s17
+    s68 = s3 + s4 * s13 - s7 * s17
     s18 = s17 / s4
-    s19 = s1 * (m_rod * s1 - s9 - s9) + s2 * (s10 + (m_rod * s2 + s10)) + k5 - s8 * s11
-    s20 = s14 + s16 - load * theta_dot - s11 * s18 - s7 * (m_piston * s67 - (k1 + s15))
-    s68 = (s20 - s8 * (s14 - inertia_rod_zz * s18)) / (s19 + s7 * (m_piston * s7) - s8 * (s11 - inertia_rod_zz * s8))
+    s19 = s1 * (m_rod * s1 - s9 - s9) + s2 * (s10 + (m_rod * s2 + s10)) + k5 - s6 * (s11 + (s11 - inertia_rod_zz * s6))
+    s20 = s14 + s16 - load * theta_dot - s11 * s18 - s6 * (s14 - inertia_rod_zz * s18)
+    s69 = (s20 - s8 * (m_piston * s68 - (k1 + s15))) / (s19 + s8 * (m_piston * s8))
     return (
-        s68,
-        -(s67 + s7 * s68),
-        s18 - s8 * s68,
+        s69,
+        s18 - s6 * s69,
+        -(s68 + s8 * s69),
     )
 
 
@@ -418,14 +419,14 @@ def _constraint_margins(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     r, k3, k4 = k
     theta, _ = y
     s1 = r * sin(theta)
-    s69 = s1 * s1
-    s4 = sqrt(k4 - s69)
+    s70 = s1 * s1
+    s4 = sqrt(k4 - s70)
     s5 = r * cos(theta) + s4
-    s70 = s4 * s4
-    s71 = s5 * s5 + s70 + (1.0 + s69)
+    s71 = s4 * s4
+    s72 = s5 * s5 + s71 + (1.0 + s70)
     return (
-        s70 / s71,
-        1.0 / s71,
+        s71 / s72,
+        1.0 / s72,
         0.5 + 0.5 * (s4 / k3),
     )
 
@@ -438,11 +439,11 @@ def _constraint_jacobian(y, k, u=(), extra=(), cos=cos, sin=sin, sqrt=sqrt):
     s4 = sqrt(k4 - s1 * s1)
     return (
         r * cos(theta) + s4,
-        0.0,
         s4,
         0.0,
-        1.0,
+        0.0,
         -s1,
+        1.0,
     )
 
 

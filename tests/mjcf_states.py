@@ -1,21 +1,25 @@
 """Imported MJCF models beside MuJoCo: the same state for both, and their accelerations."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
 import numpy as np
+from peer_frames import dynamics_at, expected_frames, frames, stand_in
 
 import eomgen
 from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.dynamics import Dynamics
 from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.importers import import_file
+from eomgen.scene.importers.conventions import convention
+from eomgen.scene.importers.conversion import Conversion, conversion
 from eomgen.scene.importers.imported import Imported, Wishes
 from eomgen.scene.importers.mjcf.compiled import compiled
 from eomgen.scene.importers.mjcf.mechanism import Names
@@ -24,6 +28,7 @@ from eomgen.scene.reader import read_tables
 
 Array = Any
 FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+BODY = mujoco.mjtObj.mjOBJ_XBODY
 OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "EQUALITY")
 
 
@@ -106,90 +111,64 @@ class Comparison:
         mujoco.mj_forward(self.mj, data)
         return data
 
-    def values(self, data: Any, rates: Array | None = None) -> dict[str, float]:
-        """The state of the scene by name; of velocities their rates, if these are given."""
-        mj, names, found = self.mj, self.names, dict[str, float]()
-        speeds, accelerating = (data.qvel if rates is None else rates), rates is not None
-        for j in range(mj.njnt):
-            kind, q, v = mj.jnt_type[j], mj.jnt_qposadr[j], mj.jnt_dofadr[j]
-            name, body = names.joints[j], mj.jnt_bodyid[j]
-            if kind not in (FREE, BALL):
-                found |= {name: data.qpos[q], f"{name}_dot": speeds[v]}
-                continue
-            spin, turn = v + 3 * (kind == FREE), q + 3 * (kind == FREE)
-            whole = kind == FREE and j not in names.split
-            prefix = names.bodies[body] if whole else name
-            if kind == FREE:
-                point = prefix if whole else names.between[body, j]
-                place, pace = np.array(data.qpos[q : q + 3]), np.array(speeds[v : v + 3])
-                if whole:
-                    arm = data.xmat[body].reshape(3, 3) @ mj.body_ipos[body]
-                    w = data.xmat[body].reshape(3, 3) @ data.qvel[spin : spin + 3]
-                    turned = data.xmat[body].reshape(3, 3) @ speeds[spin : spin + 3]
-                    pace = pace + np.cross(turned, arm)
-                    if accelerating:
-                        pace = pace + np.cross(w, np.cross(w, arm))
-                    place = place + arm
-                found |= {f"{point}_{x}": place[i] for i, x in enumerate("xyz")}
-                found |= {f"{point}_{x}_dot": pace[i] for i, x in enumerate("xyz")}
-            found |= {f"{prefix}_q{x}": data.qpos[turn + i] for i, x in enumerate("wxyz")}
-            found |= {f"{prefix}_w{x}": speeds[spin + i] for i, x in enumerate("xyz")}
-        return found
+    @cached_property
+    def conversion(self) -> Conversion:
+        """States of the scene as MuJoCo's."""
+        joints = self.imported.convention.joints
+        held = self.tables.get("locked", {})
+        return conversion(convention("MuJoCo", joints, held), stand_in(self.model))
 
-    def velocity_names(self) -> list[str]:
-        """The name in the scene of each of MuJoCo's velocities."""
-        mj, names, found = self.mj, self.names, list[str]()
-        for j in range(mj.njnt):
-            kind, name, body = mj.jnt_type[j], names.joints[j], mj.jnt_bodyid[j]
-            if kind not in (FREE, BALL):
-                found.append(f"{name}_dot")
-                continue
-            whole = kind == FREE and j not in names.split
-            prefix = names.bodies[body] if whole else name
-            if kind == FREE:
-                point = prefix if whole else names.between[body, j]
-                found += [f"{point}_{x}_dot" for x in "xyz"]
-            found += [f"{prefix}_w{x}" for x in "xyz"]
-        return found
+    def at(self, data: Any, model: Model | None = None) -> Dynamics:
+        """The scene at MuJoCo's state."""
+        model, act = model or self.model, self.activations(data.act)
+        y = self.conversion.state(data.qpos, data.qvel, **act)
+        q, v, _ = np.split(y, np.cumsum((len(model.coordinates), len(model.velocities))))
+        return dynamics_at(model, q.tolist(), v.tolist(), self.inputs(data.ctrl), act)
 
     def forces(self, data: Any) -> list[float]:
-        """The generalised forces, in the order of the scene's velocities."""
-        mj, applied = self.mj, data.qfrc_applied.copy()
-        for j in range(mj.njnt):
-            v, body = mj.jnt_dofadr[j], mj.jnt_bodyid[j]
-            if mj.jnt_type[j] == FREE and j not in self.names.split:
-                turned = data.xmat[body].reshape(3, 3)
-                moment = np.cross(turned @ mj.body_ipos[body], applied[v : v + 3])
-                applied[v + 3 : v + 6] -= turned.T @ moment
-        named = dict(zip(self.velocity_names(), applied, strict=True))
-        return [named[c.name] for c in self.model.velocities]
+        """The generalised forces, in the order of the scene's velocities: with v = B w of MuJoCo's
+        velocities and the scene's, Bᵀ of MuJoCo's.
+        """
+        y, count = self.conversion.state(data.qpos, data.qvel), len(self.model.velocities)
+        states, first = np.tile(y[:, None], count), len(self.model.coordinates)
+        states[first : first + count] = np.eye(count)
+        return list(self.conversion.velocity(states).T @ data.qfrc_applied)
+
+    def rates(self, data: Any, vd: Sequence[float]) -> Array:
+        """v̇ of MuJoCo by that of the scene."""
+        y, first = self.conversion.state(data.qpos, data.qvel), len(self.model.coordinates)
+        rates = np.zeros(len(y))
+        rates[first : first + len(vd)] = vd
+        module = SimpleNamespace(**{**vars(stand_in(self.model)), "derivative": lambda *_: rates})
+        return replace(self.conversion, module=module).acceleration(0.0, y)
 
     def inputs(self, ctrl: Array) -> dict[str, float]:
         """The inputs of the scene."""
         return dict(zip(self.names.inputs, ctrl, strict=True)) if self.driven else {}
 
     def accelerations(self, data: Any, route: str = "aba") -> Array:
-        """v̇ of the scene at a state of MuJoCo, by the recursion of a route."""
-        values, model = self.values(data), self.model
-        q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
-        given = Values(model.defaults, self.inputs(data.ctrl), q, v, self.activations(data.act))
-        return np.array(
-            Dynamics(model, given, FloatScalars(), "own").forward(route)(self.forces(data))
-        )
+        """MuJoCo's v̇ by that of the scene."""
+        return self.rates(data, self.at(data).forward(route)(self.forces(data)))
+
+    def frames_apart(self, data: Any) -> float:
+        """The greatest difference of places and velocities of bodies, relative to the greatest."""
+        d, off, size = self.at(data), [0.0], [1.0]
+        for k in range(1, self.mj.nbody):
+            moving = np.zeros(6)
+            mujoco.mj_objectVelocity(self.mj, data, BODY, k, moving, 0)
+            turn, arm = data.xmat[k].reshape(3, 3), data.xipos[k] - data.xpos[k]
+            speed = moving[3:] + np.cross(moving[:3], arm)
+            expected = expected_frames(turn, data.xipos[k], speed, moving[:3])
+            for own, other in zip(frames(d, self.names.bodies[k]), expected, strict=True):
+                off.append(np.abs(own - other).max())
+                size.append(np.abs(other).max())
+        return max(off) / max(size)
 
     def activation_rates(self, data: Any) -> tuple[Array, Array]:
         """Rates of the scene's extra states, and MuJoCo's, in the same order."""
-        values, model = self.values(data), self.model
-        q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
-        given = Values(model.defaults, self.inputs(data.ctrl), q, v, self.activations(data.act))
-        dynamics = Dynamics(model, given, FloatScalars(), "own")
-        rates = [rate for effect in model.effects for rate in effect.rates(dynamics)]
+        dynamics = self.at(data)
+        rates = [rate for effect in self.model.effects for rate in effect.rates(dynamics)]
         return np.array(rates), np.array([*self.activations(data.act_dot).values()])
-
-    def expected(self, data: Any) -> Array:
-        """v̇ of MuJoCo, in the order of the scene's velocities."""
-        values = self.values(data, data.qacc)
-        return np.array([values[c.name] for c in self.model.velocities])
 
     def activations(self, act: Array) -> dict[str, float]:
         """The extra states of the scene, by MuJoCo's activations."""
@@ -208,35 +187,43 @@ class Comparison:
 
     def from_module(self, data: Any) -> Array:
         """v̇ of the generated module."""
-        values = self.values(data)
-        q, v = ([values[c.name] for c in part] for part in self._state)
-        x, u = [*self.activations(data.act).values()], self.inputs(data.ctrl)
-        more = {"x": x} if x else {}
-        return self.module.forward_dynamics(q, v, self.forces(data), 0.0, None, u, **more)
-
-    @property
-    def _state(self) -> tuple[Any, Any]:
-        return self.model.coordinates, self.model.velocities
+        x, u = self.activations(data.act), self.inputs(data.ctrl)
+        y = self.conversion.state(data.qpos, data.qvel)
+        q, v, _ = np.split(y, np.cumsum((len(self.model.coordinates), len(self.model.velocities))))
+        more = {"x": [*x.values()]} if x else {}
+        forces = self.forces(data)
+        vd = self.module.forward_dynamics(q, v, forces, 0.0, None, u, **more)
+        return self.rates(data, vd)
 
     def differences(self, count: int, *, module: bool = False) -> Array:
         """At random states, the greatest difference of accelerations relative to the greatest of
-        them, and the greatest of single components relative to each; (count, 2).
+        them, and the greatest of single components relative to each; the same of places and
+        velocities of bodies, and of MuJoCo's state there and back; (count, 4).
         """
-        rng, found = np.random.default_rng(0), list[tuple[float, float]]()
+        rng, found = np.random.default_rng(0), list[tuple[float, ...]]()
         for _ in range(count):
-            data = self.in_mujoco(rng)
-            expected = self.expected(data)
+            data, to = self.in_mujoco(rng), self.conversion
+            expected = data.qacc
             off = np.abs((self.from_module if module else self.accelerations)(data) - expected)
             size = np.abs(expected)
-            found.append((off.max() / size.max(), (off / size).max()))
+            y = to.state(data.qpos, data.qvel)
+            back = np.abs([*(to.position(y) - self.unit(data.qpos)), *(to.velocity(y) - data.qvel)])
+            apart = self.frames_apart(data)
+            found.append((off.max() / size.max(), (off / size).max(), apart, back.max()))
         return np.array(found)
+
+    def unit(self, qpos: Array) -> Array:
+        """MuJoCo's coordinates with quaternions of length 1."""
+        found = qpos.copy()
+        mujoco.mj_normalizeQuat(self.mj, found)
+        return found
 
     def constrained(self, route: str, rng: np.random.Generator) -> "Constrained":
         """Accelerations under equality constraints, where these are met at the start."""
         model, mj = assembled(self.model), self.mj
         mj.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
         data, whole = mujoco.MjData(mj), np.zeros((mj.nv, mj.nv))
-        data.qpos[:] = self._qpos(model)
+        data.qpos[:] = self.conversion.position(stand_in(model).initial_state())
         mujoco.mj_forward(mj, data)
         residual = np.abs(data.efc_pos).max()
         rows = np.zeros((data.nefc, mj.nv))
@@ -250,14 +237,7 @@ class Comparison:
         data.qvel[:] = free.T @ rng.normal(size=len(free))
         mujoco.mj_forward(mj, data)
         mujoco.mj_fullM(mj, data, whole)
-        values = self.values(data)
-        q, v = ([values[c.name] for c in part] for part in (model.coordinates, model.velocities))
-        given = Values(model.defaults, self.inputs(data.ctrl), q, v, self.activations(data.act))
-        dynamics = Dynamics(model, given, FloatScalars(), "own")
-        found = dict(
-            zip((c.name for c in model.velocities), dynamics.forward(route)(None), strict=True)
-        )
-        vd = self._rates(data, found)
+        vd = self.rates(data, self.at(data, model).forward(route)(None))
         left = whole @ vd - data.qfrc_smooth
         pushed = rows.T @ np.linalg.lstsq(rows.T, left, rcond=1e-9)[0]
         # Along a motion with this acceleration the rows stay met, but for the third power of time.
@@ -271,41 +251,6 @@ class Comparison:
             residual,
             np.abs(moved.efc_pos).max() / step**3,
         )
-
-    def _qpos(self, model: Model) -> Array:
-        """MuJoCo's coordinates at the start of a model."""
-        mj, names = self.mj, self.names
-        named = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))
-        named |= dict(model.locked)
-        qpos = mj.qpos0.copy()
-        for j in range(mj.njnt):
-            kind, at, name = mj.jnt_type[j], mj.jnt_qposadr[j], names.joints[j]
-            if kind == BALL:
-                qpos[at : at + 4] = [named[f"{name}_q{x}"] for x in "wxyz"]
-            elif kind == FREE:
-                body = mj.jnt_bodyid[j]
-                turn = [named[f"{names.bodies[body]}_q{x}"] for x in "wxyz"]
-                matrix = np.zeros(9)
-                mujoco.mju_quat2Mat(matrix, np.array(turn))
-                place = [named[f"{names.bodies[body]}_{x}"] for x in "xyz"]
-                qpos[at : at + 3] = place - matrix.reshape(3, 3) @ mj.body_ipos[body]
-                qpos[at + 3 : at + 7] = turn
-            else:
-                qpos[at] = named[name]
-        return qpos
-
-    def _rates(self, data: Any, found: dict[str, float]) -> Array:
-        """v̇ of MuJoCo by that of the scene, without free joints that are split."""
-        mj = self.mj
-        vd = np.array([found.get(name, 0.0) for name in self.velocity_names()])
-        for j in range(mj.njnt):
-            if mj.jnt_type[j] == FREE:
-                v, body = mj.jnt_dofadr[j], mj.jnt_bodyid[j]
-                turned = data.xmat[body].reshape(3, 3)
-                arm = turned @ mj.body_ipos[body]
-                w, turning = turned @ data.qvel[v + 3 : v + 6], turned @ vd[v + 3 : v + 6]
-                vd[v : v + 3] -= np.cross(turning, arm) + np.cross(w, np.cross(w, arm))
-        return vd
 
 
 @dataclass(frozen=True)

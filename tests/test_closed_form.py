@@ -276,7 +276,8 @@ def test_what_cannot_be_is_told() -> None:
     assert run.states == ("theta", "theta_dot")
     given = eomgen.simulate(text, state={"psi": run["psi"][0]}, t_end=0.01)
     assert abs(given["theta"][0] - 1.0) < 1e-9
-    psi = float(check(text).initial_q[1])
+    model = check(text)
+    (psi,) = (q for c, q in zip(model.coordinates, model.initial_q, strict=True) if c.name == "psi")
     turn = 2 * np.arctan2(-0.1 * np.sin(0.4), 0.6 - 0.1 * np.cos(0.4))  # across the diagonal
     with pytest.raises(SceneError, match="another branch of its loop, or in another turn"):
         eomgen.simulate(text, state={"theta": 0.4, "psi": turn - psi}, t_end=0.01)

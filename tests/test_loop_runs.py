@@ -188,7 +188,8 @@ def test_guess_chooses_the_branch(capsys: pytest.CaptureFixture[str], tmp_path: 
         said = capsys.readouterr().out
         assert "given: theta = 1 rad" in said and "1 degree of freedom" in said
         signs.append(said.partition("branch      ")[2][0])
-        psi = check(text).initial_q[1]
+        model = check(text)
+        psi = dict(zip((c.name for c in model.coordinates), model.initial_q, strict=True))["psi"]
         assert abs(psi - guess) < 0.5
     assert set(signs) == {"+", "-"}
     with pytest.raises(SceneError, match=r"initial\.guess\.theta: initial\.q gives it"):

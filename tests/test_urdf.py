@@ -11,7 +11,7 @@ from robot_files import GOOD_URDF
 
 import eomgen
 from eomgen.cli import main
-from eomgen.scene.importers.rotations import angles_of, rotation, to_axis
+from eomgen.scene.importers.rotations import angles_of, rotation, squared, to_axis
 
 LINK = """<link name="{name}"><inertial>
   <origin xyz="{com}" rpy="0.3 -0.2 0.5"/><mass value="1.5"/>
@@ -75,8 +75,9 @@ def rates(tables: Any, **state: float) -> dict[str, float]:
 
 @pytest.mark.parametrize("floating", [False, True])
 def test_accelerations_are_those_of_pinocchio(tmp_path: Path, floating: bool) -> None:
-    """A branched robot of all joints with one coordinate: rotated origins, full inertias, a tool
-    that is fixed, a gripper that mimics, damping and friction.
+    """Places, velocities and accelerations in its order and frames: a branched robot of all joints,
+    rotated origins, full inertias, a tool that is fixed, a gripper that mimics, a flag without mass
+    that is held, damping and friction.
     """
     from robot_peers import Robot
 
@@ -84,7 +85,7 @@ def test_accelerations_are_those_of_pinocchio(tmp_path: Path, floating: bool) ->
     path = written(
         tmp_path,
         *(link(name) for name in ("base", "arm", "hand", "finger", "thumb", "tool", "tail")),
-        '<link name="frame"/>',
+        *(link("puck"), link("bird"), '<link name="frame"/>', '<link name="flag"/>'),
         joint("shoulder", "revolute", "base", "arm", "0 1 0"),
         joint("wrist", "continuous", "arm", "hand", "0.6 0 -0.8", rubs),
         joint("grip", "prismatic", "hand", "finger", "1 0 0", rubs),
@@ -92,9 +93,36 @@ def test_accelerations_are_those_of_pinocchio(tmp_path: Path, floating: bool) ->
         joint("tooling", "fixed", "hand", "tool"),
         joint("tip", "fixed", "tool", "frame"),
         joint("wag", "revolute", "base", "tail", "1 2 3"),
+        joint("plane", "planar", "tail", "puck"),
+        joint("flight", "floating", "base", "bird"),
+        joint("banner", "continuous", "hand", "flag"),
     )
-    robot, rng = Robot(path, floating, "aba"), np.random.default_rng(1)
-    assert max(robot.difference(rng) for _ in range(5)) < 1e-12
+    robot, rng = Robot(path, floating, generate=floating), np.random.default_rng(1)
+    for _ in range(3):
+        apart = robot.difference(rng)
+        assert max(apart.accelerations, apart.frames, apart.states) < 1e-12, apart
+
+
+def test_states_are_in_the_order_of_the_file(tmp_path: Path) -> None:
+    """Joints depth first, those of one link as the file has them; bodies as a scene has them, but
+    each after its parent.
+    """
+    path = written(
+        tmp_path,
+        *(link(name) for name in ("toe", "base", "leg", "foot", "arm", "hand")),
+        joint("wrist", "revolute", "arm", "hand"),
+        joint("shoulder", "revolute", "base", "arm"),
+        joint("tip", "revolute", "foot", "toe"),
+        joint("hip", "revolute", "base", "leg"),
+        joint("ankle", "revolute", "leg", "foot"),
+    )
+    model = eomgen.check(path)
+    assert [c.name for c in model.coordinates] == ["shoulder", "wrist", "hip", "ankle", "tip"]
+    names = ("hand", "leg", "base", "arm", "toe", "foot")
+    tables = eomgen.import_robot(path).tables
+    named = {body["name"]: body for body in tables["bodies"]}
+    model = eomgen.check({**tables, "bodies": [named[name] for name in names]})
+    assert [body.name for body in model.bodies] == ["base", "arm", "hand", "leg", "foot", "toe"]
 
 
 @pytest.mark.parametrize("axis", ["0 0 1", "1 0 0", "1 -2 0.5"])
@@ -226,6 +254,22 @@ def test_masses_that_are_odd_keep_the_motion(tmp_path: Path) -> None:
     assert "of 'odd'" in said and "'ring'" in said and "held" in said and "'wave'" in said
 
 
+def test_an_inertia_that_cannot_move_is_left_out(tmp_path: Path) -> None:
+    """Of a link without mass that is fixed to the world; on a floating base it is refused."""
+    ring = '<inertial><mass value="0"/><inertia ixx="1" iyy="2" izz="3"/></inertial>'
+    joints = joint("turn", "continuous", "base", "arm"), joint("on", "fixed", "base", "plate")
+    found = []
+    for inertial in ("", ring):
+        links = (f'<link name="{name}">{inertial}</link>' for name in ("base", "plate"))
+        path = written(tmp_path, *links, link("arm"), *joints)
+        found.append(eomgen.import_robot(path))
+    plain, imported = found
+    assert imported.tables == plain.tables
+    assert "left out: inertias of links that cannot move: 'plate', 'base'" in imported.remarks
+    with pytest.raises(eomgen.SceneError, match="'base': has an inertia but no mass; give it"):
+        eomgen.import_robot(path, floating=True)
+
+
 def test_limits_are_stops_on_wish(tmp_path: Path) -> None:
     """A falling arm passes its limit, and is stopped there on wish. A joint that mimics another has
     no stop, and follows in a line of joints to the end.
@@ -325,7 +369,9 @@ def test_a_root_named_world_is_the_world(tmp_path: Path) -> None:
 
 
 def test_angles_of_a_rotation() -> None:
-    """Also where the angle about y is a right angle."""
+    """Also where the angle about y is a right angle. What is nearer than 1e-10 to one is one."""
+    assert (squared(1.57079632679), squared(-3.14159265359)) == (np.pi / 2, -np.pi)
+    assert squared(1.570796327) == 1.570796327
     for angles in ((0.1, -1.2, 2.5), (0.7, np.pi / 2, 0.0), (-3.0, -np.pi / 2, 1.0)):
         turned = rotation(angles)
         assert np.allclose(rotation(angles_of(turned)), turned, atol=1e-14)

@@ -20,12 +20,15 @@ def import_robot(
 
     path      the file
     floating  of a URDF, whether its root link moves freely; else it is fixed to the world
-    stops     of a URDF, whether the limits of joints are rigid stops without bounce; else a
-              coordinate beyond them is reported
+    stops     whether the limits of joints are rigid stops without bounce; else a coordinate beyond
+              them is reported
     allow     folders in which meshes and included files may lie, beside the file's own
 
     All functions that take a scene take `tables`, and the path of a robot file as well. `toml()`
-    of the result is the text of a scene's file. Raises `SceneError` for a file that is no robot.
+    of the result is the text of a scene's file. With the loaded module of an MJCF file,
+    `mujoco(module)` converts its states to `qpos` and `qvel` of MuJoCo and back; with that of a
+    URDF, `pinocchio(module)` to `q` and `v` of Pinocchio. Raises `SceneError` for a file that is no
+    robot.
     """
     wishes = Wishes(floating=floating, stops=stops, allowed=tuple(map(Path, allow)))
     return import_file(find_scene(str(path)), wishes)

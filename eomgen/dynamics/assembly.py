@@ -250,7 +250,8 @@ def _adds(matrix: Array, kept: Sequence[int], i: int) -> bool:
 
 def _pivots(matrix: Array, free: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
     """Rows and columns in the order of elimination. Of the entries that are not small, in columns
-    of `free` velocities if there are such, the one is taken whose row has the fewest others.
+    of `free` velocities if there are such, the one is taken whose row has the fewest others, and
+    of these the one whose column has.
     """
     work, found = matrix.copy(), list[tuple[int, int]]()
     rows, columns = list(range(len(matrix))), list(range(matrix.shape[1]))
@@ -261,8 +262,11 @@ def _pivots(matrix: Array, free: NDArray[np.bool_]) -> tuple[tuple[int, int], ..
             if entries.max() > LEAST_PIVOT * there.max():
                 break
         large = entries >= 0.1 * entries.max()
-        counts = (there > INDEPENDENT).sum(axis=1)
-        a, b = min(zip(*np.nonzero(large), strict=True), key=lambda at: (counts[at[0]], *at))
+        others, below = ((there > INDEPENDENT).sum(axis=axis) for axis in (1, 0))
+        a, b = min(
+            zip(*np.nonzero(large), strict=True),
+            key=lambda at: (others[at[0]], below[at[1]], *at),
+        )
         i, j = rows.pop(int(a)), columns.pop(int(b))
         found.append((i, j))
         for k in rows:

@@ -1,6 +1,6 @@
 """The kinematic tree: each body has one joint to its parent, and parents precede children."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from eomgen.errors import SceneError, check_known
@@ -28,7 +28,7 @@ class Link:
 
 
 def links_of(scene: Scene) -> tuple[Link, ...]:
-    """The links of a scene and its chains, sorted by depth in the tree and then as in the scene.
+    """The links of a scene and its chains, in the order of its bodies, but each after its parent.
 
     Raises `SceneError` for duplicate or unknown names, and unless the joints that close no loop
     form a tree whose root is the world.
@@ -38,12 +38,14 @@ def links_of(scene: Scene) -> tuple[Link, ...]:
     check_names([(joint.name, location) for joint, location in joints])
     locations = {body.name: location for body, location in bodies}
     parent_joint = _parent_joints(locations, [pair for pair in joints if not closes(pair[0])])
-    depth = _depths(parent_joint)
-    order = sorted(bodies, key=lambda body: depth[body[0].name])
-    index = {WORLD: -1, **{body.name: k for k, (body, _) in enumerate(order)}}
+    order = _parents_first(locations, parent_joint)
+    index = {name: k for k, name in enumerate(order, start=-1)}
+    tables = {body.name: body for body, _ in bodies}
     return tuple(
-        Link(body, location, *parent_joint[body.name], index[parent_joint[body.name][0].parent])
-        for body, location in order
+        Link(
+            tables[name], locations[name], *parent_joint[name], index[parent_joint[name][0].parent]
+        )
+        for name in order[1:]
     )
 
 
@@ -114,13 +116,17 @@ def _parent_joints(
     return parent_joint
 
 
-def _depths(parent_joint: Mapping[str, tuple[Joint, str]]) -> dict[str, int]:
-    """The number of joints between each body and the world. Raises `SceneError` for a cycle."""
-    depth: dict[str, int] = {WORLD: 0}
-    for start in parent_joint:
+def _parents_first(
+    bodies: Iterable[str], parent_joint: Mapping[str, tuple[Joint, str]]
+) -> list[str]:
+    """The world and all bodies in their order, but each after its parent.
+
+    Raises `SceneError` for a cycle.
+    """
+    found: dict[str, None] = {WORLD: None}
+    for name in bodies:
         path: dict[str, None] = {}
-        name = start
-        while name not in depth:
+        while name not in found:
             if name in path:
                 joint, location = parent_joint[name]
                 raise SceneError(
@@ -130,6 +136,5 @@ def _depths(parent_joint: Mapping[str, tuple[Joint, str]]) -> dict[str, int]:
                 )
             path[name] = None
             name = parent_joint[name][0].parent
-        for name in reversed(path):
-            depth[name] = depth[parent_joint[name][0].parent] + 1
-    return depth
+        found |= dict.fromkeys(reversed(path))
+    return list(found)

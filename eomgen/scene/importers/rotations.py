@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from eomgen.scene.importers.attributes import Vector
 
-NEAR = 1e-9
+NEAR = 1e-10
 """An angle this near to a right angle, rad, is a right angle that was printed with few digits."""
 SLIGHT = 1e-15
 """Lengths below this, m, are rounding errors of 0."""

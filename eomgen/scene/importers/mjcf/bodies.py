@@ -46,11 +46,9 @@ def is_split(model: Compiled, joint: int) -> bool:
 def add_bodies(model: Compiled, names: Names, made: Mechanism) -> None:
     """The bodies of a model, each with its joints."""
     for k in range(1, model["nbody"]):
-        made.bodies.append(_body(model, k, names, made))
         found = list(_joints(model, k, names, made))
-        # Massless bodies stand before the body that they carry.
-        for between in found[:-1]:
-            made.bodies.append(massless(between["child"]))
+        made.bodies += [massless(between["child"]) for between in found[:-1]]
+        made.bodies.append(_body(model, k, names, made))
         made.joints += found
 
 

@@ -1,9 +1,10 @@
 """An MJCF file as the tables of a scene."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from eomgen.errors import listed
+from eomgen.scene.importers.conventions import JointStates, convention, suffixed
 from eomgen.scene.importers.imported import Imported, Wishes
 from eomgen.scene.importers.mjcf.actuators import add_actuators
 from eomgen.scene.importers.mjcf.bodies import add_bodies, is_split, joints_of
@@ -15,7 +16,7 @@ from eomgen.scene.importers.mjcf.mechanism import BALL, FREE, Mechanism, Names
 from eomgen.scene.importers.mjcf.tendons import add_tendon
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
 from eomgen.scene.importers.parts import SLIDING_SPEED, SPEED
-from eomgen.scene.importers.stops import stops
+from eomgen.scene.importers.stops import add_stops
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
 
@@ -38,9 +39,11 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
         raise root.error("nothing can move: the file has no joints")
     names, changed = names_of(model)
     made = mechanism_of(model, names)
-    if wishes.stops:
-        following = {c["coordinate"] for c in made.constraints if "coordinate" in c}
-        made.effects += stops(made.joints, following | set(made.locked))
+    if wishes.stops and (moved := add_stops(made)):
+        made.remark(
+            f"the file's pose is beyond the limits of {listed(map(repr, moved))}, which start "
+            "between them"
+        )
     made.remarks |= dict.fromkeys(_remarks(model, made, wishes))
     if changed:
         made.remark(f"renamed: {listed(changed)}")
@@ -49,7 +52,24 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
     beside = ", ".join(f"{what} ({model[key]})" for key, what in COUNTED.items() if model[key])
     lost += [f"left out: {beside}"] if beside else []
     remarks = (*lost, *made.remarks, *model.warnings)
-    return Imported(made.tables(name, path.name), remarks)
+    states = convention("MuJoCo", list(_states(model, names)), made.locked)
+    return Imported(made.tables(name, path.name), remarks, states)
+
+
+def _states(model: Compiled, names: Names) -> Iterator[JointStates]:
+    """The numbers of each joint."""
+    for j, kind in enumerate(model["jnt_type"]):
+        name, k = names.joints[j], model["jnt_bodyid"][j]
+        if kind == BALL:
+            turns, spins = suffixed(name, "qw qx qy qz"), suffixed(name, "wx wy wz")
+            yield JointStates(turns, spins, "quaternion")
+        elif kind == FREE and j in names.split:
+            yield JointStates.free(names.between[k, j], name, "quaternion")
+        elif kind == FREE:
+            body, com = names.bodies[k], tuple(model["body_ipos"][k])
+            yield JointStates.free(body, body, "origin in the world", body, com)
+        else:
+            yield JointStates.single(name)
 
 
 def names_of(model: Compiled) -> tuple[Names, list[str]]:
@@ -128,5 +148,6 @@ def _remarks(model: Compiled, made: Mechanism, wishes: Wishes) -> Iterable[str]:
         yield f"friction of joints is smoothed within {SPEED:g} rad/s or m/s: {SLIDING_SPEED}"
     if FREE in model["jnt_type"]:
         yield (
-            "coordinates of a free body are those of its centre of mass, in MuJoCo of its origin"
+            "coordinates of a free body are those of its centre of mass, in MuJoCo of its origin; "
+            "import_robot(...).mujoco(module) converts them"
         )

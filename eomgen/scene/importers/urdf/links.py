@@ -11,6 +11,7 @@ from eomgen.scene.importers.attributes import ORIGIN, Vector, child, number, vec
 from eomgen.scene.importers.rotations import cleaned, is_slight, rotated_inertia, rotation
 from eomgen.scene.importers.urdf.tree import Tree
 from eomgen.scene.importers.xml_elements import Element
+from eomgen.scene.joints.base import WORLD
 from eomgen.text import brief
 
 Array = npt.NDArray[np.float64]
@@ -51,24 +52,34 @@ class Inertial:
 
 @dataclass
 class Changes:
-    """Links whose inertia was changed, or taken as it is though no body has it."""
+    """Links whose inertia was changed or left out, or taken as it is though no body has it."""
 
     rounded: list[str] = field(default_factory=list)
     lent: list[str] = field(default_factory=list)
+    still: list[str] = field(default_factory=list)
     strange: list[str] = field(default_factory=list)
 
 
-def read_inertials(tree: Tree) -> tuple[dict[str, Inertial], Changes]:
+def read_inertials(tree: Tree, *, floating: bool) -> tuple[dict[str, Inertial], Changes]:
     """The inertias of all links by name; none is negative together with what is fixed to it.
 
-    A link without mass may have an inertia if it is fixed to one with mass, which then has it: the
-    motion is the same. Raises `SceneError` for what is missing or negative.
+    A link without mass may have an inertia if it cannot move, where it is left out, as all of the
+    world is, or is fixed to one with mass, which then has it: the motion is the same. The root
+    moves if it is `floating`. Raises `SceneError` for what is missing or negative.
     """
     found, changes = dict[str, Inertial](), Changes()
+    still = set[str]() if floating else {tree.root}
     for name, element in tree.links.items():
+        joint = tree.carried.get(name)
+        if joint is not None and joint.kind == "fixed" and joint.parent in still:
+            still.add(name)
         found[name] = _read(element, name, changes)
     for name in reversed(list(tree.links)):
-        if found[name].mass == 0 and any(found[name].entries):
+        is_idle = found[name].mass == 0 and any(found[name].entries)
+        if name in still and (is_idle or (name == WORLD and found[name].mass)):
+            found[name] = Inertial(com=found[name].com)
+            changes.still.append(name)
+        elif is_idle:
             _lend(tree, name, found)
             changes.lent.append(name)
     changes.strange += [name for name, inertial in found.items() if inertial.is_strange]

@@ -10,7 +10,7 @@ from eomgen.scene.importers.meshes import ELSEWHERE
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
 from eomgen.scene.importers.parts import SLIDING_SPEED, SPEED
 from eomgen.scene.importers.rotations import is_slight
-from eomgen.scene.importers.stops import stops
+from eomgen.scene.importers.stops import add_stops
 from eomgen.scene.importers.urdf.joints import (
     Mechanism,
     Names,
@@ -20,6 +20,7 @@ from eomgen.scene.importers.urdf.joints import (
 )
 from eomgen.scene.importers.urdf.links import ENTRIES, Changes, Inertial, read_inertials
 from eomgen.scene.importers.urdf.shapes import Meshes, colours_of, shapes_of
+from eomgen.scene.importers.urdf.states import convention_of
 from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved, read_tree
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
@@ -42,13 +43,12 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     """The scene of a robot. Raises `SceneError`, one line with the line of the file."""
     if any("xacro" in element.namespace for element in robot.walk()):
         raise robot.error("has xacro macros; expand them first: xacro robot.xacro > robot.urdf")
-    tree = read_tree(robot)
-    if wishes.floating:
-        tree = _without_world(tree)
+    read = read_tree(robot)
+    tree = _without_world(read) if wishes.floating else read
     names = _names(tree)
     made, remarks = Mechanism(effects=[{"type": "gravity", "g": GRAVITY}]), list[str]()
     meshes = Meshes((path.parent, *wishes.allowed))
-    inertials, changes = read_inertials(tree)
+    inertials, changes = read_inertials(tree, floating=wishes.floating)
     _add_bodies(tree, inertials, names, made, meshes, colours_of(robot))
     if names.bodies[tree.root] != WORLD:
         base = floating_base if wishes.floating else fixed_base
@@ -59,12 +59,12 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
     if not (driven or loose or wishes.floating):
         raise robot.error("nothing can move; let the root move freely with --floating")
     if wishes.stops:
-        following = {constraint["coordinate"] for constraint in made.constraints}
-        made.effects += stops(made.joints, following | set(made.locked))
+        add_stops(made)  # all start between their limits
     remarks += _remarks(robot, tree, names, made)
     remarks += _remarks_on_bodies(tree, meshes, changes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
-    return Imported(made.tables(name, path.name), tuple(remarks))
+    states = convention_of(read, tree, names, made)
+    return Imported(made.tables(name, path.name), tuple(remarks), states)
 
 
 def _without_world(tree: Tree) -> Tree:
@@ -173,8 +173,8 @@ def _remarks_on_bodies(tree: Tree, meshes: Meshes, changes: Changes) -> Iterator
     if changes.lent:
         lent = _listed(changes.lent)
         yield f"inertias of links without mass count with what carries them: {lent}"
-    if tree.root == WORLD and tree.links[WORLD].first("inertial"):
-        yield f"left out: the inertia of the root link '{WORLD}', which cannot move"
+    if changes.still:
+        yield f"left out: inertias of links that cannot move: {_listed(changes.still)}"
     if any(link.first("collision") for link in tree.links.values()):
         yield "left out: collision geometry; contacts are effects that a scene adds"
     if meshes.drawn:

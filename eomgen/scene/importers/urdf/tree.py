@@ -50,8 +50,8 @@ class Joint:
 
 @dataclass(frozen=True)
 class Tree:
-    """The links by name, the root first and each after its parent; the joint that carries each;
-    and the joints by name.
+    """The links by name, depth first, with the joints of a link in the order of the file; and the
+    joint that carries each.
     """
 
     root: str
@@ -181,7 +181,10 @@ def _check_mimics(joints: Mapping[str, Joint]) -> None:
 
 
 def _ordered(robot: Element, links: Mapping[str, Element], carried: Mapping[str, Joint]) -> Tree:
-    """The tree with each link after its parent. Raises `SceneError` unless it has one root."""
+    """The tree with each link followed by all that it carries, in the order of the joints.
+
+    Raises `SceneError` unless it has one root.
+    """
     roots = [name for name in links if name not in carried]
     if not roots:
         raise robot.error("has no root: its joints form a circle; leave one link without a parent")
@@ -192,14 +195,15 @@ def _ordered(robot: Element, links: Mapping[str, Element], carried: Mapping[str,
             f"{' and more' * (len(roots) > 2)}; connect them by joints, a tree has one root"
         )
     children: dict[str, list[str]] = {}
-    for name in links:
-        if name in carried:
-            children.setdefault(carried[name].parent, []).append(name)
-    order = [roots[0]]
-    for name in order:
-        order += children.get(name, ())
+    for name, joint in carried.items():
+        children.setdefault(joint.parent, []).append(name)
+    order, pending = dict[str, None](), [roots[0]]
+    while pending:
+        name = pending.pop()
+        order[name] = None
+        pending += reversed(children.get(name, ()))
     if len(order) < len(links):
-        lost = next(name for name in links if name not in set(order))
+        lost = next(name for name in links if name not in order)
         raise links[lost].error(
             f"link '{brief(lost)}' is not connected to the root '{brief(roots[0])}': joints form a "
             "circle; a tree has none"
