@@ -232,14 +232,39 @@ def key_of(model: Model) -> str:
 
 
 @cache
+def package_digest() -> str:
+    """A digest of all that generates code or runs it: another program may compute other bits."""
+    others = [path for path in _files(PACKAGE, ".py") if _is_after(path)]
+    digest = hashlib.sha256(_generator_digest())
+    _add(digest, PACKAGE, others)
+    return digest.hexdigest()[:32]
+
+
+@cache
+def this_program() -> str:
+    """What distinguishes this program from others that may compute other numbers, in words: its
+    version, a digest of its files, and the versions of what it computes with.
+    """
+    libraries = " ".join(f"{name} {_version(name)}" for name in ("numpy", "scipy"))
+    python = f"Python {platform.python_version()}"
+    return f"eomgen {_version('eomgen')} ({package_digest()[:12]}; {python} {libraries})"
+
+
+@cache
 def _generator_digest() -> bytes:
     """A digest of all that generates code: Python, libraries, this program and its templates."""
     python = (platform.python_implementation(), platform.python_version(), platform.machine())
     digest = hashlib.sha256(repr((python, [_version(name) for name in LIBRARIES])).encode())
-    for root, files in ((PACKAGE, _sources()), (templates_folder(), _templates())):
-        for path in sorted(files, key=lambda path: path.as_posix()):
-            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    _add(digest, PACKAGE, _sources())
+    for name in ("c", "javascript", "python"):
+        _add(digest, templates_folder(), _files(templates_folder() / name, ".jinja"))
     return digest.digest()
+
+
+def _add(digest: "hashlib._Hash", root: Path, files: Sequence[Path]) -> None:
+    """Add names and contents of files."""
+    for path in files:
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
 
 
 def _version(library: str) -> str:
@@ -250,13 +275,16 @@ def _version(library: str) -> str:
 
 
 def _sources() -> list[Path]:
-    files = PACKAGE.rglob("*.py")
-    return [path for path in files if path.relative_to(PACKAGE).parts[0] not in AFTER]
+    return [path for path in _files(PACKAGE, ".py") if not _is_after(path)]
 
 
-def _templates() -> list[Path]:
-    return [
-        path
-        for name in ("python", "javascript", "c")
-        for path in (templates_folder() / name).rglob("*.jinja")
-    ]
+def _is_after(path: Path) -> bool:
+    return path.relative_to(PACKAGE).parts[0] in AFTER
+
+
+@cache
+def _files(root: Path, suffix: str) -> tuple[Path, ...]:
+    """The files in a folder and those in it, in an order that is the same on all systems."""
+    found = [Path(place) / name for place, _, names in os.walk(root) for name in names]
+    kept = [path for path in found if path.name.endswith(suffix)]
+    return tuple(sorted(kept, key=lambda path: path.as_posix()))
