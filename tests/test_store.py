@@ -22,6 +22,7 @@ from eomgen.cli import main
 from eomgen.entries import LARGEST, LONGEST_UNUSED, LONGEST_WRITING, Entries
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.native import library
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import BUILT_IN, parse_scene, read_scene
@@ -163,6 +164,31 @@ def test_a_folder_that_others_may_have_written_to_is_done_without(
     assert capsys.readouterr().err == f"eomgen: note: the store {folder} is not used: {words}\n"
     assert (tmp_path / "made" / "pendulum.py").read_bytes() == RIGHT
     assert (sorted(folder.iterdir()) if folder.is_dir() else []) == held
+
+
+@pytest.mark.parametrize("changed", [_writable, _link, None])
+def test_no_machine_code_comes_from_a_store_that_is_not_used(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, changed: Callable[[Path], None] | None
+) -> None:
+    """It lies in a folder of its own, which is as private as before when the store is not."""
+    loaded: list[bytes] = []
+    monkeypatch.setattr(library, "_key", lambda about: KEY)
+    monkeypatch.setattr(library, "_loaded", loaded.append)
+    folder.mkdir(mode=0o700)
+    Entries(folder / "native").put(KEY, b"code")
+    library.kept_library("")
+    assert loaded == [b"code"]
+    if changed is not None:
+        changed(folder)
+    else:
+        asked = Path.lstat
+
+        def lstat(path: Path) -> os.stat_result:
+            about = asked(path)
+            return os.stat_result((*about[:4], about.st_uid + (path == folder), *about[5:]))
+
+        monkeypatch.setattr(Path, "lstat", lstat)
+    assert library.kept_library("") is None and loaded == [b"code"]
 
 
 def test_what_belongs_to_another_user_is_not_used(
