@@ -138,7 +138,7 @@ def _whole_folder(path: Path, r: random.Random) -> None:
         lambda: path.parent.symlink_to("nowhere"),
         lambda: path.parent.write_bytes(NOTES),
         lambda: os.mkfifo(path.parent),
-        lambda: shutil.copytree(moved, path.parent / "inside"),
+        lambda: (path.parent / "inside").mkdir(parents=True),
     ]
     r.choice(kinds)()
 
