@@ -3,13 +3,12 @@
 import math
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from contextlib import closing, suppress
-from importlib import import_module
+from contextlib import closing
 from itertools import islice
-from typing import Any, Protocol
+from typing import Protocol
 
-from eomgen.errors import RunError
 from eomgen.run.progress import Progress
+from eomgen.sweep.cluster import by_dask
 from eomgen.sweep.counter import Counter
 from eomgen.sweep.design import Design
 from eomgen.sweep.members import Arrays, Task
@@ -88,7 +87,7 @@ def _results(
 ) -> Generator[tuple[int, Arrays], None, None]:
     """The chunks as they come."""
     if scheduler:
-        yield from _by_dask(task, jobs, scheduler)
+        yield from by_dask(task, jobs, scheduler)
     elif task.together:
         yield from _by_threads(task, jobs, max(1, min(workers, len(jobs))), running)
     elif workers > 1 and len(jobs) > 1:
@@ -135,27 +134,3 @@ def _by_threads(
             counter.stop()
             for future in futures:
                 future.cancel()
-
-
-def _by_dask(task: Task, jobs: Sequence[Job], scheduler: str) -> Iterator[tuple[int, Arrays]]:
-    """Chunks as tasks. Dask repeats those of a worker that is lost."""
-    try:
-        distributed: Any = import_module("dask.distributed")
-    except ImportError:
-        raise RunError("scheduler: needs Dask; run: pip install 'eomgen[dask]'") from None
-    try:
-        client = distributed.Client(scheduler, timeout=10)
-    except (OSError, ValueError) as error:
-        raise RunError(f"scheduler: {scheduler} cannot be reached: {error}") from None
-    with client:
-        shared = client.scatter(task, broadcast=True, hash=False)
-        futures = {
-            client.submit(run_chunk, shared, values, pure=False): number for number, values in jobs
-        }
-        try:
-            for future in distributed.as_completed(list(futures)):
-                yield futures[future], future.result()
-                future.release()
-        finally:
-            with suppress(Exception):
-                client.cancel(list(futures))
