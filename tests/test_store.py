@@ -534,6 +534,21 @@ def test_the_key_names_all_that_shapes_the_code(monkeypatch: pytest.MonkeyPatch)
     assert digest() != before
 
 
+def test_every_file_is_in_the_key_of_compiled_code() -> None:
+    """Whatever may be printed into it: no list of them by hand is whole for long."""
+    code = (
+        "from pathlib import Path; read, once = [], Path.read_bytes\n"
+        "Path.read_bytes = lambda path: (read.append(path), once(path))[1]\n"
+        "from eomgen.model.elaborate import elaborate; from eomgen.scene.reader import read_scene\n"
+        "from eomgen.native.accelerator import library_key\n"
+        "library_key(elaborate(read_scene('pendulum'))); print(*read, sep='\\n')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    templates = (store.templates_folder() / "c").rglob("*.jinja")
+    missed = {*store.PACKAGE.rglob("*.py"), *templates} - {*map(Path, done.stdout.splitlines())}
+    assert not missed
+
+
 def test_every_number_of_a_model_is_in_its_key() -> None:
     """Change any value of a scene by its last digit: the key is another."""
     text = (BUILT_IN / "spinning_top.toml").read_text("utf-8")
