@@ -1,6 +1,7 @@
 """Where the camera is: the view that a motion needs, or that its scene asks for."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -32,6 +33,10 @@ WIDEST = 4.0
 """Greatest width to height of what a camera shows."""
 MOST_POINTS = 2_000_000
 """About how many points of bodies are looked at."""
+MANY = 10_000
+"""Number of points of a body of which fewer are looked at."""
+AT_ONCE = 500_000
+"""About how many of these are in memory at once."""
 LEAST = 1e-6
 """Height of a view of nothing, m."""
 
@@ -95,16 +100,35 @@ def bounds_of(
     `rows` are the samples; by default up to `SOUNDINGS` of them, evenly spread.
     """
     dimensions = poses.ndim - 1
-    points_of = [extent_points(own, dimensions) for own in shapes]
+    points_of = [_outermost(extent_points(own, dimensions)) for own in shapes]
     if rows is None:
         most = MOST_POINTS // sum(map(len, points_of))
         count = min(len(poses), SOUNDINGS, max(most, FEWEST))
         rows = np.linspace(0, len(poses) - 1, count).round().astype(int).tolist()
     at = poses[list(rows)]
+    step = max(1, AT_ONCE // sum(map(len, points_of)))
+    parts = [_extents(points_of, at[k : k + step], eye) for k in range(0, len(at), step)]
+    low, high = (np.concatenate(part) for part in zip(*parts, strict=True))
+    centres = at[..., :2] if dimensions == 2 else (at[..., 3] @ eye.T)[..., :2]
+    return Bounds(low, high, centres)
+
+
+def _outermost(points: Array) -> Array:
+    """Points with the same bounds from all sides: of very many only the corners of their hull."""
+    if len(points) > MANY:
+        from scipy.spatial import ConvexHull, QhullError  # it takes long to load
+
+        with suppress(QhullError):  # they are in a plane
+            return np.asarray(points[ConvexHull(points).vertices])
+    return points
+
+
+def _extents(points_of: Sequence[Array], at: Array, eye: Array) -> tuple[Array, Array]:
+    """The least and the greatest position (n, 2) of all bodies' points at some poses."""
     places = []
     for body, points in enumerate(points_of):
         pose = at[:, body]
-        if poses.ndim == 3:
+        if at.ndim == 3:
             c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
             x, y = points.T
             turned = [np.outer(c, x) - np.outer(s, y), np.outer(s, x) + np.outer(c, y)]
@@ -113,8 +137,7 @@ def bounds_of(
             world = np.einsum("nij,kj->nki", pose[..., :3], points) + pose[:, np.newaxis, :, 3]
             places.append((world @ eye.T)[..., :2])
     every = np.concatenate(places, axis=1)
-    centres = at[..., :2] if poses.ndim == 3 else (at[..., 3] @ eye.T)[..., :2]
-    return Bounds(every.min(axis=1), every.max(axis=1), centres)
+    return every.min(axis=1), every.max(axis=1)
 
 
 def framed(
