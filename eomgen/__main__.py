@@ -3,6 +3,7 @@
 import gc
 import signal
 import sys
+import time
 from contextlib import suppress
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -14,7 +15,13 @@ STOPS = ("SIGINT", "SIGTERM", "SIGHUP")
 AGAIN = 0.02
 """Delay after which a lost interrupt is raised again, s."""
 
+TOGETHER = 0.5
+"""Time within which several stops are one, s: `timeout` sends one to the process and one to its
+group, and the second would break off what the first lets end.
+"""
+
 _stopped_by: list[int] = []
+_stopped_at: list[float] = []
 
 
 def main() -> int:
@@ -66,7 +73,11 @@ def _listen_no_more() -> None:
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
+    now = time.monotonic()
+    if _stopped_at and now - _stopped_at[-1] < TOGETHER:
+        return
     _stopped_by.append(number)
+    _stopped_at.append(now)
     raise KeyboardInterrupt
 
 

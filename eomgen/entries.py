@@ -1,7 +1,7 @@
 """A folder of entries under keys, which only this user can write.
 
 Entries are executed later, so one is read only if it is a regular file that this user owns and
-nobody else can write, of bounded size, in a folder with the same properties, and if its digest
+nobody else can write, of bounded size, in folders with the same properties, and if its digest
 matches key and content. The digest detects damage and entries under a wrong key. It is not a
 signature: whoever can write entries as this user could read the signing key, and could change this
 program too.
@@ -35,27 +35,19 @@ _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BI
 
 @dataclass(frozen=True)
 class Entries:
-    """The entries of a folder: bytes under keys of 32 hexadecimal digits."""
+    """The entries of a folder: bytes under keys of 32 hexadecimal digits.
+
+    within  a folder that holds this one, and must be the user's own as well: whoever can write to
+            it can put another one in the place of this
+    """
 
     folder: Path
+    within: Path | None = None
 
     def trouble(self) -> str:
         """Why the folder cannot be trusted, and what to do; "" if it can, or does not exist."""
-        try:
-            about = self.folder.lstat()
-        except FileNotFoundError:
-            return ""
-        except (OSError, ValueError) as error:
-            return f"it cannot be read: {_why(error)}"
-        if stat.S_ISLNK(about.st_mode):
-            return "it is a symbolic link; name the folder itself in EOMGEN_CACHE"
-        if not stat.S_ISDIR(about.st_mode):
-            return "it is not a folder; name one in EOMGEN_CACHE"
-        if not _is_own(about):
-            return "it belongs to another user; name a folder of your own in EOMGEN_CACHE"
-        if not _is_private(about):
-            return f"others can write to it; run: chmod go-w {self.folder}"
-        return ""
+        above = self.within is not None and _trouble(self.within)
+        return above or _trouble(self.folder)
 
     def get(self, key: str) -> bytes | None:
         """The content under a key; None if there is none, or none that `put` wrote."""
@@ -103,7 +95,9 @@ class Entries:
         """Create the folder if it does not exist. Returns `trouble` of it, since another process
         may have created it meanwhile.
         """
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for path in (self.within, self.folder):
+            if path is not None:
+                path.mkdir(mode=0o700, parents=True, exist_ok=True)
         return self.trouble()
 
     def _path(self, key: str) -> Path:
@@ -140,6 +134,25 @@ class Entries:
                     about = os.fstat(handle)
                     if _is_trusted(about) and file.read(len(_MARK)) == _MARK:
                         yield about, path
+
+
+def _trouble(folder: Path) -> str:
+    """Why a folder cannot be trusted, and what to do; "" if it can, or does not exist."""
+    try:
+        about = folder.lstat()
+    except FileNotFoundError:
+        return ""
+    except (OSError, ValueError) as error:
+        return f"it cannot be read: {_why(error)}"
+    if stat.S_ISLNK(about.st_mode):
+        return "it is a symbolic link; name the folder itself in EOMGEN_CACHE"
+    if not stat.S_ISDIR(about.st_mode):
+        return "it is not a folder; name one in EOMGEN_CACHE"
+    if not _is_own(about):
+        return "it belongs to another user; name a folder of your own in EOMGEN_CACHE"
+    if not _is_private(about):
+        return f"others can write to it; run: chmod go-w {folder}"
+    return ""
 
 
 def _head(key: str, content: bytes) -> bytes:

@@ -5,6 +5,7 @@ bounded size are read.
 """
 
 import os
+import re
 import secrets
 import stat
 from collections.abc import Iterable
@@ -40,6 +41,14 @@ SIGNED_AT_END = (b"eomgen film", SIGNATURES[0])
 SIGNED_WITHIN = 2048
 PIECE = 2**20
 """Bytes that are read in one call."""
+_KINDS = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFDIR: "a folder",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFLNK: "a symbolic link",
+}
+UNFINISHED = re.compile(r"\..{1,40}\.[0-9a-f]{12}")
+"""Names of files that `write_pieces` has begun."""
 
 
 def is_ours(head: bytes) -> bool:
@@ -88,11 +97,51 @@ def _check_plain(about: os.stat_result, shown: str, error: type[EomgenError]) ->
     kind = stat.S_IFMT(about.st_mode)
     if kind == stat.S_IFREG:
         return
-    kinds = {stat.S_IFIFO: "a pipe", stat.S_IFDIR: "a folder", stat.S_IFSOCK: "a socket"}
     raise error(
-        f"{shown}: is {kinds.get(kind, 'a device')}, not a plain file; "
+        f"{shown}: is {_KINDS.get(kind, 'a device')}, not a plain file; "
         "save its content to a file and name that file"
     )
+
+
+def is_kept(path: Path) -> bool:
+    """Whether a file is there, in a folder that is written to in place.
+
+    Raises `RunError` if it is anything but a plain file with no other name: a link leads to a file
+    elsewhere, which would change, and a pipe blocks.
+    """
+    try:
+        about = path.lstat()
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        raise RunError(f"{path}: cannot be read: {error.strerror}") from None
+    _check_kept(about, path)
+    return True
+
+
+def open_kept(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:
+    """Open a file in such a folder. `flags` are those of `os.open`.
+
+    Raises `RunError` as `is_kept` does, and `OSError` if the file cannot be opened.
+    """
+    is_kept(path)  # first, because opening a device may affect it, and not all systems have these:
+    more = ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")
+    handle = os.open(path, flags | sum(getattr(os, name, 0) for name in more), 0o666)
+    try:
+        _check_kept(os.fstat(handle), path)
+    except RunError:
+        os.close(handle)
+        raise
+    return os.fdopen(handle, "r+b" if flags & os.O_RDWR else "rb")
+
+
+def _check_kept(about: os.stat_result, path: Path) -> None:
+    if stat.S_ISREG(about.st_mode) and about.st_nlink < 2:
+        return
+    what = _KINDS.get(stat.S_IFMT(about.st_mode), "a device") + ", not a plain file"
+    if stat.S_ISREG(about.st_mode):
+        what = "a hard link: the file has another name, under which it would change too"
+    raise RunError(f"{path}: is {what}; remove it, or choose another folder")
 
 
 def check_writable(path: Path, *, force: bool = False) -> None:

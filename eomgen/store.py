@@ -60,16 +60,18 @@ LIBRARIES = (
 """Libraries that are loaded to generate code, except those for type annotations alone."""
 
 
-def folder(within: str = "") -> Path | None:
-    """The cache folder, or its subfolder `within`: in `EOMGEN_CACHE`, or the user's cache folder.
+def entries_of(part: str = "") -> Entries | None:
+    """The entries of the store, or of a part of it that has a folder of its own: in the folder
+    `EOMGEN_CACHE`, or in the user's cache folder.
 
     None if the user has no home folder.
     """
     chosen = os.environ.get("EOMGEN_CACHE") or platformdirs.user_cache_dir("eomgen")
     try:
-        return Path(chosen).expanduser() / within
+        folder = Path(chosen).expanduser()
     except RuntimeError:  # there is no home to expand ~ to
         return None
+    return Entries(folder / part, folder) if part else Entries(folder)
 
 
 @dataclass(frozen=True)
@@ -94,8 +96,8 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     A store that cannot be trusted, read or written is not used, and the result has a notice. A
     damaged entry is replaced.
     """
-    directory, key = folder(), key_of(model)
-    kept = _code(Entries(directory).get(key)) if directory else None
+    entries, key = entries_of(), key_of(model)
+    kept = _code(entries.get(key)) if entries else None
     if kept and not anew:
         return kept
     # Imported here because the modules that derive equations take long to load.
@@ -103,15 +105,14 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
 
     new = generate(model)
     code = Code(new.module, new.reports, new.explanation, new.notices, derived=True)
-    if directory is None:
+    if entries is None:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
-    entries = Entries(directory)
     trouble = entries.put(key, _content(code))
     trouble = trouble or _keep_program(entries, key, new.program, new.interface)
     if trouble:
-        return replace(code, notice=f"the store {directory} is not used: {trouble}")
+        return replace(code, notice=f"the store {entries.folder} is not used: {trouble}")
     if kept and kept.module != code.module:
-        notice = f"the store {directory} held other code for this scene, which was replaced"
+        notice = f"the store {entries.folder} held other code for this scene, which was replaced"
         return replace(code, notice=notice)
     return code
 
@@ -132,19 +133,19 @@ def live_code(model: Model, geometry: Sequence["Formula"] = ()) -> LiveCode:
 
     A store that cannot be used is no obstacle.
     """
-    directory = folder()
+    entries = entries_of()
     text = f"page of {key_of(model)} with {tuple(geometry)!r}"
     key = hashlib.sha256(text.encode()).hexdigest()[:32]
-    if directory and (kept := _live_code(Entries(directory).get(key))):
+    if entries and (kept := _live_code(entries.get(key))):
         return kept
     # Imported here because the modules that derive equations take long to load.
     from eomgen.pipeline import live
 
     new = live(model, geometry)
     code = LiveCode(new.source, new.loads, new.operations, new.saved)
-    if directory:
+    if entries:
         content = json.dumps([code.source, code.loads, code.operations, dict(code.saved)])
-        Entries(directory).put(key, content.encode())
+        entries.put(key, content.encode())
     return code
 
 
@@ -185,8 +186,8 @@ def program_of(model: Model) -> Program:
 
 def interfaced_program_of(model: Model) -> tuple[Program, "Interface"]:
     """The program of a model's code and its interface, which is all that a backend needs."""
-    directory, key = folder(), key_of(model)
-    if directory and (kept := _kept_program(Entries(directory), key)):
+    entries, key = entries_of(), key_of(model)
+    if entries and (kept := _kept_program(entries, key)):
         return kept
     # Imported here because the modules that derive equations take long to load.
     from eomgen.codegen.interface import interface_of
@@ -194,8 +195,8 @@ def interfaced_program_of(model: Model) -> tuple[Program, "Interface"]:
 
     system = compile_program(model).system
     program, interface = system.program, interface_of(system)
-    if directory:
-        _keep_program(Entries(directory), key, program, interface)
+    if entries:
+        _keep_program(entries, key, program, interface)
     return program, interface
 
 
@@ -252,14 +253,39 @@ def key_of(model: Model) -> str:
 
 
 @cache
+def package_digest() -> str:
+    """A digest of all that generates code or runs it: another program may compute other bits."""
+    others = [path for path in _files(PACKAGE, ".py") if _is_after(path)]
+    digest = hashlib.sha256(_generator_digest())
+    _add(digest, PACKAGE, others)
+    return digest.hexdigest()[:32]
+
+
+@cache
+def this_program() -> str:
+    """What distinguishes this program from others that may compute other numbers, in words: its
+    version, a digest of its files, and the versions of what it computes with.
+    """
+    libraries = " ".join(f"{name} {_version(name)}" for name in ("numpy", "scipy"))
+    python = f"Python {platform.python_version()}"
+    return f"eomgen {_version('eomgen')} ({package_digest()[:12]}; {python} {libraries})"
+
+
+@cache
 def _generator_digest() -> bytes:
     """A digest of all that generates code: Python, libraries, this program and its templates."""
     python = (platform.python_implementation(), platform.python_version(), platform.machine())
     digest = hashlib.sha256(repr((python, [_version(name) for name in LIBRARIES])).encode())
-    for root, files in ((PACKAGE, _sources()), (templates_folder(), _templates())):
-        for path in sorted(files, key=lambda path: path.as_posix()):
-            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    _add(digest, PACKAGE, _sources())
+    for name in ("c", "javascript", "python"):
+        _add(digest, templates_folder(), _files(templates_folder() / name, ".jinja"))
     return digest.digest()
+
+
+def _add(digest: "hashlib._Hash", root: Path, files: Sequence[Path]) -> None:
+    """Add names and contents of files."""
+    for path in files:
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
 
 
 def _version(library: str) -> str:
@@ -270,13 +296,16 @@ def _version(library: str) -> str:
 
 
 def _sources() -> list[Path]:
-    files = PACKAGE.rglob("*.py")
-    return [path for path in files if path.relative_to(PACKAGE).parts[0] not in AFTER]
+    return [path for path in _files(PACKAGE, ".py") if not _is_after(path)]
 
 
-def _templates() -> list[Path]:
-    return [
-        path
-        for name in ("python", "javascript", "c")
-        for path in (templates_folder() / name).rglob("*.jinja")
-    ]
+def _is_after(path: Path) -> bool:
+    return path.relative_to(PACKAGE).parts[0] in AFTER
+
+
+@cache
+def _files(root: Path, suffix: str) -> tuple[Path, ...]:
+    """The files in a folder and those in it, in an order that is the same on all systems."""
+    found = [Path(place) / name for place, _, names in os.walk(root) for name in names]
+    kept = [path for path in found if path.name.endswith(suffix)]
+    return tuple(sorted(kept, key=lambda path: path.as_posix()))

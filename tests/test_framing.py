@@ -1,5 +1,6 @@
 """The camera: the whole motion lies within the picture, or the camera follows what moves away."""
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -7,12 +8,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import eomgen
+from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate, expanded
 from eomgen.scene.appearance import Appearance, appearance_of
-from eomgen.scene.look import Camera
+from eomgen.scene.look import Camera, Sphere
 from eomgen.scene.reader import built_in_names
 from eomgen.show.framing import ASPECT, View, bounds_of, framed
 from eomgen.show.of_run import fixed_points, leading_bodies, spread
+from eomgen.show.outlines import extent_points
 from eomgen.show.picture import Picture, picture_of
 from eomgen.show.view import eye_axes
 
@@ -142,3 +145,28 @@ def test_what_never_was_finite_has_a_view() -> None:
     poses[7:] = np.nan
     assert scene.view(poses)[0].height < 2.0
     assert scene.view(poses * np.nan)[0] == View(height=View.height)
+
+
+def test_very_many_shapes() -> None:
+    """A body of 150 balls takes little memory, and its bounds are those of their
+    points; more than pictures draw are refused.
+    """
+    r, eye = np.random.default_rng(3), eye_axes(-60.0, 20.0)
+    at = r.normal(size=(150, 3))
+    balls = [Sphere(type="sphere", radius=0.1, center=tuple(place)) for place in at.tolist()]
+    turns, _ = np.linalg.qr(r.normal(size=(60, 3, 3)))
+    poses = np.concatenate([turns, r.normal(size=(60, 3, 1))], axis=2)[:, np.newaxis]
+    tracemalloc.start()
+    found = bounds_of([balls], poses, eye)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 60e6
+    k = 7
+    seen = (extent_points(balls, 3) @ turns[k].T + poses[k, 0, :, 3]) @ eye.T
+    assert np.allclose(found.low[k], seen.min(axis=0)[:2], rtol=0, atol=1e-12)
+    assert np.allclose(found.high[k], seen.max(axis=0)[:2], rtol=0, atol=1e-12)
+    scene = eomgen.read("tumbling_body")
+    nut = scene.bodies[0]
+    many = scene.replaced(bodies=(nut.replaced(shapes=tuple(balls) * 14),))
+    with pytest.raises(SceneError, match="shapes: the bodies have 2100 in all; pictures draw 2000"):
+        appearance_of(many)

@@ -26,6 +26,7 @@ from eomgen.cli import main
 from eomgen.entries import LARGEST, LONGEST_UNUSED, LONGEST_WRITING, Entries
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
+from eomgen.native import library
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import BUILT_IN, parse_scene, read_scene
@@ -167,6 +168,31 @@ def test_a_folder_that_others_may_have_written_to_is_done_without(
     assert capsys.readouterr().err == f"eomgen: note: the store {folder} is not used: {words}\n"
     assert (tmp_path / "made" / "pendulum.py").read_bytes() == RIGHT
     assert (sorted(folder.iterdir()) if folder.is_dir() else []) == held
+
+
+@pytest.mark.parametrize("changed", [_writable, _link, None])
+def test_no_machine_code_comes_from_a_store_that_is_not_used(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, changed: Callable[[Path], None] | None
+) -> None:
+    """It lies in a folder of its own, which is as private as before when the store is not."""
+    loaded: list[bytes] = []
+    monkeypatch.setattr(library, "_key", lambda about: KEY)
+    monkeypatch.setattr(library, "_loaded", loaded.append)
+    folder.mkdir(mode=0o700)
+    Entries(folder / "native").put(KEY, b"code")
+    library.kept_library("")
+    assert loaded == [b"code"]
+    if changed is not None:
+        changed(folder)
+    else:
+        asked = Path.lstat
+
+        def lstat(path: Path) -> os.stat_result:
+            about = asked(path)
+            return os.stat_result((*about[:4], about.st_uid + (path == folder), *about[5:]))
+
+        monkeypatch.setattr(Path, "lstat", lstat)
+    assert library.kept_library("") is None and loaded == [b"code"]
 
 
 def test_what_belongs_to_another_user_is_not_used(
@@ -511,6 +537,21 @@ def test_the_key_names_all_that_shapes_the_code(monkeypatch: pytest.MonkeyPatch)
             assert digest() != before, name
     monkeypatch.setattr(store.platform, "python_version", lambda: "3.99.0")
     assert digest() != before
+
+
+def test_every_file_is_in_the_key_of_compiled_code() -> None:
+    """Whatever may be printed into it: no list of them by hand is whole for long."""
+    code = (
+        "from pathlib import Path; read, once = [], Path.read_bytes\n"
+        "Path.read_bytes = lambda path: (read.append(path), once(path))[1]\n"
+        "from eomgen.model.elaborate import elaborate; from eomgen.scene.reader import read_scene\n"
+        "from eomgen.native.accelerator import library_key\n"
+        "library_key(elaborate(read_scene('pendulum'))); print(*read, sep='\\n')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    templates = (store.templates_folder() / "c").rglob("*.jinja")
+    missed = {*store.PACKAGE.rglob("*.py"), *templates} - {*map(Path, done.stdout.splitlines())}
+    assert not missed
 
 
 def test_every_number_of_a_model_is_in_its_key() -> None:

@@ -179,32 +179,48 @@ def test_a_full_disk_keeps_what_has_run(tmp_path: Path, monkeypatch: pytest.Monk
     assert storage.kept_members(tmp_path / "kept") == 6
 
 
-def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
-    """Killed with its workers at any time, it ends with the bytes of one that was not."""
+def started(out: Path, members: int, t_end: float, chunks: int) -> "subprocess.Popen[str]":
+    """A sweep in two processes that has finished so many chunks."""
     command = [sys.executable, "-m", "eomgen", "sweep", "pendulum", "--workers", "2"]
-    command += "--vary theta=0:1:60 --t-end 20 --backend numpy".split()
+    command += f"--vary theta=0:1:{members} --t-end {t_end} --backend numpy -o {out}".split()
     process = subprocess.Popen(
-        [*command, "-o", str(tmp_path / "one")], start_new_session=True, stdout=subprocess.DEVNULL
+        command, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    folder = tmp_path / "one" / "pendulum_sweep"
     due = time.monotonic() + 60
-    while len(list(folder.glob("chunk_*"))) < 5 and time.monotonic() < due:
+    while len(list(out.glob("*/chunk_*"))) < chunks and time.monotonic() < due:
         time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    kept = len(list(folder.glob("chunk_*")))
-    assert 5 <= kept < 60 and not (tmp_path / "one" / "pendulum_sweep.csv").exists()
-    for place in ("one", "two"):
-        assert main([*command[3:], "-o", str(tmp_path / place)]) == 0
-    files = [
-        sorted(p.relative_to(tmp_path / w) for p in (tmp_path / w).rglob("*.*") if p.name[0] != ".")
-        for w in ("one", "two")
-    ]
-    assert files[0] == files[1] and len(files[0]) == 66
+    return process
+
+
+def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
+    """Killed at any time, its workers end with it, also within a run; and it ends with the bytes of
+    one that was not.
+    """
+    one, two = tmp_path / "one", tmp_path / "two"
+    process = started(one, 30, 10, 5)
+    process.kill()
+    process.communicate(timeout=10)  # ends when nobody can write to its pipes any more
+    kept = len(list(one.glob("*/chunk_*")))
+    assert 5 <= kept < 30 and not (one / "pendulum_sweep.csv").exists()
+    for place in (one, two):
+        command = f"sweep pendulum --vary theta=0:1:30 --t-end 10 --backend numpy -o {place}"
+        assert main(command.split()) == 0
+    files = [sorted(path.relative_to(w) for path in w.rglob("*.*")) for w in (one, two)]
+    assert files[0] == files[1] and len(files[0]) == 36
     for name in files[0]:
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), (
-            name
-        )
+        assert (one / name).read_bytes() == (two / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_two_stops_at_once(number: signal.Signals, tmp_path: Path) -> None:
+    """To the process and to its group, as `timeout` sends them: one line, and no hang."""
+    for chunks in (1, 3):
+        process = started(tmp_path / str(chunks), 60, 20, chunks)
+        process.send_signal(number)
+        os.killpg(process.pid, number)
+        said = process.communicate(timeout=20)[1]
+        assert process.returncode == 128 + number and said.count("\n") == 1, said
+        assert said.startswith("eomgen: pendulum: interrupted; ")
 
 
 def test_a_member_that_fails_is_a_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,7 +24,6 @@ from eomgen.api.given import (
 )
 from eomgen.api.inputs import Inputs, in_formulas
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.entries import Entries
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
@@ -248,11 +247,12 @@ def _columns(
 
 
 def _reference_folder(reporter: Reporter) -> Path | None:
-    """The folder of stored references; notes why it cannot be used."""
-    folder = store.folder("references")
-    if folder and (trouble := Entries(folder).trouble()):
-        reporter.note(f"the store {folder} is not used: {trouble}")
-    return folder
+    """The folder of stored references, or None; notes why it cannot be used."""
+    entries = store.entries_of("references")
+    if entries and (trouble := entries.trouble()):
+        reporter.note(f"the store {entries.folder} is not used: {trouble}")
+        return None
+    return entries.folder if entries else None
 
 
 def _bench(

@@ -10,7 +10,7 @@ from pathlib import Path
 from eomgen.errors import EomgenError
 from eomgen.files import read_plain, write_whole
 from eomgen.run.progress import terminal_notice
-from eomgen.store import folder
+from eomgen.store import entries_of
 
 LARGEST, MOST = 2**20, 500
 """Largest size of the file, bytes, and greatest number of its entries."""
@@ -23,7 +23,8 @@ def timed_notice(label: str) -> Iterator[None]:
     """Show on a terminal what is done, for how long already, and about how long it will still take
     if it took long before. Remember how long it took.
     """
-    file = folder("durations.json")
+    entries = entries_of()
+    file = entries.folder / "durations.json" if entries and not entries.trouble() else None
     known = _read(file) if file else {}
     began = time.monotonic()
     with terminal_notice(label, known.get(label)):

@@ -7,7 +7,6 @@ about twice as long as with the better of the two from the start on.
 """
 
 import ctypes
-import hashlib
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +14,6 @@ from contextlib import suppress
 from copy import copy
 from dataclasses import replace
 from functools import cache, cached_property, partial
-from pathlib import Path
 from typing import Any
 
 from eomgen.codegen.backends import c
@@ -29,8 +27,7 @@ from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.run.works import Powers
-from eomgen.store import interfaced_program_of, key_of
-from eomgen.templating import templates_folder
+from eomgen.store import interfaced_program_of, key_of, package_digest
 
 STARTING, AN_OPERATION = 0.2, 0.25e-3
 """Time to compile, s: a part for all, and a part for each operation. Measured from 11 to 24,500
@@ -282,7 +279,7 @@ class Accelerator:
     def _methods(self) -> _Library:
         """The library of implicit methods, the same for all models."""
         price = STARTING + AN_OPERATION * implicit.OPERATIONS
-        about = f"implicit methods {_digest()}"
+        about = f"implicit methods {package_digest()}"
         return _Library(about, implicit.sources, implicit.MAIN, price, self._fail)
 
     def _library(self, name: str) -> _Library:
@@ -343,18 +340,4 @@ _BY_HEYOKA: dict[str, Callable[[int], Any]] = {}
 
 def library_key(model: Model, name: str = "derivative") -> str:
     """What determines these sources."""
-    return f"{name} {key_of(model)} {_digest()}"
-
-
-@cache
-def _digest() -> str:
-    """A digest of the files that, beside the model, determine the sources of a library."""
-    here = Path(__file__).resolve().parent
-    run = here.parent / "run"
-    found = hashlib.sha256()
-    checks = [run / f"{name}.py" for name in ("branches", "events", "roots")]
-    folders = (here, "*.py"), (run / "integrators", "*.py"), (templates_folder() / "c", "*.jinja")
-    listed = [path for folder, names in folders for path in sorted(folder.glob(names))]
-    for path in (*listed, *checks):
-        found.update(path.name.encode() + b"\0" + path.read_bytes())
-    return found.hexdigest()
+    return f"{name} {key_of(model)} {package_digest()}"

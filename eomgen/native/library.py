@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from eomgen.codegen.backends.c import MAIN
-from eomgen.entries import Entries
 from eomgen.errors import RunError
 from eomgen.native.compiler import FLAGS, find_compiler, suffix
-from eomgen.store import folder
+from eomgen.store import entries_of
 
 LEVELS = ("-O2", "-O1")
 """Optimisation level, and that for large sources."""
@@ -45,15 +44,15 @@ def compiled_library(
     level = LEVELS[sum(map(len, texts.values())) > LARGE]
     compiler = find_compiler()
     content = compiler.shared_library(texts, main, level, *(flags or compiler.tuning))
-    if place := folder("native"):
-        Entries(place).put(_key(about), content)
+    if entries := entries_of("native"):
+        entries.put(_key(about), content)
     return _loaded(content)
 
 
 def kept_library(about: str) -> ctypes.CDLL | None:
     """The same if it is in the store, or None. Raises `RunError` if there is no compiler."""
-    place = folder("native")
-    content = Entries(place).get(_key(about)) if place else None
+    entries = entries_of("native")
+    content = entries.get(_key(about)) if entries else None
     return None if content is None else _loaded(content)
 
 

@@ -3,10 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from eomgen.errors import check_known
+from eomgen.errors import SceneError, check_known
 from eomgen.scene.chains import written_out
 from eomgen.scene.look import Camera, Shape, check_look
 from eomgen.scene.schema import Scene
+
+MOST_SHAPES = 2000
+"""Greatest number of shapes, with which a picture takes half a GB."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,9 @@ def appearance_of(scene: Scene) -> Appearance:
     camera follows an unknown body.
     """
     bodies, _ = written_out(scene)
+    count = sum(len(body.shapes) for body, _ in bodies)
+    if count > MOST_SHAPES:
+        raise SceneError(f"shapes: the bodies have {count} in all; pictures draw {MOST_SHAPES}")
     known = {
         name: float(entry if isinstance(entry, float | int) else entry.value)
         for name, entry in scene.parameters.items()

@@ -1,6 +1,7 @@
 """Where the camera is: the view that a motion needs, or that its scene asks for."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -33,6 +34,8 @@ WIDEST = 4.0
 """Greatest width to height of what a camera shows."""
 MOST_POINTS = 2_000_000
 """About how many points of bodies are looked at."""
+MANY = 10_000
+"""Number of points of a body of which fewer are looked at."""
 LEAST = 1e-6
 """Height of a view of nothing, m."""
 
@@ -96,7 +99,7 @@ def bounds_of(
     `rows` are the samples; by default up to `SOUNDINGS` of them, evenly spread.
     """
     dimensions = poses.ndim - 1
-    points_of = [extent_points(own, dimensions) for own in shapes]
+    points_of = [_outermost(extent_points(own, dimensions)) for own in shapes]
     if rows is None:
         most = MOST_POINTS // sum(map(len, points_of))
         count = min(len(poses), SOUNDINGS, max(most, FEWEST))
@@ -116,6 +119,16 @@ def bounds_of(
         low[:, body] = centres[:, body] + turned.min(axis=2)
         high[:, body] = centres[:, body] + turned.max(axis=2)
     return Bounds(low.min(axis=1), high.max(axis=1), centres)
+
+
+def _outermost(points: Array) -> Array:
+    """Points with the same bounds from all sides: of very many only the corners of their hull."""
+    if len(points) > MANY:
+        from scipy.spatial import ConvexHull, QhullError  # it takes long to load
+
+        with suppress(QhullError):  # they are in a plane
+            return np.asarray(points[ConvexHull(points).vertices])
+    return points
 
 
 def framed(

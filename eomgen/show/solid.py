@@ -3,7 +3,7 @@
 All faces have four corners, counter-clockwise seen from outside; a triangle repeats one of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -112,15 +112,22 @@ def solids(shapes: Sequence[Sequence[Shape]], height: float, budget: int) -> Sol
         for shape in group:
             by_shape.setdefault(shape.replaced(color=None), []).append(shape)
     grain = height / FINEST
+    coarsest, least = _meshes(by_shape, np.inf)
     for _ in range(TRIES):
-        meshes = [mesh(group[0], grain) for group in by_shape.values()]
-        sizes = (len(m.faces) * len(g) for m, g in zip(meshes, by_shape.values(), strict=True))
-        if sum(sizes) <= budget:
+        meshes, faces = (coarsest, least) if least > budget else _meshes(by_shape, grain)
+        if faces <= max(budget, least):
             break
         grain *= COARSER
     index = {key: k for k, key in enumerate(by_shape)}
     of_bodies = (tuple((index[s.replaced(color=None)], s.color or BARE) for s in g) for g in shapes)
     return Solids(tuple(meshes) if by_shape else (), tuple(of_bodies))
+
+
+def _meshes(by_shape: Mapping[Shape, Sequence[Shape]], grain: float) -> tuple[list[Mesh], int]:
+    """A mesh for each shape, and the number of faces of all that are equal to these."""
+    meshes = [mesh(shape, grain) for shape in by_shape]
+    groups = zip(meshes, by_shape.values(), strict=True)
+    return meshes, sum(len(mesh.faces) * len(group) for mesh, group in groups)
 
 
 def rotation(turns_deg: Sequence[float]) -> Array:

@@ -1,31 +1,18 @@
 """The chunks of a sweep, run here, in processes of this machine, or by a Dask scheduler."""
 
 import math
-import multiprocessing
-import signal
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    Executor,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
-from importlib import import_module
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import closing
 from itertools import islice
-from multiprocessing.context import BaseContext
-from typing import Any, Protocol
+from typing import Protocol
 
-import numpy as np
-
-from eomgen.errors import RunError
 from eomgen.run.progress import Progress
-from eomgen.sweep.counter import SIZE, Counter, StoppedError
+from eomgen.sweep.cluster import by_dask
+from eomgen.sweep.counter import Counter
 from eomgen.sweep.design import Design
 from eomgen.sweep.members import Arrays, Task
+from eomgen.sweep.processes import PAUSE, Job, by_processes
 from eomgen.sweep.together import run_chunk
 
 LARGEST_CHUNK, TOGETHER, CHUNKS = 256, 4096, 64
@@ -36,11 +23,6 @@ FILLING = 32
 """Least number of members in a chunk that run together: fewer would not fill vector registers."""
 MOST_BYTES = 2**26
 """Greatest size of a chunk's results, if it has more than one member."""
-PAUSE = 0.2
-"""Time between two looks at how far the members are, s."""
-
-Job = tuple[int, np.ndarray]
-"""The number of a chunk, and the values of its members."""
 
 
 class Kept(Protocol):
@@ -89,10 +71,11 @@ def execute(
     def running(members: int) -> None:  # that have ended, in chunks that are not done
         progress(min(1.0, (ended + members) / total))
 
-    for number, arrays in _results(task, jobs, workers, scheduler, running):
-        kept.put(number, arrays)
-        ended += sizes[number]
-        running(0)
+    with closing(_results(task, jobs, workers, scheduler, running)) as results:
+        for number, arrays in results:
+            kept.put(number, arrays)
+            ended += sizes[number]
+            running(0)
 
 
 def _results(
@@ -101,12 +84,14 @@ def _results(
     workers: int,
     scheduler: str,
     running: Callable[[int], None],
-) -> Iterator[tuple[int, Arrays]]:
+) -> Generator[tuple[int, Arrays], None, None]:
     """The chunks as they come."""
     if scheduler:
-        yield from _by_dask(task, jobs, scheduler)
-    elif task.together or (workers > 1 and len(jobs) > 1):
-        yield from _by_workers(task, jobs, max(1, min(workers, len(jobs))), running)
+        yield from by_dask(task, jobs, scheduler)
+    elif task.together:
+        yield from _by_threads(task, jobs, max(1, min(workers, len(jobs))), running)
+    elif workers > 1 and len(jobs) > 1:
+        yield from by_processes(task, jobs, min(workers, len(jobs)), running)
     else:
         for number, values in jobs:
             yield number, run_chunk(task, values, _Shown(running))
@@ -124,14 +109,14 @@ class _Shown(Counter):
         self._show(self.ended)
 
 
-def _by_workers(
+def _by_threads(
     task: Task, jobs: Sequence[Job], workers: int, running: Callable[[int], None]
 ) -> Iterator[tuple[int, Arrays]]:
-    left, done = iter(jobs), 0
-    pool, counter, run = _pool(task, workers)
-    with pool:
+    """The chunks as they come; compiled code, which runs them, lets other threads go on."""
+    left, done, counter = iter(jobs), 0, Counter()
+    with ThreadPoolExecutor(workers) as pool:
         futures = {
-            pool.submit(run, task, values): (number, len(values))
+            pool.submit(run_chunk, task, values, counter): (number, len(values))
             for number, values in islice(left, 2 * workers)
         }
         try:
@@ -140,76 +125,12 @@ def _by_workers(
                 for future in ready:
                     number, members = futures.pop(future)
                     for following, values in islice(left, 1):
-                        futures[pool.submit(run, task, values)] = (following, len(values))
+                        added = pool.submit(run_chunk, task, values, counter)
+                        futures[added] = following, len(values)
                     done += members
                     yield number, future.result()
                 running(max(0, counter.ended - done))
-        except BrokenProcessPool:
-            raise RunError("a worker process ended unexpectedly, out of memory perhaps") from None
         finally:
             counter.stop()
             for future in futures:
                 future.cancel()
-
-
-Run = Callable[[Task, Any], Arrays]
-
-
-def _pool(task: Task, workers: int) -> tuple[Executor, Counter, Run]:
-    """Threads if compiled code makes the runs, which lets other threads go on; else processes."""
-    if task.together:
-        counter = Counter()
-        return ThreadPoolExecutor(workers), counter, lambda t, values: run_chunk(t, values, counter)
-    start = _start()
-    memory = start.Array("q", SIZE)
-    pool = ProcessPoolExecutor(workers, start, initializer=_begin_worker, initargs=(memory,))
-    return pool, Counter(memory.get_obj(), memory.get_lock()), _in_worker
-
-
-def _start() -> BaseContext:
-    """How processes are started: as is usual, but not as copies of one in which JAX runs, whose
-    threads would be missing there.
-    """
-    usual = multiprocessing.get_start_method()
-    return multiprocessing.get_context("spawn" if "jax" in sys.modules else usual)
-
-
-_of_worker = Counter()
-
-
-def _begin_worker(memory: Any) -> None:
-    """Ctrl-C is heard by the main process; a worker would print a traceback."""
-    global _of_worker
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _of_worker = Counter(memory.get_obj(), memory.get_lock())
-
-
-def _in_worker(task: Task, values: Any) -> Arrays:
-    try:
-        return run_chunk(task, values, _of_worker)
-    except StoppedError:
-        return {}
-
-
-def _by_dask(task: Task, jobs: Sequence[Job], scheduler: str) -> Iterator[tuple[int, Arrays]]:
-    """Chunks as tasks. Dask repeats those of a worker that is lost."""
-    try:
-        distributed: Any = import_module("dask.distributed")
-    except ImportError:
-        raise RunError("scheduler: needs Dask; run: pip install 'eomgen[dask]'") from None
-    try:
-        client = distributed.Client(scheduler, timeout=10)
-    except (OSError, ValueError) as error:
-        raise RunError(f"scheduler: {scheduler} cannot be reached: {error}") from None
-    with client:
-        shared = client.scatter(task, broadcast=True, hash=False)
-        futures = {
-            client.submit(run_chunk, shared, values, pure=False): number for number, values in jobs
-        }
-        try:
-            for future in distributed.as_completed(list(futures)):
-                yield futures[future], future.result()
-                future.release()
-        finally:
-            with suppress(Exception):
-                client.cancel(list(futures))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.sweep.members import Arrays, Task, module_of, output_shape
+from eomgen.text import one_line
 
 
 class Column(NamedTuple):
@@ -40,9 +41,9 @@ def bytes_each(layout: Layout) -> int:
 
 
 def said(arrays: Arrays) -> dict[int, str]:
-    """The messages of a chunk by number of the member in it, without empty ones."""
+    """The messages of a chunk by number of the member in it, each one line; without empty ones."""
     messages = arrays["message"]
-    return {int(i): str(messages[i]) for i in np.flatnonzero(messages != "")}
+    return {int(i): one_line(str(messages[i])) for i in np.flatnonzero(messages != "")}
 
 
 @dataclass

@@ -20,7 +20,7 @@ from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, given_values, load_module
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Trajectory
-from eomgen.store import key_of
+from eomgen.store import key_of, this_program
 from eomgen.study.closing import closed
 from eomgen.study.diagnosis import explained
 from eomgen.study.whole import initial_of, names_of, on_branch
@@ -53,6 +53,7 @@ class Task:
     settings    further arguments of `run.integrate.integrate`
     dt, every   of equal steps that members make together: the step, s, and that each `every`-th is
                 kept
+    by          the version of this program that made the task, see `store.this_program`
     """
 
     model: Model
@@ -71,6 +72,7 @@ class Task:
     dt: float = 0.0
     every: int = 1
     varying: InputsOfTime | None = None
+    by: str = field(default_factory=this_program)
 
     @cached_property
     def digest(self) -> str:
@@ -78,7 +80,7 @@ class Task:
         parts: tuple[object, ...] = (
             *(key_of(self.model), self.source, self.names, self.kinds, self.outputs, self.t_end),
             *(sorted(self.parameters.items()), sorted(self.inputs.items())),
-            *(self.times, sorted(self.settings.items()), self.together),
+            *(self.times, sorted(self.settings.items()), self.together, self.by),
         )
         if self.varying is not None:
             parts = (*parts, self.varying.plain)
