@@ -127,8 +127,13 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         if not possible:
             return _missed(search, best, judged, target, why)
         plan = min(possible, key=lambda plan: plan.work)
-        bounded = plan is not aside and (aside or len(possible) > 1)
-        search.make(plan, OVERRUN * plan.cost if bounded else math.inf)
+        stiff = [] if asked or set(names) & set(STIFF) else _stiff(search.case)
+        bounded = plan is not aside and (aside or len(possible) > 1 or stiff)
+        if not search.make(plan, OVERRUN * plan.cost if bounded else math.inf):
+            # Rounding errors of a fast mode shorten explicit steps without end.
+            names += stiff
+            for name in stiff:
+                _first(search, method_of(name))
     return search.nothing()
 
 

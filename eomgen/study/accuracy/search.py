@@ -124,8 +124,8 @@ class Search:
 
     @property
     def tightest_run(self) -> Tried | None:
-        """The run with the tightest tolerance so far; None if there is none."""
-        known = self.runs or [run for run in self.pilots if run.trajectory.finished]
+        """The run with the tightest tolerance so far, of pilots the latest; None if there is none."""
+        known = self.runs or [run for run in self.pilots[::-1] if run.trajectory.finished]
         return min(known, key=lambda run: (run.setting.dt is not None, run.tolerance), default=None)
 
     @property
@@ -196,7 +196,8 @@ class Search:
 
     def misfits(self, method: Method) -> bool:
         """Whether the absolute tolerance of the last run, by this method, was too loose, because
-        the scale of the motion was not known before. Then the run becomes a pilot.
+        the scale of the motion was not known before. Then the run becomes a pilot. A tolerance that
+        stays the same is not: the next run would be the same.
         """
         run = self.runs[-1]
         if run.setting.atol is None:
