@@ -133,15 +133,21 @@ class BranchMonitor:
         self.switched = float(memory["turned"])
         self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["checked"]]
 
-    def watched(self, t: float, length: float, most: int) -> Watched | None:
+    def known(self, t: float, end: float) -> tuple[float, float] | None:
+        """The first time from t on, but before `end`, at which the derivative changes its branch
+        whatever the state is: the last double on this side and the first on the other, s.
+        """
+        return self._schedule.first(t, math.nextafter(end, t)) if self._schedule else None
+
+    def watched(self, t: float, length: float, most: int, until: float) -> Watched | None:
         """What compiled steps from t on are checked with; None if the next step must be checked
-        here. Up to `most` steps of about this length, s, are to be made.
+        here. Up to `most` steps of about this length, s, are to be made, none beyond `until`.
         """
         functions = self.switching
         if functions.of_state and (len(self._ends) < 2 or self._ends[-1][0] != t):
             return None
         clear = self._schedule.clear(t, length, most) if self._schedule else math.inf
-        if not t + length <= clear:
+        if not min(t + length, until) <= clear:
             return None
         return Watched(self._ends, self.switched, clear, functions.timed, functions.angles)
 

@@ -109,6 +109,8 @@ def advances(
             here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
             if stepper.ended:
                 return
+            if stride.ended:
+                stepper.prepare_next(float(stride.ends[-1]), stride.states[-1])
             continue
         here += 1
         step = stepper.step()
@@ -139,7 +141,7 @@ def advances(
         sampled, cut, factored = passed, 0, stepper.factorisations
         if stepper.ended:
             return
-        stepper.prepare_next(step)
+        stepper.prepare_next(step.end, step.last)
     raise StepFailure(f"{bounds.most} steps did not suffice", method.remedy)
 
 
@@ -174,11 +176,20 @@ class _Stepper:
         """Begin at time t with the problem's initial state; `resume` is from `continuation`."""
         until = self.t_end
         if resume and self.branches:
-            until = min(float(resume["until"]), until)
+            cut = float(resume["until"])
+            until = min(cut, until) if cut > t else until
             self.branches.restore(resume)
         self._start(t, self._problem.initial, until, resume or {})
 
     def _start(self, t: float, y: FloatArray, until: float, memory: Mapping[str, Any]) -> None:
+        """Start the solver at time t, for steps up to `until` and to the first time at which the
+        derivative is known to change its branch. If that is now, start on its other side.
+        """
+        known = self.branches and self.branches.known(t, self.t_end)
+        if known and known[0] <= t:
+            t, memory = known[1], {name: x for name, x in memory.items() if name == "lost"}
+            known = self.branches and self.branches.known(t, self.t_end)
+        until = min(until, known[0]) if known else until
         options: dict[str, Any] = {"rtol": self._bounds.rtol, "atol": self._bounds.atol}
         if self.method.uses_jacobian:
             options["jac"] = self._problem.jacobian
@@ -198,7 +209,9 @@ class _Stepper:
         self.solver.t_bound = until
         self.until = until
         for name in self.method.memory if memory else ():
-            setattr(self.solver, name, _restored(memory[name], type(getattr(self.solver, name))))
+            if name in memory:
+                kind = type(getattr(self.solver, name))
+                setattr(self.solver, name, _restored(memory[name], kind))
 
     def step(self) -> Step:
         """Make a step. Raises `StepFailure` if the method fails."""
@@ -236,15 +249,16 @@ class _Stepper:
             self._start(t, y, retry.until, memory)
         return retry
 
-    def prepare_next(self, step: Step) -> None:
-        """Prepare the solver for the step after this one."""
-        if self.solver.status == "finished":  # at the end of a step that was cut
-            self._start(step.end, step.last, self.t_end, self._memory())
+    def prepare_next(self, t: float, y: FloatArray) -> None:
+        """Prepare the solver for the step after one that ended at t in the state y."""
+        self._unseen = self._unseen and self.solver.status != "finished"
+        if self.solver.status == "finished":  # where a step had to end
+            self._start(t, y, self.t_end, self._memory())
         elif self.method.one_step:
             # The slope saved for the next step is not evaluated again at the normalised state: its
             # error is of the size of this step's error, and the next step multiplies it by its
             # length. Measured: evaluating it again changes no error and costs a derivative.
-            self.solver.y = step.last.copy()
+            self.solver.y = y.copy()
 
     @property
     def is_whole(self) -> bool:

@@ -80,14 +80,15 @@ class Strides:
             self._unusual = False
             return None
         solver, branches, most = stepper.solver, stepper.branches, min(most, self._most)
-        watched = branches.watched(solver.t, solver.h_abs, most) if branches else None
+        until = stepper.until
+        watched = branches.watched(solver.t, solver.h_abs, most, until) if branches else None
         if branches and not watched:
             return None
         stride = steps(
             solver.t,
             solver.y,
             _Memory(solver, self._method.memory),
-            t_end=stepper.until,
+            t_end=until,
             rtol=self._bounds.rtol,
             atol=self._atol,
             longest=stepper.longest,
@@ -107,7 +108,7 @@ class Strides:
         stride = kept
         self._unusual = not stride.usual
         self._start, self._longest, self._watched = solver.t, stepper.longest, watched
-        self._until = stepper.until if stepper.until < stepper.t_end else np.inf
+        self._until = until if until < stepper.t_end else np.inf
         solver.t_old = float(stride.ends[-2]) if count > 1 else solver.t
         solver.t, solver.y = float(stride.ends[-1]), stride.states[-1].copy()
         for name, values in stride.memory.items():
