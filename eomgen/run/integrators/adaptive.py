@@ -26,7 +26,7 @@ from eomgen.run.integrators.interface import (
 )
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.integrators.strides import Strides, continuation
-from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.problem import FloatArray, Problem, Switching
 
 _STALLED = 100
 """A run stops after this many steps in a row that do not advance the time."""
@@ -164,11 +164,13 @@ class _Stepper:
         self.method, self.t_end, self._problem, self._bounds = method, t_end, problem, bounds
         self._remark = remark
         self.longest, self.branches = bounds.longest, None
-        if problem.switching:
+        scrutiny = problem.scrutiny
+        if problem.switching or (scrutiny and scrutiny.localised):
+            switching = problem.switching or Switching()
             self.branches = BranchMonitor(
-                problem, problem.switching, bounds.allowed, bounds.unseen, method.sees_end
+                problem, switching, bounds.allowed, bounds.unseen, method.sees_end
             )
-        elif problem.corners:
+        if problem.corners and not problem.switching:
             self.longest = min(bounds.longest, bounds.unseen)
         self._whole, self._unseen, self.factorisations = True, False, 0
 
@@ -186,9 +188,9 @@ class _Stepper:
         derivative is known to change its branch. If that is now, start on its other side.
         """
         known = self.branches and self.branches.known(t, self.t_end)
-        if known and known[0] <= t:
+        while self.branches and known and known[0] <= t:
             t, memory = known[1], {name: x for name, x in memory.items() if name == "lost"}
-            known = self.branches and self.branches.known(t, self.t_end)
+            known = self.branches.known(t, self.t_end)
         until = min(until, known[0]) if known else until
         options: dict[str, Any] = {"rtol": self._bounds.rtol, "atol": self._bounds.atol}
         if self.method.uses_jacobian:
@@ -230,9 +232,10 @@ class _Stepper:
         if not self.method.sees_end and solver.status == "finished" and not self.ended:
             solver.turn()
         dense = cache(solver.dense_output)
-        t, y, _ = self._before
+        t, y, memory = self._before
         end = self._problem.projected(float(solver.t), solver.y.copy())
-        return Step(t, float(solver.t), y, end, lambda times: dense()(times).T)
+        slopes = np.array([memory["f"], solver.f]) if "f" in memory else None
+        return Step(t, float(solver.t), y, end, lambda times: dense()(times).T, slopes)
 
     def retry(self, step: Step) -> Retry | None:
         """Check a step for branches. If it must be repeated, restart the solver for that and say

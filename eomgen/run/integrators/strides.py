@@ -9,7 +9,7 @@ import numpy as np
 
 from eomgen.run.branches import BranchMonitor
 from eomgen.run.compiled import Margins, Steps, Stride, Watched
-from eomgen.run.integrators.closed_strides import MOST, kept_closed
+from eomgen.run.integrators.closed_strides import FEWER, MORE, MOST, kept_closed
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import PROJECTS, constrained_by
@@ -76,6 +76,8 @@ class Strides:
         steps = self._steps(self._method.compiled, self._needed)
         if steps is None:
             return None
+        if stepper.branches and stepper.branches.features and not hasattr(stepper.solver, "f"):
+            return None
         if self._unusual:  # the last stride ended before a step that Python must make
             self._unusual = False
             return None
@@ -102,6 +104,8 @@ class Strides:
         count = len(stride.ends)
         if not count:
             return None
+        if branches and branches.features and not self._passes_nothing(branches, solver, stride):
+            return None
         kept, self._most = kept_closed(self._problem, solver.t, solver.y, stride, self._most)
         if kept is None:
             return None
@@ -119,6 +123,16 @@ class Strides:
         if stride.ended:
             solver.status = "finished"
         return stride
+
+    def _passes_nothing(self, branches: BranchMonitor, solver: Any, stride: Stride) -> bool:
+        """Whether steps pass over nothing; else Python makes the next one, and then fewer are made
+        at once."""
+        t = np.concatenate(([solver.t], stride.ends))
+        y = np.concatenate((solver.y[None], stride.states))
+        slopes = np.concatenate((solver.f[None], stride.memory["f"]))
+        passes = branches.tame(t, y, slopes)
+        self._most = min(MOST, MORE * self._most) if passes else max(1, self._most // FEWER)
+        return passes
 
     def advances(
         self, stride: Stride, sampled: int, resumes: bool, each: bool
