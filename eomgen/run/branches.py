@@ -48,7 +48,7 @@ TOGETHER = 1e-9
 """Fraction of a step within which switches count as one."""
 LOCATED = 1e-12
 """Fraction of a step to which a switch is located."""
-MOST_RETURNS = 100
+MOST_RETURNS = 50
 """A run under scrutiny ends when a function has gone back to 0 so often after crossing it."""
 SLIDES = "forces switch back and forth"
 """How the reason begins why a run ended in a sliding mode."""

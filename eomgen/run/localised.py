@@ -85,10 +85,12 @@ class Scrutiny:
     """What is checked in a run whose error is estimated, beside what is checked in all runs.
 
     localised  the localising functions of its derivative; None if it has none
+    shorter    whether that is not known, so that only a run with shorter steps can tell
     seed       given to round each step at random, from this seed
     """
 
     localised: Localised | None = None
+    shorter: bool = False
     seed: int | None = None
 
 

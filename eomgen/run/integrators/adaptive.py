@@ -27,6 +27,7 @@ from eomgen.run.integrators.interface import (
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.integrators.strides import Strides, continuation
 from eomgen.run.problem import FloatArray, Problem, Switching
+from eomgen.run.shaking import EVERY, Shaken
 
 _STALLED = 100
 """A run stops after this many steps in a row that do not advance the time."""
@@ -103,7 +104,8 @@ def advances(
         until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
         # A step that was cut is repeated in Python, which counts that.
         use = compiled if compiled and not cut and compiles() else None
-        stride = use.made(stepper, sampled, until - here) if use else None
+        most = min(until - here, EVERY) if stepper.shaken else until - here
+        stride = use.made(stepper, sampled, most) if use else None
         if use and stride:
             yield from use.advances(stride, sampled, stepper.is_whole, each)
             here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
@@ -111,6 +113,7 @@ def advances(
                 return
             if stride.ended:
                 stepper.prepare_next(float(stride.ends[-1]), stride.states[-1])
+            stepper.shake(len(stride.ends))
             continue
         here += 1
         step = stepper.step()
@@ -142,6 +145,7 @@ def advances(
         if stepper.ended:
             return
         stepper.prepare_next(step.end, step.last)
+        stepper.shake(1)
     raise StepFailure(f"{bounds.most} steps did not suffice", method.remedy)
 
 
@@ -173,6 +177,9 @@ class _Stepper:
         if problem.corners and not problem.switching:
             self.longest = min(bounds.longest, bounds.unseen)
         self._whole, self._unseen, self.factorisations = True, False, 0
+        self.shaken = None
+        if scrutiny and scrutiny.seed is not None and "lost" in method.memory:
+            self.shaken = Shaken(problem.derivative, scrutiny.seed)
 
     def begin(self, t: float, resume: Resume | None) -> None:
         """Begin at time t with the problem's initial state; `resume` is from `continuation`."""
@@ -262,6 +269,13 @@ class _Stepper:
             # error is of the size of this step's error, and the next step multiplies it by its
             # length. Measured: evaluating it again changes no error and costs a derivative.
             self.solver.y = y.copy()
+
+    def shake(self, steps: int) -> None:
+        """Add random rounding errors after some steps, if the run is to have them."""
+        if self.shaken:
+            solver = self.solver
+            length = float(solver.t - solver.t_old)
+            solver.lost = solver.lost + self.shaken.error(solver.t, solver.y, length, steps)
 
     @property
     def is_whole(self) -> bool:

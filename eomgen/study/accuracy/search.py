@@ -3,10 +3,11 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from eomgen.run.branches import SLIDES
 from eomgen.run.noise import Fast, fast
 from eomgen.run.problem import FloatArray
 from eomgen.study.accuracy.estimate import (
@@ -27,6 +28,9 @@ FITS = 0.2
 """A run is made again if its absolute tolerance should have been below this part of what it was."""
 SAMPLES = 2
 """Number of further runs that show the effect of rounding, where it matters."""
+SHORTER, SHIFT = 16, 0.93
+"""How many times shorter steps are in a run that looks between those of another, and a factor that
+is no simple fraction, so that they end elsewhere."""
 UNIT = 1e-6
 """Time that a unit of work is assumed to take before the first run, s."""
 
@@ -88,6 +92,7 @@ class Search:
     pilots    finished runs that only helped to set up others
     second    runs that estimate another's error, by the `id` of that run
     samples   by the same key, runs with other perturbations of the constants
+    shorter   by the same key, runs with shorter steps
     left_out  methods that are not continued for now
     """
 
@@ -100,6 +105,7 @@ class Search:
     pilots: list[Tried] = field(default_factory=list)
     second: dict[int, Tried] = field(default_factory=dict)
     samples: dict[int, list[Tried]] = field(default_factory=dict)
+    shorter: dict[int, Tried] = field(default_factory=dict)
     left_out: set[str] = field(default_factory=set)
     started: float = field(default_factory=_now)
     _fast: dict[int, Fast] = field(default_factory=dict)
@@ -114,7 +120,13 @@ class Search:
     def made(self) -> list[Tried]:
         """All runs made so far."""
         samples = [run for runs in self.samples.values() for run in runs]
-        return [*self.runs, *self.broken, *self.pilots, *self.second.values(), *samples]
+        more = (*self.second.values(), *self.shorter.values())
+        return [*self.runs, *self.broken, *self.pilots, *more, *samples]
+
+    @property
+    def slides(self) -> bool:
+        """Whether a run ended in a sliding mode: then all do, and tighter ones take longer."""
+        return any(run.trajectory.outcome.reason.startswith(SLIDES) for run in self.broken)
 
     @property
     def unit(self) -> float:
@@ -207,6 +219,9 @@ class Search:
         if again.atol > FITS * run.setting.atol:
             return False
         self.pilots.append(self.runs.pop())
+        if self.setting(method, run.tolerance) == run.setting:
+            self.runs.append(self.pilots.pop())
+            return False
         return True
 
     def make(self, plan: Plan, most: float = math.inf) -> bool:
@@ -226,6 +241,28 @@ class Search:
         """Make further runs that show the effect of rounding on a run."""
         seeds = range(1, 1 + SAMPLES) if self.case.moved is not None else ()
         self.samples[id(run)] = [self._moved(self.case, run.setting, seed) for seed in seeds]
+
+    def may_miss(self, run: Tried) -> bool:
+        """Whether a run may have passed over something between its steps, as all runs may that were
+        made so far: what it depends on is not known, or its method cannot repeat a step.
+        """
+        problem = self.case.problem
+        if problem.scrutiny is None or id(run) in self.shorter:
+            return False
+        narrow = problem.corners or problem.scrutiny.localised
+        return problem.scrutiny.shorter or bool(run.setting.dt and narrow)
+
+    def shorten(self, run: Tried) -> None:
+        """Make a run with `SHORTER` times shorter steps that end elsewhere."""
+        setting, case = run.setting, self.case
+        if setting.dt is not None:
+            setting = replace(setting, dt=setting.dt / SHORTER)
+        else:
+            longest = SHIFT * case.t_end / run.trajectory.counts["steps"] / SHORTER
+            longest = min(longest, case.kept.get("max_step") or math.inf)
+            case = replace(case, kept={**case.kept, "max_step": longest})
+        self.say(f"{setting.options}, with shorter steps, for what may lie between these")
+        self.shorter[id(run)] = self._moved(case, setting, 0)
 
     @property
     def disturbed(self) -> float:
@@ -260,6 +297,8 @@ class Search:
         own = self.of(run.setting.integrator)
         others = [other for other in own if other.tolerance > run.tolerance]
         samples = self.samples.get(id(run), [])
+        if id(run) in self.shorter:
+            samples = [*samples, self.shorter[id(run)]]
         return by_looser_run(self.case, run, self.second[id(run)], others, samples, self.scale)
 
     def rounded(self, run: Tried) -> float:
