@@ -28,7 +28,6 @@ from eomgen.study.whole import whole_of
 if TYPE_CHECKING:
     from eomgen.native.accelerator import Accelerator
     from eomgen.run.guard import Guard
-    from eomgen.run.localised import Scrutiny
     from eomgen.run.resume import Start
     from eomgen.run.tally import Follow
     from eomgen.run.works import Powers
@@ -161,7 +160,9 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
         moved = moved_problem(functions, model, *values, start=began, compiled=made)
     if plan.setting is None:
-        problem = replace(problem, scrutiny=_scrutiny(plan, model, functions, values))
+        from eomgen.study.accuracy.localised import under_scrutiny
+
+        problem = under_scrutiny(problem, model, functions, *values)
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     if powers and accelerator:
@@ -248,22 +249,6 @@ def _problem(
         problem = with_corners(problem, module, values[0], plan.varying)
         problem = replace(problem, origin=None)  # a file does not hold functions
     return problem, model
-
-
-def _scrutiny(
-    plan: Plan,
-    model: Model,
-    module: GeneratedModule,
-    values: tuple[Mapping[str, float] | None, ...],
-) -> "Scrutiny":
-    """What is checked in runs whose error is estimated."""
-    from eomgen.run.localised import Scrutiny
-    from eomgen.store import program_of
-    from eomgen.study.accuracy.localised import localised
-
-    if plan.varying and plan.varying.corners is None:
-        return Scrutiny(shorter=True)  # nothing is known of functions of the user
-    return Scrutiny(localised(model, program_of(plan.model), module, *values))
 
 
 def _accelerator(

@@ -207,7 +207,7 @@ class BranchMonitor:
             if step.length > self.unseen * (1 + TOGETHER):
                 return Retry(step.start + self.unseen, seen=False), ()
             return None, ()
-        cut = (step.start == self._cut_at, step.end == self._cut_at)
+        cut = (step.start == self._cut_at, step.end == self._cut_at and self.sees_end)
         for at, size in features.places(parts, cut):
             t = step.start + at * step.length
             if step.start < t < step.end and self._jumps(smooth, at, size):

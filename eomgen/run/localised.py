@@ -31,6 +31,9 @@ NO_ROOT = 1e-24
 absolutely those below the square of `NO_ROOT`."""
 RATIO = 64.0
 """Roots, logarithms and quotients are tame if arguments have no greater ratio than this."""
+PEAK = 0.1
+"""A function whose flank ends where a step was cut is looked at again if it has a value this part of
+its range beyond those at both ends of the flank."""
 FREE = 10.0
 """A defect matters if its effect is more than this many times the error allowed in a step."""
 DEGREE = 8
@@ -85,12 +88,10 @@ class Scrutiny:
     """What is checked in a run whose error is estimated, beside what is checked in all runs.
 
     localised  the localising functions of its derivative; None if it has none
-    shorter    whether that is not known, so that only a run with shorter steps can tell
     seed       given to round each step at random, from this seed
     """
 
     localised: Localised | None = None
-    shorter: bool = False
     seed: int | None = None
 
 
@@ -201,16 +202,15 @@ class Features:
         for i, kind in enumerate(self.localised.kinds):
             for run in _narrow(parts, i) if kind in VALUES else ():
                 a, b = run[0].a, run[-1].b
-                if (a == 0 and cut[0]) or (b == 1 and cut[1]):
-                    continue
+                seen = (a == 0 and cut[0]) or (b == 1 and cut[1])
                 at = np.concatenate([part.a + (part.b - part.a) * AT for part in run])
                 values = VALUES[kind](np.concatenate([part.arguments[:, i] for part in run]))
                 ends = sorted((values[0], values[-1]))
                 beyond = np.fmax(values - ends[1], ends[0] - values)
                 k, reach = int(np.argmax(beyond)), float(np.ptp(values))
-                if beyond[k] > 1e-6 * reach:
+                if beyond[k] > (PEAK if seen else 0) * reach:
                     found.append((float(at[k]), b - a))
-                elif reach > 0:
+                elif reach > 0 and not seen:
                     k = int(np.argmin(np.abs(values - (ends[0] + ends[1]) / 2)))
                     turns.append((float(at[k]), b - a))
         turns.sort()

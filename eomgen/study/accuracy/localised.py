@@ -1,7 +1,7 @@
 """The localising functions of a model's derivative: see `run.localised`."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,24 @@ from eomgen.program.localising import OF_STATE, OF_TIME, with_local_arguments
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
 from eomgen.run.intervals import BY_INTERVALS, Interval
-from eomgen.run.localised import Localised
+from eomgen.run.localised import Localised, Scrutiny
 from eomgen.run.module import GeneratedModule, given_values
-from eomgen.run.problem import FloatArray
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.scalars.floats import BY_NUMPY, FloatScalars
+from eomgen.store import program_of
+
+
+def under_scrutiny(
+    problem: Problem,
+    model: Model,
+    module: GeneratedModule,
+    parameters: Any = None,
+    inputs: Any = None,
+) -> Problem:
+    """A model's problem whose runs are checked for what may lie between their steps, and for
+    sliding modes."""
+    found = localised(model, program_of(model), module, parameters, inputs)
+    return replace(problem, scrutiny=Scrutiny(found))
 
 
 def localised(
@@ -26,8 +40,8 @@ def localised(
     parameters: Any = None,
     inputs: Any = None,
 ) -> Localised | None:
-    """The localising functions of a program's derivative at given parameters and inputs; None if
-    it has none. `module` was generated from it; its inputs may change with time.
+    """The localising functions of a program's derivative at given parameters and constant inputs;
+    None if it has none. `module` was generated from it.
     """
     found = with_local_arguments(program, module.STATES, divides_by_motion(model))
     if not (found.of_state or found.of_time):
@@ -41,14 +55,8 @@ def localised(
         if kinds
     ]
     known = [one.known_values(values, FloatScalars()) for one in kernels]
-    of_time = getattr(module, "inputs_of_time", None)
-    names = list(module.INPUTS)
-
-    def inputs_at(t: Any) -> Mapping[str, Any]:
-        return fixed if of_time is None else dict(zip(names, of_time(t), strict=True))
-
     def arguments(t: FloatArray, y: FloatArray) -> FloatArray:
-        at = {**inputs_at(t), TIME: t, **dict(zip(module.STATES, y.T, strict=True))}
+        at = {**fixed, TIME: t, **dict(zip(module.STATES, y.T, strict=True))}
         with np.errstate(all="ignore"):
             rows = [
                 row
@@ -60,8 +68,7 @@ def localised(
     def over(t: Interval) -> Sequence[Interval]:
         if not found.of_time:
             return ()
-        at = fixed if of_time is None else dict(zip(names, of_time.over(t), strict=True))
-        return _moving(kernels[-1], known[-1], {**at, TIME: t}, BY_INTERVALS)
+        return _moving(kernels[-1], known[-1], {**fixed, TIME: t}, BY_INTERVALS)
 
     kinds = (*found.of_state, *found.of_time)
     return Localised(kinds, arguments, len(found.of_time), over)

@@ -28,9 +28,8 @@ FITS = 0.2
 """A run is made again if its absolute tolerance should have been below this part of what it was."""
 SAMPLES = 2
 """Number of further runs that show the effect of rounding, where it matters."""
-SHORTER, SHIFT = 16, 0.93
-"""How many times shorter steps are in a run that looks between those of another, and a factor that
-is no simple fraction, so that they end elsewhere."""
+SHORTER = 16
+"""How many times shorter steps are in a run that looks between those of another."""
 UNIT = 1e-6
 """Time that a unit of work is assumed to take before the first run, s."""
 
@@ -243,26 +242,20 @@ class Search:
         self.samples[id(run)] = [self._moved(self.case, run.setting, seed) for seed in seeds]
 
     def may_miss(self, run: Tried) -> bool:
-        """Whether a run may have passed over something between its steps, as all runs may that were
-        made so far: what it depends on is not known, or its method cannot repeat a step.
+        """Whether a run may have passed over something between its steps, which its method cannot
+        repeat.
         """
         problem = self.case.problem
-        if problem.scrutiny is None or id(run) in self.shorter:
+        if run.setting.dt is None or problem.scrutiny is None or id(run) in self.shorter:
             return False
-        narrow = problem.corners or problem.scrutiny.localised
-        return problem.scrutiny.shorter or bool(run.setting.dt and narrow)
+        return problem.corners or problem.scrutiny.localised is not None
 
     def shorten(self, run: Tried) -> None:
-        """Make a run with `SHORTER` times shorter steps that end elsewhere."""
-        setting, case = run.setting, self.case
-        if setting.dt is not None:
-            setting = replace(setting, dt=setting.dt / SHORTER)
-        else:
-            longest = SHIFT * case.t_end / run.trajectory.counts["steps"] / SHORTER
-            longest = min(longest, case.kept.get("max_step") or math.inf)
-            case = replace(case, kept={**case.kept, "max_step": longest})
-        self.say(f"{setting.options}, with shorter steps, for what may lie between these")
-        self.shorter[id(run)] = self._moved(case, setting, 0)
+        """Make a run with `SHORTER` times shorter steps."""
+        assert run.setting.dt is not None
+        setting = replace(run.setting, dt=run.setting.dt / SHORTER)
+        self.say(f"{setting.options}, for what may lie between longer steps")
+        self.shorter[id(run)] = self._moved(self.case, setting, 0)
 
     @property
     def disturbed(self) -> float:
