@@ -59,4 +59,3 @@ def with_local_arguments(program: Program, states: Collection[str], divisors: bo
 def _is_local(step: Step, divisors: bool) -> bool:
     known = LOCALISING + (("div",) if divisors else ())
     return step.operation in known and step.stage > Stage.PARAMETERS
-

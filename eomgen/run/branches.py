@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 from eomgen.run.compiled import Watched
 from eomgen.run.enclosing import FACTORS, INNER, LAST
-from eomgen.run.failure import StepFailure
 from eomgen.run.localised import FREE, Features, Smooth, slope
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.roots import root
 from eomgen.run.schedule import Schedule
+from eomgen.run.sliding import Returns
 
 MOST_EVALUATIONS = 200
 """Most evaluations of the switching functions in a step. A step that needs more is limited to the
@@ -48,10 +48,6 @@ TOGETHER = 1e-9
 """Fraction of a step within which switches count as one."""
 LOCATED = 1e-12
 """Fraction of a step to which a switch is located."""
-MOST_RETURNS = 50
-"""A run under scrutiny ends when a function has gone back to 0 so often after crossing it."""
-SLIDES = "forces switch back and forth"
-"""How the reason begins why a run ended in a sliding mode."""
 INSIDE = 1 / 8
 """A step that ends at least this fraction of the time between two switches after the first one has
 evaluated the branch between them."""
@@ -120,7 +116,7 @@ class BranchMonitor:
     def __post_init__(self) -> None:
         of_time, scrutiny = self.switching.of_time, self.problem.scrutiny
         self._schedule = Schedule(of_time) if of_time else None
-        self._returns = Returns() if scrutiny else None
+        self._returns = Returns(self.unseen) if scrutiny else None
         if scrutiny and scrutiny.localised:
             self.features = Features(scrutiny.localised)
 
@@ -182,8 +178,20 @@ class BranchMonitor:
         if search:
             self._ends = [search.start, search.end]
             if self._returns:
-                self._returns.take(step.end, search.start[1], search.end[1], bool(times))
+                self._returns.take(search.start, search.end, bool(times))
         return None
+
+    def passed(self, ends: FloatArray, values: FloatArray, switched: FloatArray) -> None:
+        """Take compiled steps, by their ends (m,), the functions there (m, ns), and the times of
+        the last switch (m,), s.
+
+        Raises `StepFailure` for a sliding mode.
+        """
+        if self._returns and self._ends:
+            before = self._ends[-1]
+            for t, g, last in zip(ends.tolist(), values, switched.tolist(), strict=True):
+                self._returns.take(before, (t, g), last > before[0])
+                before = t, g
 
     def tame(self, t: FloatArray, y: FloatArray, slopes: FloatArray) -> bool:
         """Whether compiled steps that end at times t (m + 1,) after the first, in states y, with
@@ -191,9 +199,7 @@ class BranchMonitor:
         """
         return self.features is None or self.features.tame_between(t, y, slopes)
 
-    def _passed_over(
-        self, features: Features, step: Step
-    ) -> tuple[Retry | None, Sequence[float]]:
+    def _passed_over(self, features: Features, step: Step) -> tuple[Retry | None, Sequence[float]]:
         """How a step that has passed over a localised function must be repeated, or None, and the
         fractions of it between which such functions are tame; none if they are in all of it.
         """
@@ -286,40 +292,6 @@ class BranchMonitor:
             return True
         missed = np.abs(slopes[1] - (slopes[0] + slopes[2]) / 2) * length
         return not bool((missed <= self.allowed(states[1])).all())
-
-
-@dataclass
-class Returns:
-    """Watches for a sliding mode: forces on either side of a switch drive the motion back to it,
-    and steps become shorter without end.
-
-    count    (ns,), how often in succession each function went back to 0 after it had crossed it
-    since    when that began, s
-    """
-
-    count: FloatArray = field(default_factory=lambda: np.zeros(0))
-    since: float = 0.0
-    _crossed: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    def take(self, end: float, first: FloatArray, last: FloatArray, switched: bool) -> None:
-        """Take a step from the functions at its ends, and whether it has switched.
-
-        Raises `StepFailure` after `MOST_RETURNS` returns.
-        """
-        if len(self.count) != len(first):
-            self.count, self._crossed = np.zeros(len(first)), np.zeros(len(first), dtype=bool)
-        back = (last - first) * first < 0
-        self.count = np.where(self._crossed, np.where(back, self.count + 1, 0), self.count)
-        near = np.minimum(np.abs(first), np.abs(last)) <= np.abs(last - first)
-        self._crossed = (first * last < 0) | (near & switched)
-        if not (self.count > 0).any():
-            self.since = end
-        if (self.count >= MOST_RETURNS).any():
-            raise StepFailure(
-                f"{SLIDES} {MOST_RETURNS} times within {end - self.since:.2g} s, each driving the "
-                "motion back (a sliding mode)",
-                "make the switch gradual: tanh(s/width) in place of a jump of s",
-            )
 
 
 def _is_seen(before: float, between: float, after: float) -> bool:

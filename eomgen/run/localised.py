@@ -11,6 +11,7 @@ and there the derivative is compared with that of the step's own interpolant.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +33,8 @@ absolutely those below the square of `NO_ROOT`."""
 RATIO = 64.0
 """Roots, logarithms and quotients are tame if arguments have no greater ratio than this."""
 PEAK = 0.1
-"""A function whose flank ends where a step was cut is looked at again if it has a value this part of
-its range beyond those at both ends of the flank."""
+"""A function whose flank ends where a step was cut is looked at again if it goes beyond its values
+at both ends of the flank by this part of its range."""
 FREE = 10.0
 """A defect matters if its effect is more than this many times the error allowed in a step."""
 DEGREE = 8
@@ -59,7 +60,7 @@ TAME: dict[str, Callable[[FloatArray, FloatArray], Flags]] = {
     "sin": lambda low, high: high - low <= 2,
     "cos": lambda low, high: high - low <= 2,
 }
-"""Whether the polynomials of a method follow a function while its argument is between two bounds."""
+"""Whether polynomials follow a function while its argument is between two bounds."""
 VALUES: dict[str, Callable[[FloatArray], FloatArray]] = {
     **{name: getattr(np, name) for name in ("exp", "tanh", "log", "sqrt")},
     "atan": np.arctan,
@@ -107,7 +108,8 @@ class Smooth:
 @dataclass(frozen=True)
 class Part:
     """A part of a step: start and end as fractions, arguments (5, n), and the functions (n,) that
-    were not tame on twice its length."""
+    were not tame on twice its length.
+    """
 
     a: float
     b: float
@@ -134,17 +136,18 @@ class Features:
 
     def tame(self, values: FloatArray, times: Sequence[tuple[float, float]]) -> Flags:
         """Which functions are tame in parts of a run (m, n), from their arguments (5, m, n) at the
-        Chebyshev points of each, and the bounds of each, s."""
+        Chebyshev points of each, and the bounds of each, s.
+        """
         sums = np.tensordot(FACTORS, values, 1)
         inner, ends = sums[:-2], np.abs(sums[-2:])
         rest = 2 * (ends[0] + ends[1])
         low, high = inner.min(axis=0) - rest, inner.max(axis=0) + rest
         for k, (start, end) in enumerate(times):
             for i, bound in enumerate(self.localised.over(Interval(start, end))):
-                at = i - self.localised.timed
-                low[k, at], high[k, at] = bound.low, bound.high
+                last = i - self.localised.timed
+                low[k, last], high[k, last] = bound.low, bound.high
         self.greatest = np.fmax(self.greatest, np.abs(values).max(axis=(0, 1)))
-        found = np.isnan(low) | np.isnan(high)
+        found: Flags = np.isnan(low) | np.isnan(high)
         for kind, at in self._columns.items():
             found[:, at] |= TAME[kind](low[:, at], high[:, at])
             if kind in ("sqrt", "div"):
@@ -152,25 +155,27 @@ class Features:
                 found[:, at] |= size <= NO_ROOT * np.fmax(self.greatest[at], NO_ROOT)
         return found
 
-    def tame_between(
-        self, t: FloatArray, y: FloatArray, slopes: FloatArray
-    ) -> bool:
+    def tame_between(self, t: FloatArray, y: FloatArray, slopes: FloatArray) -> bool:
         """Whether all functions are tame in all steps that end at the times t (m + 1,) after the
-        first, from the states and their derivatives (m + 1, ny) there."""
+        first, from the states and their derivatives (m + 1, ny) there.
+        """
         length = np.diff(t)[:, None]
-        changes = [h * f for h, f in ((length, slopes[:-1]), (length, slopes[1:]))]
-        states = [_hermite(y[:-1], y[1:], *changes, share) for share in INNER.tolist()]
+        early, late = length * slopes[:-1], length * slopes[1:]
+        states = [_hermite(y[:-1], y[1:], early, late, share) for share in INNER.tolist()]
         times = [t[:-1] + length[:, 0] * share for share in INNER.tolist()]
         at = self.localised.arguments
         ends = at(t, y)
         inner = at(np.concatenate(times), np.concatenate(states))
         count, kinds = len(length), len(self.localised.kinds)
         values = np.concatenate((ends[None, :-1], inner.reshape(3, count, kinds), ends[None, 1:]))
-        return bool(self.tame(values, list(zip(t[:-1].tolist(), t[1:].tolist(), strict=True))).all())
+        return bool(
+            self.tame(values, list(zip(t[:-1].tolist(), t[1:].tolist(), strict=True))).all()
+        )
 
     def parts(self, step: Smooth) -> list[Part] | None:
         """The parts of a step in order, on each of which all functions are tame or which is as
-        short as can be; None if there are too many."""
+        short as can be; None if there are too many.
+        """
         length, nothing = step.end - step.start, np.zeros(len(self.localised.kinds), dtype=bool)
 
         def at(shares: FloatArray) -> FloatArray:
@@ -197,7 +202,8 @@ class Features:
 
     def places(self, parts: Sequence[Part], cut: tuple[bool, bool]) -> list[tuple[float, float]]:
         """Where a step may have passed over something: fractions of it in order, and of what length
-        it may be. `cut` says whether its start and its end were put where something is."""
+        it may be. `cut` says whether its start and its end were put where something is.
+        """
         found, turns = list[tuple[float, float]](), list[tuple[float, float]]()
         for i, kind in enumerate(self.localised.kinds):
             for run in _narrow(parts, i) if kind in VALUES else ():
@@ -214,19 +220,18 @@ class Features:
                     k = int(np.argmin(np.abs(values - (ends[0] + ends[1]) / 2)))
                     turns.append((float(at[k]), b - a))
         turns.sort()
-        between = [
-            ((a + b) / 2, b - a) for (a, _), (b, _) in zip(turns, turns[1:], strict=False) if a < b
-        ]
+        between = [((a + b) / 2, b - a) for (a, _), (b, _) in pairwise(turns) if a < b]
         return sorted({(at, size) for at, size in (*found, *turns, *between) if 0 < at < 1})
 
 
 def _hermite(
-    y: FloatArray, last: FloatArray, change: FloatArray, late: FloatArray, share: float
+    y: FloatArray, last: FloatArray, early: FloatArray, late: FloatArray, share: float
 ) -> FloatArray:
-    """The cubic between two states at a share of the time between them; `change` and `late` are
-    the derivatives there, multiplied by that time."""
+    """The cubic between two states at a share of the time between them; `early` and `late` are
+    the derivatives there, multiplied by that time.
+    """
     s, r = share, 1 - share
-    return y + s * s * (3 - 2 * s) * (last - y) + s * r * (r * change - s * late)
+    return y + s * s * (3 - 2 * s) * (last - y) + s * r * (r * early - s * late)
 
 
 def _narrow(parts: Sequence[Part], i: int) -> Iterator[list[Part]]:

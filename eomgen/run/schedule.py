@@ -36,7 +36,8 @@ class Schedule:
         which the signs are those after the change. None if there is no change, or none can be told
         apart with `MOST_PARTS` intervals; then `changes` may find some in a step.
         """
-        if self._no_change[0] <= start and end <= self._no_change[1] or start >= self._unknown:
+        known = self._no_change[0] <= start and end <= self._no_change[1]
+        if known or start >= self._unknown:
             return None
         waiting = [(start, end)]
         for _ in range(MOST_PARTS):

@@ -37,7 +37,8 @@ class Shaken:
 
     def error(self, t: float, y: FloatArray, length: float, steps: int) -> FloatArray:
         """The random error (ny,) of the last steps, of which there were `steps` more, each about
-        `length` s long; 0 until there are `EVERY`."""
+        `length` s long; 0 until there are `EVERY`.
+        """
         self._waiting += steps
         if self._waiting < EVERY:
             return np.zeros_like(y)

@@ -15,6 +15,7 @@ import math
 import signal
 import time
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import mpmath
@@ -25,6 +26,7 @@ import eomgen
 from eomgen.study.accuracy.measure import scales
 
 TARGETS = (1e-3, 1e-6, 1e-9)
+UNITS = {"x": "m", "y": "m", "x_dot": "m/s", "y_dot": "m/s", "q": "rad", "q_dot": "rad/s"}
 MASS, ARM, INERTIA, G = 1.2, 0.35, 0.04, 9.81
 WEIGHT, WHOLE = MASS * G * ARM, INERTIA + MASS * ARM**2
 PENDULUM = """name = "pendulum"
@@ -36,17 +38,34 @@ simulation = {{ t_end = {end!r} }}
 """
 SLIDER = """name = "slider"
 bodies = [{{ name = "m", mass = 1.0, inertia_com = 0 }}]
-joints = [{{ name = "s", type = "prismatic", parent = "world", child = "m", axis = [1, 0], coordinate = "x" }}]
 effects = [{effect}]
 initial = {{ q = [{q!r}], v = [{v!r}] }}
 simulation = {{ t_end = {end!r} }}
+[[joints]]
+name = "s"
+type = "prismatic"
+parent = "world"
+child = "m"
+axis = [1, 0]
+coordinate = "x"
 """
 BULLET = """name = "bullet"
 bodies = [{{ name = "b", mass = 1.0, inertia_com = 0 }}]
-joints = [{{ name = "f", type = "particle", parent = "world", child = "b", coordinates = ["x", "y"] }}]
-effects = [{{ type = "contact", name = "o", law = "spring_damper", body = "b", radius = 0.0, against = "ball", other_at = [{c!r}, 0.0], other_radius = {r!r}, stiffness = {k!r} }}]
+joints = [
+  {{ name = "f", type = "particle", parent = "world", child = "b", coordinates = ["x", "y"] }},
+]
 initial = {{ q = [0.0, {aside!r}], v = [{v!r}, 0.0] }}
 simulation = {{ t_end = {end!r} }}
+[[effects]]
+name = "o"
+type = "contact"
+law = "spring_damper"
+body = "b"
+radius = 0.0
+against = "ball"
+other_at = [{c!r}, 0.0]
+other_radius = {r!r}
+stiffness = {k!r}
 """
 
 Drawn = tuple[str, Callable[[], Sequence[float]] | None]
@@ -54,10 +73,13 @@ Drawn = tuple[str, Callable[[], Sequence[float]] | None]
 
 
 def solved(
-    f: Callable[[float, Any], Any], y: Sequence[float], marks: Sequence[float], most: Sequence[float]
+    f: Callable[[float, Any], Any],
+    y: Sequence[float],
+    marks: Sequence[float],
+    most: Sequence[float],
 ) -> Any:
     """The state at the last of some times; between two of them steps are at most so long."""
-    for a, b, longest in zip(marks, marks[1:], most, strict=False):
+    for (a, b), longest in zip(pairwise(marks), most, strict=False):
         run = solve_ivp(f, (a, b), y, "DOP853", rtol=3e-14, atol=1e-15, max_step=longest)
         y = run.y[:, -1]
     return y
@@ -96,8 +118,27 @@ def pulse(rng: Any) -> Drawn:
             y = solved(free, [q, 0.0], (0, c), (1,))
             y = solved(pushed, y, (c, c + w), (w / 4,))
             return solved(free, y, (c + w, 10), (1,))
-        marks = sorted({0.0, 10.0, *(min(max(c + s * k * w, 0.0), 10.0) for s in (-1, 1) for k in (8.0, 30.0, 300.0, 3000.0) if k <= max(reach, 30.0))})
-        longest = [max(0.25 * w, 0.05 * min(abs(m - c) for m in pair) if (pair[0] - c) * (pair[1] - c) > 0 else 0.25 * w) for pair in zip(marks, marks[1:], strict=False)]
+        marks = sorted(
+            {
+                0.0,
+                10.0,
+                *(
+                    min(max(c + s * k * w, 0.0), 10.0)
+                    for s in (-1, 1)
+                    for k in (8.0, 30.0, 300.0, 3000.0)
+                    if k <= max(reach, 30.0)
+                ),
+            }
+        )
+        longest = [
+            max(
+                0.25 * w,
+                0.05 * min(abs(m - c) for m in pair)
+                if (pair[0] - c) * (pair[1] - c) > 0
+                else 0.25 * w,
+            )
+            for pair in pairwise(marks)
+        ]
         return solved(pushed, [q, 0.0], marks, longest)
 
     return PENDULUM.format(more=motor(text), q=q, v=0.0, end=10.0), end
@@ -156,7 +197,8 @@ def bullet(rng: Any) -> Drawn:
             return math.hypot(y[0], y[1]) - r if t > 0 else -1.0
 
         out.terminal, out.direction = True, 1  # type: ignore[attr-defined]
-        run = solve_ivp(f, (0, 10 * r / v), first, "DOP853", rtol=3e-14, atol=1e-14 * v, events=out, max_step=0.02 / math.sqrt(k))  # fmt: skip
+        rates = {"rtol": 3e-14, "atol": 1e-14 * v, "max_step": 0.02 / math.sqrt(k)}
+        run = solve_ivp(f, (0, 10 * r / v), first, "DOP853", events=out, **rates)
         y, left = run.y[:, -1], t_end - t - run.t[-1]
         return [c + y[0] + y[2] * left, y[1] + y[3] * left, y[2], y[3]]
 
@@ -170,7 +212,8 @@ def separatrix(rng: Any) -> Drawn:
 
     def end() -> Any:
         with mpmath.workdps(60):
-            rate = mpmath.sqrt(mpmath.mpf(MASS) * mpmath.mpf(G) * mpmath.mpf(ARM) / (mpmath.mpf(INERTIA) + mpmath.mpf(MASS) * mpmath.mpf(ARM) ** 2))  # fmt: skip
+            mass, arm, inertia, g = map(mpmath.mpf, (MASS, ARM, INERTIA, G))
+            rate = mpmath.sqrt(mass * g * arm / (inertia + mass * arm**2))
             # From the lowest position, where it is at rest at pi + below = q + pi/2 beyond.
             start = mpmath.mpf(q) + mpmath.pi / 2 - 2 * mpmath.pi
             k = mpmath.sin(start / 2)
@@ -190,7 +233,10 @@ def relay(rng: Any) -> Drawn:
     text = "x" if not lead else f"x + {lead}*x_dot"
     force = f"{-a!r} if {text} > 0 else {a!r}"
     scene = SLIDER.format(
-        effect=f'{{ type = "motor", name = "u", joint = "s", torque = "{force}" }}', q=x, v=0.0, end=7.0
+        effect=f'{{ type = "motor", name = "u", joint = "s", torque = "{force}" }}',
+        q=x,
+        v=0.0,
+        end=7.0,
     )
     quarter = math.sqrt(2 * x / a)
 
@@ -207,12 +253,17 @@ def relay(rng: Any) -> Drawn:
 
 def spring(rng: Any) -> Drawn:
     """A light body on a stiff spring."""
-    k, ratio, x = 10 ** rng.uniform(6, 11), 10 ** rng.uniform(-4, 0.3), 0.3 + 10 ** rng.uniform(-9, -3)
+    k, ratio, x = (
+        10 ** rng.uniform(6, 11),
+        10 ** rng.uniform(-4, 0.3),
+        0.3 + 10 ** rng.uniform(-9, -3),
+    )
     turns = 10 ** rng.uniform(1, 3.3)
     rate, rest = math.sqrt(k), 0.3
     decay = ratio * rate
     t_end = float(f"{turns / rate:.6g}")
-    effect = f'{{ type = "joint_spring", name = "k", joint = "s", stiffness = {k!r}, damping = {2 * decay!r}, rest = {rest!r} }}'
+    given = f"stiffness = {k!r}, damping = {2 * decay!r}, rest = {rest!r}"
+    effect = f'{{ type = "joint_spring", name = "k", joint = "s", {given} }}'
     scene = SLIDER.format(effect=effect, q=x, v=0.0, end=t_end)
 
     def end() -> Any:
@@ -267,14 +318,15 @@ def main() -> None:
         assert choice is not None
         off = math.nan
         if end is not None and run.trajectory.finished:
-            scale = scales(run.trajectory.states, run.module.functions.UNITS, run.trajectory.y) if hasattr(run.module, "functions") else np.ptp(run.trajectory.y, axis=0)  # fmt: skip
-            off = float(np.max(np.abs(run.trajectory.y[-1] - np.array(end())) / np.maximum(scale, 1e-300)))
+            y = run.trajectory.y
+            scale = scales(run.trajectory.states, UNITS, y)
+            off = float(np.max(np.abs(y[-1] - np.array(end())) / scale))
         bad = choice.met and not off <= target
         wrong, met = wrong + bad, met + choice.met
         said = "MET AND WRONG" if bad else "met" if choice.met else "not met"
         print(
-            f"{i} {kind.__name__} {target:g}: {said}, error {off:.2g}, estimate {choice.error:.2g}, "
-            f"{run.options}, {choice.runs} runs, {seconds:.1f} s"
+            f"{i} {kind.__name__} {target:g}: {said}, error {off:.2g}, "
+            f"estimate {choice.error:.2g}, {run.options}, {choice.runs} runs, {seconds:.1f} s"
             + (f"\n{scene}" if bad else ""),
             flush=True,
         )

@@ -119,6 +119,8 @@ class Strides:
             last = values[-1]
             setattr(solver, name, last.copy() if last.ndim else float(last))
         if branches and watched:
+            if self._problem.switching and self._problem.switching.of_state:
+                branches.passed(stride.ends, stride.values, stride.switched)
             branches.restore(_checks(watched, stride, count - 1))
         if stride.ended:
             solver.status = "finished"
@@ -126,7 +128,8 @@ class Strides:
 
     def _passes_nothing(self, branches: BranchMonitor, solver: Any, stride: Stride) -> bool:
         """Whether steps pass over nothing; else Python makes the next one, and then fewer are made
-        at once."""
+        at once.
+        """
         t = np.concatenate(([solver.t], stride.ends))
         y = np.concatenate((solver.y[None], stride.states))
         slopes = np.concatenate((solver.f[None], stride.memory["f"]))

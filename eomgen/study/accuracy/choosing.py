@@ -133,7 +133,8 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         plan = min(possible, key=lambda plan: plan.work)
         stiff = [] if asked or set(names) & set(STIFF) else _stiff(search.case)
         bounded = plan is not aside and (aside or len(possible) > 1 or stiff)
-        if not search.make(plan, OVERRUN * plan.cost if bounded else math.inf):
+        made = search.make(plan, OVERRUN * plan.cost if bounded else math.inf)
+        if not made and search.broken[-1].cut:
             # Rounding errors of a fast mode shorten explicit steps without end.
             names += stiff
             for name in stiff:

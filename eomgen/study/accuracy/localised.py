@@ -28,7 +28,8 @@ def under_scrutiny(
     inputs: Any = None,
 ) -> Problem:
     """A model's problem whose runs are checked for what may lie between their steps, and for
-    sliding modes."""
+    sliding modes.
+    """
     found = localised(model, program_of(model), module, parameters, inputs)
     return replace(problem, scrutiny=Scrutiny(found))
 
@@ -55,6 +56,7 @@ def localised(
         if kinds
     ]
     known = [one.known_values(values, FloatScalars()) for one in kernels]
+
     def arguments(t: FloatArray, y: FloatArray) -> FloatArray:
         at = {**fixed, TIME: t, **dict(zip(module.STATES, y.T, strict=True))}
         with np.errstate(all="ignore"):
@@ -80,12 +82,15 @@ def _moving(
     given: Mapping[str, Any],
     functions: Mapping[str, Callable[..., Any]],
 ) -> list[Any]:
-    return one.moving(known, [given[name] for name in one.inputs], [functions[f] for f in one.functions])
+    return one.moving(
+        known, [given[name] for name in one.inputs], [functions[f] for f in one.functions]
+    )
 
 
 def divides_by_motion(model: Model) -> bool:
     """Whether a formula of a model's effects divides by something that is not constant. Only then
-    may a quotient be localised: inertias, by which recursions divide, change slowly."""
+    may a quotient be localised: inertias, by which recursions divide, change slowly.
+    """
     constant = {parameter.name for parameter in model.parameters}
     return any(
         formula.operation == "/" and not set(names_in(formula.operands[1])) <= constant

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eomgen.run.branches import SLIDES
 from eomgen.run.noise import Fast, fast
 from eomgen.run.problem import FloatArray
+from eomgen.run.sliding import SLIDES
 from eomgen.study.accuracy.estimate import (
     Estimate,
     by_looser_run,
@@ -135,7 +135,7 @@ class Search:
 
     @property
     def tightest_run(self) -> Tried | None:
-        """The run with the tightest tolerance so far, of pilots the latest; None if there is none."""
+        """The run with the tightest tolerance, of pilots the latest; None if there is none."""
         known = self.runs or [run for run in self.pilots[::-1] if run.trajectory.finished]
         return min(known, key=lambda run: (run.setting.dt is not None, run.tolerance), default=None)
 
