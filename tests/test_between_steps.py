@@ -89,7 +89,7 @@ rest = 0.3
 
 
 def chosen(scene: str, accuracy: float, **given: Any) -> eomgen.Run:
-    run = eomgen.simulate(scene, accuracy=accuracy, **given)
+    run = eomgen.simulate(scene, accuracy=accuracy, backend="numpy", **given)
     assert run.choice is not None
     return run
 
