@@ -30,6 +30,7 @@ from eomgen.study.accuracy.budgeting import within
 from eomgen.study.accuracy.choosing import meet
 from eomgen.study.accuracy.estimate import looser
 from eomgen.study.accuracy.ladder import Ladder, Rung, Work, next_rung
+from eomgen.study.accuracy.localised import under_scrutiny
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.moved import moved, moved_problem
 from eomgen.study.accuracy.reference import reference
@@ -51,6 +52,7 @@ def case_of(scene: str, t_end: float | None = None, **kept: Any) -> Case:
     model, module, wanted = made(scene)
     kept = {"samples": 1001, "rest_speed": wanted.rest_speed, **kept}
     problem, twin = problem_of(module, model=model), moved_problem(module, model)
+    problem = under_scrutiny(problem, model, module)
     return Case(problem, t_end or wanted.t_end, module.UNITS, kept, moved=twin)
 
 

@@ -22,6 +22,7 @@ from eomgen.study.accuracy import choosing
 from eomgen.study.accuracy.budgeting import within
 from eomgen.study.accuracy.choosing import meet
 from eomgen.study.accuracy.estimate import by_second_run, difference, errors, fit, remaining
+from eomgen.study.accuracy.localised import under_scrutiny
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.moved import moved_problem
 from eomgen.study.accuracy.reference import Reference, reference
@@ -71,7 +72,7 @@ def case_of(scene: str) -> Case:
     model, wanted = elaborate(tables), tables.simulation
     module = load_module(generated_code(model).module, model.name)
     kept = {"samples": 1001, "rest_speed": wanted.rest_speed}
-    problem = problem_of(module, model=model)
+    problem = under_scrutiny(problem_of(module, model=model), model, module)
     moved = moved_problem(module, model)
     return Case(problem, wanted.t_end, module.UNITS, kept, moved=moved)
 

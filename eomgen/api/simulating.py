@@ -194,6 +194,10 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         from eomgen.study.accuracy.moved import moved_problem
 
         moved = moved_problem(functions, model, *values, start=began, compiled=made)
+    if plan.setting is None:
+        from eomgen.study.accuracy.localised import under_scrutiny
+
+        problem = under_scrutiny(problem, model, functions, *values)
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
     powers = as_powers(functions, *values) if plan.works else None
     if powers and accelerator:

@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from eomgen.native.module import outputs_of, usual_constants
-from eomgen.run import branches, roots
+from eomgen.run import branches, enclosing, roots
 from eomgen.run.compiled import Array, Watched
 from eomgen.run.events import GAP_CHECKS
 
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-_INTERVALS = len(branches.INNER) + 1
+_INTERVALS = len(enclosing.INNER) + 1
 _MOST_PARTS = branches.MOST_EVALUATIONS // 4 + 2
 """Parts of a step that wait at one time, at most: each first one takes four evaluations, or three
 of one alone, and each more six."""
@@ -106,8 +106,8 @@ def watch(
         made.gaps, made.rates = (FunctionStructure(*found[name]) for name in ("gaps", "gap_rates"))
     parts = _MOST_PARTS + 1
     arrays |= {
-        "factors": np.ascontiguousarray(branches.FACTORS),
-        "inner": np.ascontiguousarray(branches.INNER),
+        "factors": np.ascontiguousarray(enclosing.FACTORS),
+        "inner": np.ascontiguousarray(enclosing.INNER),
         "room": np.empty((1 + parts * (_INTERVALS + 1)) * switching + 3 * contacts),
         "asked": np.empty(parts * switching, np.int64),
         "kinds": np.empty(switching, np.intc),

@@ -42,7 +42,7 @@ def with_switching_functions(program: Program, states: Collection[str]) -> Progr
             found = [len(steps)]
             steps.append(difference)
         nodes[found[0]] = None
-    moving, timed = _depends(steps, states), _depends(steps, (TIME,))
+    moving, timed = depends(steps, states), depends(steps, (TIME,))
     groups = {
         OF_STATE: tuple(i for i in nodes if moving[i]),
         OF_TIME: tuple(i for i in nodes if timed[i] and not moving[i]),
@@ -53,7 +53,7 @@ def with_switching_functions(program: Program, states: Collection[str]) -> Progr
     return replace(program, steps=tuple(steps), outputs={**program.outputs, **outputs})
 
 
-def _depends(steps: Sequence[Step], names: Collection[str]) -> bytearray:
+def depends(steps: Sequence[Step], names: Collection[str]) -> bytearray:
     """For each step 1 if it depends on one of the named inputs, else 0."""
     depends = bytearray(len(steps))
     for i, (_, operands, _, value) in enumerate(steps):

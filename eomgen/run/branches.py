@@ -4,9 +4,8 @@ A method evaluates the derivative at a few points of a step. A contact, a stop o
 that begins and ends between them does not show in the error estimate, however long the step. The
 derivative is smooth as long as no switching function g(t, y) of the problem crosses 0. Along a step
 these are functions of time, known from the method's dense output. On parts of the step they are
-interpolated by polynomials of degree 4, whose Bernstein coefficients enclose them (Farouki, The
-Bernstein polynomial basis, Computer Aided Geometric Design 29 (2012), 379). A part is halved until
-each function is monotone or has no zero there. Functions of time alone are enclosed by interval
+interpolated by polynomials, which enclose them (`enclosing`). A part is halved until each function
+is monotone or has no zero there. Functions of time alone are enclosed by interval
 arithmetic instead.
 
 A step passes over a branch if two switches lie in it, and the derivative between them differs from
@@ -17,7 +16,7 @@ switches.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,9 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.run.compiled import Watched
+from eomgen.run.enclosing import FACTORS, INNER, LAST
+from eomgen.run.localised import FREE, Features, Smooth, slope
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.roots import root
 from eomgen.run.schedule import Schedule
+from eomgen.run.sliding import Returns
 
 MOST_EVALUATIONS = 200
 """Most evaluations of the switching functions in a step. A step that needs more is limited to the
@@ -50,19 +52,6 @@ INSIDE = 1 / 8
 """A step that ends at least this fraction of the time between two switches after the first one has
 evaluated the branch between them."""
 
-_LAST = 4
-"""Degree of the polynomials."""
-_AT = (1 - np.cos(np.pi * np.arange(_LAST + 1) / _LAST)) / 2
-"""Chebyshev points of a part, 0 to 1, with both ends: where the functions are evaluated."""
-_TO_BERNSTEIN = np.linalg.inv(
-    np.array([[math.comb(_LAST, i) * x**i * (1 - x) ** (_LAST - i) for i in range(5)] for x in _AT])
-)
-_TO_CHEBYSHEV = np.linalg.inv(np.polynomial.chebyshev.chebvander(2 * _AT - 1, _LAST))
-INNER = _AT[1:-1]
-"""The inner ones of these points, (3,)."""
-FACTORS = np.vstack((_TO_BERNSTEIN, _TO_CHEBYSHEV[-2:]))
-"""(7, 5): from values at the points, the Bernstein and the last two Chebyshev coefficients."""
-
 States = Callable[[Any], FloatArray]
 """The states (n, ny) at times (n,) within a step, or the state (ny,) at a single time."""
 Flags = NDArray[np.bool_]
@@ -74,13 +63,16 @@ the numbers (n,) of these functions."""
 
 @dataclass(frozen=True)
 class Step:
-    """A step of a method: from `start` to `end`, s, the states there, and those between."""
+    """A step of a method: from `start` to `end`, s, the states there, those between and, if they
+    are known, the derivatives at both ends (2, ny).
+    """
 
     start: float
     end: float
     first: FloatArray
     last: FloatArray
     states: States
+    slopes: FloatArray | None = None
 
     @property
     def length(self) -> float:
@@ -108,6 +100,7 @@ class BranchMonitor:
     unseen     the longest step, s, if the functions cannot be followed
     sees_end   whether the method's error estimate depends on the derivative at the end of a step
     switched   the time of the last switch, s
+    features   what else it may pass over, if the run is under scrutiny
     """
 
     problem: Problem
@@ -116,11 +109,16 @@ class BranchMonitor:
     unseen: float
     sees_end: bool = True
     switched: float = -math.inf
+    features: Features | None = None
+    _cut_at: float = math.nan
     _ends: list[tuple[float, FloatArray]] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
-        of_time = self.switching.of_time
+        of_time, scrutiny = self.switching.of_time, self.problem.scrutiny
         self._schedule = Schedule(of_time) if of_time else None
+        self._returns = Returns(self.unseen) if scrutiny else None
+        if scrutiny and scrutiny.localised:
+            self.features = Features(scrutiny.localised)
 
     @property
     def memory(self) -> dict[str, Any]:
@@ -133,15 +131,21 @@ class BranchMonitor:
         self.switched = float(memory["turned"])
         self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["checked"]]
 
-    def watched(self, t: float, length: float, most: int) -> Watched | None:
+    def known(self, t: float, end: float) -> tuple[float, float] | None:
+        """The first time from t on, but before `end`, at which the derivative changes its branch
+        whatever the state is: the last double on this side and the first on the other, s.
+        """
+        return self._schedule.first(t, math.nextafter(end, t)) if self._schedule else None
+
+    def watched(self, t: float, length: float, most: int, until: float) -> Watched | None:
         """What compiled steps from t on are checked with; None if the next step must be checked
-        here. Up to `most` steps of about this length, s, are to be made.
+        here. Up to `most` steps of about this length, s, are to be made, none beyond `until`.
         """
         functions = self.switching
         if functions.of_state and (len(self._ends) < 2 or self._ends[-1][0] != t):
             return None
         clear = self._schedule.clear(t, length, most) if self._schedule else math.inf
-        if not t + length <= clear:
+        if not min(t + length, until) <= clear:
             return None
         return Watched(self._ends, self.switched, clear, functions.timed, functions.angles)
 
@@ -150,7 +154,14 @@ class BranchMonitor:
 
         Steps must be given in order; a step that must be repeated is forgotten.
         """
-        search = _Search(self.switching, step, self._ends) if self.switching.of_state else None
+        marks: Sequence[float] = ()
+        if self.features:
+            retry, marks = self._passed_over(self.features, step)
+            if retry:
+                return retry
+        search = None
+        if self.switching.of_state:
+            search = _Search(self.switching, step, self._ends, marks)
         times, whole = self._times(search, step)
         switched = self.switched
         for i, after in enumerate(times):
@@ -166,7 +177,67 @@ class BranchMonitor:
         self.switched = switched
         if search:
             self._ends = [search.start, search.end]
+            if self._returns:
+                self._returns.take(search.start, search.end, bool(times))
         return None
+
+    def passed(self, ends: FloatArray, values: FloatArray, switched: FloatArray) -> None:
+        """Take compiled steps, by their ends (m,), the functions there (m, ns), and the times of
+        the last switch (m,), s.
+
+        Raises `StepFailure` for a sliding mode.
+        """
+        if self._returns and self._ends:
+            before = self._ends[-1]
+            for t, g, last in zip(ends.tolist(), values, switched.tolist(), strict=True):
+                self._returns.take(before, (t, g), last > before[0])
+                before = t, g
+
+    def tame(self, t: FloatArray, y: FloatArray, slopes: FloatArray) -> bool:
+        """Whether compiled steps that end at times t (m + 1,) after the first, in states y, with
+        derivatives `slopes` there (m + 1, ny), pass over nothing but branches.
+        """
+        return self.features is None or self.features.tame_between(t, y, slopes)
+
+    def _passed_over(self, features: Features, step: Step) -> tuple[Retry | None, Sequence[float]]:
+        """How a step that has passed over a localised function must be repeated, or None, and the
+        fractions of it between which such functions are tame; none if they are in all of it.
+        """
+        if step.slopes is not None:
+            ends, states = np.array([step.start, step.end]), np.array([step.first, step.last])
+            if features.tame_between(ends, states, step.slopes):
+                return None, ()
+        smooth = Smooth(step.start, step.end, step.states)
+        parts = features.parts(smooth)
+        if parts is None:
+            if step.length > self.unseen * (1 + TOGETHER):
+                return Retry(step.start + self.unseen, seen=False), ()
+            return None, ()
+        cut = (step.start == self._cut_at, step.end == self._cut_at and self.sees_end)
+        for at, size in features.places(parts, cut):
+            t = step.start + at * step.length
+            if step.start < t < step.end and self._jumps(smooth, at, size):
+                self._cut_at = t
+                return Retry(t, seen=True), ()
+        return None, [*(part.a for part in parts), 1.0] if len(parts) > 1 else ()
+
+    def _jumps(self, step: Smooth, at: float, size: float) -> bool:
+        """Whether the derivative at a fraction of a step differs from that of its interpolant, and
+        from the mean of those at the ends of a part of this size around it, by what matters.
+        """
+        length = step.end - step.start
+        shares = np.array([max(at - size, 0.0), at, min(at + size, 1.0)])
+        times = step.start + length * shares
+        states = step.states(times)
+        allowed = FREE * self.allowed(states[1]) / (size * length)
+        try:
+            here = self.problem.derivative(float(times[1]), states[1])
+            if bool((np.abs(here - slope(step, at)) <= allowed).all()):
+                return False
+            ends = [self.problem.derivative(float(times[i]), states[i]) for i in (0, 2)]
+        except (ArithmeticError, ValueError):
+            return True
+        return not bool((np.abs(here - (ends[0] + ends[1]) / 2) <= allowed).all())
 
     def _times(self, search: "_Search | None", step: Step) -> tuple[list[float], bool]:
         """The times of the switches in a step, in order, and whether these are all. A single one is
@@ -245,13 +316,19 @@ class _Search:
     """The switching functions of the state along one step.
 
     ends  the ends of the last two steps and the functions there; this step starts at the last
+    marks fractions of the step, 0 and 1 included, between which it is smooth; none if all of it is
     """
 
     def __init__(
-        self, switching: Switching, step: Step, ends: list[tuple[float, FloatArray]]
+        self,
+        switching: Switching,
+        step: Step,
+        ends: list[tuple[float, FloatArray]],
+        marks: Sequence[float] = (),
     ) -> None:
         assert switching.of_state is not None
-        self.step, self._function, self._left = step, switching.of_state, MOST_EVALUATIONS
+        self.step, self._function, self._marks = step, switching.of_state, marks
+        self._left = MOST_EVALUATIONS + 2 * LAST * len(marks)
         known = bool(ends) and ends[-1][0] == step.start
         self._earlier = ends[0] if known and len(ends) > 1 else None
         self._timed = switching.timed
@@ -263,7 +340,7 @@ class _Search:
 
     def is_far(self) -> bool:
         """Whether all functions are so far from 0 that none crosses it in this step."""
-        if self._earlier is None or self._least_parts > 1:
+        if self._earlier is None or self._least_parts > 1 or self._marks:
             return False
         (before, g), (start, a), (_, b) = self._earlier, self.start, self.end
         moved = np.abs(b - a) + np.abs(a - g) * (self.step.length / (start - before))
@@ -285,7 +362,7 @@ class _Search:
     def brackets(self) -> tuple[list[_Bracket], bool]:
         """Brackets of the zeros in the order of time, and whether the whole step was searched."""
         step, found = self.step, list[_Bracket]()
-        if self._least_parts > MOST_EVALUATIONS / _LAST:
+        if self._least_parts > MOST_EVALUATIONS / LAST:
             return found, False
         waiting = self._first_parts()
         while waiting:
@@ -297,7 +374,7 @@ class _Search:
             if not unclear.any():
                 found += [_Bracket(int(k), *ends) for k in asked[passing]]
                 continue
-            if self._left < 2 * (_LAST - 1):
+            if self._left < 2 * (LAST - 1):
                 return found, False
             # A function that crosses 0 is bracketed again in the halves, in order with the others.
             again, middle = unclear | passing, (a + b) / 2
@@ -311,6 +388,9 @@ class _Search:
         """The parts with which the search begins, the earliest last."""
         count = math.ceil(max(self._least_parts, 1.0))
         marks = np.linspace(0.0, 1.0, count + 1)
+        if self._marks:
+            marks = np.array(sorted({*marks.tolist(), *self._marks}))
+            count = len(marks) - 1
         at_marks = [self.start[1], *self._at(marks[1:-1]), self.end[1]]
         asked = np.arange(len(self.start[1]))
         parts = []
@@ -364,7 +444,7 @@ def _classified(values: FloatArray) -> tuple[Flags, Flags]:
     of its last two Chebyshev coefficients.
     """
     sums = FACTORS[:, :1] * values[0]
-    for j in range(1, _LAST + 1):  # in this order also in compiled steps, for the same bits
+    for j in range(1, LAST + 1):  # in this order also in compiled steps, for the same bits
         sums += FACTORS[:, j : j + 1] * values[j]
     inner, ends = sums[:-2], np.abs(sums[-2:])
     rest = 2 * (ends[0] + ends[1])

@@ -20,6 +20,7 @@ from eomgen.run.passage import Passage
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.projection import Violations
+from eomgen.run.shaking import Shaken
 from eomgen.run.singular import watched
 from eomgen.run.stepping import (
     ANEW,
@@ -126,6 +127,9 @@ def integrate(
         counted = replace(counted, closed_form=replace(problem.closed_form, seen=Seen()))
     if tally:
         counted = tally.counting(counted)
+    seed = problem.scrutiny.seed if problem.scrutiny else None
+    if seed is not None and isinstance(method, Adaptive) and "lost" not in method.memory:
+        counted = replace(counted, derivative=Shaken(counted.derivative, seed).derivative)
     remarks: list[str] = []
     if isinstance(method, FixedStep):
         # Evaluations to check stability do not count. They need a Jacobian with all digits, which

@@ -26,6 +26,8 @@ growing or oscillating modes; with error control, steps are never near that."""
 MANY, DAMPED = 1e4, 100.0
 """A motion is stiff if the run is longer than `MANY` time constants 1/|λ| of its fastest modes, and
 than `DAMPED` of their decay: explicit steps must then be shorter than accuracy requires."""
+SOME = 1e3
+"""Noise is looked for where the run is longer than this many time constants of its fastest mode."""
 SOLVED = ("Radau", "BDF")
 """Methods that solve their equations to a fraction of the tolerance."""
 NOISY = 10.0
@@ -56,7 +58,7 @@ def fast(problem: Problem, states: Iterable[tuple[float, FloatArray]], span: flo
     """
     stiff, some, decay, most = False, False, 0.0, np.zeros(len(problem.states))
     for t, y in states:
-        modes, noise = _modes_and_noise(problem.derivative, problem.jacobian, t, y, span)
+        modes, noise = _modes_and_noise(problem.derivative, problem.jacobian, t, y, span, SOME)
         quick = np.abs(modes) * span > MANY
         some = some or bool(quick.any())
         stiff = stiff or bool((-modes[quick].real * span > DAMPED).any())
@@ -75,7 +77,7 @@ def step_noise(
     """The greatest change of each state (ny,) in a step from `y` at `t` by rounding errors of the
     derivative; 0 if no mode is fast compared with a run of `span` s.
     """
-    return _modes_and_noise(derivative, jacobian, t, y, span)[1]
+    return _modes_and_noise(derivative, jacobian, t, y, span, MANY)[1]
 
 
 def least_tolerance(method: str, rtol: float) -> float:
@@ -94,8 +96,11 @@ def _modes_and_noise(
     t: float,
     y: FloatArray,
     span: float,
+    least: float,
 ) -> tuple[NDArray[np.complex128], FloatArray]:
-    """The modes at a state, 1/s, and the noise of a step; none if a value is not finite."""
+    """The modes at a state, 1/s, and the noise of a step; none if a value is not finite. The noise
+    is 0 unless a run of `span` s has more than `least` time constants of the fastest mode.
+    """
     random, nothing = np.random.default_rng(0), np.zeros_like(y)
     none = np.zeros(0, dtype=np.complex128), nothing
     try:
@@ -109,7 +114,7 @@ def _modes_and_noise(
         return none
     modes = np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
     rate, most = float(np.abs(modes).max(initial=0.0)), nothing
-    if rate * span <= MANY:
+    if rate * span <= least:
         return modes, nothing
     for h in np.array(STEPS) / rate:
         inverse = np.linalg.inv(np.eye(len(y)) - h * ROTATION * matrix)

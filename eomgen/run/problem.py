@@ -12,6 +12,7 @@ from eomgen.errors import RunError
 from eomgen.run.closed_form import ClosedForm
 from eomgen.run.compiled import Compiled, Series
 from eomgen.run.intervals import Interval
+from eomgen.run.localised import Scrutiny
 from eomgen.run.origin import Origin
 from eomgen.run.projection import Projection
 
@@ -119,6 +120,7 @@ class Problem:
                 raises `RunError` where that is not possible
     projection  onto the constraints; None if there are none
     closed_form the constraints that are kept in closed form; None if there are none
+    scrutiny    what is checked beside that; None for an ordinary run
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
     quaternion in it is 0.
@@ -145,6 +147,7 @@ class Problem:
     series: Mapping[str, Callable[[], Series]] = field(default_factory=dict)
     projection: Projection | None = None
     closed_form: ClosedForm | None = None
+    scrutiny: Scrutiny | None = None
 
     def __post_init__(self) -> None:
         initial = np.array(self.initial, dtype=np.float64)

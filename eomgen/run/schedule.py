@@ -2,9 +2,11 @@
 arithmetic.
 
 An interval of time in which each function has one sign contains no change; any other is bisected
-(Moore, Kearfott, Cloud, Introduction to Interval Analysis, section 8.1).
+(Moore, Kearfott, Cloud, Introduction to Interval Analysis, section 8.1), down to neighbouring
+doubles where the first change is wanted exactly.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 from eomgen.run.intervals import Interval
@@ -27,6 +29,32 @@ class Schedule:
     def __init__(self, functions: Functions) -> None:
         self._functions = functions
         self._no_change = (0.0, 0.0)
+        self._unknown = math.inf
+
+    def first(self, start: float, end: float) -> tuple[float, float] | None:
+        """The last time before the first change in `start` to `end`, and the double after it, at
+        which the signs are those after the change. None if there is no change, or none can be told
+        apart with `MOST_PARTS` intervals; then `changes` may find some in a step.
+        """
+        known = self._no_change[0] <= start and end <= self._no_change[1]
+        if known or start >= self._unknown:
+            return None
+        waiting = [(start, end)]
+        for _ in range(MOST_PARTS):
+            if not waiting:
+                self._no_change = (start, end)
+                return None
+            low, high = waiting.pop()
+            if None not in self._signs(low, high):
+                continue
+            middle = low + (high - low) / 2
+            if low < middle < high:
+                waiting += [(middle, high), (low, middle)]
+            elif self._signs_at(low) != self._signs_at(high):
+                self._no_change = (start, low)
+                return low, high
+        self._unknown = start
+        return None
 
     def changes(self, start: float, end: float) -> tuple[list[float], bool]:
         """The times in a step at which functions change sign, in order, and whether these are all.
@@ -86,6 +114,10 @@ class Schedule:
                 yield low, high, signs
         if waiting:
             yield *waiting[-1], None
+
+    def _signs_at(self, t: float) -> list[bool]:
+        """Whether each function is > 0 at a time."""
+        return [v.low + v.high > 0 for v in self._functions(Interval(t, t))]
 
     def _signs(self, low: float, high: float) -> list[bool | None]:
         """Whether each function is > 0 in an interval; None if it may have both signs."""

@@ -34,6 +34,7 @@ from eomgen.run.problem import FloatArray
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene, read_scene
 from eomgen.store import generated_code
 from eomgen.study.accuracy.choosing import meet
+from eomgen.study.accuracy.localised import under_scrutiny
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.moved import moved_problem
 from eomgen.study.accuracy.reference import reference
@@ -68,6 +69,7 @@ def prepared(scene: str, own: bool, folder: Path, seconds: float) -> tuple[Case,
     t_end = wanted.t_end
     kept = {"rest_speed": wanted.rest_speed, "samples": 1001}
     problem, moved = problem_of(module, model=model), moved_problem(module, model)
+    problem = under_scrutiny(problem, model, module)
     case = Case(problem, t_end, module.UNITS, kept, moved=moved)
     end = closed_end(scene) if own else None
     if end is not None:

@@ -26,7 +26,8 @@ from eomgen.run.integrators.interface import (
 )
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.integrators.strides import Strides, continuation
-from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.problem import FloatArray, Problem, Switching
+from eomgen.run.shaking import EVERY, Shaken
 
 _STALLED = 100
 """A run stops after this many steps in a row that do not advance the time."""
@@ -103,12 +104,16 @@ def advances(
         until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
         # A step that was cut is repeated in Python, which counts that.
         use = compiled if compiled and not cut and compiles() else None
-        stride = use.made(stepper, sampled, until - here) if use else None
+        most = min(until - here, EVERY) if stepper.shaken else until - here
+        stride = use.made(stepper, sampled, most) if use else None
         if use and stride:
             yield from use.advances(stride, sampled, stepper.is_whole, each)
             here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
             if stepper.ended:
                 return
+            if stride.ended:
+                stepper.prepare_next(float(stride.ends[-1]), stride.states[-1])
+            stepper.shake(len(stride.ends))
             continue
         here += 1
         step = stepper.step()
@@ -139,7 +144,8 @@ def advances(
         sampled, cut, factored = passed, 0, stepper.factorisations
         if stepper.ended:
             return
-        stepper.prepare_next(step)
+        stepper.prepare_next(step.end, step.last)
+        stepper.shake(1)
     raise StepFailure(f"{bounds.most} steps did not suffice", method.remedy)
 
 
@@ -162,23 +168,37 @@ class _Stepper:
         self.method, self.t_end, self._problem, self._bounds = method, t_end, problem, bounds
         self._remark = remark
         self.longest, self.branches = bounds.longest, None
-        if problem.switching:
+        scrutiny = problem.scrutiny
+        if problem.switching or (scrutiny and scrutiny.localised):
+            switching = problem.switching or Switching()
             self.branches = BranchMonitor(
-                problem, problem.switching, bounds.allowed, bounds.unseen, method.sees_end
+                problem, switching, bounds.allowed, bounds.unseen, method.sees_end
             )
-        elif problem.corners:
+        if problem.corners and not problem.switching:
             self.longest = min(bounds.longest, bounds.unseen)
         self._whole, self._unseen, self.factorisations = True, False, 0
+        self.shaken = None
+        if scrutiny and scrutiny.seed is not None and "lost" in method.memory:
+            self.shaken = Shaken(problem.derivative, scrutiny.seed)
 
     def begin(self, t: float, resume: Resume | None) -> None:
         """Begin at time t with the problem's initial state; `resume` is from `continuation`."""
         until = self.t_end
         if resume and self.branches:
-            until = min(float(resume["until"]), until)
+            cut = float(resume["until"])
+            until = min(cut, until) if cut > t else until
             self.branches.restore(resume)
         self._start(t, self._problem.initial, until, resume or {})
 
     def _start(self, t: float, y: FloatArray, until: float, memory: Mapping[str, Any]) -> None:
+        """Start the solver at time t, for steps up to `until` and to the first time at which the
+        derivative is known to change its branch. If that is now, start on its other side.
+        """
+        known = self.branches and self.branches.known(t, self.t_end)
+        while self.branches and known and known[0] <= t:
+            t, memory = known[1], {name: x for name, x in memory.items() if name == "lost"}
+            known = self.branches.known(t, self.t_end)
+        until = min(until, known[0]) if known else until
         options: dict[str, Any] = {"rtol": self._bounds.rtol, "atol": self._bounds.atol}
         if self.method.uses_jacobian:
             options["jac"] = self._problem.jacobian
@@ -198,7 +218,9 @@ class _Stepper:
         self.solver.t_bound = until
         self.until = until
         for name in self.method.memory if memory else ():
-            setattr(self.solver, name, _restored(memory[name], type(getattr(self.solver, name))))
+            if name in memory:
+                kind = type(getattr(self.solver, name))
+                setattr(self.solver, name, _restored(memory[name], kind))
 
     def step(self) -> Step:
         """Make a step. Raises `StepFailure` if the method fails."""
@@ -217,9 +239,10 @@ class _Stepper:
         if not self.method.sees_end and solver.status == "finished" and not self.ended:
             solver.turn()
         dense = cache(solver.dense_output)
-        t, y, _ = self._before
+        t, y, memory = self._before
         end = self._problem.projected(float(solver.t), solver.y.copy())
-        return Step(t, float(solver.t), y, end, lambda times: dense()(times).T)
+        slopes = np.array([memory["f"], solver.f]) if "f" in memory else None
+        return Step(t, float(solver.t), y, end, lambda times: dense()(times).T, slopes)
 
     def retry(self, step: Step) -> Retry | None:
         """Check a step for branches. If it must be repeated, restart the solver for that and say
@@ -236,15 +259,23 @@ class _Stepper:
             self._start(t, y, retry.until, memory)
         return retry
 
-    def prepare_next(self, step: Step) -> None:
-        """Prepare the solver for the step after this one."""
-        if self.solver.status == "finished":  # at the end of a step that was cut
-            self._start(step.end, step.last, self.t_end, self._memory())
+    def prepare_next(self, t: float, y: FloatArray) -> None:
+        """Prepare the solver for the step after one that ended at t in the state y."""
+        self._unseen = self._unseen and self.solver.status != "finished"
+        if self.solver.status == "finished":  # where a step had to end
+            self._start(t, y, self.t_end, self._memory())
         elif self.method.one_step:
             # The slope saved for the next step is not evaluated again at the normalised state: its
             # error is of the size of this step's error, and the next step multiplies it by its
             # length. Measured: evaluating it again changes no error and costs a derivative.
-            self.solver.y = step.last.copy()
+            self.solver.y = y.copy()
+
+    def shake(self, steps: int) -> None:
+        """Add random rounding errors after some steps, if the run is to have them."""
+        if self.shaken:
+            solver = self.solver
+            length = float(solver.t - solver.t_old)
+            solver.lost = solver.lost + self.shaken.error(solver.t, solver.y, length, steps)
 
     @property
     def is_whole(self) -> bool:

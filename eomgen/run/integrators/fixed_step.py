@@ -11,6 +11,7 @@ from eomgen.run.integrators.equal_strides import EqualStrides, advances_of
 from eomgen.run.integrators.interface import Advance, Change, Resume, Stability
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.shaking import EVERY, Shaken
 
 
 def count_steps(span: float, dt: float) -> float:
@@ -59,17 +60,22 @@ def advances(
     monitor = StabilityMonitor(change, stability)
     recorded = monitor.recording(problem) if checked else problem
     strides = EqualStrides(compiled, t_start, t_end, dt) if compiled else None
+    seed = problem.scrutiny.seed if problem.scrutiny else None
+    shaken = None if seed is None else Shaken(problem.derivative, seed)
     i = first - 1
     while i < steps:
         if strides and i >= first:
             given = (monitor if checked else None), problem
-            stride = strides.made(i, steps, t, y, lost, *given)
+            last = min(steps, i + 1 + EVERY) if shaken else steps
+            stride = strides.made(i, last, t, y, lost, *given)
             if stride:
                 shorter = partial(_shorter, change, problem)
                 how = (problem, (t, y), shorter, _continuation, each)
                 yield from advances_of(stride, i, every, *how)
                 i += len(stride.ends)
                 t, y, lost = float(stride.ends[-1]), stride.states[-1], stride.losses[-1]
+                if shaken:
+                    lost = lost + shaken.error(t, y, dt, len(stride.ends))
                 continue
         i += 1
         # From the start each time: a sum of steps would accumulate rounding errors.
@@ -86,6 +92,8 @@ def advances(
         y, lost = _sum(y, step + lost)
         y = problem.projected(end, y)
         t, regular = end, True
+        if shaken:
+            lost = lost + shaken.error(t, y, length, 1)
         samples = [(t, y)] if i == steps or i % every == 0 else []
         continuation = partial(_continuation, mark, y, lost) if whole else None
         yield Advance(t, y, samples, problem, within, resume=continuation)

@@ -9,7 +9,7 @@ import numpy as np
 
 from eomgen.run.branches import BranchMonitor
 from eomgen.run.compiled import Margins, Steps, Stride, Watched
-from eomgen.run.integrators.closed_strides import MOST, kept_closed
+from eomgen.run.integrators.closed_strides import FEWER, MORE, MOST, kept_closed
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import PROJECTS, constrained_by
@@ -76,18 +76,21 @@ class Strides:
         steps = self._steps(self._method.compiled, self._needed)
         if steps is None:
             return None
+        if stepper.branches and stepper.branches.features and not hasattr(stepper.solver, "f"):
+            return None
         if self._unusual:  # the last stride ended before a step that Python must make
             self._unusual = False
             return None
         solver, branches, most = stepper.solver, stepper.branches, min(most, self._most)
-        watched = branches.watched(solver.t, solver.h_abs, most) if branches else None
+        until = stepper.until
+        watched = branches.watched(solver.t, solver.h_abs, most, until) if branches else None
         if branches and not watched:
             return None
         stride = steps(
             solver.t,
             solver.y,
             _Memory(solver, self._method.memory),
-            t_end=stepper.until,
+            t_end=until,
             rtol=self._bounds.rtol,
             atol=self._atol,
             longest=stepper.longest,
@@ -101,23 +104,38 @@ class Strides:
         count = len(stride.ends)
         if not count:
             return None
+        if branches and branches.features and not self._passes_nothing(branches, solver, stride):
+            return None
         kept, self._most = kept_closed(self._problem, solver.t, solver.y, stride, self._most)
         if kept is None:
             return None
         stride = kept
         self._unusual = not stride.usual
         self._start, self._longest, self._watched = solver.t, stepper.longest, watched
-        self._until = stepper.until if stepper.until < stepper.t_end else np.inf
+        self._until = until if until < stepper.t_end else np.inf
         solver.t_old = float(stride.ends[-2]) if count > 1 else solver.t
         solver.t, solver.y = float(stride.ends[-1]), stride.states[-1].copy()
         for name, values in stride.memory.items():
             last = values[-1]
             setattr(solver, name, last.copy() if last.ndim else float(last))
         if branches and watched:
+            if self._problem.switching and self._problem.switching.of_state:
+                branches.passed(stride.ends, stride.values, stride.switched)
             branches.restore(_checks(watched, stride, count - 1))
         if stride.ended:
             solver.status = "finished"
         return stride
+
+    def _passes_nothing(self, branches: BranchMonitor, solver: Any, stride: Stride) -> bool:
+        """Whether steps pass over nothing; else Python makes the next one, and then fewer are made
+        at once.
+        """
+        t = np.concatenate(([solver.t], stride.ends))
+        y = np.concatenate((solver.y[None], stride.states))
+        slopes = np.concatenate((solver.f[None], stride.memory["f"]))
+        passes = branches.tame(t, y, slopes)
+        self._most = min(MOST, MORE * self._most) if passes else max(1, self._most // FEWER)
+        return passes
 
     def advances(
         self, stride: Stride, sampled: int, resumes: bool, each: bool

@@ -40,7 +40,7 @@ def within(
         raise RunError(f"--budget: {budget:g} s is not a computing time; give e.g. 2s")
     search = Search(case, say, FIRST, budget)
     names = race(search, asked, False)
-    while search.runs:
+    while search.runs and not search.slides:
         judged = search.judged()
         best = min(search.runs, key=lambda run: judged[id(run)])
         left = (budget - search.spent) / search.unit

@@ -3,12 +3,13 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from eomgen.run.noise import Fast, fast
 from eomgen.run.problem import FloatArray
+from eomgen.run.sliding import SLIDES
 from eomgen.study.accuracy.estimate import (
     Estimate,
     by_looser_run,
@@ -27,6 +28,8 @@ FITS = 0.2
 """A run is made again if its absolute tolerance should have been below this part of what it was."""
 SAMPLES = 2
 """Number of further runs that show the effect of rounding, where it matters."""
+SHORTER = 16
+"""How many times shorter steps are in a run that looks between those of another."""
 UNIT = 1e-6
 """Time that a unit of work is assumed to take before the first run, s."""
 
@@ -88,6 +91,7 @@ class Search:
     pilots    finished runs that only helped to set up others
     second    runs that estimate another's error, by the `id` of that run
     samples   by the same key, runs with other perturbations of the constants
+    shorter   by the same key, runs with shorter steps
     left_out  methods that are not continued for now
     """
 
@@ -100,6 +104,7 @@ class Search:
     pilots: list[Tried] = field(default_factory=list)
     second: dict[int, Tried] = field(default_factory=dict)
     samples: dict[int, list[Tried]] = field(default_factory=dict)
+    shorter: dict[int, Tried] = field(default_factory=dict)
     left_out: set[str] = field(default_factory=set)
     started: float = field(default_factory=_now)
     _fast: dict[int, Fast] = field(default_factory=dict)
@@ -114,7 +119,13 @@ class Search:
     def made(self) -> list[Tried]:
         """All runs made so far."""
         samples = [run for runs in self.samples.values() for run in runs]
-        return [*self.runs, *self.broken, *self.pilots, *self.second.values(), *samples]
+        more = (*self.second.values(), *self.shorter.values())
+        return [*self.runs, *self.broken, *self.pilots, *more, *samples]
+
+    @property
+    def slides(self) -> bool:
+        """Whether a run ended in a sliding mode: then all do, and tighter ones take longer."""
+        return any(run.trajectory.outcome.reason.startswith(SLIDES) for run in self.broken)
 
     @property
     def unit(self) -> float:
@@ -124,8 +135,8 @@ class Search:
 
     @property
     def tightest_run(self) -> Tried | None:
-        """The run with the tightest tolerance so far; None if there is none."""
-        known = self.runs or [run for run in self.pilots if run.trajectory.finished]
+        """The run with the tightest tolerance, of pilots the latest; None if there is none."""
+        known = self.runs or [run for run in self.pilots[::-1] if run.trajectory.finished]
         return min(known, key=lambda run: (run.setting.dt is not None, run.tolerance), default=None)
 
     @property
@@ -196,7 +207,8 @@ class Search:
 
     def misfits(self, method: Method) -> bool:
         """Whether the absolute tolerance of the last run, by this method, was too loose, because
-        the scale of the motion was not known before. Then the run becomes a pilot.
+        the scale of the motion was not known before. Then the run becomes a pilot. A tolerance that
+        stays the same is not: the next run would be the same.
         """
         run = self.runs[-1]
         if run.setting.atol is None:
@@ -206,6 +218,9 @@ class Search:
         if again.atol > FITS * run.setting.atol:
             return False
         self.pilots.append(self.runs.pop())
+        if self.setting(method, run.tolerance) == run.setting:
+            self.runs.append(self.pilots.pop())
+            return False
         return True
 
     def make(self, plan: Plan, most: float = math.inf) -> bool:
@@ -225,6 +240,22 @@ class Search:
         """Make further runs that show the effect of rounding on a run."""
         seeds = range(1, 1 + SAMPLES) if self.case.moved is not None else ()
         self.samples[id(run)] = [self._moved(self.case, run.setting, seed) for seed in seeds]
+
+    def may_miss(self, run: Tried) -> bool:
+        """Whether a run may have passed over something between its steps, which its method cannot
+        repeat.
+        """
+        problem = self.case.problem
+        if run.setting.dt is None or problem.scrutiny is None or id(run) in self.shorter:
+            return False
+        return problem.corners or problem.scrutiny.localised is not None
+
+    def shorten(self, run: Tried) -> None:
+        """Make a run with `SHORTER` times shorter steps."""
+        assert run.setting.dt is not None
+        setting = replace(run.setting, dt=run.setting.dt / SHORTER)
+        self.say(f"{setting.options}, for what may lie between longer steps")
+        self.shorter[id(run)] = self._moved(self.case, setting, 0)
 
     @property
     def disturbed(self) -> float:
@@ -259,6 +290,8 @@ class Search:
         own = self.of(run.setting.integrator)
         others = [other for other in own if other.tolerance > run.tolerance]
         samples = self.samples.get(id(run), [])
+        if id(run) in self.shorter:
+            samples = [*samples, self.shorter[id(run)]]
         return by_looser_run(self.case, run, self.second[id(run)], others, samples, self.scale)
 
     def rounded(self, run: Tried) -> float:

@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -218,6 +218,8 @@ class Case:
         follow  called with time and state after each step; may end the run
         """
         problem = self.problem if moved is None or not self.moved else self.moved(moved)
+        if moved is not None and self.problem.scrutiny:
+            problem = replace(problem, scrutiny=replace(self.problem.scrutiny, seed=moved))
         spent = meter(problem, setting.integrator)
         pace = _Pace(spent, most, due, self.t_end, like)
         tally = Tally(pace.check, follow)
