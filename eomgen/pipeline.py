@@ -30,7 +30,7 @@ from eomgen.scene.schema import Scene
 @dataclass(frozen=True)
 class Generated:
     """What a model is compiled to: a Python module, its program with the interface, what passes
-    saved, why its route was taken, and what the report must say of it.
+    saved, why its route was taken, what the report must say of it, and `Choice.digits`.
     """
 
     module: str
@@ -39,6 +39,7 @@ class Generated:
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
+    digits: int | None
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,7 @@ def render(compiled: Compiled) -> Generated:
         compiled.system.reports,
         tuple(compiled.explanation()),
         tuple(compiled.choice.notices()),
+        compiled.choice.digits,
     )
 
 

@@ -44,6 +44,8 @@ class Module:
     others       contents of further files of the backend, by name
     library      sources of its shared library by name, if it is to be compiled and loaded
     reference    source of the Python module that a compiled one falls back on; "" without one
+    digits       how many of 16 digits of accelerations are right at the worst of some states; None
+                 if at least ten
     """
 
     name: str
@@ -56,6 +58,7 @@ class Module:
     others: Mapping[str, str] = field(default_factory=dict)
     library: Mapping[str, str] = field(default_factory=dict, compare=False)
     reference: str = field(default="", compare=False)
+    digits: int | None = None
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
         """Write the file, and further files beside it, each atomically.

@@ -86,6 +86,7 @@ class Code:
     reports: tuple[PassReport, ...]
     explanation: tuple[str, ...]
     notices: tuple[str, ...]
+    digits: int | None
     derived: bool
     notice: str = ""
 
@@ -104,7 +105,7 @@ def generated_code(model: Model, *, anew: bool = False) -> Code:
     from eomgen.pipeline import generate
 
     new = generate(model)
-    code = Code(new.module, new.reports, new.explanation, new.notices, derived=True)
+    code = Code(new.module, new.reports, new.explanation, new.notices, new.digits, derived=True)
     if entries is None:
         return replace(code, notice="no store: there is no home folder; name one in EOMGEN_CACHE")
     trouble = entries.put(key, _content(code))
@@ -228,13 +229,13 @@ def _program_key(key: str) -> str:
 def _content(code: Code) -> bytes:
     """The bytes of an entry for code."""
     reports = [astuple(report) for report in code.reports]
-    return json.dumps([code.module, reports, code.explanation, code.notices]).encode()
+    return json.dumps([code.module, reports, code.explanation, code.notices, code.digits]).encode()
 
 
 def _code(content: bytes | None) -> Code | None:
     """The code of an entry that `_content` wrote; None for any other bytes."""
     try:
-        module, reports, explanation, notices = json.loads(content or b"")
+        module, reports, explanation, notices, digits = json.loads(content or b"")
         passes = tuple(PassReport(*report) for report in reports)
         texts = [module, *explanation, *notices, *(report.name for report in passes)]
         "".join(texts).encode()  # fails for lone surrogates
@@ -242,9 +243,10 @@ def _code(content: bytes | None) -> Code | None:
         return None
     counts = [getattr(r, f.name) for r in passes for f in fields(r) if f.name != "name"]
     lists = all(type(part) is list for part in (reports, explanation, notices))
+    counts += [] if digits is None else [digits]
     if not (lists and all(type(n) is int for n in counts)):
         return None
-    return Code(module, passes, tuple(explanation), tuple(notices), derived=False)
+    return Code(module, passes, tuple(explanation), tuple(notices), digits, derived=False)
 
 
 def key_of(model: Model) -> str:

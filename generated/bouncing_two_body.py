@@ -32,7 +32,7 @@ Rigid contacts, each with the unit of its gap and its effect:
     ground_elbow  m  ground
     ground_end_B  m  ground
 
-One call of `derivative` takes 87 operations: 14 add, 18 sub, 41 mul, 9 div, 1 neg, 2 sin, 2 cos; 3
+One call of `derivative` takes 45 operations: 10 add, 3 sub, 24 mul, 1 div, 1 neg, 3 sin, 3 cos; 35
 more depend on parameters alone and are done once.
 
 `p` is None (the scene's values), a mapping by name, or an array in the order of PARAMETERS; `u` is
@@ -116,12 +116,12 @@ CONTACTS = {
 }
 COST = {
     "initial_state": {"total": 0, "parameters": 0},
-    "derivative": {"add": 14, "sub": 18, "mul": 41, "div": 9, "neg": 1, "sin": 2, "cos": 2, "total": 87, "parameters": 3},
-    "jacobian": {"add": 70, "sub": 76, "mul": 147, "div": 29, "neg": 2, "sin": 2, "cos": 2, "total": 328, "parameters": 6},
+    "derivative": {"add": 10, "sub": 3, "mul": 24, "div": 1, "neg": 1, "sin": 3, "cos": 3, "total": 45, "parameters": 35},
+    "jacobian": {"add": 24, "sub": 13, "mul": 69, "div": 4, "neg": 3, "sin": 3, "cos": 3, "total": 119, "parameters": 36},
     "gaps": {"add": 3, "sub": 4, "mul": 2, "sin": 2, "total": 11, "parameters": 1},
     "gap_rates": {"add": 4, "sub": 1, "mul": 4, "cos": 2, "total": 11, "parameters": 1},
     "impact": {"add": 40, "sub": 38, "mul": 90, "div": 17, "neg": 1, "sin": 2, "cos": 2, "sqrt": 1, "max": 6, "select": 1, "total": 198, "parameters": 4},
-    "held": {"add": 33, "sub": 40, "mul": 78, "div": 12, "sin": 2, "cos": 2, "sqrt": 3, "max": 3, "total": 173, "parameters": 5},
+    "held": {"add": 31, "sub": 27, "mul": 72, "div": 4, "sin": 3, "cos": 3, "sqrt": 3, "max": 3, "total": 146, "parameters": 38},
 }
 
 
@@ -152,21 +152,42 @@ def _fixed(m_A, I_A, m_B, I_B, l_A, l_B, g, ground_radius, ground_restitution, g
         return "mass of B is not positive"
     if not I_B >= 0.0:
         return "inertia_com of B is negative"
+    if not m_A > 0.0:
+        return "mass of A is not positive"
+    if not I_A > 0.0:
+        return "inertia_com of A is not positive"
+    if not m_B > 0.0:
+        return "mass of B is not positive"
+    if not I_B >= 0.0:
+        return "inertia_com of B is negative"
+    mass_A = m_A + m_B
+    l_B_squared = l_B * l_B
+    k10 = m_A * m_B
+    k11 = l_B_squared * k10
+    k1 = l_B * (l_A * k10) / mass_A
+    k12 = k11 + I_B * mass_A
+    k13 = m_A * I_A
+    l_A_squared = l_A * l_A
+    k14 = l_A_squared * (I_B * k10) + (l_B_squared * (m_B * k13) + I_B * (k13 + I_A * m_B))
+    k2 = k14 / k12
+    k3 = m_B * m_B * (m_A * m_A * (l_B_squared * l_A_squared)) / (mass_A * k12)
+    k4 = 1.0 / (I_B + k11 / mass_A)
+    k5 = m_B * l_A / mass_A
     moment_B_x = m_B * l_B
+    k6 = moment_B_x / mass_A
+    k7 = k3 * 2.0
+    k8 = l_B + l_B
     inertia_B_zz = I_B + l_B * moment_B_x
-    k1 = m_A + m_B
-    k2 = m_B * l_A
-    k3 = I_A + inertia_B_zz
-    k4 = l_B + l_B
     ground_slip_speed_squared = ground_slip_speed * ground_slip_speed
+    k9 = 1.0 / mass_A
     return {
         "initial_state": (),
-        "derivative": (m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz),
-        "jacobian": (m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, k1, k2, k3),
-        "gaps": (l_A, ground_radius, k4),
-        "gap_rates": (l_A, k4),
-        "impact": (m_A, I_A, m_B, l_A, moment_B_x, inertia_B_zz, ground_radius, k4, ground_restitution, ground_friction),
-        "held": (m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, ground_radius, k4, ground_friction, ground_slip_speed_squared),
+        "derivative": (g, k1, k2, k3, k4, k5, k6),
+        "jacobian": (k1, k2, k3, k4, k5, k6, k7),
+        "gaps": (l_A, ground_radius, k8),
+        "gap_rates": (l_A, k8),
+        "impact": (m_A, I_A, m_B, l_A, moment_B_x, ground_radius, k8, ground_restitution, ground_friction, inertia_B_zz),
+        "held": (l_A, g, k1, k2, k3, k4, k5, k6, ground_radius, k8, ground_friction, ground_slip_speed_squared, k9),
     }
 
 
@@ -219,162 +240,78 @@ def _initial_state(y, k, u=(), extra=()):
     )
 
 
-def _derivative(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """87 operations: 14 add, 18 sub, 41 mul, 9 div, 1 neg, 2 sin, 2 cos."""
-    m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz = k
+def _derivative(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """45 operations: 10 add, 3 sub, 24 mul, 1 div, 1 neg, 3 sin, 3 cos."""
+    g, k1, k2, k3, k4, k5, k6 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     angle_B = theta + phi
-    s1 = l_A * cos(theta)
-    s2 = l_A * sin(theta)
-    s3 = moment_B_x * cos(angle_B)
-    s4 = moment_B_x * sin(angle_B)
-    omega_B_z = theta_dot + phi_dot
+    sin_angle_B = sin(angle_B)
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s5 = s1 * theta_dot_squared
-    s6 = s2 * theta_dot_squared
-    omega_B_z_squared = omega_B_z * omega_B_z
-    s7 = s4 / inertia_B_zz
-    s8 = s3 / inertia_B_zz
-    s9 = m_B - s4 * s7
-    s10 = m_B - s3 * s8
-    s11 = s3 * s7
-    s12 = s1 * s11 - s2 * s9
-    s13 = s1 * s10 - s2 * s11
-    pivot_A = I_A + (s1 * s13 - s2 * s12)
-    s14 = s12 / pivot_A
-    s15 = s13 / pivot_A
-    pivot_A_2 = m_A + s10 - s13 * s15
-    s16 = s11 - s13 * s14
-    s17 = s16 / pivot_A_2
-    s18 = s3 * s6 - s4 * s5
-    s19 = m_B * s5 + s3 * omega_B_z_squared + s7 * s18
-    s20 = s8 * s18 - (m_B * s6 + s4 * omega_B_z_squared)
-    s21 = s1 * s20 + s2 * s19
-    s22 = s15 * s21 - s20
-    delta_A_1_x = (s19 + s14 * s21 - s17 * s22) / (m_A + s9 - s12 * s14 - s16 * s17)
-    delta_A_2_y = s22 / pivot_A_2 - s17 * delta_A_1_x
-    s23 = s21 / pivot_A + (s14 * delta_A_1_x + s15 * delta_A_2_y)
-    alpha_B_z = s18 / inertia_B_zz - (s8 * (delta_A_2_y - s1 * s23) - s7 * (delta_A_1_x + s2 * s23))
+    sin_phi = sin(phi)
+    s1 = sin_phi * k1
+    s2 = theta_dot_squared * s1
+    coupling_B_A = k1 * cos(phi)
+    sin_theta = sin(theta)
+    cos_theta = cos(theta)
+    omega_B = theta_dot + phi_dot
+    omega_B_squared = omega_B * omega_B
+    alpha_A = (k4 * (s2 * coupling_B_A) + s1 * omega_B_squared) / (k2 + sin_phi * sin_phi * k3)
+    s3 = k4 * (s2 + coupling_B_A * alpha_A)
+    s4 = k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A) + k6 * (sin_angle_B * omega_B_squared + cos_angle_B * s3)
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
         phi_dot,
-        delta_A_1_x,
-        delta_A_2_y - g,
-        -s23,
-        s23 + alpha_B_z,
+        k5 * (sin_theta * alpha_A + theta_dot_squared * cos_theta) + k6 * (cos_angle_B * omega_B_squared - sin_angle_B * s3),
+        s4 - g,
+        alpha_A,
+        -(alpha_A + s3),
     )
 
 
-def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
-    """328 operations: 70 add, 76 sub, 147 mul, 29 div, 2 neg, 2 sin, 2 cos."""
-    m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, k1, k2, k3 = k
-    _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
-    cos_theta = cos(theta)
-    sin_theta = sin(theta)
+def _jacobian(y, k, u=(), extra=(), sin=sin, cos=cos):
+    """119 operations: 24 add, 13 sub, 69 mul, 4 div, 3 neg, 3 sin, 3 cos."""
+    k1, k2, k3, k4, k5, k6, k7 = k
+    _, _, theta, phi, _, _, theta_dot, phi_dot = y
     angle_B = theta + phi
-    s1 = l_A * cos_theta
-    s2 = l_A * sin_theta
-    s3 = moment_B_x * cos(angle_B)
-    s4 = moment_B_x * sin(angle_B)
-    omega_B_z = theta_dot + phi_dot
+    sin_angle_B = sin(angle_B)
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s5 = s1 * theta_dot_squared
-    s6 = s2 * theta_dot_squared
-    omega_B_z_squared = omega_B_z * omega_B_z
-    s24 = s3 * omega_B_z_squared
-    s25 = s4 * omega_B_z_squared
-    s7 = s4 / inertia_B_zz
-    s8 = s3 / inertia_B_zz
-    s26 = s4 * s7
-    s9 = m_B - s26
-    s27 = s3 * s8
-    s10 = m_B - s27
-    s11 = s3 * s7
-    s12 = s1 * s11 - s2 * s9
-    s13 = s1 * s10 - s2 * s11
-    pivot_A = I_A + (s1 * s13 - s2 * s12)
-    s14 = s12 / pivot_A
-    s15 = s13 / pivot_A
-    pivot_A_2 = m_A + s10 - s13 * s15
-    s16 = s11 - s13 * s14
-    s17 = s16 / pivot_A_2
-    s18 = s3 * s6 - s4 * s5
-    s19 = m_B * s5 + s24 + s7 * s18
-    s20 = s8 * s18 - (m_B * s6 + s25)
-    s21 = s1 * s20 + s2 * s19
-    s22 = s15 * s21 - s20
-    delta_A_1_x = (s19 + s14 * s21 - s17 * s22) / (m_A + s9 - s12 * s14 - s16 * s17)
-    delta_A_2_y = s22 / pivot_A_2 - s17 * delta_A_1_x
-    s23 = s21 / pivot_A + (s14 * delta_A_1_x + s15 * delta_A_2_y)
-    s28 = s2 * s23
-    s29 = s1 * s23
-    alpha_B_z = s18 / inertia_B_zz - (s8 * (delta_A_2_y - s29) - s7 * (delta_A_1_x + s28))
-    phi_ddot = s23 + alpha_B_z
-    s30 = theta_dot * s2
-    velocity_B_x = x_A_dot - s30
-    velocity_B_y = y_A_dot + theta_dot * s1
-    s31 = s4 + m_B * s2
-    s32 = s3 + m_B * s1
-    s33 = inertia_B_zz + (s2 * s4 + s1 * s3)
-    s34 = s33 / inertia_B_zz
-    pivot_theta_dot = s1 * (s3 + s32) + s2 * (s4 + s31) + k3 - s33 * s34
-    s35 = s32 - s3 * s34
-    s36 = s4 * s34 - s31
-    s37 = s35 / pivot_theta_dot
-    s38 = s36 / pivot_theta_dot
-    pivot_y_A_dot = k1 - s27 - s35 * s37
-    s39 = s4 * s8 - s36 * s37
-    s40 = s39 / pivot_y_A_dot
-    pivot_x_A_dot = k1 - s26 - s36 * s38 - s39 * s40
-    a_A_2_y = g + (delta_A_2_y - g)
-    s41 = cos_theta * k2
-    s42 = sin_theta * k2
-    s43 = s3 + s41
-    s44 = s4 + s42
-    s45 = s4 * (s23 - phi_ddot)
-    s46 = s45 - s24
-    s47 = s3 * (phi_ddot - s23)
-    s48 = s47 - s25
-    s49 = s4 * omega_B_z
-    s50 = s3 * omega_B_z
-    s51 = s3 * velocity_B_x + s4 * velocity_B_y
-    s52 = y_A_dot + y_A_dot
-    s53 = x_A_dot + x_A_dot
-    s54 = theta_dot * velocity_B_y
-    s55 = s30 - x_A_dot
-    s56 = 2.0 * s51
-    s57 = s3 * (s54 - (delta_A_1_x + (s28 - s5) + s54))
-    s58 = s4 * (a_A_2_y - (s6 + s29) - theta_dot * (velocity_B_x + s55))
-    s59 = 2.0 * s50
-    s60 = 2.0 * s49
-    s61 = s56 + (s3 * (s55 + s55) - s4 * (velocity_B_y + velocity_B_y))
-    s62 = s4 * a_A_2_y + s3 * delta_A_1_x
-    s63 = delta_A_1_x * s43 + a_A_2_y * s44 - s34 * s62
-    s64 = s23 * s42 - theta_dot_squared * s41 + s46 + s8 * s62 + s37 * s63
-    s65 = s48 - (s23 * s41 + theta_dot_squared * s42) + s7 * s62 - s38 * s63 + s40 * s64
-    s66 = s65 / pivot_x_A_dot
-    s67 = s64 / pivot_y_A_dot + s40 * s66
-    s68 = s63 / pivot_theta_dot + s37 * s67 - s38 * s66
-    s69 = s58 - s57
-    s70 = s57 - s58 + (s1 * s46 - s2 * (s25 - s47)) + s34 * s69
-    s71 = s24 - s45 - s8 * s69 + s37 * s70
-    s72 = (s48 + s7 * s69 + s38 * s70 - s40 * s71) / pivot_x_A_dot
-    s73 = s71 / pivot_y_A_dot - s40 * s72
-    s74 = s70 / pivot_theta_dot + s37 * s73 + s38 * s72
-    s75 = s43 * s53 + s44 * s52 - 2.0 * (x_A_dot * s41 + y_A_dot * s42 + (s51 + (s2 * s50 - s1 * s49)))
-    s76 = s4 * s52 + s3 * s53 - s56
-    s77 = s75 - s34 * s76
-    s78 = 2.0 * (theta_dot * s42 + s49) - s8 * s76 - s37 * s77
-    s79 = (2.0 * (theta_dot * s41 + s50) + s7 * s76 - s38 * s77 - s40 * s78) / pivot_x_A_dot
-    s80 = s78 / pivot_y_A_dot - s40 * s79
-    s81 = s77 / pivot_theta_dot - s37 * s80 - s38 * s79
-    s82 = s34 * s61 - (s61 + (s2 * s59 - s1 * s60))
-    s83 = s60 + s8 * s61 - s37 * s82
-    s84 = (s59 - s7 * s61 - s38 * s82 - s40 * s83) / pivot_x_A_dot
-    s85 = s83 / pivot_y_A_dot - s40 * s84
-    s86 = s82 / pivot_theta_dot - s37 * s85 - s38 * s84
+    sin_phi = sin(phi)
+    s1 = sin_phi * k1
+    s2 = theta_dot_squared * s1
+    cos_phi = cos(phi)
+    coupling_B_A = k1 * cos_phi
+    pivot_A = k2 + sin_phi * sin_phi * k3
+    sin_theta = sin(theta)
+    cos_theta = cos(theta)
+    omega_B = theta_dot + phi_dot
+    omega_B_squared = omega_B * omega_B
+    s5 = cos_angle_B * omega_B_squared
+    s6 = sin_angle_B * omega_B_squared
+    s7 = coupling_B_A * k4
+    alpha_A_2 = (s2 * s7 + s1 * omega_B_squared) / pivot_A
+    s8 = k4 * (s2 + coupling_B_A * alpha_A_2)
+    s9 = sin_angle_B * s8
+    s10 = cos_angle_B * s8
+    s11 = theta_dot_squared * coupling_B_A
+    s12 = k4 * (coupling_B_A * s11 - s1 * s2) + coupling_B_A * omega_B_squared - alpha_A_2 * (sin_phi * cos_phi * k7)
+    s13 = s12 / pivot_A
+    s14 = k4 * (s11 + (coupling_B_A * s13 - s1 * alpha_A_2))
+    s15 = sin_theta * k5
+    s16 = cos_theta * k5
+    s17 = theta_dot * 2.0
+    s18 = s1 * s17
+    s19 = omega_B * 2.0
+    s20 = s1 * s19
+    s21 = (s7 * s18 + s20) / pivot_A
+    s22 = k4 * (s18 + coupling_B_A * s21)
+    s23 = cos_angle_B * s19
+    s24 = sin_angle_B * s19
+    s25 = s20 / pivot_A
+    s26 = s7 * s25
     return (
         0.0,
         0.0,
@@ -410,222 +347,207 @@ def _jacobian(y, k, u=(), extra=(), cos=cos, sin=sin):
         1.0,
         0.0,
         0.0,
-        s66,
-        s72,
+        k5 * (cos_theta * alpha_A_2 - theta_dot_squared * sin_theta) - k6 * (s6 + s10),
+        s13 * s15 - k6 * (s6 + (s10 + sin_angle_B * s14)),
         0.0,
         0.0,
-        s79,
-        s84,
+        k5 * (sin_theta * s21 + cos_theta * s17) + k6 * (s23 - sin_angle_B * s22),
+        s15 * s25 + k6 * (s23 - sin_angle_B * s26),
         0.0,
         0.0,
-        -s67,
-        s73,
+        k5 * (sin_theta * alpha_A_2 + theta_dot_squared * cos_theta) + k6 * (s5 - s9),
+        k6 * (s5 + (cos_angle_B * s14 - s9)) - s13 * s16,
         0.0,
         0.0,
-        s80,
-        s85,
+        k5 * (sin_theta * s17 - cos_theta * s21) + k6 * (s24 + cos_angle_B * s22),
+        k6 * (s24 + cos_angle_B * s26) - s16 * s25,
         0.0,
         0.0,
-        s68,
-        -s74,
+        0.0,
+        s13,
         0.0,
         0.0,
-        s81,
-        s86,
+        s21,
+        s25,
         0.0,
         0.0,
-        s62 / inertia_B_zz - s34 * s68 + s8 * s67 + s7 * s66,
-        s69 / inertia_B_zz + s34 * s74 - s8 * s73 + s7 * s72,
+        0.0,
+        -(s13 + s14),
         0.0,
         0.0,
-        s76 / inertia_B_zz - s34 * s81 - s8 * s80 + s7 * s79,
-        s7 * s84 - (s61 / inertia_B_zz + s34 * s86 + s8 * s85),
+        -(s21 + s22),
+        -(s25 + s26),
     )
 
 
 def _gaps(y, k, u=(), extra=(), sin=sin):
     """11 operations: 3 add, 4 sub, 2 mul, 2 sin."""
-    l_A, ground_radius, k4 = k
+    l_A, ground_radius, k8 = k
     _, y_A, theta, phi, _, _, _, _ = y
-    s2 = l_A * sin(theta)
-    s87 = y_A + s2
+    s27 = l_A * sin(theta)
+    s28 = y_A + s27
     return (
-        y_A - s2 - ground_radius,
-        s87 - ground_radius,
-        s87 + sin(theta + phi) * k4 - ground_radius,
+        y_A - s27 - ground_radius,
+        s28 - ground_radius,
+        s28 + sin(theta + phi) * k8 - ground_radius,
     )
 
 
 def _gap_rates(y, k, u=(), extra=(), cos=cos):
     """11 operations: 4 add, 1 sub, 4 mul, 2 cos."""
-    l_A, k4 = k
+    l_A, k8 = k
     _, _, theta, phi, _, y_A_dot, theta_dot, phi_dot = y
-    s88 = theta_dot * (l_A * cos(theta))
-    velocity_B_y = y_A_dot + s88
+    s29 = theta_dot * (l_A * cos(theta))
+    velocity_B_y = y_A_dot + s29
     return (
-        y_A_dot - s88,
+        y_A_dot - s29,
         velocity_B_y,
-        velocity_B_y + (theta_dot + phi_dot) * (cos(theta + phi) * k4),
+        velocity_B_y + (theta_dot + phi_dot) * (cos(theta + phi) * k8),
     )
 
 
-def _impact(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, select=select, sqrt=sqrt):
+def _impact(y, k, u=(), extra=(), sin=sin, cos=cos, max=max, select=select, sqrt=sqrt):
     """198 operations: 40 add, 38 sub, 90 mul, 17 div, 1 neg, 2 sin, 2 cos, 1 sqrt, 6 max, 1 select."""
-    m_A, I_A, m_B, l_A, moment_B_x, inertia_B_zz, ground_radius, k4, ground_restitution, ground_friction = k
+    m_A, I_A, m_B, l_A, moment_B_x, ground_radius, k8, ground_restitution, ground_friction, inertia_B_zz = k
     x_A, y_A, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     struck__ground_end_A, struck__ground_elbow, struck__ground_end_B, impact__bounce = extra
     angle_B = theta + phi
-    cos_angle_B = cos(angle_B)
     sin_angle_B = sin(angle_B)
-    s1 = l_A * cos(theta)
-    s2 = l_A * sin(theta)
-    s3 = moment_B_x * cos_angle_B
-    s4 = moment_B_x * sin_angle_B
-    s7 = s4 / inertia_B_zz
-    s8 = s3 / inertia_B_zz
-    s9 = m_B - s4 * s7
-    s10 = m_B - s3 * s8
-    s11 = s3 * s7
-    s12 = s1 * s11 - s2 * s9
-    s13 = s1 * s10 - s2 * s11
-    pivot_A = I_A + (s1 * s13 - s2 * s12)
-    s14 = s12 / pivot_A
-    s15 = s13 / pivot_A
-    pivot_A_2 = m_A + s10 - s13 * s15
-    s16 = s11 - s13 * s14
-    s17 = s16 / pivot_A_2
-    pivot_A_1 = m_A + s9 - s12 * s14 - s16 * s17
-    s89 = struck__ground_end_B + (struck__ground_end_A + struck__ground_elbow)
-    s90 = ground_friction * s89
-    s91 = cos_angle_B * k4 * struck__ground_end_B
-    s92 = s1 * (struck__ground_elbow - struck__ground_end_A) + (s91 + s1 * struck__ground_end_B)
-    s93 = struck__ground_elbow * (s2 - ground_radius) - struck__ground_end_A * (ground_radius + s2)
-    s94 = struck__ground_end_B * (sin_angle_B * k4 - ground_radius)
-    s95 = s93 + (s94 + s2 * struck__ground_end_B)
-    s96 = s7 * s91
-    s97 = s8 * s91
-    s98 = s92 - (s91 + (s1 * s97 + s2 * s96))
-    s99 = s89 - (s97 + s15 * s98)
-    s100 = (s14 * s98 - s96 + s17 * s99) / pivot_A_1
-    delta_A_2_y_2 = s99 / pivot_A_2 + s17 * s100
-    alpha_A_z = s98 / pivot_A - (s15 * delta_A_2_y_2 - s14 * s100)
-    alpha_B_z_2 = s91 / inertia_B_zz - (s7 * (s100 + s2 * alpha_A_z) + s8 * (delta_A_2_y_2 + s1 * alpha_A_z))
-    s101 = alpha_B_z_2 - alpha_A_z
-    s102 = s7 * s94
-    s103 = s8 * s94
-    s104 = s95 - (s94 + (s1 * s103 + s2 * s102))
-    s105 = s103 + s15 * s104
-    s106 = (s89 + (s14 * s104 - s102 - s17 * s105)) / pivot_A_1
-    delta_A_2_y_3 = s17 * s106 - s105 / pivot_A_2
-    alpha_A_z_2 = s104 / pivot_A - (s15 * delta_A_2_y_3 - s14 * s106)
-    alpha_B_z_3 = s94 / inertia_B_zz - (s7 * (s106 + s2 * alpha_A_z_2) + s8 * (delta_A_2_y_3 + s1 * alpha_A_z_2))
-    s107 = alpha_B_z_3 - alpha_A_z_2
-    s108 = s91 * s107 + (s89 * delta_A_2_y_3 + s92 * alpha_A_z_2)
-    s109 = s94 * s107 + (s89 * s106 + s95 * alpha_A_z_2)
-    s110 = max(s91 * s101 + (s89 * delta_A_2_y_2 + s92 * alpha_A_z), 1e-300)
-    s111 = (phi_dot * s91 + (y_A_dot * s89 + theta_dot * s92)) / s110
-    s112 = s111 * (1.0 + impact__bounce * (ground_restitution * s89))
-    s113 = s108 / s110
-    s114 = s109 - s108 * s113
-    s115 = (phi_dot * s94 + (theta_dot * s95 - x_A_dot * s89) - s108 * s111) / max(s114, 1e-300)
-    s116 = select(s114 - s109 * 1e-12, s115, 0.0)
-    s117 = s113 * s116
-    s118 = max(-s90 * s112, 0.0)
-    s119 = s118 / max(max(sqrt(max(s116 * s116, 1e-300)) - s90 * s117, s118), 1e-300)
-    s120 = s117 * s119 - s112
-    s121 = s116 * s119
+    cos_angle_B = cos(angle_B)
+    s27 = l_A * sin(theta)
+    s30 = l_A * cos(theta)
+    s31 = cos_angle_B * moment_B_x
+    s32 = sin_angle_B * moment_B_x
+    s33 = struck__ground_end_B + (struck__ground_end_A + struck__ground_elbow)
+    s34 = ground_friction * s33
+    s35 = cos_angle_B * k8 * struck__ground_end_B
+    s36 = s30 * (struck__ground_elbow - struck__ground_end_A) + (s35 + s30 * struck__ground_end_B)
+    s37 = struck__ground_elbow * (s27 - ground_radius) - struck__ground_end_A * (ground_radius + s27)
+    s38 = struck__ground_end_B * (sin_angle_B * k8 - ground_radius)
+    s39 = s37 + (s38 + s27 * struck__ground_end_B)
+    s40 = s32 / inertia_B_zz
+    s41 = s31 / inertia_B_zz
+    s42 = m_B - s32 * s40
+    s43 = m_B - s31 * s41
+    s44 = s31 * s40
+    s45 = s30 * s44 - s27 * s42
+    s46 = s30 * s43 - s27 * s44
+    pivot_A_2 = I_A + (s30 * s46 - s27 * s45)
+    s47 = s45 / pivot_A_2
+    s48 = s46 / pivot_A_2
+    pivot_A_2_2 = m_A + s43 - s46 * s48
+    s49 = s44 - s46 * s47
+    s50 = s49 / pivot_A_2_2
+    pivot_A_1 = m_A + s42 - s45 * s47 - s49 * s50
+    s51 = s35 * s40
+    s52 = s35 * s41
+    s53 = s36 - (s35 + (s30 * s52 + s27 * s51))
+    s54 = s33 - (s52 + s48 * s53)
+    s55 = (s47 * s53 - s51 + s50 * s54) / pivot_A_1
+    delta_A_2_y = s54 / pivot_A_2_2 + s50 * s55
+    alpha_A_z = s53 / pivot_A_2 - (s48 * delta_A_2_y - s47 * s55)
+    alpha_B_z = s35 / inertia_B_zz - (s40 * (s55 + s27 * alpha_A_z) + s41 * (delta_A_2_y + s30 * alpha_A_z))
+    s56 = alpha_B_z - alpha_A_z
+    s57 = s38 * s40
+    s58 = s38 * s41
+    s59 = s39 - (s38 + (s30 * s58 + s27 * s57))
+    s60 = s58 + s48 * s59
+    s61 = (s33 + (s47 * s59 - s57 - s50 * s60)) / pivot_A_1
+    delta_A_2_y_2 = s50 * s61 - s60 / pivot_A_2_2
+    alpha_A_z_2 = s59 / pivot_A_2 - (s48 * delta_A_2_y_2 - s47 * s61)
+    s62 = s40 * (s61 + s27 * alpha_A_z_2) + s41 * (delta_A_2_y_2 + s30 * alpha_A_z_2)
+    s63 = s38 / inertia_B_zz - s62 - alpha_A_z_2
+    s64 = s35 * s63 + (s33 * delta_A_2_y_2 + s36 * alpha_A_z_2)
+    s65 = s38 * s63 + (s33 * s61 + s39 * alpha_A_z_2)
+    s66 = max(s35 * s56 + (s33 * delta_A_2_y + s36 * alpha_A_z), 1e-300)
+    s67 = (phi_dot * s35 + (y_A_dot * s33 + theta_dot * s36)) / s66
+    s68 = s67 * (1.0 + impact__bounce * (ground_restitution * s33))
+    s69 = s64 / s66
+    s70 = s65 - s64 * s69
+    s71 = (phi_dot * s38 + (theta_dot * s39 - x_A_dot * s33) - s64 * s67) / max(s70, 1e-300)
+    s72 = select(s70 - s65 * 1e-12, s71, 0.0)
+    s73 = s69 * s72
+    s74 = max(-s34 * s68, 0.0)
+    s75 = s74 / max(max(sqrt(max(s72 * s72, 1e-300)) - s34 * s73, s74), 1e-300)
+    s76 = s73 * s75 - s68
+    s77 = s72 * s75
     return (
         x_A,
         y_A,
         theta,
         phi,
-        x_A_dot - s100 * s120 + s106 * s121,
-        y_A_dot + delta_A_2_y_2 * s120 - delta_A_2_y_3 * s121,
-        theta_dot + alpha_A_z * s120 - alpha_A_z_2 * s121,
-        phi_dot + s101 * s120 - s107 * s121,
+        x_A_dot - s55 * s76 + s61 * s77,
+        y_A_dot + delta_A_2_y * s76 - delta_A_2_y_2 * s77,
+        theta_dot + alpha_A_z * s76 - alpha_A_z_2 * s77,
+        phi_dot + s56 * s76 - s63 * s77,
     )
 
 
-def _held(y, k, u=(), extra=(), cos=cos, sin=sin, max=max, sqrt=sqrt):
-    """173 operations: 33 add, 40 sub, 78 mul, 12 div, 2 sin, 2 cos, 3 sqrt, 3 max."""
-    m_A, I_A, m_B, l_A, g, moment_B_x, inertia_B_zz, ground_radius, k4, ground_friction, ground_slip_speed_squared = k
+def _held(y, k, u=(), extra=(), sin=sin, cos=cos, max=max, sqrt=sqrt):
+    """146 operations: 31 add, 27 sub, 72 mul, 4 div, 3 sin, 3 cos, 3 sqrt, 3 max."""
+    l_A, g, k1, k2, k3, k4, k5, k6, ground_radius, k8, ground_friction, ground_slip_speed_squared, k9 = k
     _, _, theta, phi, x_A_dot, y_A_dot, theta_dot, phi_dot = y
     force__ground_end_A, force__ground_elbow, force__ground_end_B = extra
     angle_B = theta + phi
-    cos_angle_B = cos(angle_B)
     sin_angle_B = sin(angle_B)
-    s1 = l_A * cos(theta)
-    s2 = l_A * sin(theta)
-    s3 = moment_B_x * cos_angle_B
-    s4 = moment_B_x * sin_angle_B
-    omega_B_z = theta_dot + phi_dot
+    cos_angle_B = cos(angle_B)
     theta_dot_squared = theta_dot * theta_dot
-    s5 = s1 * theta_dot_squared
-    s6 = s2 * theta_dot_squared
-    omega_B_z_squared = omega_B_z * omega_B_z
-    s7 = s4 / inertia_B_zz
-    s8 = s3 / inertia_B_zz
-    s9 = m_B - s4 * s7
-    s10 = m_B - s3 * s8
-    s11 = s3 * s7
-    s12 = s1 * s11 - s2 * s9
-    s13 = s1 * s10 - s2 * s11
-    pivot_A = I_A + (s1 * s13 - s2 * s12)
-    s14 = s12 / pivot_A
-    s15 = s13 / pivot_A
-    pivot_A_2 = m_A + s10 - s13 * s15
-    s16 = s11 - s13 * s14
-    s17 = s16 / pivot_A_2
-    s30 = theta_dot * s2
-    s88 = theta_dot * s1
-    velocity_B_y = y_A_dot + s88
-    s122 = sin_angle_B * k4
-    s123 = cos_angle_B * k4
-    s124 = omega_B_z * s122
-    s125 = ground_radius * theta_dot
-    s126 = x_A_dot + s30 + s125
-    s127 = s126 * s126
-    s128 = ground_friction * force__ground_end_A / sqrt(max(s127 + ground_slip_speed_squared, 1e-300))
-    s129 = s126 * s128
-    s130 = s30 - x_A_dot - s125
-    s131 = s130 * s130
-    s132 = ground_friction * force__ground_elbow / sqrt(max(ground_slip_speed_squared + s131, 1e-300))
-    s133 = s130 * s132
-    s134 = s124 - (x_A_dot - s30) - ground_radius * omega_B_z
-    s135 = s134 * s134
-    s136 = ground_friction * force__ground_end_B / sqrt(max(ground_slip_speed_squared + s135, 1e-300))
-    s137 = s134 * s136
-    s138 = ground_radius * s133 + (s1 * force__ground_elbow - s2 * s133) - (ground_radius * s129 + (s1 * force__ground_end_A + s2 * s129))
-    s139 = ground_radius * s137 + (s123 * force__ground_end_B - s122 * s137)
-    s140 = s139 - (s4 * s5 - s3 * s6)
-    s141 = m_B * s5 + s3 * omega_B_z_squared + s7 * s140
-    s142 = s8 * s140 - (m_B * s6 + s4 * omega_B_z_squared)
-    s143 = s138 + (s139 + (s1 * force__ground_end_B - s2 * s137)) - (s139 + (s1 * s142 + s2 * s141))
-    s144 = force__ground_end_B + (force__ground_end_A + force__ground_elbow) - (s142 + s15 * s143)
-    delta_A_1_x_2 = (s137 + (s133 - s129) - (s14 * s143 - s141 + s17 * s144)) / (m_A + s9 - s12 * s14 - s16 * s17)
-    delta_A_2_y_4 = s144 / pivot_A_2 - s17 * delta_A_1_x_2
-    alpha_A_z_3 = s143 / pivot_A - (s14 * delta_A_1_x_2 + s15 * delta_A_2_y_4)
-    s145 = s1 * alpha_A_z_3
-    alpha_B_z_4 = s140 / inertia_B_zz - (s8 * (delta_A_2_y_4 + s145) - s7 * (delta_A_1_x_2 - s2 * alpha_A_z_3))
-    phi_ddot_2 = alpha_B_z_4 - alpha_A_z_3
-    y_A_ddot = delta_A_2_y_4 - g
-    s146 = s145 - theta_dot * s30
-    s147 = y_A_ddot + s146
+    sin_phi = sin(phi)
+    s1 = sin_phi * k1
+    coupling_B_A = k1 * cos(phi)
+    sin_theta = sin(theta)
+    cos_theta = cos(theta)
+    omega_B = theta_dot + phi_dot
+    omega_B_squared = omega_B * omega_B
+    s27 = l_A * sin_theta
+    s78 = sin_angle_B * k8
+    s30 = l_A * cos_theta
+    s79 = cos_angle_B * k8
+    s29 = theta_dot * s30
+    velocity_B_y = y_A_dot + s29
+    s80 = theta_dot * s27
+    s81 = omega_B * s78
+    s82 = ground_radius * theta_dot
+    s83 = x_A_dot + s80 + s82
+    s84 = s83 * s83
+    s85 = ground_friction * force__ground_end_A / sqrt(max(s84 + ground_slip_speed_squared, 1e-300))
+    s86 = s83 * s85
+    s87 = s80 - x_A_dot - s82
+    s88 = s87 * s87
+    s89 = ground_friction * force__ground_elbow / sqrt(max(ground_slip_speed_squared + s88, 1e-300))
+    s90 = s87 * s89
+    s91 = s81 - (x_A_dot - s80) - ground_radius * omega_B
+    s92 = s91 * s91
+    s93 = ground_friction * force__ground_end_B / sqrt(max(ground_slip_speed_squared + s92, 1e-300))
+    s94 = s91 * s93
+    s95 = ground_radius * s90 + (s30 * force__ground_elbow - s27 * s90) - (ground_radius * s86 + (s30 * force__ground_end_A + s27 * s86))
+    s96 = ground_radius * s94 + (s79 * force__ground_end_B - s78 * s94)
+    s97 = s94 + (s90 - s86)
+    s98 = force__ground_end_B + (force__ground_end_A + force__ground_elbow)
+    load_B = s96 + k6 * (sin_angle_B * s97 - cos_angle_B * s98) - theta_dot_squared * s1
+    s99 = s95 + (s96 + (s30 * force__ground_end_B - s27 * s94)) + k5 * (sin_theta * s97 - cos_theta * s98)
+    alpha_A_3 = (s1 * omega_B_squared + s99 - s96 - k4 * (coupling_B_A * load_B)) / (k2 + sin_phi * sin_phi * k3)
+    alpha_B = k4 * (load_B - coupling_B_A * alpha_A_3)
+    s100 = k6 * (sin_angle_B * omega_B_squared - cos_angle_B * alpha_B) + (s98 * k9 + k5 * (theta_dot_squared * sin_theta - cos_theta * alpha_A_3))
+    ydd_A = s100 - g
+    phi_ddot = alpha_B - alpha_A_3
+    s101 = s30 * alpha_A_3 - theta_dot * s80
+    s102 = ydd_A + s101
     return (
         x_A_dot,
         y_A_dot,
         theta_dot,
         phi_dot,
-        delta_A_1_x_2,
-        y_A_ddot,
-        alpha_A_z_3,
-        phi_ddot_2,
-        y_A_ddot - s146,
-        s147,
-        s147 + (s123 * (alpha_A_z_3 + phi_ddot_2) - omega_B_z * s124),
-        force__ground_end_A * (y_A_dot - s88) - s127 * s128,
-        velocity_B_y * force__ground_elbow - s131 * s132,
-        force__ground_end_B * (velocity_B_y + omega_B_z * s123) - s135 * s136,
+        k6 * (cos_angle_B * omega_B_squared + sin_angle_B * alpha_B) + (s97 * k9 + k5 * (theta_dot_squared * cos_theta + sin_theta * alpha_A_3)),
+        ydd_A,
+        alpha_A_3,
+        phi_ddot,
+        ydd_A - s101,
+        s102,
+        s102 + (s79 * (alpha_A_3 + phi_ddot) - omega_B * s81),
+        force__ground_end_A * (y_A_dot - s29) - s84 * s85,
+        force__ground_elbow * velocity_B_y - s88 * s89,
+        force__ground_end_B * (velocity_B_y + omega_B * s79) - s92 * s93,
     )
 
 
@@ -872,12 +794,12 @@ def derivative(t, y, p=None, u=None):
                 return _from(values, _FLOAT, 8)
         except (ArithmeticError, ValueError):
             pass
-    return _evaluate(_derivative, "derivative", (8,), ('cos', 'sin'), y, p, u)
+    return _evaluate(_derivative, "derivative", (8,), ('sin', 'cos'), y, p, u)
 
 
 def jacobian(t, y, p=None, u=None):
     """Exact Jacobian of `derivative` with respect to the state."""
-    return _evaluate(_jacobian, "jacobian", (8, 8), ('cos', 'sin'), y, p, u)
+    return _evaluate(_jacobian, "jacobian", (8, 8), ('sin', 'cos'), y, p, u)
 
 
 def gaps(t, y, p=None, u=None):
@@ -900,7 +822,7 @@ def impact(t, y, contact, bounce=1.0, p=None, u=None):
         raise ValueError(f"contact is {contact}, not one of 0 to 2: {', '.join(CONTACTS)}")
     extra = [0.0] * 3 + _beside([bounce], "bounce", 1, ())
     extra[int(contact)] = 1.0
-    return _evaluate(_impact, "impact", (8,), ('cos', 'sin', 'max', 'select', 'sqrt'), y, p, u, extra)
+    return _evaluate(_impact, "impact", (8,), ('sin', 'cos', 'max', 'select', 'sqrt'), y, p, u, extra)
 
 
 def held(t, y, forces, p=None, u=None):
@@ -913,4 +835,4 @@ def held(t, y, forces, p=None, u=None):
     if forces.shape not in ((3,), (3, *y.shape[1:])):
         raise ValueError(f"forces have shape {forces.shape}, not (3,): {', '.join(CONTACTS)}")
     forces = _beside(forces, "forces", 3, y.shape[1:])
-    return _evaluate(_held, "held", (14,), ('cos', 'sin', 'max', 'sqrt'), y, p, u, forces)
+    return _evaluate(_held, "held", (14,), ('sin', 'cos', 'max', 'sqrt'), y, p, u, forces)

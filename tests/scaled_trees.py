@@ -39,7 +39,7 @@ def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Model:
     """
     while True:
         try:
-            model = elaborate(parse_scene(_scaled(seed, dimensions, decades)))
+            model = elaborate(parse_scene(scaled(seed, dimensions, decades)))
             break
         except SceneError as error:
             if "principal moments" not in str(error):
@@ -58,7 +58,7 @@ def drawn(seed: int, dimensions: int, decades: Sequence[float]) -> Model:
     return replace(model, bodies=tuple(bodies))
 
 
-def _scaled(seed: int, dimensions: int, decades: Sequence[float]) -> str:
+def scaled(seed: int, dimensions: int, decades: Sequence[float]) -> str:
     """The scene of such a tree."""
     tree, _ = random_spatial_tree(seed, dimensions, MOST_BODIES)
     factors: dict[str, float] = {}

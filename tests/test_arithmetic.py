@@ -513,12 +513,12 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_command_reports_what_is_not_there(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Another form, contacts, missing routes; and invalid options."""
+    """Another form, contacts; and invalid options."""
     other = ["--states", "3", "-o", str(tmp_path)]
     assert main(["accuracy", "bouncing_two_body", "--arithmetic", *other]) == 0
     text = " ".join(capsys.readouterr().out.split())
     assert "all rigid contacts open" in text
-    assert "closed it takes no 'contact'" in text
+    assert "chosen: closed" in text
     for wrong in (["--states", "0"], ["--seed", "-1"], ["--set", "M=1"]):
         assert main(["accuracy", "pendulum", "--arithmetic", *wrong, "-o", str(tmp_path)]) == 1
         assert capsys.readouterr().err.startswith(f"eomgen: {wrong[0]}: ")

@@ -17,7 +17,7 @@ from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 import eomgen.derivation.projected
 from eomgen.cli import main
-from eomgen.codegen.from_projected import from_projected
+from eomgen.codegen.from_closed_form import from_closed_form, of_projected
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System
@@ -113,7 +113,7 @@ def tree(seed: int, dimensions: int, most: int) -> Model:
 
 def agree(model: Model, seed: int, error: float) -> None:
     """Closed form and articulated bodies: every output of the dynamics."""
-    closed = from_projected(derive_projected(model))
+    closed = from_closed_form(of_projected(derive_projected(model)), model)
     aba = from_recursion(Recording(model, "aba"))
     given = values(model, np.random.default_rng(seed))
     for output in ("derivative", *DYNAMICS):
@@ -179,7 +179,7 @@ def scene(name: str) -> ProjectedEquations:
 def test_built_in_scenes(name: str) -> None:
     """They too, exactly; and their Jacobian."""
     equations = scene(name)
-    closed = from_projected(equations)
+    closed = from_closed_form(of_projected(equations), equations.model)
     aba = from_recursion(Recording(equations.model, "aba"))
     given = values(equations.model, np.random.default_rng(1))
     for output in ("derivative", "jacobian", *DYNAMICS):

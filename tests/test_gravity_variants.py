@@ -309,13 +309,21 @@ def test_columns_and_a_run() -> None:
 
 
 def test_plain_gravity_is_as_it_was() -> None:
-    """Downwards for all bodies needs no other key, and the closed form takes nothing else."""
-    assert quick(PLANE + effect(""), "closed").system.route == "closed"
+    """Downwards for all bodies needs no other key. The closed form takes every kind, aslant in as
+    few operations; a form with momenta takes this one only.
+    """
+    down = quick(PLANE + effect(""), "closed").system
     assert quick(PLANE + effect("except_bodies = []")).source == quick(PLANE + effect("")).source
-    for more in ("direction = [0, -1]", 'except_bodies = ["upper"]'):
-        assert quick(PLANE + effect(more)).system.route != "closed"
-        with pytest.raises(SceneError, match="closed form, and it takes no 'gravity'"):
-            compile_scene(parse_scene('route = "closed"\n' + PLANE + effect(more)))
+    aslant = quick(PLANE + effect("direction = [3, -4]"), "closed").system
+    assert aslant.program.operations["derivative"] <= down.program.operations["derivative"] + 4
+    for more in ("direction = [3, -4]", 'except_bodies = ["upper"]'):
+        closed, aba = (quick(PLANE + effect(more), route).module for route in ("closed", "aba"))
+        y = closed.initial_state() + 0.3
+        for name in ("derivative", "potential_energy", "gravity_force", "applied_force"):
+            found, right = getattr(closed, name)(0.0, y), getattr(aba, name)(0.0, y)
+            np.testing.assert_allclose(found, right, rtol=1e-12, atol=1e-12, err_msg=name)
+        with pytest.raises(SceneError, match="and in momenta it takes no 'gravity'"):
+            compile_scene(parse_scene('form = "redundant"\n' + PLANE + effect(more)))
 
 
 MISTAKES = [

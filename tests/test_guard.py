@@ -79,7 +79,7 @@ def test_a_run_that_loses_digits_is_stopped_and_says_what_to_do(route: str) -> N
     assert not stopped.finished and stopped.t[-1] == 0.0
     assert stopped.message.startswith("stopped at t = 0, link_joint_1_angle=0.3")
     assert f"(relative error {lost:.2g}, allowed 1e-08)" in stopped.message
-    assert "take --route orthogonal, or --guard repair" in stopped.message
+    assert "take --guard repair, or --route orthogonal if" in stopped.message
 
 
 def test_a_repaired_run_is_right() -> None:

@@ -17,7 +17,6 @@ from striking import (
 )
 
 from eomgen.codegen import jacobians
-from eomgen.errors import SceneError
 
 FREE = """\
 [[bodies]]
@@ -599,11 +598,16 @@ def test_absence_is_free() -> None:
         assert lacks not in getattr(bare.module, name).__doc__
 
 
-def test_no_closed_form() -> None:
-    """The closed routes refuse; auto takes a recursion."""
-    with pytest.raises(SceneError, match="it takes no 'balls' that depends on the motion"):
-        striking(TWIN, WALL, route="closed")
-    assert striking(TWIN, WALL).system.route in ("aba", "ldl")
+def test_closed_form_with_contacts() -> None:
+    """Contacts add nothing to v̇ and keep the closed form: the same impact, the same held motion."""
+    closed, ldl = (striking(TWIN, WALL, route=route) for route in ("auto", "ldl"))
+    assert closed.system.route == "closed"
+    one, other = closed.module, ldl.module
+    y = closed.random_state(np.random.default_rng(10))
+    given: dict[str, Any] = {"derivative": (), "gap_rates": (), "impact": (1,), "held": ([3, 2],)}
+    for name, more in given.items():
+        found, right = getattr(one, name)(0.1, y, *more), getattr(other, name)(0.1, y, *more)
+        np.testing.assert_allclose(found, right, rtol=1e-12, atol=1e-12, err_msg=name)
 
 
 def test_kernels_grow_with_the_model(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """How many operations programs take, beside work by hand."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,69 @@ AT_THE_JOINT = {
     "joint_friction": "viscous = 0.1",
     "joint_spring": "stiffness = 2.0\nrest = 0.3",
 }
+ARM = (BUILT_IN / "chain.toml").read_text("utf-8").replace("count = 10", "count = 2")
+OF_TIME = 'type = "external_{0}"\nname = "pull"\nbody = "link_2"\n{0} = {1}\n'
+HOLD = 'type = "controller"\nname = "hold"\nstates = {{ z = {{ rate = "link_joint_2_angle" }} }}\n'
+HOLD += "torques = {{ {} }}\n"
+TOUCH = 'type = "contact"\nname = "floor"\nlaw = "{}"\nbodies = ["{}"]\nradius = 0.01\n'
+ON_ARM = {  # what an effect adds to the 28 operations of the arm, by hand
+    "contact": (TOUCH.format("impact", "link_2") + "offset = -1.0\nrestitution = 0.5\n", 0),
+    "stop": (
+        'type = "joint_stop"\njoint = "link_joint_2"\nhigh = 1.0\nrestitution = 0.5\nname = "s"\n',
+        0,
+    ),
+    "state": (HOLD.format('link_joint_1 = "0"'), 0),
+    "controller": (HOLD.format('link_joint_2 = "-z"'), 2),
+    "shoulder": (HOLD.format('link_joint_1 = "-2*z"'), 2),
+    "torque": (OF_TIME.format("torque", '"sin(t)"'), 2),
+    # Three sines, and for each link two products and a sum.
+    "force": (OF_TIME.format("force", '["2*sin(t)", 0]') + "at = [0.1, 0]\n", 9),
+}
+EVERY = """
+[[effects]]
+type = "spring"
+name = "rope"
+body_1 = "world"
+body_2 = "{1}"
+at_2 = {2}
+stiffness = 9.0
+damping = 0.3
+tension_only = true
+[[effects]]
+type = "drag"
+name = "air"
+bodies = ["{0}", "{1}"]
+linear = 0.2
+[[effects]]
+type = "external_force"
+name = "jet"
+body = "{1}"
+axes = "body"
+at = {2}
+force = ["2*sin(3*t)", "{3}"]
+[[effects]]
+type = "controller"
+name = "hold"
+states = {{ z = {{ initial = 0.2, rate = "{3}" }} }}
+torques = {{ {4} = "-3*z" }}
+[[effects]]
+type = "contact"
+name = "soft"
+law = "spring_damper"
+bodies = ["{0}", "{1}"]
+radius = 5.0
+stiffness = 60.0
+friction = 0.3
+slip_speed = 0.1
+[[effects]]
+type = "contact"
+name = "hard"
+law = "impact"
+bodies = ["{0}", "{1}"]
+radius = 0.2
+offset = -3.0
+restitution = 0.6
+"""
 LOADS = (
     *(f'type = "{kind}"\n{rest}' for kind, rest in AT_THE_JOINT.items()),
     'type = "joint_friction"\ncoulomb = 0.1\nspeed = 0.01',
@@ -70,6 +134,40 @@ def test_a_load_at_a_joint_adds_four_operations(name: str, joint: str) -> None:
     alone = operations((BUILT_IN / f"{name}.toml").read_text("utf-8"))
     for kind, values in AT_THE_JOINT.items():
         assert operations(loaded(name, joint, f'type = "{kind}"\n{values}')) <= alone + 4, kind
+
+
+@pytest.mark.parametrize("what", ON_ARM)
+def test_an_effect_costs_its_own_terms_and_no_route(what: str) -> None:
+    """Contacts and states add no term to v̇, and a load adds those that it has by hand."""
+    table, more = ON_ARM[what]
+    found = compile_program(model_of(f"{ARM}\n[[effects]]\n{table}"), jacobian=False)
+    assert (found.system.route, found.operations) == ("closed", 28 + more)
+
+
+@pytest.mark.parametrize(
+    ("name", "names"),
+    [
+        ("two_body", ("A", "B", "[0.1, -0.2]", "phi", "hinge")),
+        ("cart_pole", ("cart", "pole", "[0.1, -0.2]", "theta", "pin")),
+    ],
+)
+def test_closed_takes_every_effect(name: str, names: tuple[str, ...]) -> None:
+    """Loads of bodies, states and contacts at once, by both derivations, as by articulated
+    bodies.
+    """
+    text = (BUILT_IN / f"{name}.toml").read_text("utf-8") + EVERY.format(*names)
+    text = text.replace('type = "gravity"', 'type = "gravity"\ndirection = [3, -4]')
+    closed, aba = (
+        eomgen.load(eomgen.generate(parse_scene(text), route=route)) for route in ("closed", "aba")
+    )
+    y = closed.initial_state() + np.linspace(0.1, 0.4, len(closed.STATES))
+    given: dict[str, Any] = {"held": ([3.0, 2.0],), "impact": (1,)}
+    names = ("derivative", "jacobian", "applied_force", "joint_forces", "potential_energy")
+    for output in (*names, "effect_powers", "gap_rates", *given):
+        one, other = (
+            getattr(module, output)(0.3, y, *given.get(output, ())) for module in (closed, aba)
+        )
+        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-11, err_msg=output)
 
 
 @pytest.mark.every(2)

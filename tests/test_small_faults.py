@@ -48,12 +48,14 @@ def test_all_outputs_in_a_list() -> None:
          "which 'motor' does not act on; name a joint that moves and is not free"),
         ('child = "rod"', 'child = "world"', "joints[0].child: 'world' is the ground, which has "
          "no parent; name it as the parent, or give the joint loop = true if it closes a loop"),
-        ("g = 9.81 }", 'g = 9.81, direction = [1, -1] }', "route: 'closed' needs the closed form, "
-         "and it takes no 'gravity' with its own direction ('gravity'); leave it out"),
+        ("g = 9.81 }", 'g = 9.81, direction = [1, -1] }', "form: 'redundant' needs the closed "
+         "form, and in momenta it takes no 'gravity' with its own direction ('gravity'); leave it "
+         "out"),
     ],
 )  # fmt: skip
 def test_refusals_say_what_is_wrong(old: str, new: str, message: str) -> None:
-    text = POLE.replace(old, new).replace('name = "pole"', 'name = "pole"\nroute = "closed"')
+    form = "redundant" if "redundant" in message else "velocity"
+    text = POLE.replace(old, new).replace('name = "pole"', f'name = "pole"\nform = "{form}"')
     if "motor" in message:
         text = text.replace(", r_child = [-0.5, 0]", "").replace(
             "9.81 }", '9.81 }, { type = "motor", name = "drive", joint = "pivot", torque = 1 }'

@@ -86,6 +86,7 @@ def module_of(code: Code, model: Model) -> Module:
         code.notices,
         code.reports,
         code.derived,
+        digits=code.digits,
     )
 
 

@@ -14,7 +14,7 @@ from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, origin_from, split
 from eomgen.model.elaborate import expanded
 from eomgen.model.model import Model
-from eomgen.results import Run
+from eomgen.results import Module, Run
 from eomgen.run.inputs import ModuleWithInputs, with_corners
 from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.problem import Problem
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from eomgen.run.works import Powers
     from eomgen.study.accuracy.search import Choice
     from eomgen.study.accuracy.trial import Case, Tried
+
+WATCHED = 6
+"""Runs of a module with fewer correct digits of accelerations have a guard."""
 
 
 def simulate(
@@ -87,7 +90,8 @@ def simulate(
     save        what to save beside the states: "energy", "points", "poses", "works", "inputs", or
                 outputs by name, for example "joint_forces"; see `Run.saved`
     guard       check rounding errors at each step; where digits are lost, "stop" the run or
-                "repair" the step
+                "repair" the step. By default runs stop there of scenes that may have fewer than
+                `WATCHED` digits of accelerations right, unless inputs are tables or functions
     unstable    allow steps of an explicit fixed-step method that are too long for stability
     estimate    estimate the error by a second run
     resume      continue an earlier run: a `Run`, or its archive `.npz`
@@ -178,7 +182,7 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         "samples": plan.samples,
         "max_step": plan.max_step,
         "rest_speed": plan.scene.simulation.rest_speed,
-        "guard": _guard(plan, functions, values),
+        "guard": _guard(plan, module, functions, values),
         "unstable": plan.unstable,
     }
     problem, model = _problem(plan, model, functions, values, reporter)
@@ -335,15 +339,19 @@ def _run_case(
 
 
 def _guard(
-    plan: Plan, module: GeneratedModule, values: tuple[Mapping[str, float] | None, ...]
+    plan: Plan,
+    module: Module,
+    functions: GeneratedModule,
+    values: tuple[Mapping[str, float] | None, ...],
 ) -> "Guard | None":
-    """The guard against rounding errors, if the plan has one."""
-    if plan.guard is None:
+    """The guard against rounding errors, if the plan has one, or if few digits are right."""
+    few = module.digits is not None and module.digits < WATCHED and not plan.varying
+    if plan.guard is None and not few:
         return None
     from eomgen.precision.guarding import guard_of
     from eomgen.store import program_of
 
-    return guard_of(module, program_of(plan.model), *values, repairs=plan.guard == "repair")
+    return guard_of(functions, program_of(plan.model), *values, repairs=plan.guard == "repair")
 
 
 def _start(plan: Plan, problem: Problem) -> "Start | None":

@@ -8,7 +8,7 @@ from eomgen.codegen.derive import Derived, derive, record
 from eomgen.derivation.supported import why_not_closed, why_not_tried
 from eomgen.dynamics.assur import with_closed_form
 from eomgen.dynamics.closed_positions import with_safe_pivots
-from eomgen.dynamics.digits import ALL, Route, digits_lost
+from eomgen.dynamics.digits import ALL, Route, digits_lost, digits_lost_by_kind
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -28,8 +28,10 @@ ENOUGH = 10
 """Number of correct digits of v̇ from which on no notice is given."""
 MOST_DENSE = 12
 """Rows of constraints beyond which only the route whose cost grows linearly with them is tried."""
-FEWEST = 6
-"""Smallest number of correct digits of v̇; a scene that would have fewer is refused."""
+FEWEST, LEAST = 4, 1
+"""Smallest numbers of correct digits of v̇ at states that are not aligned, and at all; a scene that
+would have fewer is refused.
+"""
 DERIVATIVES_A_STEP = 4
 """The derivatives of a step for which loops in closed form and projections are compared."""
 BY_INDEPENDENT = ("independent", "embedded")
@@ -57,20 +59,25 @@ class Candidate:
 class Choice:
     """The equations by the chosen route, and all candidates.
 
-    `digits` is the number of correct digits of accelerations, None if at least `ENOUGH`.
+    digits    number of correct digits of accelerations at the worst states, None if at least
+              `ENOUGH`
+    ordinary  at states that are not aligned
     """
 
     derived: Derived
     candidates: tuple[Candidate, ...]
     digits: int | None = None
+    ordinary: int | None = None
 
     def notices(self) -> list[str]:
         """Notices for the user, one line each."""
         if self.digits is None:
             return []
+        more = self.ordinary is not None and self.ordinary > self.digits
+        aligned = f" where parts align, elsewhere {self.ordinary}" if more else ""
         return [
             f"{_ILL_CONDITIONED}; with the best, '{self.derived.route}', "
-            f"{self.digits} of {ALL:.0f} digits of accelerations are right"
+            f"{self.digits} of {ALL:.0f} digits of accelerations are right{aligned}"
         ]
 
 
@@ -164,12 +171,13 @@ def _chosen(model: Model, closed: bool) -> Choice:
         return _only(model, "closed", f"form '{model.form}' comes from this route alone")
     candidates, attempts = _attempts(model, closed)
     routes = {name: _route(model, attempt) for name, attempt in attempts.items()}
-    judged, digits = _judged(candidates, digits_lost(model, routes)), None
+    judged, digits, ordinary = _judged(candidates, digits_lost(model, routes)), None, None
     if not _accepted(judged):
         last = next(name for name, spec in ROUTES.items() if spec.last)
         attempts[last] = _recursive(derive(model, last))
         routes[last] = _route(model, attempts[last])
-        lost = digits_lost(model, routes, closely=True)
+        by_kind = digits_lost_by_kind(model, routes, closely=True)
+        lost = {route: max(parts) for route, parts in by_kind.items()}
         judged = _judged(candidates, lost)
         if not _accepted(judged):
             one = (
@@ -179,9 +187,9 @@ def _chosen(model: Model, closed: bool) -> Choice:
             )
             words = f"keeps digits that the other routes lose: {one} loses {lost[one]:.0f}"
             judged.append(Candidate(last, _operations(attempts[last].alone), words))
-            digits = _correct_digits(lost[last])
+            digits, ordinary = _correct_digits(by_kind[last])
     best = min(_accepted(judged), key=lambda c: c.operations or 0)
-    return Choice(attempts[best.route].derived, tuple(judged), digits)
+    return Choice(attempts[best.route].derived, tuple(judged), digits, ordinary)
 
 
 @dataclass(frozen=True)
@@ -261,18 +269,19 @@ def _candidate(route: str, operations: int) -> Candidate:
     return Candidate(route, operations, "operations a call of derivative")
 
 
-def _correct_digits(lost: float) -> int | None:
-    """The number of correct digits by the route of last resort, which loses `lost`; None if
-    `ENOUGH`. Raises `SceneError` for fewer than `FEWEST`.
+def _correct_digits(lost: Sequence[float]) -> tuple[int | None, int | None]:
+    """The numbers of correct digits by the route of last resort, which loses `lost` at states of
+    each kind: at the worst of all, and at those that are not aligned; None if `ENOUGH`. Raises
+    `SceneError` for fewer than `LEAST` or `FEWEST`.
     """
-    correct = max(0, math.floor(ALL - lost - SPARE))
-    if correct < FEWEST:
+    correct, ordinary = (max(0, math.floor(ALL - part - SPARE)) for part in (max(lost), lost[0]))
+    if correct < LEAST or ordinary < FEWEST:
         raise SceneError(
             f"route: {_ILL_CONDITIONED}; with the best, 'orthogonal', "
             f"only {correct} of {ALL:.0f} digits of accelerations would be right; make "
             "them less uneven, or give route = 'orthogonal' to take it anyway"
         )
-    return correct if correct < ENOUGH else None
+    return (correct, ordinary) if correct < ENOUGH else (None, None)
 
 
 def least_factoring(model: Model) -> int:

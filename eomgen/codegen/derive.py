@@ -6,8 +6,9 @@ from functools import partial
 
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
+from eomgen.codegen.stand_ins import with_stand_ins
 from eomgen.codegen.system import System
-from eomgen.derivation.supported import why_not_closed, why_not_pins
+from eomgen.derivation.supported import why_not_closed, why_not_momenta, why_not_pins
 from eomgen.dynamics.kinematics import Axes
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -66,22 +67,26 @@ def why_not_derived(model: Model, route: str) -> str:
         )
     why_not = ""
     if ROUTES[route].symbolic:
-        why_not = why_not_closed(model) if velocity else why_not_pins(model)
+        why_not = why_not_closed(model) if velocity else why_not_momenta(model)
     asked = f"route: '{route}'" if velocity else f"form: '{model.form}'"
     return f"{asked} needs the closed form, and {why_not}; leave it out" if why_not else ""
 
 
 def _symbolic(model: Model) -> Derived:
     # Imported here because SymPy takes longer to load than all other modules together.
-    if why_not_pins(model):
-        from eomgen.codegen.from_projected import from_projected
-        from eomgen.derivation.projected.derive import derive_projected
-
-        return Derived("closed", partial(from_projected, derive_projected(model)))
+    from eomgen.codegen.from_closed_form import from_closed_form, of_pins, of_projected
     from eomgen.codegen.from_equations import from_equations
     from eomgen.derivation import closed
+    from eomgen.derivation.projected.derive import derive_projected
 
-    return Derived("closed", partial(from_equations, closed.derive(model)))
+    derived, _ = with_stand_ins(model)
+    if why_not_pins(derived):
+        form = of_projected(derive_projected(derived))
+    elif derived is model:
+        return Derived("closed", partial(from_equations, closed.derive(model)))
+    else:
+        form = of_pins(closed.derive(derived))
+    return Derived("closed", partial(from_closed_form, form, model))
 
 
 def _axes(model: Model, route: str) -> list[Axes | None]:

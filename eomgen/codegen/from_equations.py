@@ -6,13 +6,12 @@ from typing import Any
 import sympy as sp
 
 from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
-from eomgen.derivation.closed import Equations, written_out_forces
+from eomgen.derivation.closed import Equations, conditions, written_out_forces
 from eomgen.derivation.forms import state_form
 from eomgen.derivation.free_bodies import SymbolicMechanism
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
-from eomgen.derivation.supported import off_centre
 from eomgen.derivation.symbols import Vec, rotate
-from eomgen.language.formula import evaluate, is_zero
+from eomgen.language.formula import evaluate
 from eomgen.model.model import Point
 from eomgen.outputs import OUTPUTS
 from eomgen.program.differentiate import jacobian as slopes_of
@@ -90,7 +89,10 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
         "forward_dynamics": names_of_inputs(tau.values()),
         "inverse_dynamics": names_of_inputs(vd.values()),
     }
-    checks = _checks(equations, starting)
+    checks = [
+        Check(what, starting.lower(value).index, may_vanish)
+        for what, value, may_vanish in conditions(equations)
+    ]
     return recorded(model, "closed", form.states, tape, nodes, checks, extra, frozenset())
 
 
@@ -180,18 +182,3 @@ def _momentum(equations: Equations) -> list[Any]:
         sp.Add(*(m * yd for m, _, _, _, _, yd, _ in bodies)),
         sp.Add(*(m * (x * yd - y * xd) + i * w for m, i, x, y, xd, yd, w in bodies)),
     ]
-
-
-def _checks(equations: Equations, lowering: Lowering) -> list[Check]:
-    """Conditions on a user's parameters under which the closed form holds."""
-    model, symbols = equations.model, equations.symbols
-    checks = []
-    for k, body in enumerate(model.bodies):
-        mass = lowering.lower(symbols.mass[k])
-        checks.append(Check(f"mass of {body.name}", mass.index, may_vanish=False))
-        if not is_zero(body.moment):
-            # If the joint is not at the centre of mass, m r² alone makes the mass matrix regular.
-            may_vanish = model.form == "velocity" and off_centre(body.joint)
-            inertia = lowering.lower(symbols.inertia[k])
-            checks.append(Check(f"inertia_com of {body.name}", inertia.index, may_vanish))
-    return checks

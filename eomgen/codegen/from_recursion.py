@@ -29,9 +29,22 @@ from eomgen.program import differentiate
 from eomgen.program.program import Check
 from eomgen.program.tape import Node
 
+ExtraInputs = dict[str, tuple[str, ...]]
+"""For some outputs the names of the inputs that they take besides the state."""
 
-def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
-    """The system of a recorded model, with or without the Jacobian of the derivative."""
+
+def from_recursion(
+    record: Recording,
+    *,
+    jacobian: bool = True,
+    given: Callable[[str, ExtraInputs], list[Node] | None] = lambda name, extra: None,
+    conditions: Sequence[Check] = (),
+) -> System:
+    """The system of a recorded model, with or without the Jacobian of the derivative.
+
+    given       the nodes of outputs that something else than the recursions computes
+    conditions  conditions on parameters beside those of the recursions
+    """
     model, tape, ny = record.model, record.tape, len(record.rates)
     start = [tape.constant(x) for x in initial_state(model)]
     nodes: OutputNodes = {"initial_state": ((ny,), start), "derivative": ((ny,), record.rates)}
@@ -41,8 +54,9 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
     following = ("coordinates", "velocities", "accelerations") if model.groups else ()
     for name in dict.fromkeys((*model.outputs, *following)):
         if name not in DERIVATIVES:
-            shape, found = output(record, name, extra)
-            nodes[name] = shape, record.closed(found)
+            found = given(name, extra)
+            found = output(record, name, extra) if found is None else found
+            nodes[name] = output_shape(name, model), record.closed(found)
     if record.dynamics.contacts:
         more, more_extra = contact_outputs(
             record.dynamics, tape, record.route, record.forward, record.position_rates
@@ -57,17 +71,15 @@ def from_recursion(record: Recording, *, jacobian: bool = True) -> System:
         velocity_states(model),
         tape,
         nodes,
-        checks(record),
+        [*checks(record), *conditions],
         extra,
         derivatives.tangents,
         contact_labels(record.dynamics),
     )
 
 
-def output(
-    record: Recording, name: str, extra: dict[str, tuple[str, ...]]
-) -> tuple[tuple[int, ...], list[Node]]:
-    """Shape and nodes of an output; for all outputs except matrices of derivatives.
+def output(record: Recording, name: str, extra: ExtraInputs) -> list[Node]:
+    """The nodes of an output; for all outputs except matrices of derivatives.
 
     Enters into `extra` the names of the inputs that the output takes besides the state.
     """
@@ -75,12 +87,10 @@ def output(
         prefix, compute = BESIDE[name]
         given = record.velocity_inputs(prefix)
         extra[name] = names_of_inputs(given)
-        nodes = compute(record, given)
-    elif name in OBSERVED:
-        nodes = OBSERVED[name](record)
-    else:
-        nodes = OF_DYNAMICS[name](record.dynamics)
-    return output_shape(name, record.model), nodes
+        return compute(record, given)
+    if name in OBSERVED:
+        return OBSERVED[name](record)
+    return OF_DYNAMICS[name](record.dynamics)
 
 
 def _inverse(record: Recording, vd: Sequence[Node]) -> list[Node]:

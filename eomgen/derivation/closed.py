@@ -15,9 +15,10 @@ from eomgen.derivation.elimination import (
 from eomgen.derivation.free_bodies import FreeBodies, draw_free_bodies
 from eomgen.derivation.kinematics import Kinematics, differentiate_joints
 from eomgen.derivation.solution import Definition, Solution, gathered, solve
-from eomgen.derivation.supported import why_not_pins
+from eomgen.derivation.supported import off_centre, why_not_pins
 from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
 from eomgen.errors import SceneError
+from eomgen.language.formula import is_zero
 from eomgen.model.model import Model
 from eomgen.scene.joints import Free
 
@@ -96,6 +97,21 @@ def _recovered_forces(
         if not isinstance(model.bodies[k].joint, Free)
         for symbol, expression in zip(symbols.force[k], found[k], strict=True)
     )
+
+
+def conditions(equations: Equations) -> tuple[tuple[str, Expr, bool], ...]:
+    """The conditions on a user's parameters under which the closed form holds: quantities that must
+    be positive, each with its name and whether it may be 0.
+    """
+    model, symbols = equations.model, equations.symbols
+    found: list[tuple[str, Expr, bool]] = []
+    for k, body in enumerate(model.bodies):
+        found.append((f"mass of {body.name}", symbols.mass[k], False))
+        if not is_zero(body.moment):
+            # If the joint is not at the centre of mass, m r² alone makes the mass matrix regular.
+            may_vanish = model.form == "velocity" and off_centre(body.joint)
+            found.append((f"inertia_com of {body.name}", symbols.inertia[k], may_vanish))
+    return tuple(found)
 
 
 def written_out_forces(equations: Equations) -> tuple[Definition, ...]:

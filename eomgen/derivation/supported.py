@@ -44,26 +44,30 @@ def why_not_tried(model: Model) -> str:
 
 
 def why_not_plain(model: Model) -> str:
-    """Why a model has no closed form: prescribed motion, something left out, or an effect that
-    depends on more than poses and inputs.
-    """
+    """Why a model has no closed form: prescribed motion, a loop, something left out."""
     for c in model.prescribed:
         return f"it takes no {'locked' if c.locked else 'driven'} coordinate ('{c.position.name}')"
     for constraint in model.constraints:
         return f"it closes no loops ('{constraint.name}')"
     for words in model.leave_out:
         return f"it leaves nothing out ('{words}')"
+    return ""
+
+
+def why_not_momenta(model: Model) -> str:
+    """Why a model has no state form with momenta: the handout's derivation, for pins and free
+    bodies in the plane, alone has them, without effects that are symbols to it.
+    """
     for effect in model.effects:
         if not effect.is_plain(model.defaults):
-            return f"it takes no '{effect.type}' {effect.why_not_plain()} ('{effect.name}')"
-    return ""
+            what = f"'{effect.type}' {effect.why_not_plain()}"
+            return f"in momenta it takes no {what} ('{effect.name}')"
+    return why_not_pins(model)
 
 
 def why_not_pins(model: Model) -> str:
     """Why a model is not covered by the handout's derivation, for pins and free bodies in the
     plane.
-
-    Only that derivation has the state forms with momenta.
     """
     if why_not_plain(model):
         return why_not_plain(model)

@@ -70,7 +70,17 @@ def digits_lost(
     model: Model, routes: Mapping[str, Route], *, closely: bool = False
 ) -> Mapping[str, float]:
     """The decimal digits of v̇ that each route, and `orthogonal`, loses at the worst of some seeded
-    states, half of them at rest; 0 to `ALL`.
+    states: the largest of `digits_lost_by_kind`.
+    """
+    found = digits_lost_by_kind(model, routes, closely=closely)
+    return {route: max(lost) for route, lost in found.items()}
+
+
+def digits_lost_by_kind(
+    model: Model, routes: Mapping[str, Route], *, closely: bool = False
+) -> Mapping[str, tuple[float, ...]]:
+    """The decimal digits of v̇ that each route, and `orthogonal`, loses at the worst of some seeded
+    states of each of the `KINDS`, half of them at rest; 0 to `ALL`.
 
     Errors are relative to the largest component of v̇, or to ω v, the size of velocity-dependent
     terms, which may cancel. At a state where this is smaller than usual they are relative to the
@@ -108,13 +118,13 @@ def digits_lost(
     parts = [(still, [nothing] * len(q))]
     if model.inputs or len(still.effects) < len(model.effects):
         parts.append((model, pushes))
-    worst = dict.fromkeys((*routes, "orthogonal"), 0.0)
+    worst = {route: np.zeros(len(KINDS)) for route in (*routes, "orthogonal")}
     for acting, inputs in parts:
         at = [Values(model.defaults, *rest, states) for rest in zip(inputs, q, v, strict=True)]
         solvers = {name: _solver(name, route, model, acting) for name, route in routes.items()}
         for name, off in _off(acting, at, solvers, closely).items():
-            worst[name] = max(worst[name], off)
-    return {route: _digits(off) for route, off in worst.items()}
+            worst[name] = np.maximum(worst[name], off)
+    return {route: tuple(map(_digits, off.tolist())) for route, off in worst.items()}
 
 
 def _on_constraints(
@@ -185,9 +195,9 @@ def _slight(rng: random.Random) -> float:
 
 def _off(
     model: Model, at: Sequence[Values], solvers: Mapping[str, Accelerations], closely: bool
-) -> dict[str, float]:
-    """For each route the largest error of v̇ at some states, relative to the size of v̇ and to the
-    error that is allowed; infinite if it gives no number.
+) -> dict[str, Array]:
+    """For each route the largest errors of v̇ at some states of each kind (4,), relative to the size
+    of v̇ and to the error that is allowed; infinite if it gives no number.
     """
     together, shape = _together(at), (len(model.velocities), len(at))
     sure = _recursion("orthogonal", model, "own")
@@ -202,7 +212,7 @@ def _off(
         nudged = _recursion("orthogonal", perturbed(model), "own")
         change = _shares(_numbers(nudged, _nudged(together, len(at)), shape), true, least)
         doubts.append(change)
-    worst = dict.fromkeys(found, 0.0)
+    worst = {route: np.zeros(len(KINDS)) for route in found}
     exactly, known_somewhere = _in_many_digits(model, nudge=closely), False
     for n in _doubtful(doubts, CLOSELY if closely else ROUGHLY):
         try:
@@ -217,16 +227,16 @@ def _off(
             own = rates[:, n]
             off = _apart(own.tolist(), long) if np.isfinite(own).all() else math.inf
             shares = _in_parts(np.array([off / size]), np.array([change_here / size]))
-            worst[route] = max(worst[route], float(shares[0]))
+            worst[route][n // EACH] = max(worst[route][n // EACH], shares[0])
     if not known_somewhere:
         return worst
-    if closely and worst["orthogonal"] > TRUSTED:
+    if closely and worst["orthogonal"].max() > TRUSTED:
         return worst
     known = np.isfinite(true).all(axis=0)
     if not closely:  # states where any route gives a number
         known = np.any([np.isfinite(rates).all(axis=0) for rates in found.values()], axis=0)
     beside = _worst(found, true, least, change, np.asarray(known))
-    return {route: max(off, beside[route]) for route, off in worst.items()}
+    return {route: np.maximum(off, beside[route]) for route, off in worst.items()}
 
 
 def _doubtful(doubts: Sequence[Array], count: int) -> list[int]:
@@ -281,14 +291,15 @@ def _worst(
     least: Array,
     change: Array,
     known: NDArray[np.bool_],
-) -> dict[str, float]:
-    """For each route the largest error of v̇ (nv, n) among the states where the true one is `known`
-    (n,), relative to its size and to the allowed error; infinite if it is nan.
+) -> dict[str, Array]:
+    """For each route the largest errors of v̇ (nv, n) among the states of each kind (4,) where the
+    true one is `known` (n,), relative to its size and to the allowed error; infinite if it is nan.
     """
     worst = {}
     for route, rates in found.items():
         off = _in_parts(_shares(rates, true, least), change)
-        worst[route] = float(np.where(np.isnan(off), np.inf, off)[known].max(initial=0.0))
+        known_off = np.where(known, np.where(np.isnan(off), np.inf, off), 0.0)
+        worst[route] = known_off.reshape(len(KINDS), EACH).max(axis=1)
     return worst
 
 

@@ -18,7 +18,12 @@ from eomgen.derivation.projected.derive import derive_projected
 from eomgen.derivation.projected.steps import projected_steps
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation, Step, handout_steps, readable
-from eomgen.derivation.supported import MOST_REPORTED, why_not_closed, why_not_pins
+from eomgen.derivation.supported import (
+    MOST_REPORTED,
+    why_not_closed,
+    why_not_momenta,
+    why_not_pins,
+)
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
 from eomgen.errors import SceneError
@@ -118,7 +123,7 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
     form = form or model.form
     effects, constraints = derived_effects(model), derived_constraints(model)
     if form != "velocity" and constraints:
-        raise SceneError(f"form: no derivation in the form '{form}': {why_not_pins(model)}")
+        raise SceneError(f"form: no derivation in the form '{form}': {why_not_momenta(model)}")
     bare = with_multipliers(with_symbols(model, effects), constraints)
     bare = replace(bare, form=form)
     parts = Parts(effects, constraints)

@@ -113,7 +113,7 @@ class RoundingMonitor:
         return StepFailure(
             f"digits lost: accelerations there have only {left:.0f} of {FULL:.0f} correct digits "
             f"(relative error {loss:.2g}, allowed {self.bound:.2g})",
-            "take --route orthogonal, or --guard repair",
+            "take --guard repair, or --route orthogonal if the run has another",
         )
 
     def words(self) -> str:

@@ -317,7 +317,7 @@ class EffectTable(Table):
         """Whether its loads depend only on parameters, inputs and poses of bodies, or are at
         joints and depend on no extra state. It has no rigid contacts.
 
-        Route `closed` requires it.
+        Route `closed` writes it out then; else its loads are symbols there.
         """
         return False
 

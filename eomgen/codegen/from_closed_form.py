@@ -4,50 +4,89 @@ v̇ and the terms of M v̇ + V + G = F are SymPy's. Energies, positions, joint f
 observables come from the recursions, recorded on the same tape.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from eomgen.codegen.from_recursion import checks, output
-from eomgen.codegen.jacobians import matrices
+from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
-from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
+from eomgen.codegen.stand_ins import with_stand_ins
+from eomgen.codegen.system import System, names_of_inputs
+from eomgen.derivation.closed import Equations, conditions
+from eomgen.derivation.forms import state_form
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.projected.derive import ProjectedEquations
+from eomgen.derivation.projected.equations import Balance
 from eomgen.language.formula import evaluate
-from eomgen.model.states import velocity_states
-from eomgen.outputs import DERIVATIVES
+from eomgen.model.model import Model
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
 from eomgen.program.tape import TIME, Node, Stage
+from eomgen.scalars.exact import Real
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """A closed form as it is lowered.
+
+    symbols      those of the derivation
+    numbers      of these, symbols of numbers
+    definitions  what v̇ consists of, each symbol over those before it
+    conditions   quantities that must be positive, or may be 0 if the third entry says so
+    balance      M v̇ + V + G = F, if it is over the same definitions
+    """
+
+    symbols: Any
+    numbers: Mapping[Real, Any]
+    definitions: Mapping[Any, Any]
+    conditions: tuple[tuple[str, Any, bool], ...]
+    balance: Balance | None = None
+
+
+def of_projected(equations: ProjectedEquations) -> ClosedForm:
+    """The closed form by projected constraints."""
+    s, solution = equations.symbols, equations.solution
+    positive = tuple(
+        (f"inertia_com of {body}", moment, False) for body, moment in solution.divisors
+    )
+    return ClosedForm(s, s.numbers, solution.definitions, positive, equations.balance)
+
+
+def of_pins(equations: Equations) -> ClosedForm:
+    """The closed form of the handout's derivation, over [q, v]."""
+    form = state_form(equations)
+    found = {**equations.free_bodies.efforts, **dict(equations.solution.definitions)}
+    definitions = {s: e.xreplace(form.replaced) for s, e in {**found, **form.defined}.items()}
+    return ClosedForm(equations.symbols, {}, definitions, conditions(equations))
 
 
 class Lowered:
-    """The equations lowered to the tape of a recording."""
+    """A closed form lowered to the tape of a recording."""
 
-    def __init__(self, equations: ProjectedEquations, record: Recording) -> None:
-        self.equations = equations
-        s = equations.symbols
+    def __init__(self, form: ClosedForm, record: Recording) -> None:
+        s, self.form = form.symbols, form
         self._tape, self._record = record.tape, record
-        self._given: dict[Any, Node] = {
-            symbol: record.parameters[name] for name, symbol in s.parameters.items()
-        }
+        _, stand_ins = with_stand_ins(record.model, record.dynamics)
+        known = {**record.parameters, **record.inputs, **stand_ins}
+        named = {**s.parameters, **s.inputs}
+        self._given: dict[Any, Node] = {symbol: known[name] for name, symbol in named.items()}
         for formula, symbol in s.formulas.items():
             self._given[symbol] = evaluate(formula, record.parameters, record.scalars)
-        self._given |= {symbol: self._tape.constant(float(x)) for x, symbol in s.numbers.items()}
+        self._given |= {symbol: self._tape.constant(float(x)) for x, symbol in form.numbers.items()}
         self._given |= dict(zip((*s.q, *s.v), (*record.q, *record.v), strict=True))
-        self._given |= {symbol: record.inputs[name] for name, symbol in s.inputs.items()}
         self._given[TIME_SYMBOL] = record.input(TIME, Stage.INPUTS)
 
     def forward(self, tau: Sequence[Node] | None = None) -> list[Node]:
         """v̇ under the effects and further generalised forces `tau`."""
         zero = self._tape.constant(0.0)
-        s = self.equations.symbols
+        s = self.form.symbols
         forces = [zero] * len(s.tau) if tau is None else tau
         return self.rows(s.a, dict(zip(s.tau, forces, strict=True)))
 
     def rows(self, expressions: Sequence[Any], given: dict[Any, Node] | None = None) -> list[Node]:
         """The nodes of expressions over the equations' symbols and those in `given`."""
-        definitions = self.equations.solution.definitions
+        definitions = self.form.definitions
         lowering = Lowering(self._tape, self._given | (given or {}), definitions)
         # In the order of the definitions, which bounds the depth of recursion.
         for symbol in self._needed(expressions, given or {}):
@@ -56,7 +95,7 @@ class Lowered:
 
     def _needed(self, expressions: Sequence[Any], given: dict[Any, Node]) -> list[Any]:
         """The defined symbols that expressions use, directly or not, in order of definition."""
-        definitions = self.equations.solution.definitions
+        definitions = self.form.definitions
         needed: set[Any] = set()
         stack = [s for e in expressions for s in e.free_symbols]
         while stack:
@@ -67,35 +106,16 @@ class Lowered:
         return [symbol for symbol in definitions if symbol in needed]
 
 
-def from_projected(equations: ProjectedEquations, *, jacobian: bool = True) -> System:
+def from_closed_form(form: ClosedForm, model: Model, *, jacobian: bool = True) -> System:
     """The system of a model by route `closed`, with or without the Jacobian of the derivative."""
-    model = equations.model
-    record = Recording(model, "closed", lambda record: Lowered(equations, record).forward)
-    lowered, tape, ny = Lowered(equations, record), record.tape, len(record.q) + len(record.v)
-    start = [tape.constant(x) for x in (*model.initial_q, *model.initial_v)]
-    nodes: OutputNodes = {"initial_state": ((ny,), start), "derivative": ((ny,), record.rates)}
-    derivatives = matrices(record, with_jacobian=jacobian)
-    nodes |= derivatives.nodes
-    extra = dict(derivatives.extra)
-    for name in model.outputs:
-        if name not in DERIVATIVES:
-            found = _dynamics(lowered, record, name, extra)
-            nodes[name] = (
-                output(record, name, extra) if found is None else (output_shape(name, model), found)
-            )
-    divisors = [
-        Check(f"inertia_com of {body}", lowered.rows([moment])[0].index, may_vanish=False)
-        for body, moment in equations.solution.divisors
+    record = Recording(model, "closed", lambda record: Lowered(form, record).forward)
+    lowered = Lowered(form, record)
+    positive = [
+        Check(what, lowered.rows([value])[0].index, may_vanish)
+        for what, value, may_vanish in form.conditions
     ]
-    return recorded(
-        model,
-        "closed",
-        velocity_states(model),
-        tape,
-        nodes,
-        [*checks(record), *divisors],
-        extra,
-        derivatives.tangents,
+    return from_recursion(
+        record, jacobian=jacobian, given=partial(_dynamics, lowered, record), conditions=positive
     )
 
 
@@ -103,7 +123,9 @@ def _dynamics(
     lowered: Lowered, record: Recording, name: str, extra: dict[str, tuple[str, ...]]
 ) -> list[Node] | None:
     """The nodes of an output that SymPy's equations give, None for any other."""
-    terms, symbols = lowered.equations.balance, lowered.equations.symbols
+    terms, symbols = lowered.form.balance, lowered.form.symbols
+    if terms is None:
+        return None
     n = len(record.v)
     match name:
         case "inverse_dynamics":
