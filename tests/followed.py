@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.derivation.dots import dotted
 from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.exposition.constraints import DerivedConstraint
@@ -83,7 +84,7 @@ def follow_recursion(
     forces: dict[str, float] = {}
     for frame in (frame for frame in frames if frame.free):
         several = len(frame.a) > 1
-        found: Any = known[f"omegadot_{frame.name}" if several else frame.a[0].name]
+        found: Any = known[dotted(f"omega_{frame.name}") if several else frame.a[0].name]
         rates |= zip((a.name for a in frame.a), found.ravel(), strict=True)
         forces |= zip((a.name for a in frame.a), known[f"F_{frame.name}"].ravel(), strict=True)
     names = [c.acceleration for c in model.velocities]

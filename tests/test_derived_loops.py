@@ -12,6 +12,7 @@ from campaign import some
 from followed import Instant, follow_recursion, instant
 
 import eomgen
+from eomgen.derivation.dots import dotted
 from eomgen.dynamics import constraints as solved
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.clusters import accelerations_at_rest, jacobian_of
@@ -195,7 +196,7 @@ def eliminated(
         if line.left.is_Matrix:
             known[line.left.name] = array(line.right, known)
     rates = np.empty(n)
-    rates[order] = known["vdot"].ravel()
+    rates[order] = known[dotted("v")].ravel()
     return rates, known["lambda"]
 
 

@@ -17,6 +17,7 @@ from test_driven import given
 
 import eomgen
 from eomgen.cli import main
+from eomgen.derivation.dots import dotted
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.equations import Derivation
@@ -24,7 +25,6 @@ from eomgen.exposition.derivation import exposition_of, prescribed_motion
 from eomgen.exposition.effects import derived_effects
 from eomgen.exposition.evaluate import array, define, number
 from eomgen.exposition.impacts import impact_steps
-from eomgen.exposition.reading import dotted
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
@@ -78,7 +78,7 @@ def test_each_effect_by_its_formulas(case: Case) -> None:
     rates, forces = follow_recursion(model, at.known)
     assert_close(forces, at.solver.applied_force)
     assert_close(rates, at.solver.articulated_forward())
-    states = [at.known[dotted(x.name, "dot")] for x in model.states]
+    states = [at.known[dotted(x.name)] for x in model.states]
     assert_close(states, at.solver.state_rates)
 
 
@@ -318,6 +318,49 @@ def test_the_impulse_equations() -> None:
         assert_close(at.known[f"u_{name},t"], solver.power_of(tangent))
         row = impulses.generalised(solver, contact.normal)
         assert_close(at.known[f"u_{name},n"], np.dot(row, solver.v))
+
+
+ENDING_IN_D = """
+name = "names"
+parameters = { load = 1.0, polkadot = 0.5 }
+bodies = [
+    { name = "rod", mass = "load", inertia_com = 0.1 },
+    { name = "lid", mass = 2.0, inertia_com = 0.3 },
+]
+effects = [{ type = "gravity", g = 9.81 }]
+[[joints]]
+name = "elbow"
+type = "revolute"
+parent = "world"
+child = "rod"
+r_child = [0, "polkadot"]
+coordinate = "bend"
+[[joints]]
+name = "rail"
+type = "prismatic"
+parent = "rod"
+child = "lid"
+coordinate = "speed"
+axis = [1, 0]
+"""
+
+
+def test_dots_are_over_whole_names() -> None:
+    """Over those that end in d as over others, and none over a name that ends in dot."""
+    for found in (eomgen.derive(parse_scene(ENDING_IN_D)), eomgen.derive("two_body")):
+        model, steps = found.model, found.steps
+        named = "bend" if model.name == "names" else "θ"
+        text, paper = as_text(model, steps), as_latex(model, steps, found.exposition.effects)
+        page = as_html(model, steps, found.exposition.effects)
+        one, two = ("˙", "¨") if named == "bend" else ("\u0307", "\u0308")
+        assert named + one in text and named + two in text
+        over = r"\mathrm{bend}" if named == "bend" else r"\theta"
+        assert rf"\dot{{{over}}}" in paper and rf"\ddot{{{over}}}" in paper
+        for mark in "˙¨":
+            assert re.search(rf"<mover><mi[^>]*>{named}</mi><mo>{mark}</mo>", page)
+        for shown in (text, paper, page):
+            words = re.findall(r"\b(ben|loa|spee|ro|polka|polkad)\b", shown)
+            assert not words, words
 
 
 @pytest.mark.parametrize("scene", SHOWN)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.closed import Equations
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.elimination import trees
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
@@ -133,7 +134,7 @@ def _momenta(equations: Equations, k: int) -> Pairs:
     (_, fx), (_, fy), (_, torque) = equations.free_bodies.equations[3 * k : 3 * k + 3]
     px, py, spin = (sp.Symbol(f"{word}_{name}{axis}") for word, axis in
                     (("P", ",x"), ("P", ",y"), ("L", "")))  # fmt: skip
-    dpx, dpy, dspin = (sp.Symbol(x.name.replace("_", "dot_", 1)) for x in (px, py, spin))
+    dpx, dpy, dspin = (sp.Symbol(dotted(x.name)) for x in (px, py, spin))
     pairs = [(s.xd[k], px / s.mass[k]), (s.yd[k], py / s.mass[k]), (dpx, fx), (dpy, fy)]
     if s.inertia[k] != 0:
         pairs.append((s.omega[k], spin / s.inertia[k]))
@@ -206,16 +207,16 @@ def _solved(equations: Equations) -> list[tuple[Expr, Expr]]:
 
 
 def readable(equations: Equations) -> dict[Expr, Expr]:
-    """Symbols by ones whose names SymPy's printers know how to write: `thetaddot` is θ̈."""
+    """Symbols by ones whose names that printers know how to write."""
     s, model = equations.symbols, equations.model
     names = [body.name for body in model.bodies]
     shown: dict[Expr, Expr] = {}
     taken = {*s.parameters, *s.inputs, *(q.name for q in s.q)}
     for q, v, a in zip(s.q, s.v, s.a, strict=True):
-        shown[v], shown[a] = _dotted(q.name, "dot"), _dotted(q.name, "ddot")
+        shown[v], shown[a] = sp.Symbol(dotted(q.name)), sp.Symbol(dotted(q.name, 2))
     words = (
-        ("x", s.x), ("y", s.y), ("psi", s.angle), ("xdot", s.xd), ("ydot", s.yd),
-        ("omega", s.omega), ("xddot", s.xdd), ("yddot", s.ydd), ("alpha", s.alpha),
+        ("x", s.x), ("y", s.y), ("psi", s.angle), (dotted("x"), s.xd), (dotted("y"), s.yd),
+        ("omega", s.omega), (dotted("x", 2), s.xdd), (dotted("y", 2), s.ydd), ("alpha", s.alpha),
     )  # fmt: skip
     for word, symbols in words:
         for name, symbol in zip(names, symbols, strict=True):
@@ -239,8 +240,3 @@ def readable(equations: Equations) -> dict[Expr, Expr]:
             brief = f"{short[kind]}_{rest}"
             shown[symbol] = sp.Symbol(f"{kind}_{rest}" if brief in taken else brief)
     return shown
-
-
-def _dotted(name: str, dots: str) -> Expr:
-    base, underscore, rest = name.partition("_")
-    return sp.Symbol(f"{base}{dots}{underscore}{rest}")

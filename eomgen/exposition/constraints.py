@@ -10,6 +10,7 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
@@ -27,7 +28,6 @@ from eomgen.exposition.mechanism import (
     velocity_symbols,
 )
 from eomgen.exposition.poses import frame_name, poses
-from eomgen.exposition.reading import dotted
 from eomgen.exposition.state_forms import needed_by
 from eomgen.model.model import Model
 from eomgen.scene.constraints.base import Constraint, Row
@@ -209,10 +209,10 @@ class _Motion:
         known = {symbol for symbol, _ in definitions}
         for frame in frames:
             name = frame_name(model, frame)
-            moving |= {real(f"odot_{frame.name},{axis}") for axis in AXES[:size]}
+            moving |= {real(dotted(f"o_{frame.name},{axis}")) for axis in AXES[:size]}
             moving |= {*omega_symbols(name, size), *velocity_symbols(name, size)}
             for axis in AXES[:size]:
-                pair = real(f"o_{frame.name},{axis}"), real(f"odot_{frame.name},{axis}")
+                pair = real(f"o_{frame.name},{axis}"), real(dotted(f"o_{frame.name},{axis}"))
                 rates |= [pair] if pair[1] in known else []
             if name in bodied:
                 rates |= zip(position_symbols(name, size), velocity_symbols(name, size),
@@ -232,7 +232,7 @@ class _Motion:
         """The same with symbols for the time derivatives of further symbols, and what these are."""
         rates, found = dict(self.rates), list[Definition]()
         for symbol, value in points:
-            speed = real(dotted(symbol.name, "dot"))
+            speed = real(dotted(symbol.name))
             found.append((speed, rate(value, rates)))
             rates[symbol] = speed
         return replace(self, rates=rates), found

@@ -8,11 +8,11 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr
 from eomgen.exposition.mechanism import AXES, NamingMechanism, Notes
-from eomgen.exposition.reading import dotted
 from eomgen.language.formula import Name
 from eomgen.model.model import Model
 from eomgen.scene.effects import Driven, Effect
@@ -75,7 +75,7 @@ def _derived(model: Model, effect: Effect) -> DerivedEffect:
     if not kept:
         loads = named_loads(model, effect.name, loads, definitions)
     rates = tuple(
-        (real(dotted(state.name, "dot")), rate)
+        (real(dotted(state.name)), rate)
         for state, rate in zip(effect.states(model.dimensions), states, strict=True)
     )
     return DerivedEffect(

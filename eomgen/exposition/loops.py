@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
@@ -73,7 +74,7 @@ def constraint_steps(model: Model, constraints: Sequence[DerivedConstraint]) -> 
         yield Step("", f"Constraint `{constraint.name}`", words, tuple(lines))
         lines = equations_of(derived.speeds)
         for row in derived.rows:
-            lines.append(Equation(real(f"gdot_{row.name}"), row.speed))
+            lines.append(Equation(real(dotted(f"g_{row.name}")), row.speed))
         for row in derived.rows:
             for velocity, slope in row.slopes:
                 lines.append(Equation(entry(row.name, velocity), slope))
@@ -116,10 +117,12 @@ def solution_steps(
     if m * n <= MOST:
         lines.append(Equation(_matrix("J", m, n), matrix))
     M, J, force = _matrix("M", n, n), _matrix("J", m, n), _matrix("F_0", n, 1)
-    left = sp.MatAdd(sp.MatMul(M, _matrix("vdot", n, 1)), _matrix("V", n, 1), _matrix("G", n, 1))
+    left = sp.MatAdd(
+        sp.MatMul(M, _matrix(dotted("v"), n, 1)), _matrix("V", n, 1), _matrix("G", n, 1)
+    )
     right = sp.MatAdd(force, sp.MatMul(J.T, _matrix("lambda", m, 1)))
     lines.append(Equation(left, right))
-    bend = sp.MatAdd(sp.MatMul(J, _matrix("vdot", n, 1)), _matrix("beta", m, 1))
+    bend = sp.MatAdd(sp.MatMul(J, _matrix(dotted("v"), n, 1)), _matrix("beta", m, 1))
     lines.append(Equation(bend, sp.ZeroMatrix(m, 1)))
     yield Step("", "The equations with multipliers", MULTIPLIERS, tuple(lines))
     if by_independent_velocities(model):
@@ -157,7 +160,7 @@ def _independent(model: Model, names: Sequence[str]) -> Iterator[Equation]:
     first, second = _matrix("J_d", m, m), _matrix("J_i", m, k)
     beta, M, N = _matrix("beta", m, 1), _matrix("M", n, n), _matrix("N", n, k)
     gamma, rest = _matrix("gamma", n, 1), _matrix("F_0", n, 1)
-    V, G, rate = _matrix("V", n, 1), _matrix("G", n, 1), _matrix("vdot_i", k, 1)
+    V, G, rate = _matrix("V", n, 1), _matrix("G", n, 1), _matrix(dotted("v_i"), k, 1)
     inverse = sp.Inverse(first)
     turned = sp.MatMul(-1, inverse, second)
     yield Equation(N, sp.BlockMatrix([[turned], [sp.Identity(k)]]))
@@ -165,7 +168,7 @@ def _independent(model: Model, names: Sequence[str]) -> Iterator[Equation]:
     yield Equation(gamma, sp.BlockMatrix([[bent], [sp.ZeroMatrix(k, 1)]]))
     force = sp.MatAdd(rest, sp.MatMul(-1, V), sp.MatMul(-1, G), sp.MatMul(-1, M, gamma))
     yield Equation(rate, sp.MatMul(sp.Inverse(sp.MatMul(N.T, M, N)), N.T, force))
-    whole = _matrix("vdot", n, 1)
+    whole = _matrix(dotted("v"), n, 1)
     yield Equation(whole, sp.MatAdd(sp.MatMul(N, rate), gamma))
     needed = sp.MatAdd(sp.MatMul(M, whole), V, G, sp.MatMul(-1, rest))
     pick = sp.BlockMatrix([[sp.Identity(m), sp.ZeroMatrix(m, k)]])
@@ -180,4 +183,4 @@ def _range_space(m: int, n: int) -> Iterator[Equation]:
     yield Equation(square, sp.MatMul(J, sp.Inverse(M), J.T))
     open_by = sp.MatAdd(sp.MatMul(J, free), _matrix("beta", m, 1))
     yield Equation(found, sp.MatMul(-1, sp.Inverse(square), open_by))
-    yield Equation(_matrix("vdot", n, 1), sp.MatAdd(free, sp.MatMul(inverse, J.T, found)))
+    yield Equation(_matrix(dotted("v"), n, 1), sp.MatAdd(free, sp.MatMul(inverse, J.T, found)))

@@ -11,6 +11,7 @@ from typing import Literal
 
 import sympy as sp
 
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
@@ -116,7 +117,7 @@ class NamingMechanism:
             own = velocity_symbols(body, self.dimensions)
             more = crossed(omega_symbols(body, self.dimensions), arm)
             values = tuple(v + w for v, w in zip(own, more, strict=True))
-            found = self._defined("pdot", word, values)
+            found = self._defined(dotted("p"), word, values)
             self.notes.known["moving", body, at] = found
         return found
 
@@ -207,7 +208,7 @@ def position_symbols(body: str, dimensions: int) -> tuple[Expr, ...]:
 
 def velocity_symbols(body: str, dimensions: int) -> tuple[Expr, ...]:
     """Symbols of its velocity in the world."""
-    return tuple(real(f"{axis}dot_{body}") for axis in AXES[:dimensions])
+    return tuple(real(dotted(f"{axis}_{body}")) for axis in AXES[:dimensions])
 
 
 def omega_symbols(body: str, dimensions: int) -> tuple[Expr, ...]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr
@@ -79,14 +80,14 @@ def _pose(model: Model, frames: Sequence[Frame], k: int, collected: _Collected) 
         above = frame_name(model, parent)
         base, base_omega = rotation_symbols(above, size), omega_symbols(above, size)
         origin = tuple(real(f"o_{parent.name},{axis}") for axis in AXES[:size])
-        speed = tuple(real(f"odot_{parent.name},{axis}") for axis in AXES[:size])
+        speed = tuple(real(dotted(f"o_{parent.name},{axis}")) for axis in AXES[:size])
     named = frame.body >= 0
     _define_rotation(model, frames, k, collected)
     rotation, omega = rotation_symbols(name, size), omega_symbols(name, size)
     spin = _spin(frame, rotation, size)
     collected.define(omega, [a + b for a, b in zip(base_omega, spin, strict=True)], always=named)
     own = tuple(real(f"o_{frame.name},{axis}") for axis in AXES[:size])
-    own_speed = tuple(real(f"odot_{frame.name},{axis}") for axis in AXES[:size])
+    own_speed = tuple(real(dotted(f"o_{frame.name},{axis}")) for axis in AXES[:size])
     reach = turned(base, list(frame.offset)[:size])
     collected.define(own, [a + b for a, b in zip(origin, reach, strict=True)], always=False)
     arm = [a - b for a, b in zip(own, origin, strict=True)] if parent is not None else list(own)

@@ -4,39 +4,34 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 
 
 def reading_names(model: Model) -> dict[str, str]:
-    """How each name of a scene is written: `theta_dot` as θ with a dot, which is "thetadot"."""
+    """How each name of a scene is written: `theta_dot` as θ with a dot."""
     names: dict[str, str] = {}
     taken = {p.name for p in model.parameters} | {i.name for i in model.inputs}
     for body in model.bodies:
         for c in body.positions[body.plain :]:  # a quaternion, named <prefix>_qw
             stem, _, part = c.name.rpartition("_")
             names[c.name] = f"q_{stem},{part[1:]}"
-            names[f"{c.name}_dot"] = f"qdot_{stem},{part[1:]}"
+            names[f"{c.name}_dot"] = dotted(f"q_{stem},{part[1:]}")
         for c in body.velocities:
             stem = c.name.removesuffix("_dot")
             if stem != c.name:
-                names[c.name], names[c.acceleration] = dotted(stem, "dot"), dotted(stem, "ddot")
+                names[c.name], names[c.acceleration] = dotted(stem), dotted(stem, 2)
             else:
                 prefix, _, axis = c.name.rpartition("_w")
                 names[c.name] = f"omega_{prefix},{axis}"
-                names[c.acceleration] = f"omegadot_{prefix},{axis}"
+                names[c.acceleration] = dotted(f"omega_{prefix},{axis}")
         for ending, letter in (("mass", "m"), ("inertia_com", "I")):
             brief = f"{letter}_{body.name}"
             if f"{body.name}_{ending}" in taken and brief not in taken:
                 names[f"{body.name}_{ending}"] = brief
     return names
-
-
-def dotted(name: str, dots: str) -> str:
-    """A name with "dot" or "ddot" after its first part, which printers write above it."""
-    base, underscore, rest = name.partition("_")
-    return f"{base}{dots}{underscore}{rest}"
 
 
 def read(expression: Expr, names: Mapping[str, str]) -> Expr:

@@ -11,6 +11,7 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
@@ -75,7 +76,7 @@ class Recursion:
         symbols = frame.v if order == 1 else frame.a
         if len(symbols) == 1:
             return sp.MatrixSymbol(symbols[0].name, 1, 1)
-        return self.joint("omega" if order == 1 else "omegadot", frame)
+        return self.joint(dotted("omega", order - 1), frame)
 
     def children(self, k: int) -> list[Frame]:
         """The frames on frame k."""

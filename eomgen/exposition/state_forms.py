@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.closed import Equations
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.forms import StateForm, state_form
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
@@ -120,12 +121,12 @@ def form_step(
     )
     words += BELOW if written.definitions else BEFORE
     words += "." if form == "velocity" else OWN
-    dotted = [rate_symbol(state) for state in states]
+    named = [rate_symbol(state) for state in states]
     own = {*states}
-    plain = [rate if rate in own else symbol for symbol, rate in zip(dotted, rates, strict=True)]
+    plain = [rate if rate in own else symbol for symbol, rate in zip(named, rates, strict=True)]
     equations = [
         Equation(sp.Symbol("Y"), sp.Matrix([states])),
-        Equation(sp.Symbol("Ydot"), sp.Matrix([plain])),
+        Equation(sp.Symbol(dotted("Y")), sp.Matrix([plain])),
     ]
     equations += [Equation(s, rate) for s, rate in zip(plain, rates, strict=True) if s != rate]
     equations += [Equation(symbol, e) for symbol, e in written.definitions]
@@ -134,12 +135,11 @@ def form_step(
 
 def rate_symbol(state: Expr) -> Expr:
     """The time derivative of a state: its name with one more dot."""
-    base, underscore, rest = state.name.partition("_")
-    if rest.endswith("_dot") or rest == "dot":
+    if state.name.endswith("_dot"):
         return real(state.name.removesuffix("dot") + "ddot")
     if state.name.endswith(QUATERNION):
         return real(f"{state.name}_dot")
-    return real(f"{base}dot{underscore}{rest}")
+    return real(dotted(state.name))
 
 
 def plain_form(model: Model, accelerations: Sequence[Expr]) -> WrittenForm:

@@ -50,14 +50,15 @@ class Linearisation:
     manifold: Manifold | None = None
 
     def reduced(self) -> "Linearisation":
-        """The same system with as many states as twice the degrees of freedom.
+        """The same system with as many states as independent positions and velocities.
 
         Four deviations of a quaternion become three rotations, rad, about the body's own axes,
         named `<prefix>_rx`, …: q + δq = q (1, δr/2). With δy = T δx the system is
         ẋ = T⁺ (A T - Ṫ) x + T⁺ B u, where Ṫ follows the motion and is zero at rest. Without
         quaternions nothing changes.
 
-        With constraints only the independent deviations are left; the others follow from them.
+        With constraints only the independent deviations are left; the others follow from them. What
+        rolls has fewer independent velocities than positions.
         """
         if self.manifold:
             free = replace(self, manifold=None).reduced()

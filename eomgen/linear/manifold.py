@@ -1,5 +1,11 @@
-"""Small displacements that keep the constraints of a mechanism."""
+"""Small deviations that keep the constraints of a mechanism.
 
+Displacements keep those of positions, velocities keep all. A wheel that rolls may be displaced
+sideways, to a motion beside the one that is linearised, but may not move sideways (Neimark and
+Fufaev, Dynamics of Nonholonomic Systems, 1972).
+"""
+
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +41,7 @@ def is_constrained(module: Any) -> bool:
 
 def directions(module: Any, y: FloatArray, p: Any, u: Any, free: NDArray[np.intp]) -> FloatArray:
     """The projection (nf, nf) of the `free` displacements, three for a quaternion, onto those that
-    keep the constraints.
+    lead along motions: a wheel is displaced as it rolls.
     """
     jacobian = jacobian_of(module)(0.0, y, p, u)[:, free]
     return np.asarray(np.eye(len(free)) - np.linalg.pinv(jacobian, rcond=LEAST) @ jacobian)
@@ -72,43 +78,58 @@ def manifold(module: Any, y: FloatArray, p: Any, u: Any) -> Manifold:
     """
     jacobian = jacobian_of(module)(0.0, y, p, u)
     nv, nx = jacobian.shape[1], len(y) - len(module.POSITIONS) - jacobian.shape[1]
-    dependent = _pivots(jacobian)
-    independent = [j for j in range(nv) if j not in dependent]
-    inverse = np.linalg.inv(jacobian[:, dependent])
-    basis = np.zeros((nv, len(independent)))
-    basis[independent] = np.eye(len(independent))
-    basis[dependent] = -inverse @ jacobian[:, independent]
-    bent = np.zeros_like(basis)  # velocities that follow from displacements of a motion
-    bent[dependent] = -inverse @ (_slopes(module, y, p, u) @ basis)
-    zero, one = np.zeros, np.eye(nx)
-    k = basis.shape[1]
+    alone = getattr(module, "VELOCITY_CONSTRAINTS", ())
+    rows = [i for i, name in enumerate(module.CONSTRAINTS) if name not in alone]
+    others = [i for i, name in enumerate(module.CONSTRAINTS) if name in alone]
+    dependent = _pivots(jacobian, (rows, others))
+    displaced, paths = _solutions(jacobian[rows], dependent[: len(rows)])
+    moving, speeds = _solutions(jacobian, dependent)
+    bent = np.zeros_like(paths)  # velocities that follow from displacements of a motion
+    slopes = _slopes(module, y, p, u) @ paths
+    bent[dependent] = -np.linalg.solve(jacobian[:, dependent], slopes)
+    zero, k, n = np.zeros, len(displaced), len(moving)
     T = np.block(
         [
-            [basis, zero((nv, k)), zero((nv, nx))],
-            [bent, basis, zero((nv, nx))],
-            [zero((nx, k)), zero((nx, k)), one],
+            [paths, zero((nv, n)), zero((nv, nx))],
+            [bent, speeds, zero((nv, nx))],
+            [zero((nx, k)), zero((nx, n)), np.eye(nx)],
         ]
     )
-    kept = [*independent, *(nv + j for j in independent), *range(2 * nv, 2 * nv + nx)]
+    kept = [*displaced, *(nv + j for j in moving), *range(2 * nv, 2 * nv + nx)]
     return Manifold(T, np.array(kept, dtype=np.intp))
 
 
-def _pivots(jacobian: FloatArray) -> list[int]:
-    """The columns of complete pivoting, those of the dependent velocities."""
-    work, rows, found = jacobian.copy(), list(range(len(jacobian))), list[int]()
+def _solutions(jacobian: FloatArray, dependent: list[int]) -> tuple[list[int], FloatArray]:
+    """The columns that are independent, and the directions x with J x = 0 along each, (nv, k)."""
+    count = jacobian.shape[1]
+    independent = [j for j in range(count) if j not in dependent]
+    found = np.zeros((count, len(independent)))
+    found[independent] = np.eye(len(independent))
+    found[dependent] = -np.linalg.solve(jacobian[:, dependent], jacobian[:, independent])
+    return independent, found
+
+
+def _pivots(jacobian: FloatArray, parts: Sequence[list[int]]) -> list[int]:
+    """The columns of complete pivoting, those of the dependent velocities; one part of the rows
+    after another.
+    """
+    work, found = jacobian.copy(), list[int]()
     largest = float(np.abs(work).max())
-    while rows:
-        sizes = np.abs(work[rows])
-        a, j = np.unravel_index(int(sizes.argmax()), sizes.shape)
-        if sizes[a, j] <= LEAST * largest:
-            raise RunError(
-                "linearise: the constraints depend on each other at this state, as at a dead "
-                "point; take another"
-            )
-        i = rows.pop(int(a))
-        found.append(int(j))
-        for k in rows:
-            work[k] -= work[k, j] / work[i, j] * work[i]
+    for part in parts:
+        rows = list(part)
+        while rows:
+            sizes = np.abs(work[rows])
+            a, j = np.unravel_index(int(sizes.argmax()), sizes.shape)
+            if sizes[a, j] <= LEAST * largest:
+                raise RunError(
+                    "linearise: the constraints depend on each other at this state, as at a dead "
+                    "point; take another"
+                )
+            i = rows.pop(int(a))
+            found.append(int(j))
+            factors = work[:, j] / work[i, j]
+            factors[i] = 0.0
+            work -= np.outer(factors, work[i])
     return found
 
 

@@ -2,12 +2,14 @@
 
 There is one notation in all formats. A name is a base and, after the first underscore, its
 subscripts, which commas separate: `f_hinge,x` and the scene's own `f_A_x` are f with the subscripts
-of a joint or a body and of an axis. A base may end in dots, `thetaddot`, and have a superscript,
-`I^A`.
+of a joint or a body and of an axis. A base may end in dots (`eomgen.derivation.dots`), and have a
+superscript, `I^A`.
 """
 
 from dataclasses import dataclass
 from functools import cache
+
+from eomgen.derivation.dots import DOTS, MARK
 
 AXES = ("x", "y", "z")
 GREEK = {
@@ -45,16 +47,11 @@ def parsed(name: str) -> Written:
     """The parts of a name."""
     base, _, rest = name.partition("_")
     base, _, above = base.partition("^")
-    dots = 0
-    for ending, count in (("ddot", 2), ("dot", 1)):
-        stem = base.removesuffix(ending)
-        if stem and stem != base:
-            base, dots = stem, count
-            break
+    base, mark, dots = base.partition(MARK)
     below = [part for part in rest.split(",") if part]
     head = base.rstrip("0123456789")
     if head and head != base and base.isalnum():  # x2 is x with the subscript 2
         base, below = head, [base[len(head) :], *below]
     if below and (split := below[-1].rpartition("_"))[2] in AXES and split[0]:
         below[-1:] = [split[0], split[2]]
-    return Written(base, dots, above, tuple(below))
+    return Written(base, DOTS.index(mark + dots), above, tuple(below))

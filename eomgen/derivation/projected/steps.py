@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import sympy as sp
 
+from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.projected.simplify import gathered
@@ -51,7 +52,7 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
         [
             (sp.Symbol("q"), sp.Matrix([s.q])),
             (sp.Symbol("v"), sp.Matrix([s.v])),
-            (sp.Symbol("vdot"), sp.Matrix([s.a])),
+            (sp.Symbol(dotted("v")), sp.Matrix([s.a])),
         ],
     )
     definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
@@ -220,7 +221,7 @@ KINDS = {
 
 
 def _readable(equations: ProjectedEquations) -> dict[Expr, Expr]:
-    """Symbols by ones whose names SymPy's printers know how to write: `thetadot` is θ̇."""
+    """Symbols by ones whose names that printers know how to write."""
     s, model = equations.symbols, equations.model
     taken = {*s.parameters, *s.inputs}
     shown: dict[Expr, Expr] = {}
@@ -247,13 +248,12 @@ def _readable(equations: ProjectedEquations) -> dict[Expr, Expr]:
         name = v.name.removesuffix("_dot")
         words[v.name] = single.get(i, name)
         if name != v.name:
-            base, underscore, rest = name.partition("_")
-            show(v, f"{base}dot{underscore}{rest}")
-            show(a, f"{base}ddot{underscore}{rest}")
+            show(v, dotted(name))
+            show(a, dotted(name, 2))
         else:
             prefix, _, axis = name.rpartition("_w")
             show(v, f"omega_{prefix},{axis}")
-            show(a, f"omegadot_{prefix},{axis}")
+            show(a, dotted(f"omega_{prefix},{axis}"))
     for formula, symbol in s.formulas.items():
         shown[symbol] = sp.Symbol(written(formula))
     for c in equations.constraints:  # a body that turns freely in the world
