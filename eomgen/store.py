@@ -167,16 +167,16 @@ def bytecode_of(source: str) -> CodeType:
 
     A store that cannot be used is no obstacle.
     """
-    directory = folder()
+    entries = entries_of()
     text = b"bytecode " + MAGIC_NUMBER + source.encode()
     key = hashlib.sha256(text).hexdigest()[:32]
-    if directory and (content := Entries(directory).get(key)):
+    if entries and (content := entries.get(key)):
         with suppress(ValueError, EOFError, TypeError):
             if isinstance(kept := marshal.loads(content), CodeType):
                 return kept
     new = compile(source, "<string>", "exec", dont_inherit=True)
-    if directory:
-        Entries(directory).put(key, marshal.dumps(new))
+    if entries:
+        entries.put(key, marshal.dumps(new))
     return new
 
 
