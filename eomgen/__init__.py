@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from eomgen.scene.built_in import built_in_names
     from eomgen.scene.schema import Scene
 
+__version__ = "0.2.0"
+
 __all__ = [
     "Derivation",
     "Ensemble",
