@@ -7,6 +7,8 @@ access, so that unused ones cost no start-up time.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from eomgen.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
     from eomgen.api.deriving import derive
@@ -28,8 +30,6 @@ if TYPE_CHECKING:
     from eomgen.results import Module, Run
     from eomgen.scene.built_in import built_in_names
     from eomgen.scene.schema import Scene
-
-__version__ = "0.2.0"
 
 __all__ = [
     "Derivation",

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from eomgen.text import breaks_lines, one_line
+from eomgen.version import __version__
 
 EXAMPLES = {
     "list": "eomgen list",
@@ -53,8 +54,6 @@ class Version(argparse.Action):
         super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help=help)
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        from eomgen import __version__
-
         print(f"eomgen {__version__}")
         parser.exit()
 
