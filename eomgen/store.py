@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 
 import platformdirs
 
+from eomgen import plugins
 from eomgen.entries import Entries
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
@@ -239,6 +240,7 @@ def _generator_digest() -> bytes:
     for root, files in ((PACKAGE, _sources()), (templates_folder(), _templates())):
         for path in sorted(files, key=lambda path: path.as_posix()):
             digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    digest.update(plugins.digest())
     return digest.digest()
 
 

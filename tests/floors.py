@@ -15,6 +15,7 @@ FLOORS = (
     "version",
     "displays",
     "errors",
+    "plugins",
     "streams",
     "files",
     "loading",

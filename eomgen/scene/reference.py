@@ -12,9 +12,7 @@ from eomgen.language.base import Table
 from eomgen.language.formula import CONSTANTS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.scene.constraints import AnyConstraint
-from eomgen.scene.effects import Effect
-from eomgen.scene.joints import Joint
+from eomgen.scene.kinds import AnyConstraint, Effect, Joint
 from eomgen.scene.look import Camera, Shape
 from eomgen.scene.schema import (
     BodyTable,
