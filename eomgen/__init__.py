@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
+    from eomgen.api.environments import environment
     from eomgen.api.exhibiting import gallery
     from eomgen.api.exporting import export
     from eomgen.api.generating import generate, load
@@ -48,6 +49,7 @@ __all__ = [
     "derive",
     "effects",
     "ensemble",
+    "environment",
     "export",
     "gallery",
     "generate",
@@ -70,6 +72,7 @@ _PLACES = {
     **dict.fromkeys(("generate", "load"), "api.generating"),
     "Derivation": "equations",
     "derive": "api.deriving",
+    "environment": "api.environments",
     "export": "api.exporting",
     "gallery": "api.exhibiting",
     "import_robot": "api.importing",

@@ -99,6 +99,7 @@ def of_others(robot: Path) -> None:
     print(eomgen.casadi_functions("pendulum"))
     print(eomgen.state_space("cart_pole", outputs=["theta"]))
     print(eomgen.nonlinear_system("cart_pole"))
+    print(eomgen.environment("cart_pole", "cos(theta)", actions={"push": (-1.0, 1.0)}))
 
 
 def of_errors() -> None:
