@@ -11,3 +11,5 @@ myst_heading_anchors = 3
 # Links to files of the repository that are no pages stay as they are.
 suppress_warnings = ["myst.xref_missing"]
 exclude_patterns = ["out"]
+# The schema of scenes, at a fixed address for editors.
+html_extra_path = ["../eomgen/scenes/scene.schema.json"]

@@ -104,3 +104,19 @@ def test_the_typed_script_has_every_public_call() -> None:
 def test_the_typed_script_runs() -> None:
     """What it annotates is what it gets, as far as it uses it."""
     subprocess.run([sys.executable, SCRIPT], cwd=ROOT, check=True, capture_output=True)
+
+
+def test_generating_and_simulating_need_no_drawing() -> None:
+    """Without Matplotlib and Pillow, from an empty store."""
+    code = """
+import sys, tempfile, os
+with tempfile.TemporaryDirectory() as folder:
+    os.environ["EOMGEN_CACHE"] = folder
+    for name in ("matplotlib", "PIL", "pandas", "xarray", "gymnasium", "casadi", "control", "jax"):
+        sys.modules[name] = None
+    import eomgen
+    eomgen.generate("pendulum").save(folder + "/pendulum.py")
+    print(eomgen.simulate("pendulum", t_end=0.1).finished)
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout == "True\n"

@@ -58,6 +58,7 @@ def disagreements() -> Iterator[str]:
         ("recipe/recipe.yaml", f"homepage: {urls['Homepage']}"),
         ("recipe/recipe.yaml", f"repository: {urls['Source']}"),
         ("recipe/recipe.yaml", f"documentation: {urls['Documentation']}"),
+        ("recipe/schemastore.json", f'"url": "{urls["Documentation"]}/scene.schema.json"'),
         ("recipe/recipe.yaml", f"license: {project['license']}"),
     ):
         if line not in text(name):
