@@ -7,10 +7,13 @@ access, so that unused ones cost no start-up time.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from eomgen.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
+    from eomgen.api.environments import environment
     from eomgen.api.exhibiting import gallery
     from eomgen.api.exporting import export
     from eomgen.api.generating import generate, load
@@ -46,6 +49,7 @@ __all__ = [
     "derive",
     "effects",
     "ensemble",
+    "environment",
     "export",
     "gallery",
     "generate",
@@ -68,6 +72,7 @@ _PLACES = {
     **dict.fromkeys(("generate", "load"), "api.generating"),
     "Derivation": "equations",
     "derive": "api.deriving",
+    "environment": "api.environments",
     "export": "api.exporting",
     "gallery": "api.exhibiting",
     "import_robot": "api.importing",

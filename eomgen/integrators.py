@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from eomgen.plugins import added
+
 Kind = Literal["explicit", "implicit", "symplectic"]
 
 
@@ -17,9 +19,10 @@ class IntegratorSpec:
 
     about   what it is
     kind    by which tables and figures group it
-    method  "module:attribute" in `eomgen.run.integrators`: its `FixedStep` or `Adaptive`
+    method  "module:attribute" in `package`: its `FixedStep` or `Adaptive`
     extra   whether it needs an extra of this program
     rattle  whether its steps with constraints are those of RATTLE, on all coordinates
+    package where the module of its method is
     """
 
     about: str
@@ -27,9 +30,10 @@ class IntegratorSpec:
     method: str
     extra: bool = False
     rattle: bool = False
+    package: str = "eomgen.run.integrators"
 
 
-INTEGRATORS: Mapping[str, IntegratorSpec] = {
+_OWN: Mapping[str, IntegratorSpec] = {
     "euler": IntegratorSpec("explicit Euler, order 1", "explicit", "euler:INTEGRATOR"),
     "semi_implicit_euler": IntegratorSpec(
         "symplectic Euler, order 1", "symplectic", "semi_implicit_euler:INTEGRATOR"
@@ -83,3 +87,5 @@ INTEGRATORS: Mapping[str, IntegratorSpec] = {
         "from_scipy:LSODA",
     ),
 }
+INTEGRATORS: Mapping[str, IntegratorSpec] = {**_OWN, **added("integrators", _OWN)}
+"""All integrators, those of other packages last."""

@@ -18,6 +18,8 @@ from eomgen.study.recording import FOLLOWING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
 
     from eomgen.program.passes import PassReport
     from eomgen.run.progress import Progress
@@ -308,6 +310,32 @@ class Run:
             save_parquet(self.trajectory, base.with_suffix(".parquet"), force=force)
             return (*paths, base.with_suffix(".parquet"))
         return paths
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of each column of the table of the run, by name; without those of none."""
+        from eomgen.study.labelled import units_of
+
+        both = (*self.model.coordinates, *self.model.velocities)
+        following = {each.name: each.unit for each in both}
+        of_states = dict(zip(self.motion.states, self.motion.units, strict=True))
+        return units_of(self.trajectory, self.model, {**following, **of_states})
+
+    def to_dataframe(self) -> "DataFrame":
+        """States, works and what was saved as pandas' DataFrame over `t`: the columns of the table
+        that `save` writes, their units in `attrs["units"]`. Raises `RunError` without pandas.
+        """
+        from eomgen.study.labelled import dataframe
+
+        return dataframe(self.trajectory, self.units)
+
+    def to_xarray(self) -> "Dataset":
+        """The same as an xarray.Dataset over `t`, each variable with its attribute `units`. Raises
+        `RunError` without xarray.
+        """
+        from eomgen.study.labelled import dataset
+
+        return dataset(self.trajectory, self.units)
 
     def view(self, *, height: int = 620, live: bool | None = None) -> "Cell":
         """The page of this run, for a cell of a notebook: `height` pixels high, and live as `page`

@@ -26,12 +26,14 @@ from typing import TYPE_CHECKING
 
 import platformdirs
 
+from eomgen import plugins
 from eomgen.entries import Entries
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
 from eomgen.program.program import Program
 from eomgen.program.saving import restored, saved
 from eomgen.templating import PACKAGE, templates_folder
+from eomgen.version import __version__
 
 if TYPE_CHECKING:
     from eomgen.codegen.interface import Interface
@@ -270,7 +272,7 @@ def this_program() -> str:
     """
     libraries = " ".join(f"{name} {_version(name)}" for name in ("numpy", "scipy"))
     python = f"Python {platform.python_version()}"
-    return f"eomgen {_version('eomgen')} ({package_digest()[:12]}; {python} {libraries})"
+    return f"eomgen {__version__} ({package_digest()[:12]}; {python} {libraries})"
 
 
 @cache
@@ -281,6 +283,7 @@ def _generator_digest() -> bytes:
     _add(digest, PACKAGE, _sources())
     for name in ("c", "javascript", "python"):
         _add(digest, templates_folder(), _files(templates_folder() / name, ".jinja"))
+    digest.update(plugins.digest())
     return digest.digest()
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from eomgen.text import breaks_lines, one_line
+from eomgen.version import __version__
 
 EXAMPLES = {
     "list": "eomgen list",
@@ -47,15 +48,13 @@ def path(text: str) -> Path:
 
 
 class Version(argparse.Action):
-    """Prints the version, which is looked up only if the option is given."""
+    """Prints the version."""
 
     def __init__(self, option_strings: Sequence[str], dest: str, help: str) -> None:
         super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help=help)
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        from importlib.metadata import version
-
-        print(f"eomgen {version('eomgen')}")
+        print(f"eomgen {__version__}")
         parser.exit()
 
 

@@ -43,7 +43,7 @@ ENDS = {
 
 @dataclass(frozen=True)
 class Link:
-    """A body and the joint that holds it, as the scene has them; see `docs/reference.md`.
+    """A body and the joint that holds it, as the scene has them; see `docs/reference`.
 
     `inertia` is xx, yy, zz, xy, xz, yz; `held` is what a locked coordinate is held at, degrees or
     metres, and `spring` the stiffness and rest of a spring on each of the joint's coordinates.

@@ -12,8 +12,10 @@ PACKAGE = Path(eomgen.__file__).parent
 # package or a module, and does not count what has a line of its own.
 FLOORS = (
     "text",
+    "version",
     "displays",
     "errors",
+    "plugins",
     "streams",
     "files",
     "loading",

@@ -1,17 +1,19 @@
 """Writes the pages that are made from the program itself: `python tests/pages.py`.
 
 docs/commands.md from the command line's own help, docs/functions.md from the docstrings of the
-public functions.
+public functions and classes, docs/reference from the tables of scenes.
 """
 
 import argparse
 import inspect
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import eomgen
 from eomgen.cli import command_parsers
+from eomgen.scene.reference import reference_pages
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -26,8 +28,7 @@ interrupted. `eomgen COMMAND --help` prints the same text. A default is given in
 FUNCTIONS = """\
 # Functions of the Python API
 
-The text that `help` prints for each function, as in `help(eomgen.simulate)`. [api.md](api.md) has
-examples.
+The text that `help` prints, as in `help(eomgen.simulate)`. [api.md](api.md) has examples.
 """
 
 
@@ -61,30 +62,64 @@ def _option(action: argparse.Action) -> str:
 
 
 def functions_page() -> str:
-    """The page of all public functions."""
+    """The page of all public functions and classes."""
     lines = [FUNCTIONS]
-    for name in eomgen.__all__:
-        function = getattr(eomgen, name)
+    things = [(name, getattr(eomgen, name)) for name in eomgen.__all__]
+    lines += ["## Functions", ""]
+    for name, function in things:
         if inspect.isfunction(function):
-            text = inspect.cleandoc(function.__doc__ or "")
-            lines += [f"## {name}", "", "```text", *_call(name, function), "", text, "```", ""]
+            lines += _entry("function", f"eomgen.{name}", function, function.__doc__)
+    lines += ["## Results", "", "Their attributes and methods; all can be pickled.", ""]
+    for name, each in things:
+        if inspect.isclass(each) and each.__module__ != "eomgen.scene.schema":
+            lines += _entry("class", f"eomgen.{name}", None, each.__doc__)
+            for part, value in vars(each).items():
+                if part.startswith("_"):
+                    continue
+                if isinstance(value, property):
+                    lines += _entry("attribute", f"eomgen.{name}.{part}", None, value.__doc__)
+                elif inspect.isfunction(value):
+                    lines += _entry("method", f"eomgen.{name}.{part}", value, value.__doc__)
     return "\n".join(lines)
 
 
-def _call(name: str, function: Callable[..., Any]) -> Iterator[str]:
-    """A call with all arguments and their defaults, an argument a line."""
-    yield f"{name}("
-    by_name = False
-    for argument in inspect.signature(function).parameters.values():
-        if argument.kind is argument.KEYWORD_ONLY and not by_name:
-            by_name = True
-            yield "    *,"
-        yield f"    {argument.replace(annotation=argument.empty)},"
-    yield ")"
+def _entry(
+    kind: str, name: str, function: Callable[..., Any] | None, text: str | None
+) -> list[str]:
+    """A directive of the site, which indexes the name; elsewhere it reads as a block of text."""
+    call = "" if function is None else _call(function)
+    about = inspect.cleandoc(text or "")
+    return [f"````{{py:{kind}}} {name}{call}", "```text", about, "```", "````", ""]
 
 
-PAGES = {"commands.md": commands_page, "functions.md": functions_page}
+def _call(function: Callable[..., Any]) -> str:
+    """All arguments with their defaults."""
+    signature = inspect.signature(function)
+    given = [each for each in signature.parameters.values() if each.name != "self"]
+    bare = [each.replace(annotation=each.empty) for each in given]
+    return str(signature.replace(parameters=bare, return_annotation=signature.empty))
+
+
+def _of_reference(name: str) -> str:
+    return reference_pages()[name]
+
+
+def reference_index() -> str:
+    """The page that leads to the tables, with what the site needs to find them."""
+    pages = reference_pages()
+    listed = [name.removesuffix(".md") for name in pages if name != "index.md"]
+    fence = ["```{toctree}", ":hidden:", "", *listed, "```", ""]
+    return pages["index.md"] + "\n" + "\n".join(fence)
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "commands.md": commands_page,
+    "functions.md": functions_page,
+    **{f"reference/{name}": partial(_of_reference, name) for name in reference_pages()},
+    "reference/index.md": reference_index,
+}
 
 if __name__ == "__main__":
+    (DOCS / "reference").mkdir(exist_ok=True)
     for name, page in PAGES.items():
         (DOCS / name).write_text(page(), "utf-8")

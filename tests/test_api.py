@@ -321,3 +321,18 @@ def test_studies_are_values(tmp_path: Path) -> None:
     ):
         with pytest.raises(eomgen.RunError, match=said):
             call()
+
+
+def test_warnings_go_to_the_logger(caplog: pytest.LogCaptureFixture) -> None:
+    """What a run warns of is logged; without a handler nothing is printed."""
+    rising = {**DROP, "effects": [{"type": "gravity", "g": -9.81}]}
+    run = eomgen.simulate(rising, t_end=0.1)
+    assert run.warnings
+    assert [r.getMessage() for r in caplog.records if r.levelname == "WARNING"] == [
+        f"drop: {warning}" for warning in run.warnings
+    ]
+    assert {record.name for record in caplog.records} == {"eomgen"}
+    text = repr(rising).replace("np.float64(2.0)", "2.0").replace("np.int64(3)", "3")
+    code = f"import eomgen; print(len(eomgen.simulate({text}, t_end=0.1).warnings))"
+    quiet = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (quiet.stdout, quiet.stderr) == (f"{len(run.warnings)}\n", "")

@@ -147,7 +147,6 @@ def test_each_fact_lives_once() -> None:
     made = [*BESIDE, *OF_DYNAMICS, *OBSERVED, *DERIVATIVES[1:]]
     assert sorted(made) == sorted(OUTPUTS)
     assert (BUILT_IN / "scene.schema.json").read_text("utf-8") == json_schema()
-    assert (ROOT / "docs" / "reference.md").read_text("utf-8") == reference()
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     python = project["requires-python"].removeprefix(">=")
     assert f"Python ≥ {python}" in (ROOT / "README.md").read_text("utf-8")

@@ -1,16 +1,39 @@
-"""How a computation reports to its caller: notes, trial runs, progress. By default it is silent."""
+"""How a computation reports to its caller: notes, trial runs, progress.
+
+By default notes and trial runs go to the logger "eomgen", which is silent until it has a handler.
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
 
 from eomgen.errors import EomgenError, SceneError
 from eomgen.run.progress import Progress
 from eomgen.scene.lines import with_lines
 
+if TYPE_CHECKING:
+    from logging import Logger
 
-def _ignore(text: str) -> None:
-    pass
+
+@cache
+def logger() -> "Logger":
+    """The logger "eomgen". It is silent unless the user's program gives it a handler."""
+    import logging
+
+    found = logging.getLogger("eomgen")
+    found.addHandler(logging.NullHandler())
+    return found
+
+
+def _log(text: str) -> None:
+    if text:
+        logger().info(text)
+
+
+def _log_detail(text: str) -> None:
+    logger().debug(text)
 
 
 def _no_progress(label: str) -> AbstractContextManager[Progress]:
@@ -37,8 +60,8 @@ class Reporter:
     scene: str = ""
     text: Callable[[], str] = str
     argument: Callable[[str], str] = str
-    note: Callable[[str], None] = _ignore
-    trial: Callable[[str], None] = _ignore
+    note: Callable[[str], None] = _log
+    trial: Callable[[str], None] = _log_detail
     waiting: Callable[[str], AbstractContextManager[None]] = _no_notice
     progress: Callable[[str], AbstractContextManager[Progress]] = _no_progress
 
@@ -62,4 +85,4 @@ class Reporter:
 
 
 SILENT = Reporter()
-"""Reports nothing."""
+"""Prints nothing."""

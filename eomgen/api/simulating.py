@@ -10,7 +10,7 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, model_of, overridden, read
 from eomgen.api.inputs import Inputs, applied
 from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
-from eomgen.api.reporter import SILENT, Reporter
+from eomgen.api.reporter import SILENT, Reporter, logger
 from eomgen.api.states import initial_with, origin_from, split
 from eomgen.model.elaborate import expanded
 from eomgen.model.model import Model
@@ -102,7 +102,8 @@ def simulate(
     follow      called with time and state after each step; a true result stops the run
 
     A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
-    says why and what to change. Raises `SceneError`, or `RunError` for an invalid argument.
+    says why and what to change. Warnings also go to the logger "eomgen", notes as level INFO.
+    Raises `SceneError`, or `RunError` for an invalid argument.
     """
     scene, constants, varying = applied(read(source), inputs)
     plan = plan_run(
@@ -129,7 +130,10 @@ def simulate(
         resume=resume,
         backend=backend,
     )
-    return run_plan(plan, follow=follow)
+    run = run_plan(plan, follow=follow)
+    for warning in run.warnings:
+        logger().warning("%s: %s", run.model.name, warning)
+    return run
 
 
 def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:

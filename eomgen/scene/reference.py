@@ -12,9 +12,7 @@ from eomgen.language.base import Table
 from eomgen.language.formula import CONSTANTS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.scene.constraints import AnyConstraint
-from eomgen.scene.effects import Effect
-from eomgen.scene.joints import Joint
+from eomgen.scene.kinds import AnyConstraint, Effect, Joint
 from eomgen.scene.look import Camera, Shape
 from eomgen.scene.schema import (
     BodyTable,
@@ -57,28 +55,50 @@ def reference(kind: str | None = None) -> str:
 
     Raises `SceneError` if there is none.
     """
-    groups = {
-        "Joints": by_type(Joint),
-        "Effects": by_type(Effect),
-        "Constraints": by_type(AnyConstraint),
-        "Shapes": by_type(Shape),
-    }
     if kind is not None:
-        known = {name: table for tables in groups.values() for name, table in tables.items()}
+        known = {name: t for title, group in _groups() if title != "Tables" for name, t in group}
         if kind not in known:
             hint = nearest(kind, known) or f"; known: {', '.join(known)}"
             raise SceneError(f"no joint, effect, constraint or shape is of type '{kind}'{hint}")
         return "\n".join(_section(kind, known[kind]))
-    functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
-    constants = ", ".join(f"`{name}`" for name in CONSTANTS)
-    lines = [HEAD.format(functions=functions, constants=constants), "## Tables", ""]
-    for title, table in TABLES.items():
-        lines += _section(title, table, "### ")
-    for title, tables in groups.items():
+    lines = [_head()]
+    for title, tables in _groups():
         lines += [f"## {title}", ""]
-        for name, table in tables.items():
+        for name, table in tables:
             lines += _section(name, table, "### ")
     return "\n".join(lines).rstrip() + "\n"
+
+
+def reference_pages() -> dict[str, str]:
+    """The same, a page for each table, by the name of its file; `index.md` leads to them."""
+    lines, pages = [_head()], {}
+    for title, tables in _groups():
+        lines += [f"## {title}", "", "| | |", "|---|---|"]
+        for name, table in tables:
+            file = f"{name.replace(' ', '_')}.md"
+            assert file not in pages, file
+            pages[file] = "\n".join(_section(name, table)).rstrip() + "\n"
+            about = inspect.cleandoc(table.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+            lines.append(f"| [{name}]({file}) | {about} |")
+        lines.append("")
+    return {"index.md": "\n".join(lines).rstrip() + "\n", **pages}
+
+
+def _head() -> str:
+    functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
+    constants = ", ".join(f"`{name}`" for name in CONSTANTS)
+    return HEAD.format(functions=functions, constants=constants)
+
+
+def _groups() -> list[tuple[str, list[tuple[str, type[Table]]]]]:
+    """All tables by their names, in groups with titles."""
+    return [
+        ("Tables", [*TABLES.items()]),
+        ("Joints", [*by_type(Joint).items()]),
+        ("Effects", [*by_type(Effect).items()]),
+        ("Constraints", [*by_type(AnyConstraint).items()]),
+        ("Shapes", [*by_type(Shape).items()]),
+    ]
 
 
 def by_type(union: Any) -> dict[str, type[Table]]:

@@ -27,9 +27,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
 from eomgen.outputs import OUTPUTS
 from eomgen.routes import ROUTES
-from eomgen.scene.constraints import AnyConstraint
-from eomgen.scene.effects import Effect
-from eomgen.scene.joints import Joint
+from eomgen.scene.kinds import AnyConstraint, Effect, Joint
 from eomgen.scene.look import Camera, Shape
 from eomgen.scene.mistakes import mistakes
 

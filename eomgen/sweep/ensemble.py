@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,12 @@ from numpy.typing import NDArray
 from eomgen.errors import RunError, nearest
 from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
+from eomgen.study.labelled import need_package
 from eomgen.sweep.design import Design
 from eomgen.sweep.members import FINISHED, WORDS
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 SHARES = (0.05, 0.5, 0.95)
 """Shares of the members below the quantiles that are given if no others are asked for."""
@@ -125,6 +129,50 @@ class Ensemble:
             raise RunError("quantiles: only ends were kept; give samples = 101")
         return self.statistics(name, shares).quantiles
 
+    def to_xarray(self) -> "Dataset":
+        """The runs as an xarray.Dataset, each variable with its `units` where they are known.
+
+        Varied names are dimensions if they form a grid; else `member` is the dimension, along which
+        they are coordinates. With rows, `t` is a dimension, too; `end_time` and `status` say how
+        each member ended. Of a state that is varied, what it becomes is called NAME_run. Raises
+        `RunError` without xarray.
+        """
+        need_package("xarray", "Ensemble.to_xarray")
+        import xarray
+
+        design, units = self.design, self.units
+        if design.axes:
+            dims, lengths = tuple(design.names), tuple(map(len, design.axes))
+            given: dict[str, Any] = {
+                name: (name, np.asarray(axis), _attributes(units, name))
+                for name, axis in zip(dims, design.axes, strict=True)
+            }
+        else:
+            dims, lengths = ("member",), (len(self),)
+            given = {
+                name: ("member", column, _attributes(units, name))
+                for name, column in zip(design.names, design.values.T, strict=True)
+            }
+        along = () if self.rows is None else ("t",)
+        if along:
+            given["t"] = ("t", self.times, {"units": "s"})
+
+        def variable(name: str, values: FloatArray, over: tuple[str, ...]) -> Any:
+            rest = tuple(f"{name}_{i}" for i in range(values.ndim - 1 - len(over)))
+            shaped = values.reshape(*lengths, *values.shape[1:])
+            return ((*dims, *over, *rest), shaped, _attributes(units, name))
+
+        states = self.final if self.rows is None else self.rows
+        variables = {
+            # A state that is varied is a coordinate already: what it becomes has a name of its own.
+            (f"{name}_run" if name in given else name): variable(name, states[..., i], along)
+            for i, name in enumerate(self.states)
+        }
+        variables |= {name: variable(name, each, along) for name, each in self.outputs.items()}
+        variables["end_time"] = variable("end_time", self.t, ())
+        variables["status"] = (dims, np.array(self.status).reshape(lengths))
+        return xarray.Dataset(variables, coords=given, attrs={"scene": self.scene})
+
 
 class Statistics(NamedTuple):
     """Statistics of a quantity over the members of a sweep, in its unit.
@@ -159,3 +207,8 @@ def _statistics(values: FloatArray, shares: Sequence[float]) -> FloatArray:
         with np.errstate(over="ignore"):
             found[1:, i] = np.ldexp([*parts, *np.quantile(there, shares)], exponent)
     return found
+
+
+def _attributes(units: Mapping[str, str], name: str) -> dict[str, str]:
+    unit = "s" if name == "end_time" else units.get(name, "").partition(" | ")[0]
+    return {"units": unit} if unit else {}

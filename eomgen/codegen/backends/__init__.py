@@ -9,6 +9,7 @@ from typing import Protocol
 from eomgen.codegen.backends import c, javascript, jax, matlab, python
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError, nearest
+from eomgen.plugins import added
 from eomgen.program.program import Program
 
 
@@ -37,6 +38,7 @@ BACKENDS: dict[str, Backend] = {
     "jax": jax,
     "matlab": matlab,
 }
+BACKENDS |= added("backends", BACKENDS)
 
 
 def find_backend(name: str) -> Backend:

@@ -23,7 +23,8 @@ class _Methods(Mapping[str, FixedStep | Adaptive]):
     """The methods by name. Each is imported when it is first used: some load much of SciPy."""
 
     def __getitem__(self, name: str) -> FixedStep | Adaptive:
-        return _loaded(integrators.INTEGRATORS[name].method)
+        spec = integrators.INTEGRATORS[name]
+        return _loaded(f"{spec.package}.{spec.method}")
 
     def __iter__(self) -> Iterator[str]:
         return iter(integrators.INTEGRATORS)
@@ -34,8 +35,8 @@ class _Methods(Mapping[str, FixedStep | Adaptive]):
 
 @cache
 def _loaded(place: str) -> FixedStep | Adaptive:
-    """The method at "module:attribute"."""
-    method = resolve_name(f"{__name__}.{place}")
+    """The method at "package.module:attribute"."""
+    method = resolve_name(place)
     assert isinstance(method, FixedStep | Adaptive)
     return method
 

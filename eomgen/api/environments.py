@@ -1,0 +1,137 @@
+"""Environments for reinforcement learning: `environment`, one or many that step together."""
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from eomgen.api.generating import compiled
+from eomgen.api.given import Source, check, check_name
+from eomgen.errors import RunError
+from eomgen.language.base import identifier
+from eomgen.language.formula import FormulaError, evaluate, names_in, parse
+from eomgen.model.model import Model
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import FloatArray
+from eomgen.scalars.floats import ArrayScalars
+from eomgen.sweep.design import Law
+
+NEEDED = "environment: needs Gymnasium; run: pip install 'eomgen[gym]'"
+Columns = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+def environment(
+    source: Source,
+    reward: str,
+    *,
+    actions: Mapping[str, tuple[float, float]],
+    observe: Sequence[str] = (),
+    ended: str = "0",
+    start: Mapping[str, Law | tuple[str, float, float]] | None = None,
+    dt: float = 0.02,
+    parts: int = 4,
+    t_end: float = 10.0,
+    lanes: int | None = None,
+) -> Any:
+    """A `gymnasium.Env` over a scene or, with `lanes`, a `gymnasium.vector.VectorEnv` of so many
+    environments that step together.
+
+    reward   formula of t, states, inputs and parameters, after each step
+    actions  the inputs that are set, with their bounds; what is beyond them is cut
+    observe  formulas that are observed; (): all states
+    ended    formula that is not 0 where an episode has failed, for example "abs(theta) > 0.2"
+    start    distributions of states at the beginning, as those of `sampled`; others have the values
+             of the scene
+    dt       length of a step, s; it is made by `parts` steps of the classical Runge-Kutta method
+    t_end    time after which an episode is cut off, s
+    lanes    number of environments that step together
+
+    A seed determines an episode. A state that is not finite ends an episode, and
+    `info["diverged"]` says so. Raises `SceneError`; `RunError` for an unknown name, a formula that
+    cannot be read, for rigid contacts and for loops that are not closed in closed form, which steps
+    of this kind do not have, or if Gymnasium is not installed.
+    """
+    if find_spec("gymnasium") is None:
+        raise RunError(NEEDED)
+    model = check(source)
+    _check_steps(model, dt, parts, t_end, lanes)
+    _, module = compiled(model)
+    from eomgen.exports.gymnasium_envs import SceneEnv, SceneVectorEnv, Task
+
+    bounds = {identifier(name): each for name, each in actions.items()}
+    for name, (low, high) in bounds.items():
+        check_name(name, list(module.INPUTS), "actions", "input")
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise RunError(
+                f"actions: {name}: {low:g} to {high:g}; give two numbers, the smaller first"
+            )
+    if not bounds:
+        raise RunError("actions: name at least one input with its bounds")
+    task = Task(
+        module,
+        bounds,
+        _stacked([_function(text, "observe", module) for text in observe or module.STATES]),
+        _function(reward, "reward", module),
+        _function(ended, "ended", module),
+        _laws(start or {}, module),
+        dt,
+        parts,
+        max(1, round(t_end / dt)),
+    )
+    return SceneEnv(task) if lanes is None else SceneVectorEnv(task, lanes)
+
+
+def _check_steps(model: Model, dt: float, parts: int, t_end: float, lanes: int | None) -> None:
+    """Raise `RunError` for numbers out of range, and for scenes whose steps need more."""
+    if not (np.isfinite([dt, t_end]).all() and 0 < dt <= t_end):
+        raise RunError(f"dt: {dt:g} s is not between 0 and t_end = {t_end:g} s")
+    if parts < 1 or (lanes is not None and lanes < 1):
+        raise RunError("parts, lanes: give positive numbers")
+    if any(effect.contact_names([b.name for b in model.bodies]) for effect in model.effects):
+        raise RunError(
+            "environment: steps of equal length have no impacts; give the contacts a stiffness "
+            "instead of a restitution"
+        )
+    if model.constraints and not model.groups:
+        raise RunError(
+            "environment: the constraints of this scene are kept by projection, which these steps "
+            "do not have"
+        )
+
+
+def _function(text: str, argument: str, module: GeneratedModule) -> Columns:
+    """A formula as a function of times (k,), states (ny, k) and inputs (nu, k)."""
+    try:
+        formula = parse(text)
+    except FormulaError as error:
+        raise RunError(f"{argument}: '{text}' {error}") from None
+    known = ["t", *module.STATES, *module.INPUTS, *module.PARAMETERS]
+    for name in names_in(formula):
+        check_name(name, known, argument, "state, input or parameter")
+
+    def value(t: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:
+        names = dict(module.PARAMETERS) | {"t": t}
+        given = {**names, **dict(zip(module.STATES, y, strict=True))}
+        given |= dict(zip(module.INPUTS, u, strict=True))
+        with np.errstate(all="ignore"):
+            found = evaluate(formula, given, ArrayScalars())
+        return np.broadcast_to(np.asarray(found, dtype=float), t.shape)
+
+    return value
+
+
+def _stacked(parts: Sequence[Columns]) -> Columns:
+    return lambda t, y, u: np.array([part(t, y, u) for part in parts])
+
+
+def _laws(
+    start: Mapping[str, Law | tuple[str, float, float]], module: GeneratedModule
+) -> dict[int, Law]:
+    """The distributions by the index of their state."""
+    found = {}
+    for given, law in start.items():
+        name = identifier(given)
+        check_name(name, list(module.STATES), "start", "state")
+        found[module.STATES.index(name)] = law if isinstance(law, Law) else Law(*law)
+    return found

@@ -1,0 +1,47 @@
+"""Build the site for a host: python tools/site.py [OUT] [SCENE ...]
+
+OUT (out/site) gets a folder for this version, with the pages, their inventory `objects.inv` and the
+live gallery of the scenes (all built-in ones), and an `index.html` that leads to all versions that
+are there, the newest first. Copy OUT to any host of static files.
+`pip install -e '.[docs]'` brings what it needs.
+"""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PAGE = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta http-equiv="refresh" content="0; url={newest}/index.html">
+<title>eomgen</title>
+<h1>eomgen</h1>
+<ul>
+{items}
+</ul>
+</html>
+"""
+
+
+def main() -> None:
+    """Build; see above."""
+    out = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "out" / "site"
+    sys.path.insert(0, str(ROOT))
+    from eomgen.version import __version__
+
+    folder = out / __version__
+    python = [sys.executable, "-m"]
+    subprocess.run([*python, "sphinx", "-W", "-q", ROOT / "docs", folder], check=True)
+    scenes = ["--scene", *sys.argv[2:]] if len(sys.argv) > 2 else []
+    gallery = [*python, "eomgen", "gallery", "-o", folder / "gallery", "--force", *scenes]
+    subprocess.run(gallery, cwd=ROOT, check=True)
+    known = [path.parent.name for path in out.glob("*/objects.inv")]
+    known.sort(key=lambda name: [int(part) for part in re.findall(r"\d+", name)], reverse=True)
+    items = "\n".join(f'<li><a href="{name}/index.html">{name}</a></li>' for name in known)
+    (out / "index.html").write_text(PAGE.format(newest=known[0], items=items), "utf-8")
+
+
+if __name__ == "__main__":
+    main()
