@@ -149,8 +149,8 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     if not again.finished and again.t[-1] <= run.t[-1]:
         return run
     notice = (
-        f"at t = {run.t[-1]:.6g} s the run came to a dead point of the coordinates that were taken "
-        "as independent; it was made again with all coordinates as states"
+        f"after t = {run.t[-1]:.6g} s what was taken as independent does not determine the other "
+        "coordinates; the run was made again with all of them as states"
     )
     reporter.note(notice)
     return replace(again, warnings=(*again.warnings, notice))
