@@ -153,12 +153,14 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     module, functions = compiled(model, reporter=reporter)
     if module.source == run.module.source or states not in (None, functions.STATES):
         return run
+    again = _run(replace(plan, model=model), follow, reporter)
+    if not again.finished and again.t[-1] <= run.t[-1]:
+        return run
     notice = (
-        f"at t = {run.t[-1]:.6g} s the run came to a dead point of the coordinates that were taken "
-        "as independent; it was made again with all coordinates as states"
+        f"after t = {run.t[-1]:.6g} s what was taken as independent does not determine the other "
+        "coordinates; the run was made again with all of them as states"
     )
     reporter.note(notice)
-    again = _run(replace(plan, model=model), follow, reporter)
     return replace(again, warnings=(*again.warnings, notice))
 
 

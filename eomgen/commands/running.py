@@ -118,7 +118,7 @@ def _report(given: Arguments, run: Run) -> str:
     missed = print_choice(run.choice, given) if run.choice else ""
     if run.estimate:
         print_estimate(run.estimate)
-    if given.guard and run.finished and run.message:
+    if run.finished and run.message:
         print_wrapped("    ", run.message)
     _print_energy(run)
     _print_events(trajectory)

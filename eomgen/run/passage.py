@@ -8,6 +8,7 @@ from eomgen.run.crossing import SAFE, Crossing, crossing, distance
 from eomgen.run.integrators.interface import Advance
 from eomgen.run.margins import Seen
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.projection import Projection
 
 FAR, AGAIN = 0.25, 4.0
 """A margin of the rank from which on no change point is looked for; by how much it must fall before
@@ -38,8 +39,7 @@ class Passage:
         """See `singular.Passing`. The way through begins at the end of `advance`, unless that is
         too near to the change point, or beyond it.
         """
-        held = self.problem.projection
-        assert held is not None
+        held = _held(self.problem)
         self._made += advance.steps if advance else 0
         if advance:
             here = float(held.margins(advance.t, advance.y).min())
@@ -63,9 +63,15 @@ class Passage:
         end = min(found.end, self.t_end)
         if found.at <= end:
             self.times.append(found.at)
-        y = found.within(end)
-        rows = [(t, found.within(t)) for t in self.rows(start, end)]
-        steps = (*before, Advance(end, y, rows, self.problem, found.within))
+
+        def within(t: float) -> FloatArray:
+            y = found.within(t)
+            safe = distance(_held(self.problem), t, y) >= SAFE
+            return self.problem.projected(t, y) if safe else y
+
+        y = within(end)
+        rows = [(t, within(t)) for t in self.rows(start, end)]
+        steps = (*before, Advance(end, y, rows, self.problem, within))
         return steps, self.begin(end, y, self._made) if end < self.t_end else iter(())
 
     def words(self) -> str:
@@ -76,3 +82,8 @@ class Passage:
         what = "a change point" if count == 1 else f"{count} change points"
         when = f"at t = {self.times[0]:.6g} s" + ("" if count == 1 else ", the first")
         return f"went through {what} {when}, with the velocity continuous"
+
+
+def _held(problem: Problem) -> Projection:
+    assert problem.projection is not None
+    return problem.projection

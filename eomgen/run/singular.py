@@ -32,7 +32,7 @@ class SingularPositionError(StepFailure):
     def __init__(
         self, held: Projection | ClosedForm, t: float, y: FloatArray, margins: FloatArray
     ) -> None:
-        least, closed = int(np.argmin(margins)), isinstance(held, ClosedForm)
+        least, dead, remedy = int(np.argmin(margins)), True, OTHERS
         if isinstance(held, ClosedForm) and least >= len(held.names):
             angle = held.angles[least - len(held.names)]
             reason = (
@@ -44,15 +44,19 @@ class SingularPositionError(StepFailure):
                 f"at t = {t:.6g} s what was taken as independent is at a dead point: the other "
                 f"coordinates do not follow from it by constraint {held.names[least]}"
             )
-            closed = True
+            if isinstance(held, Projection):
+                reason += ", or this has no direction, as where a disc lies flat"
+                remedy = f"{ELSEWHERE}, or {OTHERS}"
         else:
+            dead = isinstance(held, ClosedForm)
+            remedy = OTHERS if dead else ELSEWHERE
             reason = (
                 f"the mechanism is singular at t = {t:.6g} s: constraint {held.names[least]} "
                 "follows from the others there, as at a change point, or has no direction, as "
                 "where a disc lies flat"
             )
-        super().__init__(reason, OTHERS if closed else ELSEWHERE)
-        self.dead = closed
+        super().__init__(reason, remedy)
+        self.dead = dead
 
     def __reduce__(self) -> tuple[type, tuple[str, ...]]:
         return StepFailure, (self.reason, self.remedy)

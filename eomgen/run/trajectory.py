@@ -194,7 +194,7 @@ def save_npz(trajectory: Trajectory, path: Path, force: bool = False) -> None:
         "integrator": np.array(trajectory.integrator),
         "finished": np.array(trajectory.finished),
         "message": np.array(trajectory.message),
-        "outcome": _names(astuple(trajectory.outcome)),
+        "outcome": _names(astuple(trajectory.outcome)[:3]),
         "counts": np.array([trajectory.counts[key] for key in COUNTS], dtype=np.int64),
         "events": np.array([(event.t, event.speed) for event in events]).reshape(-1, 2),
         "event_names": _names([(event.contact, event.kind) for event in events]).reshape(-1, 2),
