@@ -216,6 +216,7 @@ def test_two_stops_at_once(number: signal.Signals, tmp_path: Path) -> None:
     """To the process and to its group, as `timeout` sends them: one line, and no hang."""
     process = started(tmp_path, 60, 20, 2)
     process.send_signal(number)
+    time.sleep(0.05)
     os.killpg(process.pid, number)
     said = process.communicate(timeout=20)[1]
     assert process.returncode == 128 + number and said.count("\n") == 1, said
