@@ -9,7 +9,7 @@ from eomgen.scene.look import Camera, Shape, check_look
 from eomgen.scene.schema import Scene
 
 MOST_SHAPES = 2000
-"""Greatest number of shapes, with which a picture takes half a GB."""
+"""Greatest number of shapes, with which figure and page take 0.6 GB."""
 
 
 @dataclass(frozen=True)
