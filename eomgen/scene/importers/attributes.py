@@ -4,11 +4,9 @@ import math
 from collections.abc import Callable
 
 from eomgen.language.base import LARGEST
+from eomgen.scene.importers.vectors import ORIGIN, Vector
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.text import brief
-
-Vector = tuple[float, float, float]
-ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 def required(element: Element, key: str, what: str) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from eomgen.scene.importers.attributes import ORIGIN, Vector
+from eomgen.scene.importers.vectors import ORIGIN, Vector
 
 Frame = Literal[
     "same",

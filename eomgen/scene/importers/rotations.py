@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from eomgen.scene.importers.attributes import Vector
+from eomgen.scene.importers.vectors import Vector
 
 NEAR = 1e-10
 """An angle this near to a right angle, rad, is a right angle that was printed with few digits."""

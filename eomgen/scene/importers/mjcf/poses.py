@@ -3,8 +3,8 @@
 import math
 from collections.abc import Sequence
 
-from eomgen.scene.importers.attributes import Vector
 from eomgen.scene.importers.rotations import Matrix, angles_of
+from eomgen.scene.importers.vectors import Vector
 
 NEAR = 1e-14
 """An angle this near to a right angle, rad, or a component this near to 0, is rounding."""

@@ -4,7 +4,6 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from eomgen.scene.importers.attributes import Vector
 from eomgen.scene.importers.parts import SLIDING_SPEED, Parts
 from eomgen.scene.importers.rotations import (
     EYE,
@@ -17,6 +16,7 @@ from eomgen.scene.importers.rotations import (
     transposed,
 )
 from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved
+from eomgen.scene.importers.vectors import Vector
 from eomgen.scene.joints.base import WORLD
 
 

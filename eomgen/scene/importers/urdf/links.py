@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from eomgen.scene.importers.attributes import ORIGIN, Vector, child, number, vector
+from eomgen.scene.importers.attributes import child, number, vector
 from eomgen.scene.importers.rotations import cleaned, is_slight, rotated_inertia, rotation
 from eomgen.scene.importers.urdf.tree import Tree
+from eomgen.scene.importers.vectors import ORIGIN, Vector
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
 from eomgen.text import brief

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from eomgen.scene.importers.attributes import Vector, number, required, vector
+from eomgen.scene.importers.attributes import number, required, vector
 from eomgen.scene.importers.meshes import Bounds, MeshError, bounds_of, find_file
 from eomgen.scene.importers.rotations import image, rotation, squared
+from eomgen.scene.importers.vectors import Vector
 from eomgen.scene.importers.xml_elements import Element
 
 THINNEST = 1e-3

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from eomgen.errors import SceneError, nearest
-from eomgen.scene.importers.attributes import Vector, child, number, required, vector
+from eomgen.scene.importers.attributes import child, number, required, vector
+from eomgen.scene.importers.vectors import Vector
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.text import brief
 
