@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.dynamics import constraints
-from eomgen.dynamics.closure import CLOSED, Array, Closure, newton
+from eomgen.dynamics.closure import CLOSED, Array, Closure, least, newton, settled
 from eomgen.dynamics.clusters import jacobian_of
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -165,7 +165,9 @@ def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array 
             found.append(q)
             if spread == 0.0 or len(found) >= ENOUGH:
                 break
-    return min(found, key=lambda q: float(np.abs(q - start).max())) if found else None
+    if not found:
+        return None
+    return settled(mechanism, min(found, key=lambda q: float(np.abs(q - start).max())), free)
 
 
 def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
@@ -284,8 +286,7 @@ def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]
     matrix = mechanism.jacobian(q) / mechanism.lengths
     rate = rate / np.array([mechanism.size if unit == "N" else 1.0 for _, unit in model.rows])
     for free in (~held, np.ones(len(held), dtype=bool)):
-        change = -np.linalg.lstsq(np.where(free, matrix, 0.0), rate, rcond=1e-10)[0]
-        change = np.where(free, change, 0.0)
+        change = -least(np.where(free, matrix, 0.0), rate)
         left = float(np.abs(matrix @ change + rate).max())
         if left <= 1e-9 * max(1.0, float(np.abs(rate).max())):
             moved = float(np.abs(change[held]).max(initial=0.0))

@@ -27,6 +27,9 @@ PATIENCE = 12
 CLOSED = 1e-12
 """A residual relative to the mechanism's size that is rounding."""
 
+FINE = 32
+"""Bits to which positions are rounded before they are closed by plain sums."""
+
 
 @dataclass(frozen=True)
 class Closure:
@@ -94,7 +97,8 @@ class Closure:
         rates = constraints.position_rates(self.dynamics(q), (step * self.lengths).tolist())
         found: Array = q + np.array(rates, dtype=np.float64)
         for indices in map(list, self.model.quaternions):
-            found[indices] /= np.linalg.norm(found[indices])
+            # No library's norm, which has other bits on other machines.
+            found[indices] /= math.sqrt(math.fsum(x * x for x in found[indices].tolist()))
         return found
 
     def upright(self, q: Array) -> bool:
@@ -154,3 +158,48 @@ def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | Non
             continue
         q, g, damping = there, after, damping / 10 if damping > 1e-12 else 0.0
     return q if float(np.abs(g).max()) <= 10 * CLOSED else None
+
+
+def settled(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array:
+    """A closed position with the same bits on every machine, next to one that `newton` found.
+
+    The last bits of that depend on the machine's library for linear algebra. So the change from the
+    start is rounded, by less than 1e-9 of the mechanism's size, and the position is closed again by
+    plain sums. Two machines differ only if a change lies within rounding of the middle between two
+    rounded ones.
+    """
+    finest = 2.0 ** (math.frexp(mechanism.size)[1] - FINE)
+    grid = np.array([finest if c.unit == "m" else 2.0**-FINE for c in mechanism.model.coordinates])
+    start = np.array(mechanism.model.initial_q)
+    rounded = start + np.rint((q - start) / grid) * grid
+    q, last = mechanism.moved(rounded, np.zeros(len(free))), math.inf
+    for _ in range(STEPS):
+        g = mechanism.residuals(q)
+        size = float(np.abs(g).max())
+        if size <= CLOSED and size >= 0.5 * last:
+            break
+        last = size
+        q = mechanism.moved(q, -least(np.where(free, mechanism.holding(q), 0.0), g))
+    return q
+
+
+def least(matrix: Array, right: Array) -> Array:
+    """The least x (n,) with matrix x = right, (m,); rows that follow from others to 1e-10 are left
+    out. By Gram-Schmidt in plain sums, so that it has the same bits on every machine.
+    """
+    rows, values = matrix.tolist(), right.tolist()
+    norms = [math.fsum(x * x for x in row) for row in rows]
+    found, smallest = [0.0] * matrix.shape[1], 1e-20 * max(norms, default=0.0)
+    for _ in range(len(rows)):
+        i = max(range(len(rows)), key=norms.__getitem__)
+        square = math.fsum(x * x for x in rows[i])
+        if not square > smallest:
+            break
+        value, row = values.pop(i) / square, rows.pop(i)
+        found = [x + value * y for x, y in zip(found, row, strict=True)]
+        for k, other in enumerate(rows):
+            part = math.fsum(x * y for x, y in zip(other, row, strict=True)) / square
+            rows[k] = [x - part * y for x, y in zip(other, row, strict=True)]
+            values[k] -= part * value * square
+        norms = [math.fsum(x * x for x in each) for each in rows]
+    return np.array(found)
