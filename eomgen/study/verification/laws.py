@@ -155,16 +155,7 @@ def _slopes(
     made = extended(given), direction, change
     whole = _ulps_of(*made, len(model.coordinates), model.velocities)
     here = dict(zip(names_of(model), state.y, strict=True))
-    moved: Any = 0.0
-    if model.constraints:
-        moved = _moved(
-            model,
-            state,
-            y,
-            change,
-            lambda beside, near: _change_along(model, state, beside, near, direction),
-        )
-    return whole, _rows(*made, roundings, state, here, rest_of(model), moved)
+    return whole, _rows(*made, roundings, state, here, rest_of(model), 0.0)
 
 
 def _change_along(
@@ -257,6 +248,8 @@ def _slopes_in_closed_form(
         return None if other is None else other[0]
 
     moved = _moved(model, state, y, change, change_at)
+    if moved is None:
+        return whole, 0.0
     here = dict(zip(names, state.y, strict=True))
     return whole, _rows(*made, roundings, state, here, rest_of(model), moved)
 
@@ -267,16 +260,18 @@ def _moved(
     y: Array,
     change: Array,
     change_at: Callable[[Array, FreeBodies], Array | None],
-) -> FloatArray:
-    """How far a change along a direction moves between neighbours of a state. Under constraints
-    that is rounding: of what follows from the module's states, and of differences of differences.
+) -> FloatArray | None:
+    """How far a change along a direction moves between neighbours of a state, which is rounding of
+    what follows from the module's states; None where a neighbour has a corner or differences of
+    differences leave no digits.
     """
     moved = np.zeros(len(change))
     for seed in range(_NEAR):
         beside = y * (1 + extended(np.random.default_rng(seed).uniform(-ULP, ULP, len(y))))
         found = change_at(beside, FreeBodies(model, state.t, beside, state.u))
-        if found is not None:
-            moved = np.maximum(moved, abs(doubles(found - change)))
+        if found is None:
+            return None
+        moved = np.maximum(moved, abs(doubles(found - change)))
     return moved
 
 
