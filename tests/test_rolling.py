@@ -179,6 +179,12 @@ def test_the_rate_of_a_residual_is_the_power_of_its_loads(name: str, other: str)
     at = anywhere(model, 5)
     d, along = MechanismState(model, at, FloatScalars()), moving(model, at)
     rates = constraints.rates(d)
+    alone = [
+        n
+        for (n, _), r in zip(model.rows, constraints.rows_of(d), strict=True)
+        if r.residual is None
+    ]
+    assert list(model.velocity_rows) == alone
     for row, changing, rate in zip(
         constraints.rows_of(d), constraints.rows_of(along), rates, strict=True
     ):

@@ -23,6 +23,7 @@ from eomgen.precision.extended import doubles, extended, extended_digits
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.scene.schema import Simulation
+from eomgen.store import generated_code, interfaced_program_of
 from eomgen.study.verification import drift as drifting
 from eomgen.study.verification import horizon as horizons
 from eomgen.study.verification import sampled as sampling
@@ -30,6 +31,7 @@ from eomgen.study.verification.hard_states import KINDS, hard_states
 from eomgen.study.verification.horizon import horizon as horizon_of
 from eomgen.study.verification.judging import judged
 from eomgen.study.verification.laws import kept
+from eomgen.study.verification.roundings import Roundings
 from eomgen.study.verification.truth import Truth
 from eomgen.study.verification.verify import OUTPUTS, Verified, verify
 from eomgen.study.verification.virtual_work import FreeBodies
@@ -450,7 +452,8 @@ def test_a_module_that_gives_no_number_misses_its_bound() -> None:
     full: Any = load_module(python_module(compile_program(bare).system))
     state = hard_states(module, 1, 1, 0, 1.0)[1]
     module.derivative = lambda *_: np.full(2, np.nan)
-    found = judged(model, Truth(model), "aba", {"aba": module}, full, state)
+    roundings = Roundings([interfaced_program_of(bare)])
+    found = judged(model, Truth(model), "aba", {"aba": module}, full, roundings, state)
     assert found is not None and np.isnan(found.errors["aba"]).all()
     assert found.residuals["aba"].error == np.inf
 
@@ -595,3 +598,26 @@ def test_an_interrupt_keeps_the_states_judged_so_far(
     assert "v̇" in out and "interrupted after 3 of " in out and "drift of" not in out
     assert err.startswith("eomgen: pendulum: interrupted after 3 of ")
     assert not list((tmp_path / "kept").iterdir())
+
+
+# Small faults in components and terms that others hide.
+
+
+@pytest.mark.parametrize(
+    ("output", "size", "line"),
+    [("mass_matrix", 5e-14, "each component"), ("jacobian", 1e-12, "jacobian, each row")],
+)
+def test_a_small_fault_in_a_component_is_noticed(output: str, size: float, line: str) -> None:
+    """By what rounding makes of it; the bounds of whole outputs let it pass."""
+    model = replace(model_of("furuta_pendulum"), outputs=in_order(OUTPUTS))
+    module: Any = load_module(generated_code(model).module, "small_fault")
+    right = getattr(module, output)
+
+    def wrong(*given: Any) -> Any:
+        found = right(*given)
+        found[-1, 1] *= 1 + size
+        return found
+
+    setattr(module, output, wrong)
+    found = verify(model, Simulation(t_end=0.1), states=1, module=module)
+    assert [one.what for one in found.missed] == [line]

@@ -90,7 +90,7 @@ class Interface:
     driven, locked  prescribed coordinates
     contacts        rigid contacts
     constraints     name and unit of the multiplier of each row of the constraints
-    rolling         names of those rows that restrict velocities alone
+    velocity_rows   names of those rows that restrict velocities alone
     following       name, unit and description of each coordinate and velocity that follows from
                     others in closed form
     ranged          names of angles among these, each within one turn
@@ -119,7 +119,7 @@ class Interface:
     locked: tuple[Given, ...]
     contacts: tuple[ContactLabel, ...]
     constraints: tuple[tuple[str, str], ...]
-    rolling: tuple[str, ...]
+    velocity_rows: tuple[str, ...]
     following: tuple[tuple[str, str, str], ...]
     ranged: tuple[str, ...]
     left_out: tuple[str, ...]
@@ -160,20 +160,11 @@ def interface_of(system: System) -> Interface:
         locked=tuple(_given(c) for c in model.prescribed if c.locked),
         contacts=system.contacts,
         constraints=model.rows,
-        rolling=_rolling(system),
+        velocity_rows=model.velocity_rows,
         following=_following(model),
         ranged=model.ranged,
         left_out=tuple(left_out),
     )
-
-
-def _rolling(system: System) -> tuple[str, ...]:
-    """The rows that no position can violate: their residual is the number 0."""
-    if not system.model.rows:
-        return ()
-    steps, nodes = system.program.steps, system.program.outputs["constraint_residuals"].nodes
-    rows = zip(system.model.rows, nodes, strict=True)
-    return tuple(name for (name, _), i in rows if steps[i].value == 0.0)
 
 
 def _following(model: Model) -> tuple[tuple[str, str, str], ...]:

@@ -230,6 +230,12 @@ class Model(Displayed):
         return tuple(row for row in self.every_row if row[0] not in self.dropped)
 
     @cached_property
+    def velocity_rows(self) -> tuple[str, ...]:
+        """The names of those of them that restrict velocities alone."""
+        found = [x for c in self.constraints for x in c.velocity_rows(self.dimensions)]
+        return tuple(name for name in found if name not in self.dropped)
+
+    @cached_property
     def loops(self) -> tuple[LoopJoint, ...]:
         """The joints that close loops."""
         return tuple(c for c in self.constraints if isinstance(c, LoopJoint))

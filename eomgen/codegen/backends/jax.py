@@ -126,7 +126,7 @@ def _data(interface: Interface) -> list[tuple[str, str]]:
         "DRIVEN": tuple(c.name for c in interface.driven),
         "CONTACTS": {c.name: c.effect for c in interface.contacts},
         "CONSTRAINTS": tuple(name for name, _ in interface.constraints),
-        "VELOCITY_CONSTRAINTS": interface.rolling,
+        "VELOCITY_CONSTRAINTS": interface.velocity_rows,
     }
     return [
         (name, pprint.pformat(value, width=WIDTH - len(name), sort_dicts=False))

@@ -125,7 +125,7 @@ def module(program: Program, interface: Interface) -> str:
         "contacts": [(c.name, c.effect) for c in interface.contacts],
         "constraints": repr(tuple(n for n, _ in interface.constraints)),
         "constrained": bool(interface.constraints),
-        "rolling": repr(interface.rolling) if interface.rolling else "",
+        "velocity_rows": repr(interface.velocity_rows) if interface.velocity_rows else "",
         "ranged": repr(interface.ranged) if interface.ranged else "",
         "following": repr(tuple(n for n, _, _ in interface.following))
         if interface.following

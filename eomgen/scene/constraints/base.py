@@ -66,6 +66,9 @@ class Constraint(Protocol):
     def row_names(self, dimensions: int) -> Sequence[tuple[str, str]]:
         """The name and the unit of the multiplier of each of its rows."""
 
+    def velocity_rows(self, dimensions: int) -> Sequence[str]:
+        """The names of its rows that restrict velocities alone and have no residual."""
+
     def rows(self, mechanism: Linkage) -> Iterable[Row]:
         """Its scalar constraints, over the mechanism's scalars, in the order of `row_names`."""
 
@@ -78,6 +81,10 @@ class ConstraintTable(EffectTable):
     def row_names(self, dimensions: int) -> Sequence[tuple[str, str]]:
         """The name and the unit of the multiplier of each row."""
         raise NotImplementedError
+
+    def velocity_rows(self, dimensions: int) -> Sequence[str]:
+        """The names of its rows that restrict velocities alone; of most constraints none."""
+        return ()
 
     def rows(self, mechanism: Linkage) -> Iterable[Row]:
         """Its scalar constraints."""

@@ -66,6 +66,10 @@ position = "shoulder_angle + elbow_angle"
         """One row, of the constraint's name."""
         return [(self.name, "N m")]
 
+    def velocity_rows(self, dimensions: int) -> list[str]:
+        """The row, if the formula is one of velocities."""
+        return [] if self.velocity is None else [self.name]
+
     def rows(self, mechanism: Linkage) -> Iterator[Row]:
         """The formula itself."""
         if self.position is not None:

@@ -38,6 +38,10 @@ across = [0, 1]
         """One row, of the constraint's name."""
         return [(self.name, "N")]
 
+    def velocity_rows(self, dimensions: int) -> list[str]:
+        """The row."""
+        return [self.name]
+
     def rows(self, mechanism: Linkage) -> Iterator[Row]:
         """The velocity across the edge."""
         e = unit(mechanism, self.body, self.across)

@@ -67,6 +67,10 @@ class LoopJoint:
         names = [(word, "N") for word in words] + [(word, "N m") for word in angles]
         return [(f"{self.name}_{word}", unit) for word, unit in names]
 
+    def velocity_rows(self, dimensions: int) -> tuple[str, ...]:
+        """None of its rows restricts velocities alone."""
+        return ()
+
     def rows(self, mechanism: Linkage) -> Sequence[Row]:
         """Positions first, then orientations."""
         return [*self._positions(mechanism), *self._orientations(mechanism)]

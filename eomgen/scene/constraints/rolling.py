@@ -134,6 +134,10 @@ other_at = [0, -1.4]
         words = ["along"] if dimensions == 2 else ["along_1", "along_2"]
         return [(f"{self.name}_{word}", "N") for word in ("normal", *words)]
 
+    def velocity_rows(self, dimensions: int) -> list[str]:
+        """The rows in the plane."""
+        return [name for name, _ in self.row_names(dimensions)[1:]]
+
     def rows(self, mechanism: Linkage) -> Iterator[Row]:
         """The gap, and the slip velocity along each tangent."""
         if self.other_radius is None:

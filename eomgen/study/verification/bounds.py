@@ -8,8 +8,12 @@
 - The other routes are compared, though they are not generated. In addition they may lose what any
   solution with the mass matrix may lose, a few ulps times its condition number (Higham, Accuracy
   and Stability of Numerical Algorithms, theorem 10.3 and section 9). The report says so.
-- Residual M v̇ + h - F, all outputs, inverse dynamics at the true v̇: the same bounds as the forward
+- Residual M v̇ + h - F, all outputs, inverse dynamics beside the true v̇: the bounds of the forward
   error, in ulps of the sum of the sizes of their terms.
+- Each component of an output, and each row of the Jacobian along a direction, is off by at most
+  `PART` times what rounding makes of it in the module's own operations (see `roundings`). This
+  finds small faults in components and terms that are small beside others; whether the operations
+  lose more than the data is for the bounds above.
 - The mass matrix is positive definite: all its pivots, scaled to a diagonal of ones, are > 0.
 - Laws: kinetic energy changes by the power of all loads, and momentum by the external loads. The
   Jacobian is compared with differences of the independent solver, with a bound of the square root
@@ -41,6 +45,9 @@ SOLVING = 10.0
 """Ulps, times condition number and number of velocities, allowed in a solution with M."""
 SLOPES = 1e-8 * 2.0**52
 """Error allowed in the Jacobian, ulps."""
+PART = 30.0
+"""Error allowed in a component, in units of its spread in random arithmetic."""
+SPREADS = "in spreads by rounding"
 AGREED = 14.0
 """Digits to which the two solutions in 60 digits must agree."""
 RUN, BOOKS = 100.0, 1e-6
@@ -207,6 +214,15 @@ def loss_checks(there: Sequence[Judged], taken: str) -> list[Check]:
     return checks
 
 
+def part_checks(there: Sequence[Judged]) -> list[Check]:
+    """The component of an output that is off by most in units of what rounding makes of it."""
+    found = [(*part, name, one) for one in there for name, part in one.parts.items()]
+    # nan counts as the worst.
+    value, index, name, one = max(found, key=lambda part: (part[0] != part[0], part[0]))
+    words = f"{SPREADS}; entry {index} of {name}"
+    return [Check("each component", value, PART, "", words, one.state.label)]
+
+
 def law_checks(model: Model, laws: Sequence[Broken]) -> list[Check]:
     """Laws of motion and the Jacobian, at the states where they were checked."""
     checks = []
@@ -214,13 +230,15 @@ def law_checks(model: Model, laws: Sequence[Broken]) -> list[Check]:
         "energy law: rate = power of loads": (lambda law: law.energy, BOUND),
         "momentum law: rate = loads from outside": (lambda law: law.momentum, BOUND),
         "jacobian": (lambda law: law.slopes, SLOPES),
+        "jacobian, each row": (lambda law: law.rows, PART),
     }
     for what, (of, bound) in pick.items():
         values = [(value, law) for law in laws if (value := of(law)) is not None]
         if values:
             # nan counts as the worst.
             value, law = max(values, key=lambda pair: (pair[0] != pair[0], pair[0]))
-            checks.append(Check(what, value, bound, "ulp", at=law.state.label))
+            unit, words = ("", SPREADS) if bound == PART else ("ulp", "")
+            checks.append(Check(what, value, bound, unit, words, law.state.label))
     return checks
 
 

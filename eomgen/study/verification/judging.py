@@ -15,17 +15,19 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.extended import Array, doubles, extended, extended_digits, solved
+from eomgen.precision.extended import NOTHING, Array, doubles, extended, extended_digits, solved
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.scene.effects import Gravity
 from eomgen.study.verification.hard_states import State
+from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
 from eomgen.study.verification.truth import Truth
 from eomgen.study.verification.ulps import LEAST_SCALE
 from eomgen.study.verification.virtual_work import FreeBodies
+from eomgen.study.whole import Viewed, names_of
 
-ULP = 2.0**-52
-"""The ulp of 1 in doubles."""
+DIFFERENCED = 1e-18
+"""Error of slopes and rates that are differences of differences, relative to their terms."""
 NEAR = 4
 """Number of random changes of the data."""
 
@@ -53,6 +55,8 @@ class Judged:
     pivot      smallest pivot of these matrices, eliminated from the last row up as in LᵀDL
     residuals  the errors of M v̇ + h - F - Jᵀ λ at the v̇ of each route
     losses     errors of everything else that the module computes
+    parts      by output of the route taken, the greatest error of a component in units of what
+               rounding makes of it, and the component's index
     """
 
     state: State
@@ -64,6 +68,7 @@ class Judged:
     pivot: float
     residuals: Mapping[str, Loss]
     losses: Mapping[str, Loss]
+    parts: Mapping[str, tuple[float, int]]
 
 
 def judged(
@@ -72,10 +77,12 @@ def judged(
     taken: str,
     modules: Mapping[str, GeneratedModule],
     full: GeneratedModule,
+    roundings: Roundings,
     state: State,
 ) -> Judged | None:
     """The errors of the modules of all routes at a state, and of all outputs of the route `taken`.
-    Outputs that its module lacks are taken from `full`, which has them all.
+    Outputs that its module lacks are taken from `full`, which has them all; `roundings` are those
+    of their programs.
 
     None if there is no finite acceleration in 60 digits.
     """
@@ -104,7 +111,10 @@ def judged(
         vd = {route: ydot[nq : nq + nv] for route, ydot in found.items()}
         errors = {route: doubles(extended(x) - exact) for route, x in vd.items()}
         residuals = _residuals(free, near, vd, model)
-        losses = _outputs(free, near, (modules[taken], full), found[taken], state)
+        spreads = _Spreads(roundings, modules[taken], free, state)
+        losses, parts = _outputs(free, near, (modules[taken], full), found[taken], spreads, state)
+        vd_parts = spreads.share("accelerations", errors[taken], exact, abs(exact), data)
+        parts = {"v̇": vd_parts, **parts}
         return Judged(
             state,
             doubles(exact),
@@ -114,6 +124,7 @@ def judged(
             *_conditions(free),
             residuals,
             losses,
+            parts,
         )
 
 
@@ -193,9 +204,10 @@ def _outputs(
     near: Sequence[FreeBodies],
     modules: Sequence[Any],
     ydot: FloatArray,
+    spreads: "_Spreads",
     state: State,
-) -> dict[str, Loss]:
-    """The errors of everything that the module computes besides v̇."""
+) -> tuple[dict[str, Loss], dict[str, tuple[float, int]]]:
+    """The errors of everything that the module computes besides v̇, as a whole and by component."""
     nq, nv = len(free.model.coordinates), free.nv
     q, v, x = np.split(state.y, [nq, nq + nv])
     more = {"x": x} if len(x) else {}
@@ -210,19 +222,83 @@ def _outputs(
         except (ArithmeticError, ValueError):
             return np.nan
 
-    found = {}
+    found, parts = {}, {}
     for name, (true, changes, scale) in _quantities(free, near).items():
         given = asked(name) if name != "body_poses" else _matrices(asked(name), free.dimensions)
         found[name] = _loss(given, true, changes, scale)
-    at = doubles(free.vd)
+        change = _change(true, changes)
+        parts[name] = spreads.share(name, extended(given) - true, true, scale, change)
+    # Beside the true accelerations, at which all terms of a row cancel.
+    at = doubles(free.vd) * np.random.default_rng(1).uniform(0.5, 0.9, nv)
     true, *changes = (_on_tree(f, extended(at)) for f in (free, *near))
     scale = abs(free.mass_matrix) @ abs(extended(at)) + free.bias_sizes + free.applied_sizes
-    found["inverse_dynamics"] = _loss(asked("inverse_dynamics", at), true, changes, scale)
+    given = asked("inverse_dynamics", at)
+    found["inverse_dynamics"] = _loss(given, true, changes, scale)
+    error, change = extended(given) - true, _change(true, changes)
+    parts["inverse_dynamics"] = spreads.share("inverse_dynamics", error, true, scale, change, at)
     rest = [*range(nq), *range(nq + nv, len(state.y))]
     true, *changes = (f.state_rates[rest] for f in (free, *near))
     sizes = abs(true) + np.max(abs(true), initial=mpfr(0))
     found["other rates"] = _loss(ydot[rest], true, changes, sizes)
-    return found
+    if spreads.all_states:
+        error, change = extended(ydot[rest]) - true, _change(true, changes)
+        parts["other rates"] = spreads.share("derivative", error, true, sizes, change, rows=rest)
+    return found, parts
+
+
+def _change(true: Array, changes: Sequence[Array]) -> Array:
+    return np.max([abs(changed - true) for changed in changes], axis=0)
+
+
+def rest_of(model: Model) -> float:
+    """What 60 digits leave of terms that cancel, relative to these; more where rates and β of
+    constraints are differences.
+    """
+    return DIFFERENCED if model.constraints else NOTHING
+
+
+class _Spreads:
+    """What rounding makes of the components of outputs at a state.
+
+    all_states  whether the module's state has all coordinates. If not, the others follow from it
+                only but for rounding, and what that changes is rounding, too
+    """
+
+    def __init__(self, roundings: Roundings, module: Any, free: FreeBodies, state: State) -> None:
+        self._roundings, self._free, self._state = roundings, free, state
+        self.all_states = not isinstance(module, Viewed)
+        self._y = dict(zip(names_of(free.model), state.y.tolist(), strict=True))
+
+    def share(
+        self,
+        name: str,
+        error: Any,
+        true: Array,
+        scale: Array,
+        change: Array,
+        *extra: Any,
+        rows: Sequence[int] | None = None,
+    ) -> tuple[float, int]:
+        """The greatest error of a component of an output in units of its spread, and its index.
+
+        `scale` is the size of its terms, of which 60 digits leave a rest, `change` that by one ulp
+        in the data, `rows` those of ẏ that are meant.
+        """
+        nq, nv = len(self._free.model.coordinates), self._free.nv
+        if name == "accelerations" and self.all_states:
+            name, rows = "derivative", range(nq, nq + nv)
+        runs = self._roundings.runs(name, self._state.t, self._y, self._state.u, *extra)
+        if rows is not None:
+            runs = runs[list(rows)]
+        if name == "body_poses":
+            runs = np.stack(
+                [_matrices(runs[..., k], self._free.dimensions) for k in range(runs.shape[-1])], -1
+            )
+        rest = rest_of(self._free.model) * np.max(abs(doubles(scale)), initial=0.0)
+        allowed = spread(runs) + ULP * abs(doubles(true)) + rest
+        if not self.all_states:
+            allowed = allowed + doubles(change)
+        return worst_share(doubles(error), allowed)
 
 
 def _quantities(

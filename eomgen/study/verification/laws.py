@@ -5,7 +5,7 @@ motion that the module gives; their rates must be the power of all loads and dri
 external forces. The module's Jacobian is compared with differences of the independent solver.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from eomgen.model.model import Model
 from eomgen.precision.extended import (
     NOTHING,
     Array,
+    doubles,
     extended,
     extended_digits,
     solved,
@@ -23,20 +24,26 @@ from eomgen.precision.extended import (
 )
 from eomgen.precision.precise import Extended
 from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import FloatArray
 from eomgen.scene.constraints import Constraint, Distance, LoopJoint
 from eomgen.scene.effects import Driven
 from eomgen.scene.effects.base import JointLoad
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD, Coordinate
 from eomgen.study.verification.hard_states import State
-from eomgen.study.verification.judging import ulps
+from eomgen.study.verification.judging import rest_of, ulps
+from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
 from eomgen.study.verification.virtual_work import FreeBodies
 from eomgen.study.whole import Viewed, names_of, own_of
 
 _STEP = mpfr(2) ** -66
 """Step of central differences, s, for rates of order 1; their error is its square, about 1e-40."""
+_LONG_STEP = mpfr(2) ** -40
+"""That for slopes under constraints, whose β is itself a difference, with an error of 1e-30."""
 _LEFT = 1e-45
 """Rounding error of a difference that should be 0, relative to what is differenced."""
+_NEAR = 2
+"""Neighbours of a state whose slopes are compared."""
 SMOOTH = 1e-9
 """Greatest second difference, relative to the first difference, if there is no corner."""
 AXES = ("x", "y", "z")
@@ -49,12 +56,14 @@ class Broken:
     energy    kinetic energy changes by the power of loads and drives
     momentum  linear and angular momentum change by the external loads
     slopes    the Jacobian, along a random direction
+    rows      the greatest error of one of its rows there, in units of what rounding makes of it
     """
 
     state: State
     energy: float | None
     momentum: float | None
     slopes: float | None
+    rows: float | None
 
 
 def why_no_energy_law(model: Model) -> str:
@@ -84,7 +93,7 @@ def _between_bodies(constraint: Constraint) -> bool:
     return isinstance(constraint, Distance) and WORLD not in (constraint.body_1, constraint.body_2)
 
 
-def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
+def broken(model: Model, module: GeneratedModule, roundings: Roundings, state: State) -> Broken:
     """The errors of all laws that apply, at a state where the module has a derivative."""
     ydot = module.derivative(state.t, state.y, None, state.u or None)
     nq, nv = len(model.coordinates), len(model.velocities)
@@ -119,31 +128,71 @@ def broken(model: Model, module: GeneratedModule, state: State) -> Broken:
             momentum = max(
                 ulps((change - outside)[part], sizes[part]) for part in (slice(3), slice(3, 6))
             )
-        return Broken(state, energy, momentum, _slopes(module, state, y, free))
+        slopes, rows = _slopes(module, roundings, state, y, free) or (None, None)
+        return Broken(state, energy, momentum, slopes, rows)
 
 
-def _slopes(module: GeneratedModule, state: State, y: Array, free: FreeBodies) -> float | None:
-    """The error of the Jacobian along a direction, in ulps of its terms; None at a corner, where
-    there are two derivatives.
+def _slopes(
+    module: GeneratedModule, roundings: Roundings, state: State, y: Array, free: FreeBodies
+) -> tuple[float, float] | None:
+    """The error of the Jacobian along a direction, in ulps of its terms, and of its worst row, in
+    units of what rounding makes of it; None at a corner, where there are two derivatives.
     """
     model = free.model
     if isinstance(module, Viewed):
-        return _slopes_in_closed_form(module, state, y, free)
+        return _slopes_in_closed_form(module, roundings, state, y, free)
     if not hasattr(module, "jacobian"):
         return None
     direction = _some_direction(len(y))
     for indices in map(list, model.quaternions):  # tangent to the sphere of unit quaternions
         direction[indices] = direction[indices] - y[indices] * (direction[indices] @ y[indices])
+    change = _change_along(model, state, y, free, direction)
+    if change is None:
+        return None
+    given = module.jacobian(state.t, state.y, None, state.u or None)
+    if not np.isfinite(given).all():
+        return float("inf"), float("inf")
+    made = extended(given), direction, change
+    whole = _ulps_of(*made, len(model.coordinates), model.velocities)
+    here = dict(zip(names_of(model), state.y, strict=True))
+    return whole, _rows(*made, roundings, state, here, rest_of(model), 0.0)
+
+
+def _change_along(
+    model: Model, state: State, y: Array, free: FreeBodies, direction: Array
+) -> Array | None:
+    """The derivative of the rates along a direction; None at a corner."""
     ahead, behind, step = _beside(model, state, y, direction, still=True)
     bend = ahead.state_rates - 2 * free.state_rates + behind.state_rates
     change = ahead.state_rates - behind.state_rates
     if max(abs(bend)) > SMOOTH * max(abs(change)):
         return None
-    change = change / step
-    given = module.jacobian(state.t, state.y, None, state.u or None)
-    if not np.isfinite(given).all():
-        return float("inf")
-    return _ulps_of(extended(given), direction, change, len(model.coordinates), model.velocities)
+    return np.asarray(change / step)
+
+
+def _rows(
+    slopes: Array,
+    direction: Array,
+    change: Array,
+    roundings: Roundings,
+    state: State,
+    y: Mapping[str, float],
+    least: float,
+    moved: Any,
+) -> float:
+    """The error of the worst row of slopes along a direction, in units of what rounding makes of
+    it; `y` has the numbers of the module's state, `least` is what 60 digits leave
+    of the terms, and `moved` what else is rounding.
+    """
+    along = doubles(direction)
+    if roundings.tangent("jacobian"):
+        runs = roundings.runs("jacobian", state.t, y, state.u, along)
+    else:
+        runs = np.tensordot(along, roundings.runs("jacobian", state.t, y, state.u), (0, 1))
+    error = doubles(slopes @ direction - change)
+    terms = abs(doubles(slopes)) @ abs(along)
+    rest = least * np.max(terms + abs(doubles(change)))
+    return worst_share(error, spread(runs) + ULP * terms + moved + rest)[0]
 
 
 def _some_direction(count: int) -> Array:
@@ -172,8 +221,8 @@ def _ulps_of(
 
 
 def _slopes_in_closed_form(
-    module: Viewed, state: State, y: Array, free: FreeBodies
-) -> float | None:
+    module: Viewed, roundings: Roundings, state: State, y: Array, free: FreeBodies
+) -> tuple[float, float] | None:
     """The same of a module of fewer states: along a direction of these, the others follow so that
     J dq = 0 and J dv + dJ v = 0.
     """
@@ -182,7 +231,59 @@ def _slopes_in_closed_form(
         return None
     names = names_of(model)
     kept = [names.index(name) for name in own.STATES]
-    direction, nq = _some_direction(len(kept)), len(model.coordinates)
+    direction = _some_direction(len(kept))
+    found = _change_in_closed_form(module, state, y, free, direction)
+    given = own.jacobian(state.t, own_of(own, model, state.y), None, state.u or None)
+    if found is None:
+        return None
+    if not np.isfinite(given).all():
+        return float("inf"), float("inf")
+    change, least = found
+    made, velocities = (extended(given), direction, change), model.velocities
+    velocities = tuple(c for c in velocities if c.name in own.STATES)
+    whole = _ulps_of(*made, len(own.POSITIONS), velocities, least)
+
+    def change_at(beside: Array, near: FreeBodies) -> Array | None:
+        other = _change_in_closed_form(module, state, beside, near, direction)
+        return None if other is None else other[0]
+
+    moved = _moved(model, state, y, change, change_at)
+    if moved is None:
+        return whole, 0.0
+    here = dict(zip(names, state.y, strict=True))
+    return whole, _rows(*made, roundings, state, here, rest_of(model), moved)
+
+
+def _moved(
+    model: Model,
+    state: State,
+    y: Array,
+    change: Array,
+    change_at: Callable[[Array, FreeBodies], Array | None],
+) -> FloatArray | None:
+    """How far a change along a direction moves between neighbours of a state, which is rounding of
+    what follows from the module's states; None where a neighbour has a corner or differences of
+    differences leave no digits.
+    """
+    moved = np.zeros(len(change))
+    for seed in range(_NEAR):
+        beside = y * (1 + extended(np.random.default_rng(seed).uniform(-ULP, ULP, len(y))))
+        found = change_at(beside, FreeBodies(model, state.t, beside, state.u))
+        if found is None:
+            return None
+        moved = np.maximum(moved, abs(doubles(found - change)))
+    return moved
+
+
+def _change_in_closed_form(
+    module: Viewed, state: State, y: Array, free: FreeBodies, direction: Array
+) -> tuple[Array, Extended] | None:
+    """The change of the rates of the module's states along a direction of these, and the size of
+    its terms; None at a corner.
+    """
+    model, own = free.model, module.own
+    names, nq = names_of(model), len(model.coordinates)
+    kept = [names.index(name) for name in own.STATES]
     whole, at = zeros(len(y)), slice(nq, nq + free.nv)
     whole[kept] = direction
     place = {j: i for index in model.joint_indices for i, j in index.plain}
@@ -197,19 +298,12 @@ def _slopes_in_closed_form(
     whole[at] = _following(
         free, own.FOLLOWING, whole[at], turned[:, : free.nv] @ free.rates[: free.nv]
     )
-    ahead, behind, step = _beside(model, state, y, whole, still=True)
-    bend = ahead.state_rates - 2 * free.state_rates + behind.state_rates
-    change = ahead.state_rates - behind.state_rates
-    if max(abs(bend)) > SMOOTH * max(abs(change)):
+    change = _change_along(model, state, y, free, whole)
+    if change is None:
         return None
-    given = own.jacobian(state.t, own_of(own, model, state.y), None, state.u or None)
-    if not np.isfinite(given).all():
-        return float("inf")
-    velocities = [c for c in model.velocities if c.name in own.STATES]
     # The size of terms of ω v, which may cancel: β is a second difference of positions.
     least = max(abs(free.rates)) * (max(abs(free.rates)) + max(abs(whole[at])))
-    found = extended(given), direction, change[kept] / step
-    return _ulps_of(*found, len(own.POSITIONS), velocities, least)
+    return change[kept], least
 
 
 def _following(free: FreeBodies, names: Sequence[str], v: Array, more: Array) -> Array:
@@ -228,7 +322,8 @@ def _beside(
 
     Time advances by the same step unless `still`.
     """
-    step = _STEP / (1 + max(map(abs, direction)))
+    longest = _LONG_STEP if still and model.constraints else _STEP
+    step = longest / (1 + max(map(abs, direction)))
     time = mpfr(0) if still else step
     ahead = FreeBodies(model, state.t + time, y + step * direction, state.u)
     behind = FreeBodies(model, state.t - time, y - step * direction, state.u)

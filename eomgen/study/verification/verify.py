@@ -17,7 +17,7 @@ from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Simulation
-from eomgen.store import generated_code
+from eomgen.store import generated_code, interfaced_program_of
 from eomgen.study.verification.bounds import (
     OWN,
     Check,
@@ -29,11 +29,13 @@ from eomgen.study.verification.bounds import (
     law_checks,
     loss_checks,
     matrix_checks,
+    part_checks,
 )
 from eomgen.study.verification.drift import Drift, drift
 from eomgen.study.verification.hard_states import State, closed_states, hard_states
 from eomgen.study.verification.judging import Judged, judged
 from eomgen.study.verification.laws import broken, why_no_energy_law, why_no_momentum_law
+from eomgen.study.verification.roundings import Roundings
 from eomgen.study.verification.routes import compiled
 from eomgen.study.verification.sampled import SampledRun, sampled
 from eomgen.study.verification.truth import Truth
@@ -117,7 +119,7 @@ def verify(
     """
     form, model = model.form, replace(model, form="velocity")
     check_nonsingular(model)
-    taken, modules, full, missing = _modules(model, module, progress)
+    taken, modules, full, missing, roundings = _modules(model, module, progress)
     module, given = modules[taken], full
     modules = {route: viewed(each, model) for route, each in modules.items()}
     full, seen = viewed(full, model), modules[taken]
@@ -133,7 +135,7 @@ def verify(
     stopped = ""
     try:
         for k, state in enumerate(asked):
-            found.append(judged(bare, truth, taken, modules, full, state))
+            found.append(judged(bare, truth, taken, modules, full, roundings, state))
             progress(0.3 + 0.5 * (k + 1) / len(asked))
     except KeyboardInterrupt:
         if all(one is None for one in found):
@@ -145,7 +147,7 @@ def verify(
     lawful, ran = list[Check](), None
     if not stopped:
         firsts = [one for one in there if one.state.number == 0]
-        laws = [broken(bare, seen, one.state) for one in firsts if _has(one, taken)]
+        laws = [broken(bare, seen, roundings, one.state) for one in firsts if _has(one, taken)]
         progress(0.85)
         shown = _of_conservation(there, firsts)
         ran = drift(model, wanted, module, given, shown, lambda x: progress(0.88 + 0.12 * x))
@@ -156,6 +158,7 @@ def verify(
         *forward_checks(there, ulps, data, taken, len(bare.velocities), bound),
         *matrix_checks(there),
         *loss_checks(there, taken),
+        *part_checks(there),
         *lawful,
     )
     notes = [f"route {route} is not available: {why}" for route, why in missing.items()]
@@ -188,24 +191,27 @@ def _of_conservation(there: Sequence[Judged], firsts: Sequence[Judged]) -> list[
 
 def _modules(
     model: Model, module: GeneratedModule | None, progress: Progress
-) -> tuple[str, dict[str, GeneratedModule], GeneratedModule, dict[str, str]]:
+) -> tuple[str, dict[str, GeneratedModule], GeneratedModule, dict[str, str], Roundings]:
     """The route taken; the modules by route, with `module` for the route taken if given; a module
-    of that route with all of `OUTPUTS`; and why routes are missing.
+    of that route with all of `OUTPUTS`; why routes are missing; and the roundings of the programs
+    of the route taken.
     """
     code = generated_code(model)
     taken = next(line.split()[0] for line in code.explanation if "<- taken" in line)
     module = module or load_module(code.module, model.name)
     progress(0.05)
-    full = module
+    full, programs = module, [interfaced_program_of(model)]
     outputs = (*OUTPUTS, "constraint_forces") if model.constraints else OUTPUTS
     if not all(hasattr(module, name) for name in outputs):
         more = replace(model, outputs=in_order(outputs))
         full = load_module(generated_code(more).module, model.name)
+        programs.append(interfaced_program_of(more))
     progress(0.1)
     others, missing = compiled(replace(model, outputs=()), but=taken)
     modules = {taken: module, **{route: made.module for route, made in others.items()}}
     progress(0.2)
-    return taken, {r: modules[r] for r in ROUTES if r in modules}, full, missing
+    modules = {r: modules[r] for r in ROUTES if r in modules}
+    return taken, modules, full, missing, Roundings(programs)
 
 
 def _states(run: SampledRun, module: GeneratedModule, model: Model) -> list[State]:
