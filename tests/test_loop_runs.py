@@ -1,5 +1,6 @@
 """Runs of mechanisms with loops: no drift, energy, given starts, impacts, singular positions."""
 
+import re
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
@@ -307,3 +308,51 @@ def test_sweeps_close_each_member() -> None:
         assert gap(dict(zip(found.states, y, strict=True)), a) < 1e-13
     with pytest.raises(RunError, match="continues from earlier steps"):
         eomgen.simulate(four_bar(), integrator="BDF", t_end=0.1)
+
+
+@pytest.mark.parametrize("loops", ["projected", "closed"])
+@pytest.mark.parametrize("rate", ["", "_dot"])
+def test_given_starts_are_kept_or_refused(loops: str, rate: str) -> None:
+    """A start that gives all coordinates, or all velocities, is not replaced by another: one that
+    meets the constraints but for its rounding is taken, all others are refused. So it is with all
+    that take a start; what had to move beside is said.
+    """
+    text = four_bar(loops=loops)
+    model = check(text)
+    names, values = model.coordinates, model.initial_q
+    if rate:
+        own = eomgen.simulate(text, t_end=0.01, state={"theta_dot": 1.0}, backend="numpy")
+        names, values = model.velocities, own.model.initial_v
+        assert any("phi_dot = " in text for text in own.warnings)
+    rounded = {c.name: float(f"{x:.6g}") for c, x in zip(names, values, strict=True)}
+    run = eomgen.simulate(text, t_end=0.01, state=rounded, backend="numpy")
+    theta = run[f"theta{rate}"][0]
+    assert abs(theta - rounded[f"theta{rate}"]) < 1e-5 and run.finished
+    wrong = {**rounded, f"phi{rate}": rounded[f"phi{rate}"] + 0.3}
+    said = rf"theta{rate}, .* do not meet .*: \w+ would be moved by 0\.\d+ rad"
+    with pytest.raises(SceneError, match=rf"^state: .*{said}"):
+        eomgen.simulate(text, t_end=0.01, state=wrong)
+    with pytest.raises(SceneError, match=said):
+        eomgen.linearise(text, at="initial", state=wrong)
+    if loops == "projected":
+        both = {name: [rounded[name], wrong[name]] for name in wrong}
+        runs = eomgen.ensemble(text, both, t_end=0.01, backend="numpy")
+        assert runs.status == ["finished", "refused"]
+        assert re.search(rf"^vary: .*{said}", runs.messages[1])
+
+
+def test_starts_of_scenes_that_had_to_move_are_told() -> None:
+    """A scene that gives all coordinates is moved onto its constraints at other lengths, and each
+    run says so: a single one, and that of a sweep.
+    """
+    model = check(four_bar())
+    q = ", ".join(
+        f"{c.name} = {x!r}" for c, x in zip(model.coordinates, model.initial_q, strict=True)
+    )
+    text, said = four_bar(initial=f"q = {{ {q} }}"), "initial.q: moved to meet the constraints, by"
+    run = eomgen.simulate(text, t_end=0.01, parameters={"a": 0.31}, backend="numpy")
+    assert any(text.startswith(said) for text in run.warnings)
+    assert not eomgen.simulate(text, t_end=0.01, backend="numpy").warnings
+    runs = eomgen.ensemble(text, {"a": [0.3, 0.31]}, t_end=0.01, backend="numpy")
+    assert runs.messages[0] == "" and runs.messages[1].startswith(said)
+    assert runs.status == ["finished", "finished"]

@@ -1,7 +1,7 @@
 """Simulation of a scene: `simulate`, which calls `plan_run` and `run_plan`."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -146,7 +146,8 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
         "guard": _guard(plan, functions, values),
         "unstable": plan.unstable,
     }
-    problem, model = _problem(plan, model, functions, values, reporter)
+    said: list[str] = []
+    problem, model = _problem(plan, model, functions, values, _also(said.append, reporter))
     accelerator = _accelerator(plan, functions, values, reporter)
     made = accelerator.of if accelerator else without_compiler(model, functions, values)
     problem = made(problem)
@@ -163,7 +164,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
     powers = as_powers(functions, *values) if plan.works else None
     if powers and accelerator:
         powers = accelerator.powers(powers)
-    warnings = [*model.notices, *module.notices]
+    warnings = [*model.notices, *module.notices, *said]
     trial, choice = _run_case(plan, case, powers, follow, reporter)
     trajectory, estimate = trial.trajectory, None
     error, why = _error_of_choice(choice)
@@ -227,7 +228,7 @@ def _problem(
 ) -> tuple[Problem, Model]:
     """The problem of a plan, and its model with the initial state of the plan."""
     if not plan.state:
-        problem = problem_of(module, *values, model)
+        problem = problem_of(module, *values, model, note=reporter.note_scene)
     else:
         with reporter.located():
             problem = problem_of(
@@ -245,6 +246,16 @@ def _problem(
         problem = with_corners(problem, module, values[0], plan.varying)
         problem = replace(problem, origin=None)  # a file does not hold functions
     return problem, model
+
+
+def _also(hear: Callable[[str], None], reporter: Reporter) -> Reporter:
+    """A reporter whose notes are also heard here."""
+
+    def note(text: str) -> None:
+        hear(text)
+        reporter.note(text)
+
+    return replace(reporter, note=note)
 
 
 def _accelerator(

@@ -55,7 +55,8 @@ def initial_with(
     parameters: Values | None = None,
 ) -> FloatArray:
     """An initial state with given values; quaternions are scaled to length 1, with a note. Other
-    values meet the constraints at these parameters, with a note.
+    values meet the constraints at these parameters, with a note; given ones are kept, but for
+    rounding.
 
     Raises `RunError` for a quaternion without length, `SceneError` if constraints cannot be met.
     """
@@ -76,7 +77,9 @@ def initial_with(
                 "scaled to 1"
             )
         y[indices] /= length
-    found = closed(model, parameters, y, [names[index] for index in given])
+    found, notices = closed(model, parameters, y, [names[index] for index in given], option)
+    for notice in notices:
+        reporter.note_scene(notice)
     changed = [
         f"{name} = {value:.6g}"
         for i, (name, value) in enumerate(zip(names, found.tolist(), strict=False))

@@ -20,6 +20,7 @@ from eomgen.dynamics.closure import CLOSED, Array, Closure, newton
 from eomgen.dynamics.clusters import jacobian_of
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
+from eomgen.scene.joints.base import Coordinate
 
 STARTS = (0.0, *(0.1,) * 6, *(0.5,) * 10, *(2.0,) * 30)
 """How far the starts are from the scene's values, rad, or in sizes."""
@@ -33,6 +34,8 @@ LEAST_PIVOT = 1e-3
 """A coordinate that the scene gives is solved for where other pivots would be smaller than this."""
 MOVED = 1e-9
 """A change of a given value that is not reported."""
+ROUNDED = 1e-5
+"""A change of a value, relative to it or to its size, that is one of rounding to six digits."""
 
 
 def assembled(model: Model) -> Model:
@@ -97,12 +100,18 @@ def _check_linear(mechanism: Closure, q: Array) -> None:
 
 
 def closed_start(
-    model: Model, q: Sequence[float], v: Sequence[float], given: Collection[str] = ()
+    model: Model,
+    q: Sequence[float],
+    v: Sequence[float],
+    given: Collection[str] = (),
+    argument: str = "initial",
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[str, ...]]:
     """The start q, v of an assembled model at its parameters, as near as it can be, and notices.
 
-    Coordinates and velocities that are `given` are kept; without given coordinates those that the
-    scene gives, and without given velocities likewise. Raises `SceneError` if that cannot be.
+    Coordinates and velocities that are `given` are kept; if all are, they are moved by no more
+    than rounding. Without given coordinates those that the scene gives are kept, or all of them
+    moved with a notice, and without given velocities likewise. Raises `SceneError`, which calls
+    what is given `argument`, if that cannot be.
     """
     positions, velocities = (
         [c.name for c in each] for each in (model.coordinates, model.velocities)
@@ -117,15 +126,46 @@ def closed_start(
     mechanism = Closure.of(model)
     if mechanism.met(np.array(q), v):
         return model.initial_q, model.initial_v, ()
-    found, notices = _position(mechanism)
-    speeds, more = _speeds(mechanism, found)
+    in_q, in_v = (
+        argument if set(given) & set(names) else f"initial.{letter}"
+        for letter, names in (("q", positions), ("v", velocities))
+    )
+    found, notices = _position(mechanism, in_q)
+    _check_kept(mechanism, model.coordinates, (q, found.tolist()), given, in_q)
+    speeds, more = _speeds(mechanism, found, in_v)
+    _check_kept(mechanism, model.velocities, (v, speeds), given, in_v)
     return tuple(found.tolist()), speeds, (*notices, *more)
 
 
+def _check_kept(
+    mechanism: Closure,
+    columns: Sequence[Coordinate],
+    values: tuple[Sequence[float], Sequence[float]],
+    given: Collection[str],
+    argument: str,
+) -> None:
+    """Raise `SceneError` if of coordinates or velocities, before and after they meet the
+    constraints, those `given` differ by more than rounding. They may if all are given.
+    """
+    changes = {
+        c: abs(after - before) / max(mechanism.size_of(c), abs(before))
+        for c, before, after in zip(columns, *values, strict=True)
+        if c.name in given
+    }
+    if max(changes.values(), default=0.0) <= ROUNDED:
+        return
+    worst = max(changes, key=changes.__getitem__)
+    before, after = (dict(zip(columns, each, strict=True))[worst] for each in values)
+    raise SceneError(
+        f"{argument}: {', '.join(c.name for c in changes)} do not meet the constraints together: "
+        f"{worst.name} would be moved by {abs(after - before):.2g} {worst.unit}; give fewer of them"
+    )
+
+
 @np.errstate(over="ignore", invalid="ignore")  # residuals may be of any size
-def _position(mechanism: Closure) -> tuple[Array, list[str]]:
+def _position(mechanism: Closure, argument: str = "initial.q") -> tuple[Array, list[str]]:
     """The closed position nearest to a model's initial one, with notices; what it holds is kept,
-    unless it holds all. Raises `SceneError` if there is none.
+    unless it holds all. Raises `SceneError`, which begins with `argument`, if there is none.
     """
     model = mechanism.model
     start, free = np.array(model.initial_q), _free(model)
@@ -135,7 +175,7 @@ def _position(mechanism: Closure) -> tuple[Array, list[str]]:
         if q is not None:
             return q, _changes(model, start, q)
     if q is None:
-        raise SceneError(_open(mechanism, start, free))
+        raise SceneError(f"{argument}: {_open(mechanism, start, free)}")
     return q, []
 
 
@@ -186,7 +226,7 @@ def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     held = ", ".join(c.name for c in model.coordinates if c.name in model.held)
     given = f" with {held} as given" if held else ""
     return (
-        f"initial.q: the constraints cannot be met{given}: {name} stays open by "
+        f"the constraints cannot be met{given}: {name} stays open by "
         f"{gap:.3g} {'m' if unit == 'N' else 'rad'}; change lengths"
         f"{', or give fewer coordinates' if held else ' or the start'}"
     )
@@ -270,8 +310,13 @@ def _pivots(matrix: Array, free: NDArray[np.bool_]) -> tuple[tuple[int, int], ..
     return tuple(found)
 
 
-def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]:
-    """Velocities that meet the constraints: those given are kept, the others found, the least."""
+def _speeds(
+    mechanism: Closure, q: Array, argument: str = "initial.v"
+) -> tuple[tuple[float, ...], list[str]]:
+    """Velocities that meet the constraints: those given are kept, the others found, the least.
+
+    Raises `SceneError`, which begins with `argument`, if those given contradict them.
+    """
     model = mechanism.model
     given = np.array(model.initial_v)
     held = np.array([c.name in set(model.held) for c in model.velocities])
@@ -297,5 +342,5 @@ def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]
                 ]
             return tuple((given + change).tolist()), notices
     raise SceneError(
-        "initial.v: the velocities given contradict the constraints; give fewer of them"
+        f"{argument}: the velocities given contradict the constraints; give fewer of them"
     )

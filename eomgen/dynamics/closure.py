@@ -17,6 +17,7 @@ from eomgen.dynamics.mechanism_state import Values
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import Coordinate
 
 Array = NDArray[np.float64]
 
@@ -105,7 +106,11 @@ class Closure:
     @property
     def lengths(self) -> Array:
         """The size of each velocity's coordinate: 1 for an angle."""
-        return np.array([self.size if c.unit == "m/s" else 1.0 for c in self.model.velocities])
+        return np.array([self.size_of(c) for c in self.model.velocities])
+
+    def size_of(self, coordinate: Coordinate) -> float:
+        """The size of a coordinate or velocity: 1 rad, 1 rad/s, or the mechanism's size."""
+        return self.size if coordinate.unit in ("m", "m/s") else 1.0
 
     @property
     def _units(self) -> Array:

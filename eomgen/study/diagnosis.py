@@ -37,10 +37,12 @@ def problem_of(
     inputs: Any = None,
     model: Model | None = None,
     start: Callable[[FloatArray], FloatArray] | None = None,
+    note: Callable[[str], None] = lambda text: None,
 ) -> Problem:
     """The initial-value problem of a module, as from `as_problem`. With the `model` of the module,
     its messages name the part of the model that has no finite value, and its initial state meets
-    the constraints at these parameters. `start` is as there, of all coordinates of the model.
+    the constraints at these parameters; `note` is told of values of the scene that could not be
+    kept. `start` is as there, of all coordinates of the model.
 
     Raises `RunError` if the module refuses parameters or inputs, or has no derivative at its
     initial state.
@@ -51,7 +53,9 @@ def problem_of(
 
     def started(_: FloatArray) -> FloatArray:
         y = initial_of(module, model, parameters)
-        whole = closed(model, given[0], start(y) if start else y)
+        whole, notices = closed(model, given[0], start(y) if start else y)
+        for notice in notices:
+            note(notice)
         return on_branch(module, model, whole, *given)
 
     return as_problem(
