@@ -78,7 +78,7 @@ def test_each_effect_by_its_formulas(case: Case) -> None:
     rates, forces = follow_recursion(model, at.known)
     assert_close(forces, at.solver.applied_force)
     assert_close(rates, at.solver.articulated_forward())
-    states = [at.known[dotted(x.name, "dot")] for x in model.states]
+    states = [at.known[dotted(x.name, "dot")] for x in model.extra]
     assert_close(states, at.solver.state_rates)
 
 

@@ -23,6 +23,7 @@ from eomgen.api.given import (
     values_of,
 )
 from eomgen.api.inputs import Inputs, in_formulas
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.entries import Entries
 from eomgen.errors import RunError
@@ -93,6 +94,7 @@ class MeasurementPlan:
     time: float
 
 
+@public
 def accuracy(
     source: Source,
     *,
@@ -348,6 +350,7 @@ def _climb(
     return made
 
 
+@public
 def arithmetic(
     source: Source,
     *,

@@ -10,6 +10,7 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, model_of, overridden, read
 from eomgen.api.inputs import Inputs, applied
 from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, origin_from, split
 from eomgen.model.elaborate import expanded
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from eomgen.study.accuracy.trial import Case, Tried
 
 
+@public
 def simulate(
     source: Source,
     *,
@@ -74,10 +76,10 @@ def simulate(
     state       values that replace those of the scene's initial state, by name; `<name>_deg` in
                 degrees
     inputs      a mapping by name: constants; formulas of t, the motion and parameters, for example
-                "3*sin(t)", which become part of the module; or functions of t. Or the path of a
-                table whose first line has t and the names of inputs, and which has a line for each
-                time; between these times inputs are linear. With tables and functions nothing is
-                compiled. Inputs that are not given have their defaults
+                "3*sin(t)", which become part of the module; or functions of t. Or a
+                DataFrame, or the path of a table of comma-separated values, with a column t and one
+                for each input, and any others; between these times inputs are linear. With tables
+                and functions nothing is compiled. Inputs that are not given have their defaults
     form        state form; None: the scene's own
     route       to the equations; None: the scene's own
     samples     approximate number of rows to keep
@@ -239,9 +241,9 @@ def _problem(
         whole = whole_of(module, model, 0.0, problem.initial, *values)
         q, v, x = split(model, whole)
         states = (
-            replace(state, initial=value) for state, value in zip(model.states, x, strict=True)
+            replace(state, initial=value) for state, value in zip(model.extra, x, strict=True)
         )
-        model = replace(model, initial_q=q, initial_v=v, states=tuple(states))
+        model = replace(model, initial_q=q, initial_v=v, extra=tuple(states))
     if plan.varying:
         problem = with_corners(problem, module, values[0], plan.varying)
         problem = replace(problem, origin=None)  # a file does not hold functions

@@ -21,7 +21,7 @@ UNIT_TOLERANCE = 1e-9
 def state_names(model: Model) -> tuple[str, ...]:
     """The names by which a state can be given: those of [q, v, x], then `<name>_deg` of angles."""
     known = (*model.coordinates, *model.velocities)
-    names = [*(c.name for c in known), *(state.name for state in model.states)]
+    names = [*(c.name for c in known), *(state.name for state in model.extra)]
     return (*names, *(f"{c.name}_deg" for c in known if "rad" in c.unit))
 
 
@@ -35,7 +35,7 @@ def values_by_index(model: Model, given: Values | None, reporter: Reporter) -> d
         raise RunError(
             f"{option}: is for form = 'velocity'; in the form '{model.form}', change [initial]"
         )
-    count = len(model.coordinates) + len(model.velocities) + len(model.states)
+    count = len(model.coordinates) + len(model.velocities) + len(model.extra)
     found: dict[int, float] = {}
     for name, value in named(given, names, option, "state").items():
         index = names.index(name)

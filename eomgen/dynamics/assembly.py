@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.dynamics import constraints
-from eomgen.dynamics.closure import CLOSED, Array, Closure, newton
+from eomgen.dynamics.closure import CLOSED, INDEPENDENT, Array, Closure, newton
 from eomgen.dynamics.clusters import jacobian_of
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
@@ -26,8 +26,6 @@ STARTS = (0.0, *(0.1,) * 6, *(0.5,) * 10, *(2.0,) * 30)
 """How far the starts are from the scene's values, rad, or in sizes."""
 ENOUGH = 6
 """So many positions found suffice to take the nearest."""
-INDEPENDENT = 1e-7
-"""A row that leaves less than this of itself beside the others follows from them."""
 ALONG = (0.05, -0.05, 0.1, 0.1, 0.2, 0.3)
 """Positions along the motion at which rows are compared, rad, or in sizes."""
 LEAST_PIVOT = 1e-3
@@ -65,9 +63,10 @@ def assembled(model: Model) -> Model:
             f"{len(model.velocities)} velocities; leave one out"
         )
     if dropped:
+        follow = "follows from the others and is" if len(dropped) == 1 else ""
         notices.append(
-            f"constraints: {', '.join(dropped)} follow{'s' * (len(dropped) == 1)} from the others "
-            "and left out; the forces of these loops are then not unique"
+            f"constraints: {', '.join(dropped)} {follow or 'follow from the others and are'} left "
+            "out; the forces of these loops are then not unique"
         )
     mechanism = replace(mechanism, model=model)
     v, more = _speeds(mechanism, q)
@@ -225,10 +224,13 @@ def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     gap = abs(float(g[worst])) * (mechanism.size if unit == "N" else 1.0)
     held = ", ".join(c.name for c in model.coordinates if c.name in model.held)
     given = f" with {held} as given" if held else ""
+    remedy = f"change lengths, or {'give fewer coordinates' if held else 'change the start'}"
+    nc, nv = len(model.rows), len(model.velocities)
+    if nc >= nv:
+        remedy = f"{nc} constraints on {nv} velocities leave nothing that could move: leave one out"
     return (
         f"the constraints cannot be met{given}: {name} stays open by "
-        f"{gap:.3g} {'m' if unit == 'N' else 'rad'}; change lengths"
-        f"{', or give fewer coordinates' if held else ' or the start'}"
+        f"{gap:.3g} {'m' if unit == 'N' else 'rad'}; {remedy}"
     )
 
 

@@ -27,6 +27,8 @@ PATIENCE = 12
 """Steps that must reduce the sum of the residuals' squares by 30 %, or no position is near."""
 CLOSED = 1e-12
 """A residual relative to the mechanism's size that is rounding."""
+INDEPENDENT = 1e-7
+"""A row that leaves less than this of itself beside the others follows from them."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Closure:
         """The mechanism at q, at rest unless v is given."""
         model = self.model
         inputs = {i.name: i.default for i in model.inputs}
-        states = {x.name: x.initial for x in model.states}
+        states = {x.name: x.initial for x in model.extra}
         speeds = [0.0] * len(model.velocities) if v is None else list(v)
         values = Values(model.defaults, inputs, q.tolist(), speeds, states, 0.0)
         return Dynamics(model, values, FloatScalars(), linkage=self._linkage)

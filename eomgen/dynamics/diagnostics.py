@@ -7,6 +7,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from eomgen.dynamics.closure import INDEPENDENT, Closure
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
@@ -26,7 +29,7 @@ def values_at(
     Parameters that are not given have their defaults, and so do inputs.
     """
     nq, nv = len(model.coordinates), len(model.velocities)
-    states = {x.name: value for x, value in zip(model.states, y[nq + nv :], strict=True)}
+    states = {x.name: value for x, value in zip(model.extra, y[nq + nv :], strict=True)}
     return Values(
         {**model.defaults, **parameters},
         {**{i.name: i.default for i in model.inputs}, **inputs},
@@ -59,7 +62,7 @@ def initial_overlaps(model: Model) -> list[Overlap]:
 
     Empty if an effect has no finite value there; that is a separate error.
     """
-    start = [*model.initial_q, *model.initial_v, *(x.initial for x in model.states)]
+    start = [*model.initial_q, *model.initial_v, *(x.initial for x in model.extra)]
     dynamics = Dynamics(model, values_at(model, 0.0, start, {}, {}), FloatScalars())
     found = []
     try:
@@ -84,6 +87,22 @@ def _size(effect: Effect, dynamics: Dynamics) -> float:
     for number in numbers:
         largest = max(largest, abs(number)) if math.isfinite(number) else math.inf
     return largest
+
+
+def dependent_row(model: Model, values: Values) -> str:
+    """The name of a row of the constraints that follows from the others at this position; "" if all
+    are independent.
+    """
+    if not model.constraints:
+        return ""
+    moved = model.with_parameters({p.name: values.parameters[p.name] for p in model.parameters})
+    matrix = Closure.of(moved).jacobian(np.array(values.q))
+    lengths = np.linalg.norm(matrix, axis=1)
+    if not lengths.all():
+        return model.rows[int(np.argmin(lengths))][0]
+    left, sizes, _ = np.linalg.svd(matrix / lengths[:, np.newaxis])
+    # The combination of rows that is nearest to 0.
+    return model.rows[int(np.abs(left[:, -1]).argmax())][0] if sizes[-1] <= INDEPENDENT else ""
 
 
 def is_singular(model: Model, values: Values) -> bool:

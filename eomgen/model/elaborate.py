@@ -79,7 +79,7 @@ def elaborate(scene: Scene) -> Model:
         bodies=bodies,
         points=points,
         effects=effects,
-        states=states,
+        extra=states,
         initial_q=start.q,
         initial_v=start.v,
         outputs=(),

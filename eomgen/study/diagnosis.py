@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.dynamics.diagnostics import effect_sizes, is_singular, values_at
+from eomgen.dynamics.diagnostics import dependent_row, effect_sizes, is_singular, values_at
 from eomgen.dynamics.singularity import relative_pivots, why_unresisted
 from eomgen.model.model import Model, dofs_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
@@ -76,7 +76,7 @@ def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str
         "locked coordinates": model.locked,
         "effects left out": model.leave_out,
         UNITS: tuple((p.name, p.unit) for p in model.parameters),
-        START: (model.initial_q, model.initial_v, model.states),
+        START: (model.initial_q, model.initial_v, model.extra),
     }
     for body in model.bodies:
         parts[f"body '{body.name}'"] = body
@@ -153,6 +153,11 @@ def explained(
             for i in sorted(felt):
                 if felt[i][0] < GONE:
                     return Explanation(*why_unresisted(model, i))
+        if row := dependent_row(model, values):
+            return Explanation(
+                f"constraint {row} follows from the others, as at a dead point or a change point",
+                "take another start, or lengths that do not line up",
+            )
         if is_singular(model, values):
             return Explanation(
                 "the mass matrix is singular", "change lengths, masses or inertias, or keep away"
