@@ -245,12 +245,14 @@ def test_impacts_keep_energy_and_constraints() -> None:
 
 
 def test_a_driven_crank_moves_the_loop() -> None:
-    """With a driven crank a four-bar has no freedom left, which is refused in one line; with a rod
-    in place of the last pin it has one, and the rod keeps its length.
+    """With a driven crank a four-bar has no freedom left; a constraint more is refused in one line.
+    With a rod in place of the last pin it has a freedom, and the rod keeps its length.
     """
     drive = '[[effects]]\ntype = "driven"\nname = "motor"\njoint = "A"\ncoordinate = "1 + 2*t"\n'
-    with pytest.raises(SceneError, match="the loops hold everything"):
-        check(four_bar(initial="q = {}", effects=drive))
+    more = '[[constraints]]\ntype = "coupling"\nname = "more"\ncoordinate = "phi"\nequals = "{}"\n'
+    phi = check(four_bar(initial="q = {}", effects=drive)).initial_q[1]
+    with pytest.raises(SceneError, match=r"cannot be met while theta moves: the loops hold every"):
+        check(four_bar(initial="q = {}", effects=drive + more.format(phi)))
     slack = '[[constraints]]\ntype = "distance"\nname = "rod"\nbody_1 = "coupler"\n'
     slack += 'at_1 = ["b/2", 0]\nbody_2 = "rocker"\nat_2 = ["c/2", 0]\nlength = 0.2\n'
     text = four_bar(initial="q = {}", effects=drive + slack)
@@ -356,3 +358,30 @@ def test_starts_of_scenes_that_had_to_move_are_told() -> None:
     runs = eomgen.ensemble(text, {"a": [0.3, 0.31]}, t_end=0.01, backend="numpy")
     assert runs.messages[0] == "" and runs.messages[1].startswith(said)
     assert runs.status == ["finished", "finished"]
+
+
+@pytest.mark.every(2)
+@pytest.mark.parametrize(("equals", "end"), [("asin(u)", 1.0), ("sqrt(u)", 0.0)])
+@pytest.mark.parametrize("loops", ["auto", "projected"])
+def test_formulas_of_limited_domain_in_constraints(equals: str, end: float, loops: str) -> None:
+    """What the search along the motion meets beyond the domain is no place of the mechanism; a run
+    towards its end stops there in a sentence.
+    """
+    text = f"""
+name = "limited"
+loops = "{loops}"
+bodies = [
+    {{ name = "a", mass = 1.0, inertia_com = 0.1 }},
+    {{ name = "b", mass = 1.0, inertia_com = 0.1 }},
+]
+joints = [
+    {{ name = "p", type = "revolute", parent = "world", child = "a", coordinate = "u" }},
+    {{ name = "q", type = "revolute", parent = "world", child = "b", coordinate = "w" }},
+]
+constraints = [{{ type = "coupling", name = "g", coordinate = "w", equals = "{equals}" }}]
+initial = {{ q = {{ u = 0.7 }} }}
+"""
+    assert eomgen.simulate(text, t_end=0.1, backend="numpy").finished
+    push = {"u_dot": 2.0 if end > 0.7 else -2.0}
+    run = eomgen.simulate(text, t_end=9.0, state=push, backend="numpy")
+    assert not run.finished and abs(run["u"][-1] - end) < 1e-3

@@ -161,6 +161,7 @@ def plan_measurement(
 
     for name, value in (("run_time", run_time), ("time", time)):
         check_time(value, reporter.argument(name))
+    _check_moves(model)
     chosen = methods_named(methods)
     parameters, inputs = values_of(model, parameters, inputs, reporter)
     end = simulation.t_end if t_end is None else t_end
@@ -375,6 +376,15 @@ def arithmetic(
     return arithmetic_of(model, scene.simulation, states=states, seed=seed, single=single)
 
 
+def _check_moves(model: Model) -> None:
+    """Raise `RunError` for a model without velocities, whose motion is given by the time."""
+    if not model.velocities:
+        raise RunError(
+            f"{model.name}: all coordinates are driven, so that no method makes an error; leave "
+            "one free"
+        )
+
+
 def check_arithmetic(states: int | None, seed: int, reporter: Reporter = SILENT) -> None:
     """Raise `RunError` for an invalid argument of `arithmetic`."""
     check_states(states, seed, MOST_STATES, reporter)
@@ -391,6 +401,7 @@ def arithmetic_of(
     reporter: Reporter = SILENT,
 ) -> "Arithmetic":
     """The result of `arithmetic` for a model; `name` is the name of the scene in it."""
+    _check_moves(model)
     from eomgen.study.cost.arithmetic import arithmetic as measured
 
     name = name or model.name

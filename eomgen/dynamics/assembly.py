@@ -28,6 +28,8 @@ ENOUGH = 6
 """So many positions found suffice to take the nearest."""
 ALONG = (0.05, -0.05, 0.1, 0.1, 0.2, 0.3)
 """Positions along the motion at which rows are compared, rad, or in sizes."""
+SOON = (1e-3, 1e-2, 0.1)
+"""Times at which loops that hold everything are to follow their drives, s."""
 LEAST_PIVOT = 1e-3
 """A coordinate that the scene gives is solved for where other pivots would be smaller than this."""
 MOVED = 1e-9
@@ -50,6 +52,8 @@ def assembled(model: Model) -> Model:
     _check_linear(mechanism, np.array(model.initial_q))
     q, notices = _position(mechanism)
     dropped = _dependent(mechanism, q)
+    if dropped and model.driven:
+        _check_driven(mechanism, q, dropped)
     model = replace(model, initial_q=tuple(q.tolist()), dropped=dropped)
     if not model.rows:
         raise SceneError(
@@ -57,7 +61,7 @@ def assembled(model: Model) -> Model:
             f"restrict{'s' * (len(model.constraints) == 1)} nothing that the other joints do not "
             "restrict already; leave it out"
         )
-    if len(model.rows) >= len(model.velocities):
+    if len(model.rows) >= len(model.velocities) and not model.driven:
         raise SceneError(
             f"joints: the loops hold everything: {len(model.rows)} independent constraints on "
             f"{len(model.velocities)} velocities; leave one out"
@@ -210,12 +214,15 @@ def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array 
 def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     """What cannot close, and by how much at least."""
     q, g = start, mechanism.residuals(start)
+    if not np.isfinite(g).all():
+        name, _ = mechanism.model.rows[int(np.argmin(np.isfinite(g)))]
+        return f"a formula of the constraints, of {name} perhaps, has no value there; give another"
     for _ in range(200):
         matrix = np.where(free, mechanism.holding(q), 0.0)
         step = -matrix.T @ np.linalg.solve(matrix @ matrix.T + 1e-3 * np.eye(len(g)), g)
         there = mechanism.moved(q, step * min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300)))
         after = mechanism.residuals(there)
-        if float(after @ after) >= float(g @ g):
+        if not float(after @ after) < float(g @ g):
             break
         q, g = there, after
     model = mechanism.model
@@ -226,7 +233,7 @@ def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     given = f" with {held} as given" if held else ""
     remedy = f"change lengths, or {'give fewer coordinates' if held else 'change the start'}"
     nc, nv = len(model.rows), len(model.velocities)
-    if nc >= nv:
+    if nc >= nv and not model.driven:
         remedy = f"{nc} constraints on {nv} velocities leave nothing that could move: leave one out"
     return (
         f"the constraints cannot be met{given}: {name} stays open by "
@@ -269,6 +276,24 @@ def _dependent(mechanism: Closure, q: Array) -> tuple[str, ...]:
         if any(_adds(matrix, kept, i) for matrix in matrices):
             kept.append(i)
     return tuple(name for i, (name, _) in enumerate(mechanism.model.rows) if i not in kept)
+
+
+def _check_driven(mechanism: Closure, q: Array, dropped: tuple[str, ...]) -> None:
+    """Raise `SceneError` if rows that follow from the others at rest do not while drives move."""
+    names = [name for name, _ in mechanism.model.rows]
+    kept = replace(mechanism, model=replace(mechanism.model, dropped=dropped))
+    for time in SOON:
+        found = newton(replace(kept, time=time), q, np.ones(len(mechanism.lengths), dtype=bool))
+        if found is None:
+            return  # a run that gets there says so
+        left = np.abs(replace(mechanism, time=time).residuals(found))
+        if left.max() > MOVED:
+            raise SceneError(
+                f"joints: {names[int(left.argmax())]} cannot be met while "
+                f"{', '.join(c.position.name for c in mechanism.model.driven)} moves: the loops "
+                "hold everything; leave one out"
+            )
+        q = found
 
 
 def _independent(matrix: Array) -> bool:

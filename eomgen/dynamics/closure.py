@@ -33,10 +33,15 @@ INDEPENDENT = 1e-7
 
 @dataclass(frozen=True)
 class Closure:
-    """A model's constraints as functions of the coordinates. Residuals and steps are in sizes."""
+    """A model's constraints as functions of the coordinates, at a time, s. Residuals and steps are
+    in sizes.
+
+    Where a formula has no value, as the asin of 2, residuals and J are nan.
+    """
 
     model: Model
     size: float
+    time: float = 0.0
 
     @classmethod
     def of(cls, model: Model) -> "Closure":
@@ -49,7 +54,7 @@ class Closure:
         inputs = {i.name: i.default for i in model.inputs}
         states = {x.name: x.initial for x in model.extra}
         speeds = [0.0] * len(model.velocities) if v is None else list(v)
-        values = Values(model.defaults, inputs, q.tolist(), speeds, states, 0.0)
+        values = Values(model.defaults, inputs, q.tolist(), speeds, states, self.time)
         return Dynamics(model, values, FloatScalars(), linkage=self._linkage)
 
     @cached_property
@@ -59,7 +64,10 @@ class Closure:
 
     def residuals(self, q: Array) -> Array:
         """g of each row, (nc,)."""
-        found = np.array(constraints.residuals(self.dynamics(q)))
+        try:
+            found = np.array(constraints.residuals(self.dynamics(q)))
+        except (ArithmeticError, ValueError):
+            found = np.full(len(self.model.rows), np.nan)
         return np.asarray(found / self._units)
 
     def met(self, q: Array, v: Sequence[float]) -> bool:
@@ -71,13 +79,15 @@ class Closure:
 
     def both(self, q: Array) -> tuple[Array, Array]:
         """`residuals` and `jacobian`."""
-        d = self.dynamics(q)
-        found = np.array(constraints.residuals(d), dtype=np.float64)
-        return np.asarray(found / self._units), self._in_sizes(jacobian_of(d))
+        return self.residuals(q), self.jacobian(q)
 
     def jacobian(self, q: Array) -> Array:
         """J (nc, nv) in sizes."""
-        return self._in_sizes(jacobian_of(self.dynamics(q)))
+        try:
+            rows: Sequence[Sequence[float]] = jacobian_of(self.dynamics(q))
+        except (ArithmeticError, ValueError):
+            rows = [[np.nan] * len(self.model.velocities)] * len(self.model.rows)
+        return self._in_sizes(rows)
 
     def _in_sizes(self, rows: Sequence[Sequence[float]]) -> Array:
         matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.model.velocities))
@@ -88,7 +98,10 @@ class Closure:
         """J (nc, nv) in sizes, 0 in the rows that restrict velocities alone: what positions can be
         closed by. A wheel is put on the ground without rolling there.
         """
-        rows = constraints.rows_of(self.dynamics(q))
+        try:
+            rows = constraints.rows_of(self.dynamics(q))
+        except (ArithmeticError, ValueError):
+            return self.jacobian(q)
         held = np.array([[row.residual is not None] for row in rows], dtype=bool)
         return np.where(held.reshape(len(rows), 1), self.jacobian(q), 0.0)
 
@@ -153,7 +166,8 @@ def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | Non
         step *= min(1.0, 0.5 / length) if length else 1.0
         there = mechanism.moved(q, step)
         after = mechanism.residuals(there)
-        if float(after @ after) > float(g @ g) and size > CLOSED:
+        worse = not float(after @ after) <= float(g @ g)  # also where a formula has no value
+        if worse and (size > CLOSED or not np.isfinite(after).all()):
             damping = max(10 * damping, 1e-6)
             last = math.inf
             if damping > 1e6:

@@ -89,20 +89,25 @@ def _size(effect: Effect, dynamics: Dynamics) -> float:
     return largest
 
 
-def dependent_row(model: Model, values: Values) -> str:
-    """The name of a row of the constraints that follows from the others at this position; "" if all
-    are independent.
+def constraint_trouble(model: Model, values: Values) -> str:
+    """What is wrong with the constraints at this position: that one follows from the others, or has
+    no value; "" if they are independent.
     """
     if not model.constraints:
         return ""
     moved = model.with_parameters({p.name: values.parameters[p.name] for p in model.parameters})
     matrix = Closure.of(moved).jacobian(np.array(values.q))
+    if not np.isfinite(matrix).all():
+        return "a formula of the constraints has no finite value, as at the end of its domain"
     lengths = np.linalg.norm(matrix, axis=1)
-    if not lengths.all():
-        return model.rows[int(np.argmin(lengths))][0]
-    left, sizes, _ = np.linalg.svd(matrix / lengths[:, np.newaxis])
-    # The combination of rows that is nearest to 0.
-    return model.rows[int(np.abs(left[:, -1]).argmax())][0] if sizes[-1] <= INDEPENDENT else ""
+    worst = int(np.argmin(lengths))
+    if lengths[worst]:
+        left, sizes, _ = np.linalg.svd(matrix / lengths[:, np.newaxis])
+        if sizes[-1] > INDEPENDENT:
+            return ""
+        worst = int(np.abs(left[:, -1]).argmax())  # the combination that is nearest to 0
+    name, _ = model.rows[worst]
+    return f"constraint {name} follows from the others, as at a dead point or a change point"
 
 
 def is_singular(model: Model, values: Values) -> bool:

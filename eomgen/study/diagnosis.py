@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.dynamics.diagnostics import dependent_row, effect_sizes, is_singular, values_at
+from eomgen.dynamics.diagnostics import constraint_trouble, effect_sizes, is_singular, values_at
 from eomgen.dynamics.singularity import relative_pivots, why_unresisted
 from eomgen.model.model import Model, dofs_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
@@ -153,11 +153,8 @@ def explained(
             for i in sorted(felt):
                 if felt[i][0] < GONE:
                     return Explanation(*why_unresisted(model, i))
-        if row := dependent_row(model, values):
-            return Explanation(
-                f"constraint {row} follows from the others, as at a dead point or a change point",
-                "take another start, or lengths that do not line up",
-            )
+        if why := constraint_trouble(model, values):
+            return Explanation(why, "take another start, or lengths that do not line up")
         if is_singular(model, values):
             return Explanation(
                 "the mass matrix is singular", "change lengths, masses or inertias, or keep away"
