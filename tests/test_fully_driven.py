@@ -82,6 +82,20 @@ def test_a_driven_rod(integrator: str) -> None:
     np.testing.assert_allclose(run.saved["driving_forces"][:, 0], torque, rtol=1e-13)
 
 
+def test_a_coupling_with_the_time() -> None:
+    """It drives as a drive does, and its multiplier is the torque."""
+    drive = '{ type = "driven", name = "drive", joint = "a", coordinate = "1 + 3.0*t" }'
+    coupling = '{ type = "coupling", name = "k", coordinate = "a_angle", equals = "1 + 3*t" }'
+    follow = f"constraints = [{coupling}]"
+    text = BAR.replace(f", {drive}", "").replace("driving_forces", "constraint_forces") + follow
+    runs = [
+        eomgen.simulate(scene, t_end=0.5, save=(what,), backend="numpy")
+        for scene, what in ((BAR, "driving_forces"), (text, "constraint_forces"))
+    ]
+    torque = runs[1].saved["constraint_forces"][-1, 2]
+    assert abs(torque) == pytest.approx(abs(runs[0].saved["driving_forces"][-1, 0]), rel=1e-7)
+
+
 def test_a_driven_crank() -> None:
     """Its torque is the change of the energy over the angle; the loop stays closed."""
     run = eomgen.simulate(BAR, t_end=2.0, save=("driving_forces", "poses"), backend="numpy")

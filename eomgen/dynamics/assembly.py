@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.dynamics import constraints
+from eomgen.dynamics.closed_positions import timed
 from eomgen.dynamics.closure import CLOSED, INDEPENDENT, Array, Closure, newton
 from eomgen.dynamics.clusters import jacobian_of
 from eomgen.errors import SceneError
@@ -52,8 +53,8 @@ def assembled(model: Model) -> Model:
     _check_linear(mechanism, np.array(model.initial_q))
     q, notices = _position(mechanism)
     dropped = _dependent(mechanism, q)
-    if dropped and model.driven:
-        _check_driven(mechanism, q, dropped)
+    if dropped and _is_moved(model):
+        _check_followed(mechanism, q, dropped)
     model = replace(model, initial_q=tuple(q.tolist()), dropped=dropped)
     if not model.rows:
         raise SceneError(
@@ -61,7 +62,7 @@ def assembled(model: Model) -> Model:
             f"restrict{'s' * (len(model.constraints) == 1)} nothing that the other joints do not "
             "restrict already; leave it out"
         )
-    if len(model.rows) >= len(model.velocities) and not model.driven:
+    if len(model.rows) >= len(model.velocities) and not _is_moved(model):
         raise SceneError(
             f"joints: the loops hold everything: {len(model.rows)} independent constraints on "
             f"{len(model.velocities)} velocities; leave one out"
@@ -233,7 +234,7 @@ def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     given = f" with {held} as given" if held else ""
     remedy = f"change lengths, or {'give fewer coordinates' if held else 'change the start'}"
     nc, nv = len(model.rows), len(model.velocities)
-    if nc >= nv and not model.driven:
+    if nc >= nv and not _is_moved(model):
         remedy = f"{nc} constraints on {nv} velocities leave nothing that could move: leave one out"
     return (
         f"the constraints cannot be met{given}: {name} stays open by "
@@ -278,9 +279,15 @@ def _dependent(mechanism: Closure, q: Array) -> tuple[str, ...]:
     return tuple(name for i, (name, _) in enumerate(mechanism.model.rows) if i not in kept)
 
 
-def _check_driven(mechanism: Closure, q: Array, dropped: tuple[str, ...]) -> None:
+def _is_moved(model: Model) -> bool:
+    """Whether a drive, or a constraint with the time in it, moves what has no freedom."""
+    return bool(model.driven) or timed(model)
+
+
+def _check_followed(mechanism: Closure, q: Array, dropped: tuple[str, ...]) -> None:
     """Raise `SceneError` if rows that follow from the others at rest do not while drives move."""
     names = [name for name, _ in mechanism.model.rows]
+    moving = [c.position.name for c in mechanism.model.driven]
     kept = replace(mechanism, model=replace(mechanism.model, dropped=dropped))
     for time in SOON:
         found = newton(replace(kept, time=time), q, np.ones(len(mechanism.lengths), dtype=bool))
@@ -290,8 +297,7 @@ def _check_driven(mechanism: Closure, q: Array, dropped: tuple[str, ...]) -> Non
         if left.max() > MOVED:
             raise SceneError(
                 f"joints: {names[int(left.argmax())]} cannot be met while "
-                f"{', '.join(c.position.name for c in mechanism.model.driven)} moves: the loops "
-                "hold everything; leave one out"
+                f"{', '.join(moving) or 'time'} moves on: the loops hold everything; leave one out"
             )
         q = found
 
