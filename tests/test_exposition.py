@@ -242,7 +242,7 @@ def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
     """M v̇ + V + G = F and its solution, F written out."""
     model = model_of(BY[by])
     exposition, at = exposition_of(model), instant(model)
-    bare = exposition_of(replace(model, effects=model.effects[:1], states=()))
+    bare = exposition_of(replace(model, effects=model.effects[:1], extra=()))
     found, other = exposition.matrices, bare.matrices
     assert found is not None and other is not None
     for letter in "MVG":
