@@ -65,6 +65,9 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         parser = _parser()
         given = parser.parse_args(arguments)
+        if "run" not in given:  # no command
+            parser.print_help()
+            return 0
         if "scenes" in given and not (given.scenes or given.all):
             parser.error("generate: no scene; name one, or give --all for the built-in ones")
         code: int = given.run(given)
@@ -99,13 +102,13 @@ def _parser(
         epilog="SCENE is a file or the name of a built-in scene (eomgen list).",
     )
     parser.add_argument("--version", action=Version, help="print the version and exit")
-    sub = parser.add_subparsers(metavar="COMMAND", required=True)
+    sub = parser.add_subparsers(metavar="COMMAND")
 
     def command(
         name: str, run: Callable[[Arguments], int], about: str, scenes: str | None = "scene"
     ) -> argparse.ArgumentParser:
         added = sub.add_parser(name, help=about, description=about, epilog=example_of(name))
-        added.set_defaults(run=run, command=name)
+        added.set_defaults(run=run, command=name, parser_of_command=added)
         if found is not None:
             found.append((name, added))
         if scenes == "scene":

@@ -99,7 +99,7 @@ class Derivation:
     def meanings(self) -> dict[str, str]:
         """What each symbol is, with its unit, by name."""
         model = self.model
-        known: list[Any] = [*model.coordinates, *model.velocities, *model.states]
+        known: list[Any] = [*model.coordinates, *model.velocities, *model.extra]
         known += [*model.inputs, *model.parameters]
         meanings = {x.name: ", ".join(filter(None, (x.about, x.unit))) for x in known}
         rates = {c.acceleration: f"time derivative of {c.name}" for c in model.velocities}

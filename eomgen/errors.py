@@ -45,10 +45,32 @@ LONGER = 2 / ALIKE - 1
 """A word more than this many times as long as a known one is never that similar."""
 
 
+SYNONYMS = {
+    **dict.fromkeys("hinge pin pivot rotary rotational continuous".split(), "revolute"),
+    **dict.fromkeys("slider slide sliding linear translational".split(), "prismatic"),
+    **dict.fromkeys("fixed rigid".split(), "weld"),
+    **dict.fromkeys("spherical socket".split(), "ball"),
+    **dict.fromkeys("cardan hooke".split(), "universal"),
+    **dict.fromkeys("floating freeflyer".split(), "free"),
+    **dict.fromkeys("gear gears belt rack screw pulley mimic".split(), "coupling"),
+    **dict.fromkeys("rope cable string tendon damper".split(), "spring"),
+    **dict.fromkeys("link strut".split(), "distance"),
+    **dict.fromkeys("wheel tyre tire".split(), "rolling"),
+    **dict.fromkeys("actuator drive".split(), "motor"),
+    **dict.fromkeys("limit endstop".split(), "joint_stop"),
+    **dict.fromkeys("ground base earth fixed_frame origin".split(), "world"),
+}
+"""Words of other programs and of workshops for what has another name here."""
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return ``" (did you mean 'x'?)"`` for the known word nearest to `word`, or ``""``."""
-    # Words that differ in case alone come first: rk45 is RK45 rather than rk4.
+    """Return ``" (did you mean 'x'?)"`` for the known word of the same meaning or the one nearest
+    to `word`, or ``""``.
+    """
     names = list(known)
+    if (meant := SYNONYMS.get(word.casefold())) in names:
+        return f" (did you mean '{meant}'?)"
+    # Words that differ in case alone come first: rk45 is RK45 rather than rk4.
     if len(word) > LONGER * max(map(len, names), default=0):
         return ""
     close = [name for name in names if name.casefold() == word.casefold()]

@@ -23,10 +23,6 @@ SIGNATURES = (
     b"# eomgen accuracy of ",
     b"# eomgen arithmetic of ",
     b"eomgen linearisation of ",  # tables
-    b"method,kind,order,dt_s,rtol,atol,status,error,error_is,",
-    b"state_kind,t,condition,",
-    b"member,status,t,",
-    b"name,unit,t,members,mean,deviation,",
     b"# eomgen verification of ",
     b'"eomgen": "verification of ',
     b"eomgen.npy",  # archives: their first member
@@ -35,7 +31,10 @@ SIGNATURES = (
     b"% eomgen figure\n",  # PDF
     b"!\xfe\x06eomgen\0",  # GIF: a comment
 )
-"""Every file that this program writes has one of these in its first `SIGNED_WITHIN` bytes."""
+"""Every file that this program writes, but tables, has one of these in its first `SIGNED_WITHIN`
+bytes."""
+TABLES = (b'"method",kind,', b'"state_kind",t,', b'"member",status,', b'"name",unit,t,members,')
+"""How tables begin: see `marked`."""
 SIGNED_AT_END = (b"eomgen film", SIGNATURES[0])
 """What films, and functions for CasADi, have in their last bytes instead."""
 SIGNED_WITHIN = 2048
@@ -53,7 +52,15 @@ UNFINISHED = re.compile(r"\..{1,40}\.[0-9a-f]{12}")
 
 def is_ours(head: bytes) -> bool:
     """Whether a file that begins like this was written by this program."""
-    return any(signature in head[:SIGNED_WITHIN] for signature in SIGNATURES)
+    return head.startswith(TABLES) or any(sign in head[:SIGNED_WITHIN] for sign in SIGNATURES)
+
+
+def marked(table: str) -> str:
+    """A table of comma-separated values as ours: the first name is in quotation marks, the second
+    is not. Whatever reads tables reads it as others, and no other program writes it like that.
+    """
+    name, comma, rest = table.partition(",")
+    return f'"{name}"{comma}{rest}'
 
 
 def read_plain(

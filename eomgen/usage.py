@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from eomgen.errors import nearest
 from eomgen.text import breaks_lines, one_line
 from eomgen.version import __version__
 
@@ -73,6 +74,22 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"formatter_class": Help, **options})
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As that of argparse, with a hint at an option that is known and similar."""
+        given, left = self.parse_known_args(args, namespace)
+        if left:
+            command = getattr(given, "parser_of_command", self)
+            known = [text for action in command._actions for text in action.option_strings]
+            hints = [nearest(word.partition("=")[0], known) for word in left if word[:1] == "-"]
+            self.error(f"unrecognized arguments: {' '.join(left)}{''.join(hints)}")
+        return given
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            names = list(map(str, action.choices))
+            hint = nearest(str(value), names) or f"; known: {', '.join(names)}"
+            raise argparse.ArgumentError(action, f"no '{value}'{hint}")
 
     def error(self, message: str) -> NoReturn:
         super().error(one_line(message))

@@ -38,7 +38,7 @@ def instant(model: Model, seed: int = 0, shake: float = 0.3, *, closed: bool = F
         q[list(four)] /= np.linalg.norm(q[list(four)])
     v = rng.normal(size=len(model.velocities))
     inputs = {i.name: float(rng.normal()) for i in model.inputs}
-    states = {x.name: float(rng.normal()) for x in model.states}
+    states = {x.name: float(rng.normal()) for x in model.extra}
     if closed:
         found = newton(Closure.of(model), q, np.ones(len(v), dtype=bool))
         assert found is not None

@@ -177,7 +177,7 @@ class Comparison:
             for name, first in zip(self.names.inputs, self.mj.actuator_actadr, strict=True)
             if first >= 0
         }
-        return {state.name: named[state.name] for state in self.model.states}
+        return {state.name: named[state.name] for state in self.model.extra}
 
     @cached_property
     def module(self) -> Any:

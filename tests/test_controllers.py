@@ -295,7 +295,7 @@ def test_dynamics_with_states(name: str) -> None:
     module = quick(SCENES[name]).module
     rng = np.random.default_rng(2)
     y = random_state(module, 2)
-    extra = len(quick(SCENES[name]).model.states)
+    extra = len(quick(SCENES[name]).model.extra)
     nq = len(module.POSITIONS)
     q, v, x = y[:nq], y[nq : len(y) - extra], y[len(y) - extra :]
     tau = rng.normal(size=len(v))
@@ -349,7 +349,7 @@ def test_absence_is_free() -> None:
     assert not bounded.search(bare.source) and ", x=None" not in bare.source
     assert bounded.search(quick(WHEEL + servo("pd", "limit = 1")).source)
     straight = quick(WHEEL + servo("pd"))
-    assert straight.model.states == () and not bounded.search(straight.source)
+    assert straight.model.extra == () and not bounded.search(straight.source)
     assert quick(WHEEL + servo("pd", "target_rate = 0")).source == straight.source
 
 

@@ -78,7 +78,7 @@ def test_each_effect_by_its_formulas(case: Case) -> None:
     rates, forces = follow_recursion(model, at.known)
     assert_close(forces, at.solver.applied_force)
     assert_close(rates, at.solver.articulated_forward())
-    states = [at.known[dotted(x.name)] for x in model.states]
+    states = [at.known[dotted(x.name)] for x in model.extra]
     assert_close(states, at.solver.state_rates)
 
 
@@ -242,7 +242,7 @@ def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
     """M v̇ + V + G = F and its solution, F written out."""
     model = model_of(BY[by])
     exposition, at = exposition_of(model), instant(model)
-    bare = exposition_of(replace(model, effects=model.effects[:1], states=()))
+    bare = exposition_of(replace(model, effects=model.effects[:1], extra=()))
     found, other = exposition.matrices, bare.matrices
     assert found is not None and other is not None
     for letter in "MVG":

@@ -105,7 +105,7 @@ class Moment:
         q, v, x = np.split(y, [self.nq, self.nq + self.nv])
         parameters = {name: MP.mpf(value) for name, value in self.module.PARAMETERS.items()}
         inputs = {name: MP.mpf(value) for name, value in self.u.items()}
-        states = dict(zip((state.name for state in self.model.states), x, strict=True))
+        states = dict(zip((state.name for state in self.model.extra), x, strict=True))
         values = Values(parameters, inputs, list(q), list(v), states, MP.mpf(self.t))
         return Dynamics(self.model, values, Digits())
 
@@ -296,7 +296,7 @@ def test_module_is_its_program(m: Moment) -> None:
         if name.endswith("_dynamics"):
             extra = np.array(m.tau, dtype=float)
             q, v, x = np.split(y, [m.nq, m.nq + m.nv])
-            given = {"x": x} if m.model.states else {}
+            given = {"x": x} if m.model.extra else {}
             found = getattr(module, name)(q, v, extra, t=m.t, u=m.u, **given)
             expected = m.e.exactly(name, m.y, m.u, extra=m.tau, t=m.t)
         else:

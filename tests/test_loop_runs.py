@@ -1,5 +1,6 @@
 """Runs of mechanisms with loops: no drift, energy, given starts, impacts, singular positions."""
 
+import re
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
@@ -247,12 +248,14 @@ def test_impacts_keep_energy_and_constraints() -> None:
 
 
 def test_a_driven_crank_moves_the_loop() -> None:
-    """With a driven crank a four-bar has no freedom left, which is refused in one line; with a rod
-    in place of the last pin it has one, and the rod keeps its length.
+    """With a driven crank a four-bar has no freedom left; a constraint more is refused in one line.
+    With a rod in place of the last pin it has a freedom, and the rod keeps its length.
     """
     drive = '[[effects]]\ntype = "driven"\nname = "motor"\njoint = "A"\ncoordinate = "1 + 2*t"\n'
-    with pytest.raises(SceneError, match="the loops hold everything"):
-        check(four_bar(initial="q = {}", effects=drive))
+    more = '[[constraints]]\ntype = "coupling"\nname = "more"\ncoordinate = "phi"\nequals = "{}"\n'
+    phi = check(four_bar(initial="q = {}", effects=drive)).initial_q[1]
+    with pytest.raises(SceneError, match=r"cannot be met while theta moves on: the loops hold"):
+        check(four_bar(initial="q = {}", effects=drive + more.format(phi)))
     slack = '[[constraints]]\ntype = "distance"\nname = "rod"\nbody_1 = "coupler"\n'
     slack += 'at_1 = ["b/2", 0]\nbody_2 = "rocker"\nat_2 = ["c/2", 0]\nlength = 0.2\n'
     text = four_bar(initial="q = {}", effects=drive + slack)
@@ -358,3 +361,78 @@ def test_sweeps_close_each_member() -> None:
         assert gap(dict(zip(found.states, y, strict=True)), a) < 1e-13
     with pytest.raises(RunError, match="continues from earlier steps"):
         eomgen.simulate(four_bar(), integrator="BDF", t_end=0.1)
+
+
+@pytest.mark.parametrize("loops", ["projected", "closed"])
+@pytest.mark.parametrize("rate", ["", "_dot"])
+def test_given_starts_are_kept_or_refused(loops: str, rate: str) -> None:
+    """A start that gives all coordinates, or all velocities, is not replaced by another: one that
+    meets the constraints but for its rounding is taken, all others are refused. So it is with all
+    that take a start; what had to move beside is said.
+    """
+    text = four_bar(loops=loops)
+    model = check(text)
+    names, values = model.coordinates, model.initial_q
+    if rate:
+        own = eomgen.simulate(text, t_end=0.01, state={"theta_dot": 1.0}, backend="numpy")
+        names, values = model.velocities, own.model.initial_v
+        assert any("phi_dot = " in text for text in own.warnings)
+    rounded = {c.name: float(f"{x:.6g}") for c, x in zip(names, values, strict=True)}
+    run = eomgen.simulate(text, t_end=0.01, state=rounded, backend="numpy")
+    theta = run[f"theta{rate}"][0]
+    assert abs(theta - rounded[f"theta{rate}"]) < 1e-5 and run.finished
+    wrong = {**rounded, f"phi{rate}": rounded[f"phi{rate}"] + 0.3}
+    said = rf"theta{rate}, .* do not meet .*: \w+ would be moved by 0\.\d+ rad"
+    with pytest.raises(SceneError, match=rf"^state: .*{said}"):
+        eomgen.simulate(text, t_end=0.01, state=wrong)
+    with pytest.raises(SceneError, match=said):
+        eomgen.linearise(text, at="initial", state=wrong)
+    if loops == "projected":
+        both = {name: [rounded[name], wrong[name]] for name in wrong}
+        runs = eomgen.ensemble(text, both, t_end=0.01, backend="numpy")
+        assert runs.status == ["finished", "refused"]
+        assert re.search(rf"^vary: .*{said}", runs.messages[1])
+
+
+def test_starts_of_scenes_that_had_to_move_are_told() -> None:
+    """A scene that gives all coordinates is moved onto its constraints at other lengths, and each
+    run says so: a single one, and that of a sweep.
+    """
+    model = check(four_bar())
+    q = ", ".join(
+        f"{c.name} = {x!r}" for c, x in zip(model.coordinates, model.initial_q, strict=True)
+    )
+    text, said = four_bar(initial=f"q = {{ {q} }}"), "initial.q: moved to meet the constraints, by"
+    run = eomgen.simulate(text, t_end=0.01, parameters={"a": 0.31}, backend="numpy")
+    assert any(text.startswith(said) for text in run.warnings)
+    assert not eomgen.simulate(text, t_end=0.01, backend="numpy").warnings
+    runs = eomgen.ensemble(text, {"a": [0.3, 0.31]}, t_end=0.01, backend="numpy")
+    assert runs.messages[0] == "" and runs.messages[1].startswith(said)
+    assert runs.status == ["finished", "finished"]
+
+
+@pytest.mark.every(2)
+@pytest.mark.parametrize(("equals", "end"), [("asin(u)", 1.0), ("sqrt(u)", 0.0)])
+@pytest.mark.parametrize("loops", ["auto", "projected"])
+def test_formulas_of_limited_domain_in_constraints(equals: str, end: float, loops: str) -> None:
+    """What the search along the motion meets beyond the domain is no place of the mechanism; a run
+    towards its end stops there in a sentence.
+    """
+    text = f"""
+name = "limited"
+loops = "{loops}"
+bodies = [
+    {{ name = "a", mass = 1.0, inertia_com = 0.1 }},
+    {{ name = "b", mass = 1.0, inertia_com = 0.1 }},
+]
+joints = [
+    {{ name = "p", type = "revolute", parent = "world", child = "a", coordinate = "u" }},
+    {{ name = "q", type = "revolute", parent = "world", child = "b", coordinate = "w" }},
+]
+constraints = [{{ type = "coupling", name = "g", coordinate = "w", equals = "{equals}" }}]
+initial = {{ q = {{ u = 0.7 }} }}
+"""
+    assert eomgen.simulate(text, t_end=0.1, backend="numpy").finished
+    push = {"u_dot": 2.0 if end > 0.7 else -2.0}
+    run = eomgen.simulate(text, t_end=9.0, state=push, backend="numpy")
+    assert not run.finished and abs(run["u"][-1] - end) < 1e-3

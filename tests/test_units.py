@@ -120,7 +120,7 @@ def at(joint: str) -> Model:
 def test_units_are_those_of_the_joint(joint: str, kind: int) -> None:
     """A controller's own states keep what the scene says of them."""
     model = at(joint)
-    named = [*model.parameters, *model.inputs, *model.states]
+    named = [*model.parameters, *model.inputs, *model.extra]
     held = {body.name for body in model.bodies} | {"rail", "pin"}
     units = {x.name: x.unit for x in named if x.name.partition("_")[0] not in held}
     assert units == {name: pair[kind] for name, pair in UNITS.items()}

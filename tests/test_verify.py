@@ -217,7 +217,7 @@ def test_kinetic_energy_of_free_bodies_has_their_mass_matrix() -> None:
     """T = ½ vᵀ M v, two sums that are made apart, where no drive moves anything."""
     model = replace(model_of("quadruped"), outputs=())
     rng = np.random.default_rng(5)
-    y = rng.uniform(-1, 1, len(model.coordinates) + len(model.velocities) + len(model.states))
+    y = rng.uniform(-1, 1, len(model.coordinates) + len(model.velocities) + len(model.extra))
     with extended_digits():
         free = FreeBodies(model, 0.0, y)
         twice = free.rates @ free.mass_matrix @ free.rates

@@ -23,6 +23,7 @@ from eomgen.api.given import (
     values_of,
 )
 from eomgen.api.inputs import Inputs, in_formulas
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
@@ -92,6 +93,7 @@ class MeasurementPlan:
     time: float
 
 
+@public
 def accuracy(
     source: Source,
     *,
@@ -158,6 +160,7 @@ def plan_measurement(
 
     for name, value in (("run_time", run_time), ("time", time)):
         check_time(value, reporter.argument(name))
+    _check_moves(model)
     chosen = methods_named(methods)
     parameters, inputs = values_of(model, parameters, inputs, reporter)
     end = simulation.t_end if t_end is None else t_end
@@ -348,6 +351,7 @@ def _climb(
     return made
 
 
+@public
 def arithmetic(
     source: Source,
     *,
@@ -372,6 +376,15 @@ def arithmetic(
     return arithmetic_of(model, scene.simulation, states=states, seed=seed, single=single)
 
 
+def _check_moves(model: Model) -> None:
+    """Raise `RunError` for a model without velocities, whose motion is given by the time."""
+    if not model.velocities:
+        raise RunError(
+            f"{model.name}: all coordinates are driven, so that no method makes an error; leave "
+            "one free"
+        )
+
+
 def check_arithmetic(states: int | None, seed: int, reporter: Reporter = SILENT) -> None:
     """Raise `RunError` for an invalid argument of `arithmetic`."""
     check_states(states, seed, MOST_STATES, reporter)
@@ -388,6 +401,7 @@ def arithmetic_of(
     reporter: Reporter = SILENT,
 ) -> "Arithmetic":
     """The result of `arithmetic` for a model; `name` is the name of the scene in it."""
+    _check_moves(model)
     from eomgen.study.cost.arithmetic import arithmetic as measured
 
     name = name or model.name

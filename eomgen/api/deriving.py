@@ -1,12 +1,14 @@
 """The equations as SymPy matrices, with their derivation: `derive`."""
 
 from eomgen.api.given import Source, checked, modelled, read
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.equations import Derivation
 from eomgen.model.model import Model
 from eomgen.scene.schema import Form
 
 
+@public
 def derive(source: Source, *, form: Form | None = None) -> Derivation:
     """Derive M v̇ + V + G = F, and the steps to it, ending in the time derivative of a state.
 

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.api.given import Source, check_time, model_of, read
 from eomgen.api.inputs import Inputs, all_in_formulas
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.scene.schema import Route, Scene
 
@@ -14,6 +15,7 @@ MOTION = 10.0
 """Default length of the motions that are compared, s."""
 
 
+@public
 def effects(
     source: Source,
     *,

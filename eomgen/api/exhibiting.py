@@ -8,6 +8,7 @@ from typing import Any
 
 from eomgen.api.given import Source, model_of, read
 from eomgen.api.planning import plan_run
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.simulating import run_plan
 from eomgen.errors import RunError
@@ -23,6 +24,7 @@ BASE = 3.0
 """What a scene without bodies would take to be shown, in bodies."""
 
 
+@public
 def gallery(
     folder: str | PathLike[str],
     scenes: Sequence[Source] | None = None,

@@ -5,6 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from eomgen.api.given import Outputs, Source, checked, modelled, read
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.exports import Number, Options, find_format
@@ -13,6 +14,7 @@ from eomgen.model.model import Model
 from eomgen.scene.schema import Form, Route
 
 
+@public
 def export(
     source: Source,
     format: str,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal, cast
 
 from eomgen.api.given import Outputs, Source, check, overridden
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError, SceneError
 from eomgen.files import read_plain
@@ -24,6 +25,7 @@ LARGEST = 2**30
 Freshness = Literal["fresh", "listed", "stale", "missing"]
 
 
+@public
 def generate(
     source: Source,
     *,

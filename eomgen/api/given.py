@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.displays import DISPLAYS
 from eomgen.dynamics.assembly import assembled
@@ -48,6 +49,7 @@ def read(source: Source) -> Scene:
     )
 
 
+@public
 def check(source: Source) -> Model:
     """Build the model of a scene: bodies in a tree, `coordinates`, `velocities`, `states`,
     `inputs`, `parameters`, and `notices` of corrected values.
@@ -60,7 +62,9 @@ def check(source: Source) -> Model:
 def _show_scene(scene: Scene) -> str:
     from eomgen.show.notebook import model_html, scene_html
 
-    return scene_html(scene.name, scene.title, scene.about) + model_html(elaborate(scene))
+    return scene_html(scene.name, scene.title, scene.about) + model_html(
+        assembled(elaborate(scene))
+    )
 
 
 def _show_model(model: Model) -> str:
@@ -151,6 +155,8 @@ def named(
     finite.
     """
     found = {}
+    if not isinstance(values, Mapping | None):
+        raise RunError(f"{argument}: {type(values).__name__} is no mapping; give values by name")
     for name, value in (values or {}).items():
         name = identifier(name)
         check_name(name, known, argument, what)

@@ -2,15 +2,16 @@
 
 import csv
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
 from eomgen.api.given import check_name, named
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.errors import RunError
+from eomgen.errors import RunError, nearest
 from eomgen.files import read_plain
 from eomgen.language.base import identifier
 from eomgen.language.conditions import value_of
@@ -26,12 +27,26 @@ from eomgen.language.formula import (
 )
 from eomgen.model.inputs import all_inputs, with_formulas
 from eomgen.run.inputs import InputsOfTime, Table
+from eomgen.run.problem import FloatArray
 from eomgen.scene.schema import Scene
 
 Given = float | str | Callable[[float], float]
 """A constant, a formula, or a function of time."""
-Inputs = Mapping[str, Given] | str | PathLike[str]
-"""Inputs by name, or the path of a table."""
+
+
+class Frame(Protocol):
+    """A table with columns by name, such as a DataFrame of pandas."""
+
+    @property
+    def columns(self) -> Any:
+        """The names of its columns."""
+
+    def __getitem__(self, name: Any, /) -> Any:
+        """A column."""
+
+
+Inputs = Mapping[str, Given] | str | PathLike[str] | Frame
+"""Inputs by name, a table with a column `t`, or the path of one."""
 LARGEST_TABLE = 10**8
 """Size of the largest table that is read, bytes."""
 MOST_PIECES = 100
@@ -164,9 +179,19 @@ def _by_kind(
     varying: dict[str, Table | Callable[[float], float]] = {}
     if inputs is None:
         return constants, formulas, varying
-    if not isinstance(inputs, Mapping):
-        inputs = read_table(Path(inputs), reporter)
-    for name, value in inputs.items():
+    by_name: Mapping[str, Any]
+    if isinstance(inputs, Mapping):
+        by_name = inputs
+    elif isinstance(inputs, str | PathLike):
+        by_name = read_table(Path(inputs), known, reporter)
+    elif hasattr(inputs, "columns"):
+        by_name = table_of_frame(inputs, known, reporter)
+    else:
+        raise RunError(
+            f"{argument}: {type(inputs).__name__} is none; give values by name, a DataFrame with a "
+            "column t, or the path of a table"
+        )
+    for name, value in by_name.items():
         name = identifier(name)
         check_name(name, known, argument, "input")
         if callable(value):
@@ -190,9 +215,10 @@ def formula_of(name: str, text: str, argument: str) -> Formula:
         raise RunError(f"{argument} {name}: '{text}' {error}") from None
 
 
-def read_table(path: Path, reporter: Reporter = SILENT) -> dict[str, Table]:
-    """The inputs in a file of comma-separated values: a line with t and the names of inputs, then a
-    line of numbers for each time, in ascending order. Between them the inputs are linear.
+def read_table(path: Path, known: Sequence[str], reporter: Reporter = SILENT) -> dict[str, Table]:
+    """The inputs in a file of comma-separated values: a line with t and names, then a line for each
+    time, in ascending order. Between them the inputs are linear. Columns that are not among the
+    `known` inputs may hold anything.
 
     Raises `RunError`, which names the line, for a file that is not such a table.
     """
@@ -203,25 +229,68 @@ def read_table(path: Path, reporter: Reporter = SILENT) -> dict[str, Table]:
     except (UnicodeDecodeError, csv.Error) as error:
         raise RunError(f"{argument}: {path}: is not a table of text: {error}") from None
     names = [word.strip() for word in rows[0]] if rows else []
-    if "t" not in names or len(names) < 2:
-        raise RunError(f"{argument}: {path}:1: needs a first line with t and the names of inputs")
-    if len(set(names)) < len(names):
-        raise RunError(f"{argument}: {path}:1: a name is given twice")
+    wanted = _wanted(names, known, f"{argument}: {path}:1")
     numbers = []
     for line, row in enumerate(rows[1:], 2):
         if not any(word.strip() for word in row):
             continue
         try:
-            values = [float(word) for word in row]
+            values = [float(row[i]) for i in wanted] if len(row) == len(names) else []
         except ValueError:
             values = []
-        if len(values) != len(names) or not all(map(math.isfinite, values)):
-            raise RunError(f"{argument}: {path}:{line}: does not have {len(names)} finite numbers")
+        if not values or not all(map(math.isfinite, values)):
+            raise RunError(
+                f"{argument}: {path}:{line}: does not have {len(names)} values, with finite "
+                f"numbers for {', '.join(names[i] for i in wanted)}"
+            )
         numbers.append(values)
-    table = np.array(numbers).reshape(-1, len(names))
-    t = table[:, names.index("t")]
-    if not len(t) or np.any(np.diff(t) <= 0):
+    table = np.array(numbers).reshape(-1, len(wanted)).T
+    return _tables([names[i] for i in wanted], table, f"{argument}: {path}")
+
+
+def table_of_frame(
+    frame: Frame, known: Sequence[str], reporter: Reporter = SILENT
+) -> dict[str, Table]:
+    """The same of a DataFrame with a column t. Raises `RunError`."""
+    place = f"{reporter.argument('inputs')}: the table"
+    names = [str(name) for name in frame.columns]
+    wanted = _wanted(names, known, place)
+    columns = []
+    for i in wanted:
+        try:
+            columns.append(np.asarray(frame[frame.columns[i]], dtype=float))
+        except (TypeError, ValueError):
+            columns.append(np.array([math.nan]))
+        if columns[-1].ndim != 1 or not np.isfinite(columns[-1]).all():
+            raise RunError(f"{place}: column {names[i]} does not hold finite numbers only")
+    return _tables([names[i] for i in wanted], np.array(columns), place)
+
+
+def _wanted(names: Sequence[str], known: Sequence[str], place: str) -> list[int]:
+    """The columns that are used: t, which comes first, and the inputs.
+
+    Raises `RunError`, which begins with `place`, if t or all inputs are missing, if one is there
+    twice, or if another column is named almost like an input that is missing.
+    """
+    found = {name: i for i, name in enumerate(names) if name == "t" or identifier(name) in known}
+    if "t" not in names or len(names) < 2:
+        raise RunError(f"{place}: needs a first line with t and the names of inputs")
+    missing = [name for name in known if name not in map(identifier, found)]
+    for name in names:
+        if name not in found and (hint := nearest(name, missing)):
+            raise RunError(f"{place}: no input '{name}'{hint}")
+    if len(found) < 2:
         raise RunError(
-            f"{argument}: {path}: the times t must ascend; sort them, and give each only once"
+            f"{place}: none of its columns is an input; known: {', '.join(known) or 'none'}"
         )
-    return {name: Table(t, table[:, i]) for i, name in enumerate(names) if name != "t"}
+    if any(names.count(name) > 1 for name in found):
+        raise RunError(f"{place}: a name is given twice")
+    return [found.pop("t"), *found.values()]
+
+
+def _tables(names: Sequence[str], columns: FloatArray, place: str) -> dict[str, Table]:
+    """Inputs of columns (n, rows), the first of which is t. Raises `RunError` unless it ascends."""
+    t, *others = columns
+    if not len(t) or np.any(np.diff(t) <= 0):
+        raise RunError(f"{place}: the times t must ascend; sort them, and give each only once")
+    return {name: Table(t, values) for name, values in zip(names[1:], others, strict=True)}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, values_of
 from eomgen.api.inputs import Inputs, constant_inputs
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, state_names, values_by_index
 from eomgen.errors import RunError
@@ -50,6 +51,7 @@ class Linearised:
     steady: bool
 
 
+@public
 def linearise(
     source: Source,
     *,

@@ -98,6 +98,8 @@ def plan_run(
     bounds = {"rtol": rtol, "atol": atol, "dt": dt}
     aims = [n for n, x in (("accuracy", accuracy), ("budget", budget)) if x is not None]
     _check_aims(aims, bounds, resume, reporter)
+    if not model.states:  # all is given by the time, and no step makes an error
+        accuracy, budget, aims = None, None, []
     parameters, inputs = values_of(model, parameters, inputs, reporter)
     if guard not in (None, "stop", "repair"):
         raise RunError(f"{reporter.argument('guard')}: '{guard}' is not one of stop, repair")

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eomgen.errors import EomgenError
-from eomgen.files import check_folder, check_writable, remove_ours, write_pieces, write_whole
+from eomgen.files import (
+    check_folder,
+    check_writable,
+    marked,
+    remove_ours,
+    write_pieces,
+    write_whole,
+)
 from eomgen.results import Run
 from eomgen.run.trajectory import is_own_table, save_csv, save_npz
 
@@ -126,7 +133,7 @@ def _member_lines(found: "Ensemble") -> Iterator[str]:
 
     single = [name for name in found.outputs if found.of(name).ndim == 1]
     names = [*found.design.names, *(f"{name} (end)" for name in (*found.states, *single))]
-    yield _csv([["member", "status", "t", *names, "message"]])
+    yield marked(_csv([["member", "status", "t", *names, "message"]]))
     ends = [found.design.values, found.final, *(found.of(name)[:, None] for name in single)]
     for start in range(0, len(found), TABLE_PART):
         part = slice(start, start + TABLE_PART)
@@ -161,7 +168,7 @@ def save_statistics(found: "Ensemble", path: Path, *, force: bool = False) -> No
             each.times.tolist(), each.members.tolist(), numbers, strict=True
         ):
             lines.append([name, found.units.get(name, ""), repr(t), count, *map(repr, values)])
-    write_whole(path, _csv(lines), force=force)
+    write_whole(path, marked(_csv(lines)), force=force)
 
 
 def _csv(rows: Iterable[Sequence[object]]) -> str:

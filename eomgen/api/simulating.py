@@ -1,7 +1,7 @@
 """Simulation of a scene: `simulate`, which calls `plan_run` and `run_plan`."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -10,6 +10,7 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, model_of, overridden, read
 from eomgen.api.inputs import Inputs, applied
 from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter, logger
 from eomgen.api.states import initial_with, origin_from, split
 from eomgen.model.elaborate import expanded
@@ -39,6 +40,7 @@ WATCHED = 6
 """Runs of a module with fewer correct digits of accelerations have a guard."""
 
 
+@public
 def simulate(
     source: Source,
     *,
@@ -78,10 +80,10 @@ def simulate(
     state       values that replace those of the scene's initial state, by name; `<name>_deg` in
                 degrees
     inputs      a mapping by name: constants; formulas of t, the motion and parameters, for example
-                "3*sin(t)", which become part of the module; or functions of t. Or the path of a
-                table whose first line has t and the names of inputs, and which has a line for each
-                time; between these times inputs are linear. With tables and functions nothing is
-                compiled. Inputs that are not given have their defaults
+                "3*sin(t)", which become part of the module; or functions of t. Or a
+                DataFrame, or the path of a table of comma-separated values, with a column t and one
+                for each input, and any others; between these times inputs are linear. With tables
+                and functions nothing is compiled. Inputs that are not given have their defaults
     form        state form; None: the scene's own
     route       to the equations; None: the scene's own
     samples     approximate number of rows to keep
@@ -191,7 +193,8 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         "guard": _guard(plan, module, functions, values),
         "unstable": plan.unstable,
     }
-    problem, model = _problem(plan, model, functions, values, reporter)
+    said: list[str] = []
+    problem, model = _problem(plan, model, functions, values, _also(said.append, reporter))
     accelerator = _accelerator(plan, functions, values, reporter)
     made = accelerator.of if accelerator else without_compiler(model, functions, values)
     problem = made(problem)
@@ -212,7 +215,7 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
     powers = as_powers(functions, *values) if plan.works else None
     if powers and accelerator:
         powers = accelerator.powers(powers)
-    warnings = [*model.notices, *module.notices]
+    warnings = [*model.notices, *module.notices, *said]
     trial, choice = _run_case(plan, case, powers, follow, reporter)
     trajectory, estimate = trial.trajectory, None
     error, why = _error_of_choice(choice)
@@ -276,7 +279,7 @@ def _problem(
 ) -> tuple[Problem, Model]:
     """The problem of a plan, and its model with the initial state of the plan."""
     if not plan.state:
-        problem = problem_of(module, *values, model)
+        problem = problem_of(module, *values, model, note=reporter.note_scene)
     else:
         with reporter.located():
             problem = problem_of(
@@ -287,13 +290,23 @@ def _problem(
         whole = whole_of(module, model, 0.0, problem.initial, *values)
         q, v, x = split(model, whole)
         states = (
-            replace(state, initial=value) for state, value in zip(model.states, x, strict=True)
+            replace(state, initial=value) for state, value in zip(model.extra, x, strict=True)
         )
-        model = replace(model, initial_q=q, initial_v=v, states=tuple(states))
+        model = replace(model, initial_q=q, initial_v=v, extra=tuple(states))
     if plan.varying:
         problem = with_corners(problem, module, values[0], plan.varying)
         problem = replace(problem, origin=None)  # a file does not hold functions
     return problem, model
+
+
+def _also(hear: Callable[[str], None], reporter: Reporter) -> Reporter:
+    """A reporter whose notes are also heard here."""
+
+    def note(text: str) -> None:
+        hear(text)
+        reporter.note(text)
+
+    return replace(reporter, note=note)
 
 
 def _accelerator(

@@ -21,7 +21,7 @@ UNIT_TOLERANCE = 1e-9
 def state_names(model: Model) -> tuple[str, ...]:
     """The names by which a state can be given: those of [q, v, x], then `<name>_deg` of angles."""
     known = (*model.coordinates, *model.velocities)
-    names = [*(c.name for c in known), *(state.name for state in model.states)]
+    names = [*(c.name for c in known), *(state.name for state in model.extra)]
     return (*names, *(f"{c.name}_deg" for c in known if "rad" in c.unit))
 
 
@@ -35,7 +35,7 @@ def values_by_index(model: Model, given: Values | None, reporter: Reporter) -> d
         raise RunError(
             f"{option}: is for form = 'velocity'; in the form '{model.form}', change [initial]"
         )
-    count = len(model.coordinates) + len(model.velocities) + len(model.states)
+    count = len(model.coordinates) + len(model.velocities) + len(model.extra)
     found: dict[int, float] = {}
     for name, value in named(given, names, option, "state").items():
         index = names.index(name)
@@ -55,7 +55,8 @@ def initial_with(
     parameters: Values | None = None,
 ) -> FloatArray:
     """An initial state with given values; quaternions are scaled to length 1, with a note. Other
-    values meet the constraints at these parameters, with a note.
+    values meet the constraints at these parameters, with a note; given ones are kept, but for
+    rounding.
 
     Raises `RunError` for a quaternion without length, `SceneError` if constraints cannot be met.
     """
@@ -76,7 +77,9 @@ def initial_with(
                 "scaled to 1"
             )
         y[indices] /= length
-    found = closed(model, parameters, y, [names[index] for index in given])
+    found, notices = closed(model, parameters, y, [names[index] for index in given], option)
+    for notice in notices:
+        reporter.note_scene(notice)
     changed = [
         f"{name} = {value:.6g}"
         for i, (name, value) in enumerate(zip(names, found.tolist(), strict=False))

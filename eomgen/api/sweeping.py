@@ -13,6 +13,7 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check_name, check_time, model_of, read, values_of
 from eomgen.api.inputs import Inputs, for_members
 from eomgen.api.planning import Backend
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import state_names
@@ -73,6 +74,7 @@ class SweepPlan:
     backend: Backend
 
 
+@public
 def ensemble(
     source: Source,
     vary: Design | Mapping[str, Sequence[float] | FloatArray],
@@ -199,7 +201,7 @@ def plan_sweep(
 
 def _degrees(model: Model) -> dict[str, str]:
     """The names of angles in degrees, unless something else has them, with those in radians."""
-    plain = len(model.coordinates) + len(model.velocities) + len(model.states)
+    plain = len(model.coordinates) + len(model.velocities) + len(model.extra)
     others = {*model.defaults, *(i.name for i in model.inputs)}
     angles = state_names(model)[plain:]
     return {name: name.removesuffix("_deg") for name in angles if name not in others}

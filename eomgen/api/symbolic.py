@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from eomgen.api.given import Outputs, Source, check, overridden
+from eomgen.api.public import public
 from eomgen.scene.schema import Form, Route
 from eomgen.store import interfaced_program_of
 
@@ -10,6 +11,7 @@ if TYPE_CHECKING:
     from eomgen.exports.casadi import CasadiFunctions
 
 
+@public
 def casadi_functions(
     source: Source,
     *,

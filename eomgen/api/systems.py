@@ -10,6 +10,7 @@ from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, values_of
 from eomgen.api.inputs import Inputs, constant_inputs
 from eomgen.api.linearising import Linearised, Place, Point, linearisable, linearised_at
+from eomgen.api.public import public
 from eomgen.api.states import state_names
 from eomgen.errors import RunError, nearest
 from eomgen.model.model import Model
@@ -26,6 +27,7 @@ from eomgen.study.recording import SAVED
 NEEDED = "control: python-control is not installed; run: pip install 'eomgen[control]'"
 
 
+@public
 def state_space(
     source: Source,
     *,
@@ -73,6 +75,7 @@ def state_space(
     )
 
 
+@public
 def nonlinear_system(source: Source, *, outputs: Sequence[str] = ()) -> Any:
     """The scene as a `control.NonlinearIOSystem`: ẋ = f(t, x, u), y = h(t, x, u).
 
@@ -110,7 +113,7 @@ def nonlinear_system(source: Source, *, outputs: Sequence[str] = ()) -> Any:
 
 def _states(model: Model) -> tuple[str, ...]:
     """The names of [q, v, x]."""
-    count = len(model.coordinates) + len(model.velocities) + len(model.states)
+    count = len(model.coordinates) + len(model.velocities) + len(model.extra)
     return state_names(model)[:count]
 
 

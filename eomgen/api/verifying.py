@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.api.given import Source, check_states, check_time, model_of, read
 from eomgen.api.inputs import Inputs, all_in_formulas
+from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.errors import RunError
 from eomgen.model.model import Model
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 MOST_STATES = 10_000
 
 
+@public
 def verify(
     source: Source,
     *,
@@ -48,6 +50,7 @@ def verify(
     )
 
 
+@public
 def horizon(source: Source, *, seconds: float = 60.0, inputs: Inputs | None = None) -> "Horizon":
     """Estimate for how long a run in doubles follows the exact motion of a scene.
 

@@ -167,6 +167,8 @@ def _chosen(model: Model, closed: bool) -> Choice:
     """The choice among routes."""
     if model.route != "auto":
         return _only(model, model.route, "named")
+    if not model.velocities:
+        return _only(model, "aba", "all coordinates are driven: no acceleration is solved for")
     if model.form != "velocity":
         return _only(model, "closed", f"form '{model.form}' comes from this route alone")
     candidates, attempts = _attempts(model, closed)

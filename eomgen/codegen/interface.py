@@ -145,7 +145,7 @@ def interface_of(system: System) -> Interface:
         states=tuple(Variable(s.name, s.unit, s.about, position=s.position) for s in system.states),
         coordinates=len(model.state_coordinates),
         velocities=len(model.state_velocities),
-        others=len(model.states),
+        others=len(model.extra),
         forces=len(model.velocities),
         inputs=tuple(Variable(i.name, i.unit, i.about, i.default) for i in model.inputs),
         parameters=tuple(Variable(p.name, p.unit, p.about, p.default) for p in model.parameters),

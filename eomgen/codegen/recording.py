@@ -51,8 +51,8 @@ class Recording:
         self.q = [self.input(c.name, Stage.POSITIONS) for c in model.coordinates]
         self.v = [self.input(c.name, Stage.VELOCITIES) for c in model.velocities]
         self.inputs = {i.name: self.input(i.name, Stage.INPUTS) for i in model.inputs}
-        self.x = [self.input(x.name, Stage.VELOCITIES) for x in model.states]
-        extra = {x.name: node for x, node in zip(model.states, self.x, strict=True)}
+        self.x = [self.input(x.name, Stage.VELOCITIES) for x in model.extra]
+        extra = {x.name: node for x, node in zip(model.extra, self.x, strict=True)}
         time = self.input(TIME, Stage.INPUTS)
         values = Values(self.parameters, self.inputs, self.q, self.v, extra, time)
         own: Axes | None = "own" if ROUTES[route].frame_axes else axes

@@ -129,9 +129,7 @@ def with_stand_ins(
             effects.append(StandIn(name=effect.name, components=loads))
     inputs = (*model.inputs, *(Input(name, "", "") for name in names.inputs))
     parameters = (*model.parameters, *(Parameter(name, 1.0, "", "") for name in names.parameters))
-    derived = replace(
-        model, effects=tuple(effects), inputs=inputs, parameters=parameters, states=()
-    )
+    derived = replace(model, effects=tuple(effects), inputs=inputs, parameters=parameters, extra=())
     return derived, names.inputs | names.parameters
 
 

@@ -9,14 +9,13 @@ from eomgen.api.reporter import Reporter
 from eomgen.commands.shared import (
     OPTIONS,
     Arguments,
-    given_inputs,
     print_wrapped,
     read_whole,
     reporter_of,
+    scene_with_inputs,
 )
 from eomgen.errors import InterruptedRunError
 from eomgen.files import check_folder
-from eomgen.scene.reader import read_scene
 
 if TYPE_CHECKING:
     from eomgen.study.cost.bill import Bill, Item
@@ -32,7 +31,7 @@ def effects(given: Arguments) -> int:
 
     check_motion(given.motion_time, Reporter(argument=OPTIONS.__getitem__))
     reporter = reporter_of(given, given.scene)
-    tables = all_in_formulas(read_scene(given.scene), given_inputs(given.input), reporter)
+    tables = all_in_formulas(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, tables)
     path = given.output / f"{name}_effects.png"
     check_folder(path.parent)

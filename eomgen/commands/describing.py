@@ -41,19 +41,12 @@ def check(given: Arguments) -> int:
     model, _ = read_model(given.scene, given)
     checked(model, reporter_of(given, given.scene))
     most = sys.maxsize if given.long else FEW
-    nq, nv = len(model.coordinates), len(model.velocities) - len(model.rows)
-    freedom = f"{nv} degree{'s' if nv != 1 else ''} of freedom"
-    if model.rows:
-        freedom += f", {nq} coordinates with {len(model.rows)} constraints"
-    elif nq != nv:
-        balls = len(model.quaternions)
-        freedom += f", {nq} coordinates with {balls} unit quaternion{'s' if balls > 1 else ''}"
     print(f"{model.name}: {model.title}")
     print(f"dimensions  {model.dimensions}: {'the plane' if model.dimensions == 2 else 'space'}")
     print_listed("bodies      ", shortened([body.name for body in model.bodies], most))
     for line in shortened([_joint(model, body) for body in model.bodies], most):
         print_wrapped("joint       ", line)
-    print(f"freedom     {freedom}")
+    print(f"freedom     {model.freedom}")
     for c in model.prescribed:
         label = "locked      " if c.locked else "driven      "
         print_wrapped(label, f"{c.position.name} = {written(c.value)} {c.position.unit}")

@@ -43,7 +43,8 @@ def linearise(given: Arguments) -> int:
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
     with located(given.scene):
         state = assignments(given.state, state_names(model), "--state")
-    point = Point(given.at, state, parameters, given_inputs(given.input), given.hold, given.trim)
+    inputs = given_inputs(given.input, [i.name for i in model.inputs])
+    point = Point(given.at, state, parameters, inputs, given.hold, given.trim)
     found = linearised_at(model, point, reporter_of(given, given.scene))
     linearisation = found.linearisation
     reduced = linearisation.reduced()

@@ -10,15 +10,14 @@ from eomgen.commands.arithmetic import check_files, print_arithmetic
 from eomgen.commands.shared import (
     Arguments,
     assignments,
-    given_inputs,
     print_listed,
     read_whole,
     reporter_of,
+    scene_with_inputs,
 )
 from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_line
-from eomgen.scene.reader import read_scene
 from eomgen.scene.schema import Simulation
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 def accuracy(given: Arguments) -> int:
     """Print, write and draw time and error of runs by each method, and rounding errors of v̇."""
     reporter = reporter_of(given, given.scene)
-    tables, inputs = in_formulas(read_scene(given.scene), given_inputs(given.input), reporter)
+    tables, inputs = in_formulas(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, tables)
     if not given.no_arithmetic:
         check_files(given, name)

@@ -16,20 +16,19 @@ from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, w
 from eomgen.commands.shared import (
     Arguments,
     assignments,
-    given_inputs,
     overlap_lines,
     print_listed,
     print_wrapped,
     read_whole,
     reporter_of,
     required,
+    scene_with_inputs,
     shortened,
 )
 from eomgen.errors import InterruptedRunError, RunError
 from eomgen.results import Run
 from eomgen.run.parquet import check_parquet
 from eomgen.run.trajectory import Trajectory
-from eomgen.scene.reader import read_scene
 
 ROUNDING = 1e-12
 """Energies smaller than this, relative to the greatest of the run, are printed as 0."""
@@ -43,7 +42,7 @@ def simulate(given: Arguments) -> int:
     if given.no_pictures and given.live:
         raise RunError("--no-pictures writes no page, and --live asks for one; drop one")
     reporter = reporter_of(given, given.scene)
-    applied_to = applied(read_scene(given.scene), given_inputs(given.input), reporter)
+    applied_to = applied(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, applied_to[0])
     parameters = assignments(given.set, model.defaults, "--set")
     with reporter.located():

@@ -38,6 +38,8 @@ def copy(given: argparse.Namespace) -> int:
 
 def _write(text: str, name: Path, force: bool) -> None:
     """Write a scene's text to NAME.toml, with the name of the file. Raises `SceneError`."""
+    if name.name in ("", ".."):
+        raise RunError(f"'{name}' is no name of a file; give one, swing for example")
     path = name if name.suffix == ".toml" else name.with_name(f"{name.name}.toml")
     if path.exists() and not force:
         raise RunError(f"{path}: exists; choose another name, or give --force")

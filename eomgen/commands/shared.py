@@ -16,6 +16,7 @@ from eomgen.commands.durations import timed_notice
 from eomgen.errors import RunError
 from eomgen.language.angles import number_with_unit
 from eomgen.language.base import identifier
+from eomgen.model.inputs import all_inputs
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_progress
 from eomgen.scene.reader import find_scene, read_scene, scene_text
@@ -131,12 +132,23 @@ def assignments(
     return values
 
 
-def given_inputs(texts: list[str]) -> dict[str, Given]:
-    """The inputs of `--input NAME=X`, where X is a number or a formula, and of `--input FILE`."""
+def scene_with_inputs(given: Arguments) -> tuple[Scene, dict[str, Given]]:
+    """The scene, and the inputs that `--input` gives."""
+    scene = read_scene(given.scene)
+    return scene, given_inputs(given.input, [i.name for i in all_inputs(scene)])
+
+
+def given_inputs(texts: list[str], known: Sequence[str]) -> dict[str, Given]:
+    """The inputs of `--input NAME=X`, where X is a number or a formula, and of `--input FILE`, of
+    which the columns of the `known` inputs are taken.
+    """
     found: dict[str, Given] = {}
     for text in texts:
         name, sign, value = text.partition("=")
-        found |= {name: value} if sign else read_table(Path(text), Reporter(argument=_option))
+        if sign:
+            found[name] = value
+        else:
+            found |= read_table(Path(text), known, Reporter(argument=_option))
     return found
 
 

@@ -24,10 +24,10 @@ from eomgen.api.sweeping import (
 from eomgen.commands.shared import (
     Arguments,
     assignments,
-    given_inputs,
     named_outputs,
     read_whole,
     reporter_of,
+    scene_with_inputs,
     shortened,
 )
 from eomgen.errors import InterruptedRunError, RunError, nearest
@@ -35,7 +35,6 @@ from eomgen.files import check_folder, check_writable
 from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import terminal_progress
-from eomgen.scene.reader import read_scene
 from eomgen.sweep.design import MOST
 from eomgen.sweep.storage import kept_members
 
@@ -50,9 +49,7 @@ def sweep(given: Arguments) -> int:
         raise RunError("--outputs: name the functions to compute, kinetic_energy for example")
     given.outputs = None
     reporter = reporter_of(given, given.scene)
-    tables, inputs, varying = for_members(
-        read_scene(given.scene), given_inputs(given.input), reporter
-    )
+    tables, inputs, varying = for_members(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, tables)
     parameters = assignments(given.set, model.defaults, "--set")
     plan = plan_sweep(

@@ -3,9 +3,8 @@
 from eomgen.api.inputs import all_in_formulas
 from eomgen.api.reporter import Reporter
 from eomgen.api.verifying import check_verification, digest, horizon_of, verified_model
-from eomgen.commands.shared import Arguments, given_inputs, read_whole, reporter_of
+from eomgen.commands.shared import Arguments, read_whole, reporter_of, scene_with_inputs
 from eomgen.errors import InterruptedRunError, RunError
-from eomgen.scene.reader import read_scene
 
 
 def verify(given: Arguments) -> int:
@@ -17,7 +16,7 @@ def verify(given: Arguments) -> int:
     reporter = Reporter(argument=lambda name: f"--{name}")
     check_verification(**options, horizon=given.horizon, reporter=reporter)
     reporter = reporter_of(given, given.scene)
-    tables = all_in_formulas(read_scene(given.scene), given_inputs(given.input), reporter)
+    tables = all_in_formulas(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, tables)
     if given.save is not None:
         evidence.paths(given.save, name, force=given.force)

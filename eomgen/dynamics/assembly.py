@@ -16,23 +16,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.dynamics import constraints
-from eomgen.dynamics.closure import CLOSED, Array, Closure, least, newton, settled
+from eomgen.dynamics.closed_positions import timed
+from eomgen.dynamics.closure import (
+    CLOSED,
+    INDEPENDENT,
+    Array,
+    Closure,
+    least,
+    newton,
+    settled,
+)
 from eomgen.dynamics.clusters import jacobian_of
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
+from eomgen.scene.joints.base import Coordinate
 
 STARTS = (0.0, *(0.1,) * 6, *(0.5,) * 10, *(2.0,) * 30)
 """How far the starts are from the scene's values, rad, or in sizes."""
 ENOUGH = 6
 """So many positions found suffice to take the nearest."""
-INDEPENDENT = 1e-7
-"""A row that leaves less than this of itself beside the others follows from them."""
 ALONG = (0.05, -0.05, 0.1, 0.1, 0.2, 0.3)
 """Positions along the motion at which rows are compared, rad, or in sizes."""
+SOON = (1e-3, 1e-2, 0.1)
+"""Times at which loops that hold everything are to follow their drives, s."""
 LEAST_PIVOT = 1e-3
 """A coordinate that the scene gives is solved for where other pivots would be smaller than this."""
 MOVED = 1e-9
 """A change of a given value that is not reported."""
+ROUNDED = 1e-5
+"""A change of a value, relative to it or to its size, that is one of rounding to six digits."""
 
 
 def assembled(model: Model) -> Model:
@@ -49,6 +61,8 @@ def assembled(model: Model) -> Model:
     _check_linear(mechanism, np.array(model.initial_q))
     q, notices = _position(mechanism)
     dropped = _dependent(mechanism, q)
+    if dropped and _is_moved(model):
+        _check_followed(mechanism, q, dropped)
     model = replace(model, initial_q=tuple(q.tolist()), dropped=dropped)
     if not model.rows:
         raise SceneError(
@@ -56,15 +70,16 @@ def assembled(model: Model) -> Model:
             f"restrict{'s' * (len(model.constraints) == 1)} nothing that the other joints do not "
             "restrict already; leave it out"
         )
-    if len(model.rows) >= len(model.velocities):
+    if len(model.rows) >= len(model.velocities) and not _is_moved(model):
         raise SceneError(
             f"joints: the loops hold everything: {len(model.rows)} independent constraints on "
             f"{len(model.velocities)} velocities; leave one out"
         )
     if dropped:
+        follow = "follows from the others and is" if len(dropped) == 1 else ""
         notices.append(
-            f"constraints: {', '.join(dropped)} follow{'s' * (len(dropped) == 1)} from the others "
-            "and left out; the forces of these loops are then not unique"
+            f"constraints: {', '.join(dropped)} {follow or 'follow from the others and are'} left "
+            "out; the forces of these loops are then not unique"
         )
     mechanism = replace(mechanism, model=model)
     v, more = _speeds(mechanism, q)
@@ -97,12 +112,18 @@ def _check_linear(mechanism: Closure, q: Array) -> None:
 
 
 def closed_start(
-    model: Model, q: Sequence[float], v: Sequence[float], given: Collection[str] = ()
+    model: Model,
+    q: Sequence[float],
+    v: Sequence[float],
+    given: Collection[str] = (),
+    argument: str = "initial",
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[str, ...]]:
     """The start q, v of an assembled model at its parameters, as near as it can be, and notices.
 
-    Coordinates and velocities that are `given` are kept; without given coordinates those that the
-    scene gives, and without given velocities likewise. Raises `SceneError` if that cannot be.
+    Coordinates and velocities that are `given` are kept; if all are, they are moved by no more
+    than rounding. Without given coordinates those that the scene gives are kept, or all of them
+    moved with a notice, and without given velocities likewise. Raises `SceneError`, which calls
+    what is given `argument`, if that cannot be.
     """
     positions, velocities = (
         [c.name for c in each] for each in (model.coordinates, model.velocities)
@@ -117,15 +138,46 @@ def closed_start(
     mechanism = Closure.of(model)
     if mechanism.met(np.array(q), v):
         return model.initial_q, model.initial_v, ()
-    found, notices = _position(mechanism)
-    speeds, more = _speeds(mechanism, found)
+    in_q, in_v = (
+        argument if set(given) & set(names) else f"initial.{letter}"
+        for letter, names in (("q", positions), ("v", velocities))
+    )
+    found, notices = _position(mechanism, in_q)
+    _check_kept(mechanism, model.coordinates, (q, found.tolist()), given, in_q)
+    speeds, more = _speeds(mechanism, found, in_v)
+    _check_kept(mechanism, model.velocities, (v, speeds), given, in_v)
     return tuple(found.tolist()), speeds, (*notices, *more)
 
 
+def _check_kept(
+    mechanism: Closure,
+    columns: Sequence[Coordinate],
+    values: tuple[Sequence[float], Sequence[float]],
+    given: Collection[str],
+    argument: str,
+) -> None:
+    """Raise `SceneError` if of coordinates or velocities, before and after they meet the
+    constraints, those `given` differ by more than rounding. They may if all are given.
+    """
+    changes = {
+        c: abs(after - before) / max(mechanism.size_of(c), abs(before))
+        for c, before, after in zip(columns, *values, strict=True)
+        if c.name in given
+    }
+    if max(changes.values(), default=0.0) <= ROUNDED:
+        return
+    worst = max(changes, key=changes.__getitem__)
+    before, after = (dict(zip(columns, each, strict=True))[worst] for each in values)
+    raise SceneError(
+        f"{argument}: {', '.join(c.name for c in changes)} do not meet the constraints together: "
+        f"{worst.name} would be moved by {abs(after - before):.2g} {worst.unit}; give fewer of them"
+    )
+
+
 @np.errstate(over="ignore", invalid="ignore")  # residuals may be of any size
-def _position(mechanism: Closure) -> tuple[Array, list[str]]:
+def _position(mechanism: Closure, argument: str = "initial.q") -> tuple[Array, list[str]]:
     """The closed position nearest to a model's initial one, with notices; what it holds is kept,
-    unless it holds all. Raises `SceneError` if there is none.
+    unless it holds all. Raises `SceneError`, which begins with `argument`, if there is none.
     """
     model = mechanism.model
     start, free = np.array(model.initial_q), _free(model)
@@ -135,7 +187,7 @@ def _position(mechanism: Closure) -> tuple[Array, list[str]]:
         if q is not None:
             return q, _changes(model, start, q)
     if q is None:
-        raise SceneError(_open(mechanism, start, free))
+        raise SceneError(f"{argument}: {_open(mechanism, start, free)}")
     return q, []
 
 
@@ -173,12 +225,15 @@ def _closed(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> Array 
 def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     """What cannot close, and by how much at least."""
     q, g = start, mechanism.residuals(start)
+    if not np.isfinite(g).all():
+        name, _ = mechanism.model.rows[int(np.argmin(np.isfinite(g)))]
+        return f"a formula of the constraints, of {name} perhaps, has no value there; give another"
     for _ in range(200):
         matrix = np.where(free, mechanism.holding(q), 0.0)
         step = -matrix.T @ np.linalg.solve(matrix @ matrix.T + 1e-3 * np.eye(len(g)), g)
         there = mechanism.moved(q, step * min(1.0, 0.3 / max(float(np.abs(step).max()), 1e-300)))
         after = mechanism.residuals(there)
-        if float(after @ after) >= float(g @ g):
+        if not float(after @ after) < float(g @ g):
             break
         q, g = there, after
     model = mechanism.model
@@ -187,10 +242,13 @@ def _open(mechanism: Closure, start: Array, free: NDArray[np.bool_]) -> str:
     gap = abs(float(g[worst])) * (mechanism.size if unit == "N" else 1.0)
     held = ", ".join(c.name for c in model.coordinates if c.name in model.held)
     given = f" with {held} as given" if held else ""
+    remedy = f"change lengths, or {'give fewer coordinates' if held else 'change the start'}"
+    nc, nv = len(model.rows), len(model.velocities)
+    if nc >= nv and not _is_moved(model):
+        remedy = f"{nc} constraints on {nv} velocities leave nothing that could move: leave one out"
     return (
-        f"initial.q: the constraints cannot be met{given}: {name} stays open by "
-        f"{gap:.3g} {'m' if unit == 'N' else 'rad'}; change lengths"
-        f"{', or give fewer coordinates' if held else ' or the start'}"
+        f"the constraints cannot be met{given}: {name} stays open by "
+        f"{gap:.3g} {'m' if unit == 'N' else 'rad'}; {remedy}"
     )
 
 
@@ -229,6 +287,29 @@ def _dependent(mechanism: Closure, q: Array) -> tuple[str, ...]:
         if any(_adds(matrix, kept, i) for matrix in matrices):
             kept.append(i)
     return tuple(name for i, (name, _) in enumerate(mechanism.model.rows) if i not in kept)
+
+
+def _is_moved(model: Model) -> bool:
+    """Whether a drive, or a constraint with the time in it, moves what has no freedom."""
+    return bool(model.driven) or timed(model)
+
+
+def _check_followed(mechanism: Closure, q: Array, dropped: tuple[str, ...]) -> None:
+    """Raise `SceneError` if rows that follow from the others at rest do not while drives move."""
+    names = [name for name, _ in mechanism.model.rows]
+    moving = [c.position.name for c in mechanism.model.driven]
+    kept = replace(mechanism, model=replace(mechanism.model, dropped=dropped))
+    for time in SOON:
+        found = newton(replace(kept, time=time), q, np.ones(len(mechanism.lengths), dtype=bool))
+        if found is None:
+            return  # a run that gets there says so
+        left = np.abs(replace(mechanism, time=time).residuals(found))
+        if left.max() > MOVED:
+            raise SceneError(
+                f"joints: {names[int(left.argmax())]} cannot be met while "
+                f"{', '.join(moving) or 'time'} moves on: the loops hold everything; leave one out"
+            )
+        q = found
 
 
 def _independent(matrix: Array) -> bool:
@@ -276,8 +357,13 @@ def _pivots(matrix: Array, free: NDArray[np.bool_]) -> tuple[tuple[int, int], ..
     return tuple(found)
 
 
-def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]:
-    """Velocities that meet the constraints: those given are kept, the others found, the least."""
+def _speeds(
+    mechanism: Closure, q: Array, argument: str = "initial.v"
+) -> tuple[tuple[float, ...], list[str]]:
+    """Velocities that meet the constraints: those given are kept, the others found, the least.
+
+    Raises `SceneError`, which begins with `argument`, if those given contradict them.
+    """
     model = mechanism.model
     given = np.array(model.initial_v)
     held = np.array([c.name in set(model.held) for c in model.velocities])
@@ -302,5 +388,5 @@ def _speeds(mechanism: Closure, q: Array) -> tuple[tuple[float, ...], list[str]]
                 ]
             return tuple((given + change).tolist()), notices
     raise SceneError(
-        "initial.v: the velocities given contradict the constraints; give fewer of them"
+        f"{argument}: the velocities given contradict the constraints; give fewer of them"
     )

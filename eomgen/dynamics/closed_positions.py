@@ -77,6 +77,8 @@ def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
         q = closure.moved(q, np.multiply(step, STEP / size, dtype=np.float64))
         for _ in range(4):
             g, matrix = closure.both(q)
+            if not (np.isfinite(g).all() and np.isfinite(matrix).all()):
+                return  # a constraint ends here
             if float(np.abs(g).max()) < MET:
                 break
             q = closure.moved(q, np.asarray(-np.linalg.lstsq(matrix, g, rcond=1e-9)[0]))

@@ -17,6 +17,7 @@ from eomgen.dynamics.mechanism_state import Values
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.joints import Free
+from eomgen.scene.joints.base import Coordinate
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,8 @@ PATIENCE = 12
 """Steps that must reduce the sum of the residuals' squares by 30 %, or no position is near."""
 CLOSED = 1e-12
 """A residual relative to the mechanism's size that is rounding."""
+INDEPENDENT = 1e-7
+"""A row that leaves less than this of itself beside the others follows from them."""
 
 FINE = 32
 """Bits to which positions are rounded before they are closed by plain sums."""
@@ -33,10 +36,15 @@ FINE = 32
 
 @dataclass(frozen=True)
 class Closure:
-    """A model's constraints as functions of the coordinates. Residuals and steps are in sizes."""
+    """A model's constraints as functions of the coordinates, at a time, s. Residuals and steps are
+    in sizes.
+
+    Where a formula has no value, as the asin of 2, residuals and J are nan.
+    """
 
     model: Model
     size: float
+    time: float = 0.0
 
     @classmethod
     def of(cls, model: Model) -> "Closure":
@@ -47,9 +55,9 @@ class Closure:
         """The mechanism at q, at rest unless v is given."""
         model = self.model
         inputs = {i.name: i.default for i in model.inputs}
-        states = {x.name: x.initial for x in model.states}
+        states = {x.name: x.initial for x in model.extra}
         speeds = [0.0] * len(model.velocities) if v is None else list(v)
-        values = Values(model.defaults, inputs, q.tolist(), speeds, states, 0.0)
+        values = Values(model.defaults, inputs, q.tolist(), speeds, states, self.time)
         return Dynamics(model, values, FloatScalars(), linkage=self._linkage)
 
     @cached_property
@@ -59,7 +67,10 @@ class Closure:
 
     def residuals(self, q: Array) -> Array:
         """g of each row, (nc,)."""
-        found = np.array(constraints.residuals(self.dynamics(q)))
+        try:
+            found = np.array(constraints.residuals(self.dynamics(q)))
+        except (ArithmeticError, ValueError):
+            found = np.full(len(self.model.rows), np.nan)
         return np.asarray(found / self._units)
 
     def met(self, q: Array, v: Sequence[float]) -> bool:
@@ -71,13 +82,15 @@ class Closure:
 
     def both(self, q: Array) -> tuple[Array, Array]:
         """`residuals` and `jacobian`."""
-        d = self.dynamics(q)
-        found = np.array(constraints.residuals(d), dtype=np.float64)
-        return np.asarray(found / self._units), self._in_sizes(jacobian_of(d))
+        return self.residuals(q), self.jacobian(q)
 
     def jacobian(self, q: Array) -> Array:
         """J (nc, nv) in sizes."""
-        return self._in_sizes(jacobian_of(self.dynamics(q)))
+        try:
+            rows: Sequence[Sequence[float]] = jacobian_of(self.dynamics(q))
+        except (ArithmeticError, ValueError):
+            rows = [[np.nan] * len(self.model.velocities)] * len(self.model.rows)
+        return self._in_sizes(rows)
 
     def _in_sizes(self, rows: Sequence[Sequence[float]]) -> Array:
         matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.model.velocities))
@@ -88,7 +101,10 @@ class Closure:
         """J (nc, nv) in sizes, 0 in the rows that restrict velocities alone: what positions can be
         closed by. A wheel is put on the ground without rolling there.
         """
-        rows = constraints.rows_of(self.dynamics(q))
+        try:
+            rows = constraints.rows_of(self.dynamics(q))
+        except (ArithmeticError, ValueError):
+            return self.jacobian(q)
         held = np.array([[row.residual is not None] for row in rows], dtype=bool)
         return np.where(held.reshape(len(rows), 1), self.jacobian(q), 0.0)
 
@@ -109,7 +125,11 @@ class Closure:
     @property
     def lengths(self) -> Array:
         """The size of each velocity's coordinate: 1 for an angle."""
-        return np.array([self.size if c.unit == "m/s" else 1.0 for c in self.model.velocities])
+        return np.array([self.size_of(c) for c in self.model.velocities])
+
+    def size_of(self, coordinate: Coordinate) -> float:
+        """The size of a coordinate or velocity: 1 rad, 1 rad/s, or the mechanism's size."""
+        return self.size if coordinate.unit in ("m", "m/s") else 1.0
 
     @property
     def _units(self) -> Array:
@@ -150,7 +170,8 @@ def newton(mechanism: Closure, q: Array, free: NDArray[np.bool_]) -> Array | Non
         step *= min(1.0, 0.5 / length) if length else 1.0
         there = mechanism.moved(q, step)
         after = mechanism.residuals(there)
-        if float(after @ after) > float(g @ g) and size > CLOSED:
+        worse = not float(after @ after) <= float(g @ g)  # also where a formula has no value
+        if worse and (size > CLOSED or not np.isfinite(after).all()):
             damping = max(10 * damping, 1e-6)
             last = math.inf
             if damping > 1e6:

@@ -7,6 +7,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from eomgen.dynamics.closure import INDEPENDENT, Closure
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
@@ -26,7 +29,7 @@ def values_at(
     Parameters that are not given have their defaults, and so do inputs.
     """
     nq, nv = len(model.coordinates), len(model.velocities)
-    states = {x.name: value for x, value in zip(model.states, y[nq + nv :], strict=True)}
+    states = {x.name: value for x, value in zip(model.extra, y[nq + nv :], strict=True)}
     return Values(
         {**model.defaults, **parameters},
         {**{i.name: i.default for i in model.inputs}, **inputs},
@@ -59,7 +62,7 @@ def initial_overlaps(model: Model) -> list[Overlap]:
 
     Empty if an effect has no finite value there; that is a separate error.
     """
-    start = [*model.initial_q, *model.initial_v, *(x.initial for x in model.states)]
+    start = [*model.initial_q, *model.initial_v, *(x.initial for x in model.extra)]
     dynamics = Dynamics(model, values_at(model, 0.0, start, {}, {}), FloatScalars())
     found = []
     try:
@@ -84,6 +87,27 @@ def _size(effect: Effect, dynamics: Dynamics) -> float:
     for number in numbers:
         largest = max(largest, abs(number)) if math.isfinite(number) else math.inf
     return largest
+
+
+def constraint_trouble(model: Model, values: Values) -> str:
+    """What is wrong with the constraints at this position: that one follows from the others, or has
+    no value; "" if they are independent.
+    """
+    if not model.constraints:
+        return ""
+    moved = model.with_parameters({p.name: values.parameters[p.name] for p in model.parameters})
+    matrix = Closure.of(moved).jacobian(np.array(values.q))
+    if not np.isfinite(matrix).all():
+        return "a formula of the constraints has no finite value, as at the end of its domain"
+    lengths = np.linalg.norm(matrix, axis=1)
+    worst = int(np.argmin(lengths))
+    if lengths[worst]:
+        left, sizes, _ = np.linalg.svd(matrix / lengths[:, np.newaxis])
+        if sizes[-1] > INDEPENDENT:
+            return ""
+        worst = int(np.abs(left[:, -1]).argmax())  # the combination that is nearest to 0
+    name, _ = model.rows[worst]
+    return f"constraint {name} follows from the others, as at a dead point or a change point"
 
 
 def is_singular(model: Model, values: Values) -> bool:

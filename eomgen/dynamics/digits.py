@@ -114,7 +114,7 @@ def digits_lost_by_kind(
         kept = tuple(e for e in model.effects if isinstance(e, Gravity | Driven))
         still = replace(model, effects=kept)
     nothing = {i.name: 0.0 for i in model.inputs}
-    states = {x.name: x.initial for x in model.states}
+    states = {x.name: x.initial for x in model.extra}
     parts = [(still, [nothing] * len(q))]
     if model.inputs or len(still.effects) < len(model.effects):
         parts.append((model, pushes))
@@ -134,7 +134,7 @@ def _on_constraints(
     all at once.
     """
     names = {i.name: i.default for i in model.inputs}
-    states = {x.name: x.initial for x in model.states}
+    states = {x.name: x.initial for x in model.extra}
 
     def at(q: Sequence[Any], v: Sequence[Any] | None = None) -> Dynamics:
         still = [0.0] * len(model.velocities) if v is None else v

@@ -219,4 +219,4 @@ def with_symbols(model: Model, derived: Sequence[DerivedEffect]) -> Model:
         effects.append(stand_in)
         inputs += stand_in.inputs(model.dimensions)
     states: tuple[ExtraState, ...] = ()
-    return replace(model, effects=tuple(effects), inputs=tuple(inputs), states=states)
+    return replace(model, effects=tuple(effects), inputs=tuple(inputs), extra=states)

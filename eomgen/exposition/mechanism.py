@@ -62,7 +62,7 @@ class NamingMechanism:
         self.joints = dofs_of(model.bodies, model.dimensions)
         self._by_joint = {body.joint.name: body for body in model.bodies}
         self._points: dict[tuple[str, Vector], str] = {}
-        names = [x.name for group in (model.parameters, model.inputs, model.states) for x in group]
+        names = [x.name for group in (model.parameters, model.inputs, model.extra) for x in group]
         names += [c.name for body in model.bodies for c in (*body.positions, *body.velocities)]
         self.names = {"t": real("t"), **{name: real(name) for name in names}}
 

@@ -113,7 +113,7 @@ def form_step(
 ) -> Step:
     """The last step: Y, and Ẏ line by line."""
     states, rates = list(written.states), list(written.rates)
-    states += (real(x.name) for x in model.states)
+    states += (real(x.name) for x in model.extra)
     rates += (rate for derived in extra for _, rate in derived.rates)
     words = (
         FORMS[form].format(count=len(states))

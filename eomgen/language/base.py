@@ -2,8 +2,9 @@
 
 import keyword
 import re
+from collections.abc import Mapping
 from itertools import zip_longest
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, get_args
 
 from pydantic import (
     AfterValidator,
@@ -28,10 +29,12 @@ MOST_HINTS = 10
 class Table(BaseModel):
     """A table of the scene. Unknown keys are errors; values are frozen.
 
-    example  an example in TOML, which the reference shows
+    example    an example in TOML, which the reference shows
+    misplaced  keys that only similar tables have, with what is wrong about them here
     """
 
     example: ClassVar[str] = ""
+    misplaced: ClassVar[Mapping[str, str]] = {}
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, defer_build=True)
 
@@ -39,6 +42,9 @@ class Table(BaseModel):
     @classmethod
     def _only_known_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
+            for key in cls.misplaced:
+                if key in data:
+                    raise PydanticCustomError("keys", cls.misplaced[key], {"key": key})
             known = [field.alias or name for name, field in cls.model_fields.items()]
             unknown = [str(key) for key in data if key not in known]
             # Messages show no more, and finding the nearest known key takes time.
@@ -51,9 +57,39 @@ class Table(BaseModel):
                 _check_clashes(key, table)
         return data
 
+    def model_post_init(self, _: Any) -> None:
+        """Freeze the dictionaries among the values."""
+        _freeze(self.__dict__)
+
     def replaced(self, **values: Any) -> Self:
         """A copy with some fields replaced by values of the right type, which are not checked."""
+        _freeze(values)
         return self.model_copy(update=values)
+
+
+class FrozenDict(dict[Any, Any]):
+    """A dictionary that does not change, of a value that does not."""
+
+    def _refuse(self, *_: Any, **named: Any) -> Any:
+        raise TypeError("these values are frozen; make a copy with dict(…) and change that")
+
+    __setitem__ = __delitem__ = __ior__ = update = pop = popitem = clear = setdefault = _refuse
+
+    def __reduce__(self) -> tuple[type, tuple[dict[Any, Any]]]:
+        return type(self), (dict(self),)
+
+
+def _freeze(fields: dict[str, Any]) -> None:
+    """Replace the dictionaries among the values by frozen ones."""
+    for name, value in fields.items():
+        if isinstance(value, dict) and not isinstance(value, FrozenDict):
+            fields[name] = FrozenDict(value)
+
+
+def types_of(union: Any) -> dict[str, type[Table]]:
+    """The tables of an annotated union, by their `type`."""
+    tables = get_args(get_args(union)[0])
+    return {str(get_args(t.model_fields["type"].annotation)[0]): t for t in tables}
 
 
 def identifier(name: str) -> str:

@@ -58,11 +58,8 @@ def elaborate(scene: Scene) -> Model:
     locked = locked_values(scene.locked, bodies, effects)
     appearance_of(scene)  # raises SceneError if the mechanism cannot be drawn
     prescribed = prescribed_of(bodies, effects, locked)
-    if not velocities_of(bodies, prescribed):
-        raise SceneError(
-            "scene: every coordinate is driven or locked, so there is no motion to find; "
-            "leave one free"
-        )
+    if not velocities_of(bodies, prescribed) and all(c.locked for c in prescribed):
+        raise SceneError("scene: every coordinate is locked, so nothing moves; leave one free")
     if scene.initial.guess and not constraints:
         raise SceneError(
             "initial.guess: is for mechanisms with loops, and this scene has none; give initial.q"
@@ -79,7 +76,7 @@ def elaborate(scene: Scene) -> Model:
         bodies=bodies,
         points=points,
         effects=effects,
-        states=states,
+        extra=states,
         initial_q=start.q,
         initial_v=start.v,
         outputs=(),

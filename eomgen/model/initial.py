@@ -38,7 +38,12 @@ def initial_state(
     v = _values(given.v, velocities_of(bodies, prescribed), "initial.v", prescribed)
     values = {c.name: x for c, x in zip(coordinates, q, strict=True)}
     values |= _guesses(given, coordinates, prescribed)
-    notices = [_angle_notice(c.name, x) for c, x in zip(coordinates, q, strict=True) if _far(c, x)]
+    plain = {c.name for c in coordinates} & set(given.q if isinstance(given.q, dict) else values)
+    notices = [
+        _angle_notice(c.name, x)
+        for c, x in zip(coordinates, q, strict=True)
+        if _far(c, x) and c.name in plain
+    ]
     for body in bodies:
         if names := [c.name for c in body.positions[body.plain :]]:
             parts = [values[name] for name in names]

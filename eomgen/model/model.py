@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import accumulate
 
 from eomgen.displays import Displayed
+from eomgen.language.base import FrozenDict
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import Constant, Formula, evaluate
 from eomgen.language.quantity import Parameter
@@ -170,7 +171,7 @@ class Model(Displayed):
     """A mechanism and the effects that act on it, without drawing and integration settings.
 
     conditions  conditions on the values of parameters
-    states      extra states of effects, which follow coordinates and velocities
+    extra       extra states of effects, which follow coordinates and velocities
     locked      locked coordinates by name, with their values
     locked_deg  locked angles by name, as the scene gives them in degrees: 90 is exact, π/2 is not
     notices     what elaboration corrected, one line each
@@ -194,7 +195,7 @@ class Model(Displayed):
     bodies: tuple[Body, ...]
     points: tuple[Point, ...]
     effects: tuple[Effect, ...]
-    states: tuple[ExtraState, ...]
+    extra: tuple[ExtraState, ...]
     initial_q: tuple[float, ...]
     initial_v: tuple[float, ...]
     outputs: tuple[str, ...]
@@ -276,6 +277,29 @@ class Model(Displayed):
         """The indices in v of the velocities that are states."""
         following = {column for _, column in self.pivots} if self.groups else set()
         return tuple(j for j in range(len(self.velocities)) if j not in following)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The names of the entries of the state [q, v, x] of form 'velocity'.
+
+        Where loops are closed in closed form, which is decided when a module is generated, its
+        `STATES` are some of these, and its `FOLLOWING` the others.
+        """
+        positions = (self.coordinates[i].name for i in self.state_coordinates)
+        velocities = (self.velocities[j].name for j in self.state_velocities)
+        return (*positions, *velocities, *(x.name for x in self.extra))
+
+    @property
+    def freedom(self) -> str:
+        """The number of degrees of freedom, and what they are counted from, in words."""
+        nq, free = len(self.coordinates), len(self.velocities) - len(self.rows)
+        text = f"{free} degree{'s' if free != 1 else ''} of freedom"
+        if self.rows:
+            return f"{text}, {nq} coordinates with {len(self.rows)} constraints"
+        if nq != free:
+            balls = len(self.quaternions)
+            text += f", {nq} coordinates with {balls} unit quaternion{'s' if balls > 1 else ''}"
+        return text
 
     @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
@@ -370,7 +394,7 @@ class Model(Displayed):
     @cached_property
     def defaults(self) -> Mapping[str, float]:
         """The scene's parameter values, by name."""
-        return {p.name: p.default for p in self.parameters}
+        return FrozenDict({p.name: p.default for p in self.parameters})
 
     def quantities(self) -> Iterator[Formula]:
         """Every quantity of bodies, joints, points and effects, in order."""

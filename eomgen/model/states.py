@@ -28,7 +28,7 @@ def velocity_states(model: Model) -> tuple[State, ...]:
         for group, position in ((positions, True), (velocities, False))
         for c in group
     )
-    return (*mechanical, *(State(x.name, x.unit, x.about, False) for x in model.states))
+    return (*mechanical, *(State(x.name, x.unit, x.about, False) for x in model.extra))
 
 
 def initial_state(model: Model) -> tuple[float, ...]:
@@ -36,5 +36,5 @@ def initial_state(model: Model) -> tuple[float, ...]:
     return (
         *(model.initial_q[i] for i in model.state_coordinates),
         *(model.initial_v[j] for j in model.state_velocities),
-        *(x.initial for x in model.states),
+        *(x.initial for x in model.extra),
     )

@@ -376,14 +376,21 @@ def save_csv(trajectory: Trajectory, path: Path, force: bool = False) -> None:
 
 
 def is_own_table(path: Path) -> bool:
-    """Whether a table is ours: its columns are those of a trajectory in the .npz of the same name.
+    """Whether a table is ours: its columns, its first row and its last one are those of the
+    trajectory in the .npz of the same name.
 
     A mark in the table itself would disturb other programs that read it.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            head = next(csv.reader(file), [])
-        return head == [*table_of(load_npz(path.with_suffix(".npz")))]
+            rows = csv.reader(file)
+            head, first = next(rows, []), next(rows, [])
+            last = first
+            for row in rows:
+                last = row
+        columns = table_of(load_npz(path.with_suffix(".npz")))
+        ends = [[str(column[i].item()) for column in columns.values()] for i in (0, -1)]
+        return [head, first, last] == [[*columns], *ends]
     except (OSError, UnicodeDecodeError, csv.Error, RunError):
         return False
 

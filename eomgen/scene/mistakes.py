@@ -5,10 +5,21 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from eomgen.errors import SceneError, nearest
+from eomgen.errors import SYNONYMS, SceneError, nearest
+from eomgen.language.base import types_of
+from eomgen.scene.constraints import AnyConstraint
+from eomgen.scene.effects import Effect
+from eomgen.scene.joints import Joint
 from eomgen.text import brief
 
 MOST_MESSAGES = 10
+TABLES = {"joints": Joint, "effects": Effect, "constraints": AnyConstraint}
+"""The tables whose types differ, with the unions of their entries."""
+REMARKS = dict.fromkeys(
+    ("rope", "cable", "string"),
+    " and tension_only = true, or a coupling if it is taut around a pulley",
+)
+"""What else belongs to a word that means a type."""
 
 
 def mistakes(error: ValidationError, source: str) -> SceneError:
@@ -99,7 +110,7 @@ def _line(detail: ErrorDetails) -> str:
         case "union_tag_invalid":
             known = [tag.strip().strip("'") for tag in context["expected_tags"].split(",")]
             tag = str(context["tag"])
-            hint = nearest(tag, known) or f"; known: {', '.join(known)}"
+            hint = elsewhere(tag, location) or nearest(tag, known) or f"; known: {', '.join(known)}"
             return f"{location}.type: unknown value '{brief(tag)}'{hint}"
         case "union_tag_not_found":
             return f"{location}.type: missing; it says what kind this is"
@@ -135,6 +146,18 @@ def _line(detail: ErrorDetails) -> str:
             return f"{location}: {value} is not {wanted}; give one"
         case _:
             return f"{location}: {value}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
+
+
+def elsewhere(word: str, location: str) -> str:
+    """A hint at the table for which a type, or a word that means one, is; "" if `location` is in
+    that table, or for any other word.
+    """
+    kind = SYNONYMS.get(word.casefold(), word)
+    for table, union in TABLES.items():
+        if kind in types_of(union) and not location.startswith(table):
+            more = REMARKS.get(word.casefold(), "")
+            return f"; that is a table [[{table}]] with type = '{kind}'{more}"
+    return ""
 
 
 def _entries(detail: ErrorDetails) -> str:

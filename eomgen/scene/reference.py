@@ -8,7 +8,7 @@ from typing import Any, get_args
 from pydantic.fields import FieldInfo
 
 from eomgen.errors import SceneError, nearest
-from eomgen.language.base import Table
+from eomgen.language.base import Table, types_of
 from eomgen.language.formula import CONSTANTS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint
 from eomgen.scalars.functions import FUNCTIONS
@@ -103,12 +103,7 @@ def _groups() -> list[tuple[str, list[tuple[str, type[Table]]]]]:
 
 def by_type(union: Any) -> dict[str, type[Table]]:
     """The tables of an annotated union, by their `type`, in alphabetical order."""
-    tables = get_args(get_args(union)[0])
-    return {_word(table): table for table in sorted(tables, key=_word)}
-
-
-def _word(table: type[Table]) -> str:
-    return str(get_args(table.model_fields["type"].annotation)[0])
+    return dict(sorted(types_of(union).items()))
 
 
 def _section(name: str, table: type[Table], heading: str = "# ") -> Iterator[str]:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from eomgen.files import write_whole
+from eomgen.files import marked, write_whole
 from eomgen.run.problem import FloatArray
 from eomgen.show.style import FAINT, INK, PALETTE, plain, style, write_figure
 from eomgen.study.cost.arithmetic import Arithmetic, Solver
@@ -101,4 +101,4 @@ def save_table(found: Arithmetic, path: Path, *, force: bool = False) -> None:
         for i, (t, y) in enumerate(zip(sample.t.tolist(), sample.y.tolist(), strict=True)):
             errors = [f"{column[i]:.6g}" for column in columns]
             table.writerow([sample.kind, repr(t), f"{sample.condition[i]:.6g}", *errors, *y])
-    write_whole(path, text.getvalue(), force=force)
+    write_whole(path, marked(text.getvalue()), force=force)

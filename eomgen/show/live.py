@@ -50,7 +50,7 @@ def live_table(
     parameters = [p.name for p in live.parameters]
     given = inputs or {}
     states = velocity_states(live)
-    values = (*live.initial_q, *live.initial_v, *(x.initial for x in live.states))
+    values = (*live.initial_q, *live.initial_v, *(x.initial for x in live.extra))
     units = {s.name: s.unit for s in states} | {p.name: p.unit for p in live.parameters}
     start = dict(zip((s.name for s in states), values, strict=True))
     moving = len(live.coordinates) + len(live.velocities)

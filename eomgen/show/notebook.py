@@ -87,8 +87,8 @@ def scene_html(name: str, title: str, about: str = "") -> str:
 
 def model_html(model: Model) -> str:
     """The bodies with their joints, the effects, and a sketch at the initial state."""
-    counts = f"{len(model.bodies)} bodies, {len(model.velocities)} degrees of freedom"
-    counts += f", {'in space' if model.dimensions == 3 else 'in the plane'}"
+    place = "in space" if model.dimensions == 3 else "in the plane"
+    counts = f"{len(model.bodies)} bodies {place}, {model.freedom}"
     parents = ["world", *(body.name for body in model.bodies)]
     bodies = [
         (

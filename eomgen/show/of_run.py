@@ -92,8 +92,9 @@ def _ground(picture: Picture, model: Model, poses: Array, base: Support) -> tupl
     """The unit vector down, or up if what the joint holds is below it most of the time."""
     dimensions = poses.ndim - 1
     heights = poses[..., 1] if dimensions == 2 else poses[..., 2, 3]
-    own = [k for k, root in enumerate(model.roots) if root == base.joint]
-    pin = model.value(picture.joints[base.joint].at_parent[-1])
+    joint = picture.joints[base.joint]  # of the tree, or one that closes a loop
+    own = [k for k, root in enumerate(model.roots) if root == model.roots[joint.child]]
+    pin = model.value(joint.at_parent[-1])
     below = float(np.median(heights[:, own].mean(axis=1))) < pin
     return constant(*[0.0] * (dimensions - 1), 1.0 if below else -1.0)
 

@@ -86,7 +86,9 @@ def render_page(motion: Motion, code: PageCode) -> str:
     """
     assert not re.search(r"</script|<!--", code.source, re.IGNORECASE), "would end its script"
     data = page_data(motion, code)
-    three = templates_folder() / "page" / "vendor" / "three" / "three.min.js"
+    three = templates_folder() / "page" / "vendor" / "three"
+    # The licence asks for itself to be in all copies.
+    licence = (three / "LICENSE").read_text(encoding="utf-8").replace("*/", "* /")
     context: Mapping[str, object] = {
         "heading": motion.heading,
         "summary": _summary(motion, data["run"]["rows"]),
@@ -95,7 +97,7 @@ def render_page(motion: Motion, code: PageCode) -> str:
         "live": code.live,
         "data": data,
         "mechanism": code.source,
-        "three": three.read_text(encoding="utf-8"),
+        "three": f"/*\n{licence}*/\n{(three / 'three.min.js').read_text(encoding='utf-8')}",
     }
     return render("page", "page.html", context, html=True)
 

@@ -119,7 +119,7 @@ def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Pic
         given = appearance.shapes.get(body.name)
         if given:
             shapes = tuple(shape_from_centre(shape, body.com) for shape in given)
-            colour = next((shape.color for shape in shapes if shape.color), colour)
+            colour = shapes[0].color or colour
             shapes = (*hidden_rods(model, shapes, own.joints, size, colour), *shapes)
         else:
             shapes = invented_shapes(inventor, body, own, colour)

@@ -60,7 +60,7 @@ class Pose:
             {i.name: 1.0 for i in model.inputs},
             model.initial_q,
             model.initial_v,
-            {x.name: x.initial for x in model.states},
+            {x.name: x.initial for x in model.extra},
             0.0,
         )
         self.state = MechanismState(model, values, FloatScalars())

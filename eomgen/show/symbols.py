@@ -197,6 +197,9 @@ def _at_joint(sight: Sight, element: AtJoint) -> Iterator[Stroke]:
     if joint.type in ("prismatic", "cylindrical", "planar"):
         center = sight.seen(sight.world(joint.child, joint.at_child))
     r = number(element.radius)
+    if _slides(element, joint) and element.kind != "stop":
+        yield from _at_slider(sight, element, joint, center)
+        return
     match element.kind:
         case "torsion":
             angles = np.linspace(0, 2 * np.pi * TURNS, 60)
@@ -216,6 +219,39 @@ def _at_joint(sight: Sight, element: AtJoint) -> Iterator[Stroke]:
                 yield Stroke(center + 0.8 * r * arc, 2.0)
         case "stop":
             yield from _stop(sight, element, joint)
+
+
+def _slides(element: AtJoint, joint: DrawnJoint) -> bool:
+    """Whether the coordinate of an element is a displacement along the joint's axis."""
+    own = joint.type == "prismatic" or (joint.type == "cylindrical" and not element.coordinate)
+    return own and joint.axis is not None
+
+
+def _at_slider(
+    sight: Sight, element: AtJoint, joint: DrawnJoint, center: Array
+) -> Iterator[Stroke]:
+    """A spring along the axis, an arrow beside it, or pads on both sides."""
+    assert joint.axis is not None
+    axis = np.array(numbers(joint.axis))[: sight.pose.shape[-1] - (sight.pose.ndim == 2)]
+    along = sight.seen(sight.outward(joint.parent, axis)[np.newaxis])[0]
+    along = along / (np.linalg.norm(along) or 1.0)
+    places = np.array([along, [-along[1], along[0]]]) * number(element.radius)
+    match element.kind:
+        case "torsion":
+            x, y = _coil(0.0)
+            yield Stroke(center + np.column_stack([2.4 * x - 1.2, 0.4 * y]) @ places)
+        case "brake":
+            for side in (-0.6, 0.6):
+                yield Stroke(center + np.array([[-0.6, side], [0.6, side]]) @ places, 2.0)
+        case _:
+            arrow = (
+                np.array([[-1.2, 1.0], [1.2, 1.0]]),
+                np.array([[0.8, 1.3], [1.2, 1.0], [0.8, 0.7]]),
+            )
+            for points in arrow:
+                yield Stroke(center + points @ places, 1.3)
+            if element.kind == "servo":
+                yield Stroke(center + 0.15 * number(element.radius) * circle(16), closed=True)
 
 
 def _stop(sight: Sight, stop: AtJoint, joint: DrawnJoint) -> Iterator[Stroke]:

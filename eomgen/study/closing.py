@@ -14,16 +14,18 @@ def closed(
     parameters: Mapping[str, float] | None,
     y: FloatArray,
     given: Collection[str] = (),
-) -> FloatArray:
+    argument: str = "initial",
+) -> tuple[FloatArray, tuple[str, ...]]:
     """The state `y` (ny,) of a model of form 'velocity', moved onto its constraints at these
-    parameters; states named in `given` are kept. Without constraints it is `y` itself.
+    parameters, and notices of what the scene gives and could not be kept; states named in `given`
+    are kept. Without constraints it is `y` itself.
 
-    Raises `SceneError` if they cannot be met.
+    Raises `SceneError`, which calls what is given `argument`, if they cannot be met.
     """
     if not model.constraints:
-        return y
+        return y, ()
     nq, nv = len(model.coordinates), len(model.velocities)
     values = y.tolist()
     moved = model.with_parameters(parameters or {})
-    q, v, _ = closed_start(moved, values[:nq], values[nq : nq + nv], given)
-    return np.array([*q, *v, *values[nq + nv :]])
+    q, v, notices = closed_start(moved, values[:nq], values[nq : nq + nv], given, argument)
+    return np.array([*q, *v, *values[nq + nv :]]), notices

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.dynamics.diagnostics import effect_sizes, is_singular, values_at
+from eomgen.dynamics.diagnostics import constraint_trouble, effect_sizes, is_singular, values_at
 from eomgen.dynamics.singularity import relative_pivots, why_unresisted
 from eomgen.model.model import Model, dofs_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
@@ -37,10 +37,12 @@ def problem_of(
     inputs: Any = None,
     model: Model | None = None,
     start: Callable[[FloatArray], FloatArray] | None = None,
+    note: Callable[[str], None] = lambda text: None,
 ) -> Problem:
     """The initial-value problem of a module, as from `as_problem`. With the `model` of the module,
     its messages name the part of the model that has no finite value, and its initial state meets
-    the constraints at these parameters. `start` is as there, of all coordinates of the model.
+    the constraints at these parameters; `note` is told of values of the scene that could not be
+    kept. `start` is as there, of all coordinates of the model.
 
     Raises `RunError` if the module refuses parameters or inputs, or has no derivative at its
     initial state.
@@ -51,7 +53,9 @@ def problem_of(
 
     def started(_: FloatArray) -> FloatArray:
         y = initial_of(module, model, parameters)
-        whole = closed(model, given[0], start(y) if start else y)
+        whole, notices = closed(model, given[0], start(y) if start else y)
+        for notice in notices:
+            note(notice)
         return on_branch(module, model, whole, *given)
 
     return as_problem(
@@ -72,7 +76,7 @@ def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str
         "locked coordinates": model.locked,
         "effects left out": model.leave_out,
         UNITS: tuple((p.name, p.unit) for p in model.parameters),
-        START: (model.initial_q, model.initial_v, model.states),
+        START: (model.initial_q, model.initial_v, model.extra),
     }
     for body in model.bodies:
         parts[f"body '{body.name}'"] = body
@@ -149,6 +153,8 @@ def explained(
             for i in sorted(felt):
                 if felt[i][0] < GONE:
                     return Explanation(*why_unresisted(model, i))
+        if why := constraint_trouble(model, values):
+            return Explanation(why, "take another start, or lengths that do not line up")
         if is_singular(model, values):
             return Explanation(
                 "the mass matrix is singular", "change lengths, masses or inertias, or keep away"

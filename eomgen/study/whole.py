@@ -27,7 +27,7 @@ SAME = 1e-6
 def names_of(model: Model) -> list[str]:
     """The names of all coordinates, velocities and extra states, [q, v, x]."""
     names = [c.name for c in (*model.coordinates, *model.velocities)]
-    return [*names, *(x.name for x in model.states)]
+    return [*names, *(x.name for x in model.extra)]
 
 
 def has_all(module: Any) -> bool:
@@ -39,7 +39,7 @@ def initial_of(module: Any, model: Model, parameters: Any = None) -> FloatArray:
     """The initial state of all coordinates, or of a model of another form that of the module."""
     if has_all(module):
         return np.asarray(module.initial_state(parameters))
-    extra = (x.initial for x in model.states)
+    extra = (x.initial for x in model.extra)
     return np.array([*model.initial_q, *model.initial_v, *extra])
 
 
@@ -57,7 +57,7 @@ def whole_of(
     """The state of all coordinates for one of a module, (n,) or (n, k)."""
     if has_all(module):
         return y
-    extra = y[len(y) - len(model.states) :]
+    extra = y[len(y) - len(model.extra) :]
     found = (module.coordinates, module.velocities)
     return np.concatenate([*(each(t, y, parameters, inputs) for each in found), extra])
 

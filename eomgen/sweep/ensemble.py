@@ -34,7 +34,8 @@ class Ensemble:
     final      (n, ny), the state at the end, or where a member stopped; nan if it was refused
     t          (n,), the time of that, s
     codes      (n,), how members ended; see `status`
-    messages   (n,), why a member did not finish, or ""
+    messages   (n,), why a member did not finish, what of its start was moved to meet
+               constraints, or ""
     times      (m,), of the rows, s
     rows       (n, m, ny), states at these times, nan after a stop; None if only ends were kept
     outputs    functions of the module by name: (n, m, …) at these times, or (n, …) at the end

@@ -1,7 +1,7 @@
 """The runs of some members in this process. Its tasks and results can be sent to another one."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
@@ -103,7 +103,7 @@ def run_members(task: Task, values: FloatArray, counter: Counter | None = None) 
     final    the state at the end, or where a member stopped; nan if it was refused
     t        the time of that, s
     status   `FINISHED`, `STOPPED` or `REFUSED`
-    message  why it did not finish, or ""
+    message  why it did not finish, what of its start was moved to meet constraints, or ""
     rows     (m, n, ny), the states at the kept times, nan after a stop; if there are more than two
     NAME     each of the outputs, (m, n, …) at these times, or (m, …) at the end
     """
@@ -171,8 +171,9 @@ class _Prepared:
             module = ModuleWithInputs(module, varying)
         values = given["parameter"] or None, given.get("input") or None
         own = self.accelerator and self.accelerator.at(*values)
+        notices: list[str] = []
         try:
-            problem = self._problem(module, given["state"], values, own)
+            problem = self._problem(module, given["state"], values, own, notices.append)
             if varying is not None:
                 problem = with_corners(problem, module, values[0], varying)
             run = self._run(problem)
@@ -185,10 +186,16 @@ class _Prepared:
         rows = self._rows(run)
         outputs = self._outputs(module, rows, values, own)
         status = FINISHED if run.finished else STOPPED
-        return _Member(run.y[-1], float(run.t[-1]), status, run.message, rows, outputs)
+        text = "; ".join([*notices, run.message] if run.message else notices)
+        return _Member(run.y[-1], float(run.t[-1]), status, text, rows, outputs)
 
     def _problem(
-        self, module: Any, states: Mapping[str, float], values: Values, own: Accelerator | None
+        self,
+        module: Any,
+        states: Mapping[str, float],
+        values: Values,
+        own: Accelerator | None,
+        note: Callable[[str], None],
     ) -> Problem:
         model, given = self.task.model, given_values(module, *values)
         explain = explained(model, *given, module)
@@ -200,7 +207,12 @@ class _Prepared:
 
         def assembled(_: FloatArray) -> FloatArray:
             y = start(initial_of(module, model, values[0]), names_of(model))
-            return on_branch(module, model, closed(model, values[0], y, states), *values)
+            for indices in map(list, model.quaternions):
+                y[indices] /= np.linalg.norm(y[indices]) or 1.0
+            whole, notices = closed(model, values[0], y, states, "vary")
+            for notice in notices:
+                note(notice)
+            return on_branch(module, model, whole, *values)
 
         loops = bool(self.task.model.constraints)
         problem = as_problem(module, *values, explain=explain, start=assembled if loops else None)

@@ -168,7 +168,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   function portrait() {
     const { pairs } = channels;
     const [x, y] = pairs.find((pair) => !plots.some(({ spec }) => spec.x === pair[0])) ?? pairs[0] ?? [];
-    return x ? { x, y: [y] } : { x: channels.list[0].key, y: [channels.list[channels.states.length - 1].key] };
+    return x ? { x, y: [y] } : { x: channels.list[0].key, y: [channels.list[Math.max(0, channels.states.length - 1)].key] };
   }
 
   function removePlot(plot) {

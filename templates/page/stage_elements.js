@@ -118,6 +118,21 @@ const makeElements = (scene, mixed) => {
     };
   }
 
+  // Whether an element's coordinate is a displacement along the joint's axis; then it is drawn in a
+  // frame at the child's point whose x axis is the joint's.
+  const slides = ({ joint, coordinate }) => Boolean(joints[joint].axis)
+    && (joints[joint].type === "prismatic" || (joints[joint].type === "cylindrical" && !coordinate));
+  function placedAtSlider(element, parts) {
+    const { child, at_child: point } = joints[element.joint];
+    return (now) => {
+      const along = unit(jointFrame(element.joint, now).line);
+      const [one, two] = across(along);
+      const radius = number(element.radius, now.values);
+      const at = place(now.poses, child, vector(point, now.values));
+      for (const part of parts) frame(part, at, scaled(along, radius), scaled(one, radius), scaled(two, radius));
+    };
+  }
+
   function placedAtJoint(element, parts, factor = 1) {
     return (now) => {
       const { at, axis, one, two } = jointFrame(element.joint, now);
@@ -138,6 +153,10 @@ const makeElements = (scene, mixed) => {
 
   const ring = (from, to, ink = INK) => stroke(lines.arc(from, to), { ink, width: 2.2 });
   function motor(element) {
+    if (slides(element)) {
+      const arrow = [-1.2, 1, 0, 1.2, 1, 0, 0.8, 1.3, 0, 1.2, 1, 0, 1.2, 1, 0, 0.8, 0.7, 0];
+      return placedAtSlider(element, [stroke(arrow, { pieces: true, width: 2.2 })]);
+    }
     // An arc with an arrowhead.
     const end = 1.6 * Math.PI;
     const [x, y] = [Math.cos(end), Math.sin(end)];
@@ -300,7 +319,9 @@ const makeElements = (scene, mixed) => {
 
   const MAKERS = {
     coil: link, damper: link, spring_damper: link, rope, motor, servo: motor, drive: motor, stop,
-    torsion: (element) => placedAtJoint(element, [stroke(spiral(2.75), { width: 1.8 })], 1),
+    torsion: (element) => (slides(element)
+      ? placedAtSlider(element, [stroke(coilPoints(5, 0, 0.4).map((x, i) => (i % 3 ? x : 2.4 * x - 1.2)))])
+      : placedAtJoint(element, [stroke(spiral(2.75), { width: 1.8 })], 1)),
     ball, wheel: ball, obstacle: ball, field, base, rail, attraction,
   };
 

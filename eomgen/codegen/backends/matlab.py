@@ -87,7 +87,7 @@ def _file(program: Program, interface: Interface, function: Function, name: str)
 
 def _rows(results: Sequence[str], shape: tuple[int, ...]) -> list[str]:
     """The rows of the result: of an output with three axes, those of the first two."""
-    columns = shape[-1] if len(shape) > 1 else 1
+    columns = max(1, shape[-1]) if len(shape) > 1 else 1
     return [", ".join(results[i : i + columns]) for i in range(0, len(results), columns)]
 
 

@@ -274,6 +274,8 @@ def units(interface: Interface) -> list[tuple[str, str]]:
 def document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
     """The docstring's tables: states, inputs, parameters, effects, operations."""
     lines = ["State y, in this order:"]
+    if not interface.states:
+        lines = ["The state y is empty, (0,): all is given by the time."]
     lines += _table([(s.name, s.unit, s.about) for s in interface.states])
     if interface.inputs:
         lines += ["", "Inputs u, each 0 unless given:"]
@@ -331,7 +333,7 @@ def _given(interface: Interface) -> list[str]:
 
 
 def _table(rows: list[tuple[str, str, str]]) -> list[str]:
-    widths = [max(len(row[i]) for row in rows) for i in (0, 1)]
+    widths = [max((len(row[i]) for row in rows), default=0) for i in (0, 1)]
     return [
         f"    {name:<{widths[0]}}  {unit:<{widths[1]}}  {about}".rstrip()
         for name, unit, about in rows

@@ -208,7 +208,7 @@ def multipliers_at(projection: Projection, t: float, y: FloatArray, ways: FloatA
 
 def _finite(update: FloatArray) -> float:
     """The size of an update. Raises `StepFailure` if it is not finite."""
-    size = float(np.abs(update).max())
+    size = float(np.abs(update).max(initial=0.0))
     if not isfinite(size):
         raise StepFailure("Newton's iteration diverges", REMEDY)
     return size
@@ -223,7 +223,7 @@ def _is_solved(
 ) -> bool:
     """Whether the iteration has converged to roundoff, by the sizes of the last two updates."""
     scale = np.abs(y) + _last(np.abs(changes), axis=0)
-    largest = float(scale.max())
+    largest = float(scale.max(initial=0.0))
     # The remaining error is about the next update: this one times the last contraction factor.
     # Hairer, Wanner, Solving ODEs II, section IV.8.
     missing = np.abs(update) * (size / previous)

@@ -103,6 +103,8 @@ class StabilityMonitor:
 
         Raises `UnstableStepError` if it is too long.
         """
+        if not y.size:  # all is given by the time
+            return
         evaluated = self._evaluated
         self._count(1, len(evaluated))
         rate, last = step / h, self._last

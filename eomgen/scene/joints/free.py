@@ -1,5 +1,6 @@
 """The free joint: a body with all degrees of freedom."""
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -26,6 +27,9 @@ type = "free"
 child = "hand"
 """
     spaces: ClassVar[tuple[int, ...]] = (PLANE, SPACE)
+    misplaced: ClassVar[Mapping[str, str]] = {
+        "loop": "a free joint holds nothing, so it closes no loop; leave the joint out"
+    }
     type: Literal["free"]
     name: Identifier
     parent: Literal["world"] = "world"

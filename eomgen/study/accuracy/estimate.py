@@ -96,7 +96,7 @@ def difference(one: Trajectory, other: Trajectory, scale: FloatArray) -> float:
     since = end - LAST * (end - start)
     a, b = _rows(one, since), _rows(other, since)
     _, i, j = np.intersect1d(a[0], b[0], return_indices=True)
-    apart = np.max(np.abs(a[1][i] - b[1][j]) / scale, axis=1)
+    apart = np.max(np.abs(a[1][i] - b[1][j]) / scale, axis=1, initial=0.0)
     return max(float(apart[-1]), float(np.median(apart)))
 
 
@@ -268,7 +268,7 @@ def by_looser_run(
 def _greatest(one: Trajectory, two: Trajectory, scale: FloatArray) -> tuple[float, float]:
     """The greatest difference of rows at equal times, relative to the scale, and its time, s."""
     t, i, j = np.intersect1d(one.t, two.t, return_indices=True)
-    apart = np.max(np.abs(one.y[i] - two.y[j]) / scale, axis=1)
+    apart = np.max(np.abs(one.y[i] - two.y[j]) / scale, axis=1, initial=0.0)
     worst = int(np.argmax(apart))
     return float(apart[worst]), float(t[worst])
 

@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 
 from eomgen.errors import RunError
-from eomgen.files import is_ours, read_plain, write_whole
+from eomgen.files import is_ours, marked, read_plain, write_whole
 from eomgen.integrators import INTEGRATORS
 from eomgen.study.accuracy.ladder import Rung, Status, Work, order
 
@@ -94,7 +94,7 @@ def save(
     table.writerow([*COLUMNS, *same, GENERATION, KEY])
     rest = [*same.values(), _cell(generation), key]
     table.writerows([*_row(work), *rest] for work in ordered(works))
-    write_whole(path, buffer.getvalue(), force=force)
+    write_whole(path, marked(buffer.getvalue()), force=force)
 
 
 def ordered(works: Iterable[Work]) -> list[Work]:

@@ -69,7 +69,7 @@ def _started(scene: Scene, by: Collection[str | None]) -> Scene:
     for c in (c for c in model.prescribed if c.by in by):
         value, rate, _ = with_rates(c.value, model.defaults, 0.0, FloatScalars())
         q[c.position.name], v[c.velocity.name] = float(value), float(rate)
-    return scene.replaced(initial=scene.initial.replaced(q=q, v=v))
+    return scene.replaced(initial=scene.initial.replaced(q=q, v=v, guess={}))
 
 
 def counted(scene: Scene) -> Scene:

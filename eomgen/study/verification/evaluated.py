@@ -76,7 +76,7 @@ class EvaluatedModel:
         self.q: list[Extended] = [*y[:nq], *(x for x, _, _ in given)]
         self.v: list[Extended] = [*y[nq : nq + self.nv], *(v for _, v, _ in given)]
         self.driven_rates = extended([a for _, _, a in given[: len(model.driven)]])
-        names = (x.name for x in model.states)
+        names = (x.name for x in model.extra)
         self._states = dict(zip(names, y[nq + self.nv :], strict=True))
         self.index = {name: k for k, name in enumerate(self.bodies)}
         self.joint_indices = {index.body.joint.name: index for index in model.joint_indices}

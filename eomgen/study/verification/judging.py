@@ -150,7 +150,7 @@ def _agreed(free: FreeBodies, vd: Array) -> float:
     root = extended([_root(x) for x in np.diag(free.mass_matrix)])
     errors = abs(_needed(free, vd)) / root
     terms = (abs(free.mass_matrix) @ abs(vd) + _load_sizes(free)) / root
-    terms = np.maximum(terms, LEAST_SCALE * np.max(terms))
+    terms = np.maximum(terms, LEAST_SCALE * np.max(terms, initial=0.0))
     worst = max((a / b for a, b in zip(errors, terms, strict=True) if a), default=0)
     return -_log10(worst) if worst else 60.0
 
@@ -382,7 +382,9 @@ def ulps(error: Array, scale: Array) -> float:
     the greatest scale (see `ulps`). Where all scales are 0, any difference is infinite. nan if any
     difference is nan.
     """
-    error, scale = np.broadcast_arrays(error, np.maximum(scale, LEAST_SCALE * np.max(scale)))
+    error, scale = np.broadcast_arrays(
+        error, np.maximum(scale, LEAST_SCALE * np.max(scale, initial=0.0))
+    )
     parts = [
         float(abs(x) / s / ULP) if s else np.inf
         for x, s in zip(error.flat, scale.flat, strict=True)
@@ -403,6 +405,8 @@ def _conditions(free: FreeBodies) -> tuple[float, float]:
 
 def _condition(matrix: Array) -> tuple[float, float]:
     """Condition number and smallest pivot of a matrix scaled to a diagonal of ones."""
+    if not len(matrix):
+        return 1.0, 1.0
     root = extended([_root(x) for x in np.diag(matrix)])
     scaled = matrix / np.outer(root, root)
     n = len(scaled)

@@ -141,7 +141,7 @@ def _slopes(
     model = free.model
     if isinstance(module, Viewed):
         return _slopes_in_closed_form(module, roundings, state, y, free)
-    if not hasattr(module, "jacobian"):
+    if not (hasattr(module, "jacobian") and len(y)):
         return None
     direction = _some_direction(len(y))
     for indices in map(list, model.quaternions):  # tangent to the sphere of unit quaternions
@@ -323,7 +323,7 @@ def _beside(
     Time advances by the same step unless `still`.
     """
     longest = _LONG_STEP if still and model.constraints else _STEP
-    step = longest / (1 + max(map(abs, direction)))
+    step = longest / (1 + max(map(abs, direction), default=0))
     time = mpfr(0) if still else step
     ahead = FreeBodies(model, state.t + time, y + step * direction, state.u)
     behind = FreeBodies(model, state.t - time, y - step * direction, state.u)
@@ -392,7 +392,7 @@ def kept(model: Model, states: Sequence[State]) -> Kept:
             lost_energy |= not _is_nothing(total, scale + abs(change))
             rates = (ahead.momentum - behind.momentum) / step
             pace = abs(free.state_rates)
-            scale = free.momentum_sizes + np.max(abs(rates)) + np.max(pace) * NOTHING
+            scale = free.momentum_sizes + np.max(abs(rates)) + np.max(pace, initial=0) * NOTHING
             lost = [
                 gone or not _is_nothing(rate, size)
                 for gone, rate, size in zip(lost, rates, scale, strict=True)
