@@ -338,6 +338,19 @@ def test_dead_points_change_coordinates(route: Any, loops: str, settings: dict[s
     assert longer.finished
 
 
+def test_runs_of_sweeps_say_what_has_a_dead_point() -> None:
+    """They keep their coordinates; that the mechanism is singular would be wrong."""
+    found = eomgen.ensemble(
+        four_bar(initial=DEAD, route="independent"),
+        {"a": [0.5]},
+        parameters={"b": 0.3, "c": 0.3},
+        t_end=1.0,
+        backend="numpy",
+    )
+    assert "taken as independent is at a dead point" in found.messages[0]
+    assert "mechanism is singular" not in found.messages[0]
+
+
 def test_margins_that_stay_away_from_0() -> None:
     """A margin that comes to 0 does so with a slope, wherever it lies between the samples; one with
     a smooth minimum above 0 is told from it once samples are near.
