@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.branches import BranchMonitor, Retry, Step
+from eomgen.run.branches import BranchMonitor, Retry
 from eomgen.run.compiled import Steps
+from eomgen.run.crossings import Step
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import (
     Adaptive,
