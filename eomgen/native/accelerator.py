@@ -350,7 +350,9 @@ def _digest() -> str:
     here = Path(__file__).resolve().parent
     run = here.parent / "run"
     found = hashlib.sha256()
-    checks = [run / f"{name}.py" for name in ("branches", "events", "roots")]
+    checks = [
+        run / f"{name}.py" for name in ("branches", "crossings", "enclosing", "events", "roots")
+    ]
     folders = (here, "*.py"), (run / "integrators", "*.py"), (templates_folder() / "c", "*.jinja")
     listed = [path for folder, names in folders for path in sorted(folder.glob(names))]
     for path in (*listed, *checks):
