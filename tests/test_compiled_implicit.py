@@ -238,6 +238,19 @@ def test_corners_in_time_are_seen(rtol: float) -> None:
     assert compiled.trajectory.y[-1][1] == pytest.approx(0.5, rel=5 * rtol)
 
 
+@pytest.mark.parametrize("integrator", ["DOP853", "Rodas5P"])
+def test_steps_end_at_known_times_in_both(integrator: str) -> None:
+    """At the last double before a pulse of 10 µs begins, and before it ends: none of it is lost."""
+    pulse = "1e5*(step(t - 5.00001) - step(t - 5.00002))"
+    pushed = FALL.replace("-1/x**2", pulse)
+    compiled, python = both(pushed, t_end=10.0, integrator=integrator, rtol=1e-13, atol=1e-12)
+    assert_same(compiled, python)
+    assert compiled.compiled
+    speed = 1e5 * (5.00002 - 5.00001) / 2
+    assert compiled.trajectory.y[-1][1] == pytest.approx(speed, rel=1e-9)
+    assert compiled.trajectory.counts["derivatives"] < 1000
+
+
 def test_corners_in_space_are_seen() -> None:
     """Python makes these steps."""
     pushed = FALL.replace("-1/x**2", "-2*max(x, 0)")

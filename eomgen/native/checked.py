@@ -1,6 +1,6 @@
 """What compiled steps are checked with: switching functions, and the gaps of rigid contacts.
 
-`templates/c/checks.c.jinja` repeats `eomgen.run.branches` and `eomgen.run.events`. The functions
+`templates/c/checks.c.jinja` repeats `eomgen.run.crossings` and `eomgen.run.events`. The functions
 lie in libraries of their own.
 """
 
@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from eomgen.native.module import outputs_of, usual_constants
-from eomgen.run import branches, enclosing, roots
+from eomgen.run import branches, crossings, enclosing, roots
 from eomgen.run.compiled import Array, Watched
 from eomgen.run.events import GAP_CHECKS
 
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _INTERVALS = len(enclosing.INNER) + 1
-_MOST_PARTS = branches.MOST_EVALUATIONS // 4 + 2
+_MOST_PARTS = crossings.MOST_EVALUATIONS // 4 + 2
 """Parts of a step that wait at one time, at most: each first one takes four evaluations, or three
 of one alone, and each more six."""
 
@@ -55,15 +55,15 @@ def context() -> dict[str, Any]:
     """The values of the template."""
     return {
         "intervals": _INTERVALS,
-        "irregular": [repr(share) for share in branches.IRREGULAR],
-        "far": repr(branches.FAR),
-        "shortest_part": repr(branches.SHORTEST_PART),
+        "irregular": [repr(share) for share in crossings.IRREGULAR],
+        "far": repr(crossings.FAR),
+        "shortest_part": repr(crossings.SHORTEST_PART),
         "inside": repr(branches.INSIDE),
-        "most_evaluations": branches.MOST_EVALUATIONS,
+        "most_evaluations": crossings.MOST_EVALUATIONS,
         "most_parts": _MOST_PARTS,
-        "largest_angle": repr(branches.LARGEST_ANGLE),
-        "together": repr(branches.TOGETHER),
-        "located": repr(branches.LOCATED),
+        "largest_angle": repr(crossings.LARGEST_ANGLE),
+        "together": repr(crossings.TOGETHER),
+        "located": repr(crossings.LOCATED),
         "root_rtol": repr(roots.RTOL),
         "most_iterations": roots.MOST,
         "gap_checks": [repr(share) for share in GAP_CHECKS],

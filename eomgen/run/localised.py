@@ -168,9 +168,11 @@ class Features:
         inner = at(np.concatenate(times), np.concatenate(states))
         count, kinds = len(length), len(self.localised.kinds)
         values = np.concatenate((ends[None, :-1], inner.reshape(3, count, kinds), ends[None, 1:]))
-        return bool(
-            self.tame(values, list(zip(t[:-1].tolist(), t[1:].tolist(), strict=True))).all()
-        )
+        before, bounds = self.greatest, list(zip(t[:-1].tolist(), t[1:].tolist(), strict=True))
+        if self.tame(values, bounds).all():
+            return True
+        self.greatest = before  # these steps are looked at again
+        return False
 
     def parts(self, step: Smooth) -> list[Part] | None:
         """The parts of a step in order, on each of which all functions are tame or which is as

@@ -26,7 +26,7 @@ growing or oscillating modes; with error control, steps are never near that."""
 MANY, DAMPED = 1e4, 100.0
 """A motion is stiff if the run is longer than `MANY` time constants 1/|λ| of its fastest modes, and
 than `DAMPED` of their decay: explicit steps must then be shorter than accuracy requires."""
-SOME = 1e3
+SOME = 3e3
 """Noise is looked for where the run is longer than this many time constants of its fastest mode."""
 SOLVED = ("Radau", "BDF")
 """Methods that solve their equations to a fraction of the tolerance."""

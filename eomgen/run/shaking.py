@@ -30,6 +30,11 @@ class Shaken:
     def __init__(self, derivative: Callable[[float, FloatArray], FloatArray], seed: int) -> None:
         self._plain, self._random, self._waiting = derivative, np.random.default_rng(seed), 0
 
+    @property
+    def left(self) -> int:
+        """The number of steps to the next random error of the sum."""
+        return EVERY - self._waiting
+
     def derivative(self, t: float, y: FloatArray) -> FloatArray:
         """The derivative, rounded at random."""
         slope = self._plain(t, self._rounded(y))

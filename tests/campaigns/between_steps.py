@@ -1,7 +1,7 @@
 """Is anything between steps overlooked by `--accuracy`, called met although rounding decides, or
 without an end?
 
-    python tests/campaigns/between_steps.py [--count N] [--seed S] [--limit SECONDS]
+    python tests/campaigns/between_steps.py [--count N] [--first I] [--seed S] [--limit SECONDS]
 
 Random scenes: pulses in time from 1 µs, bumps and wells in a field, bullets that meet a hard ball
 for a moment, pendulums up to 1e-12 rad from upright, relays with and without a sliding mode, light
@@ -95,17 +95,16 @@ def pulse(rng: Any) -> Drawn:
     q, a = rng.uniform(-2.5, -1.2), area / w
     shape = rng.choice(["bell", "steps", "tanh", "hill"])
     x = lambda t: (t - c) / w  # noqa: E731
-    forms: dict[str, tuple[str, Callable[[float], float], float]] = {
-        "bell": (f"{a!r}*exp(-((t - {c!r})/{w!r})**2)", lambda t: math.exp(-(x(t) ** 2)), 8.0),
-        "steps": (f"{a!r}*(step(t - {c!r}) - step(t - {c + w!r}))", lambda t: 1.0, 1.0),
+    forms: dict[str, tuple[str, Callable[[float], float]]] = {
+        "bell": (f"{a!r}*exp(-((t - {c!r})/{w!r})**2)", lambda t: math.exp(-(x(t) ** 2))),
+        "steps": (f"{a!r}*(step(t - {c!r}) - step(t - {c + w!r}))", lambda t: 1.0),
         "tanh": (
             f"{a!r}*(tanh((t - {c!r})/{w!r}) - tanh((t - {c + 4 * w!r})/{w!r}))/2",
             lambda t: (math.tanh(x(t)) - math.tanh(x(t) - 4)) / 2,
-            24.0,
         ),
-        "hill": (f"{a!r}/(1 + ((t - {c!r})/{w!r})**4)", lambda t: 1 / (1 + x(t) ** 4), 3000.0),
+        "hill": (f"{a!r}/(1 + ((t - {c!r})/{w!r})**4)", lambda t: 1 / (1 + x(t) ** 4)),
     }
-    text, height, reach = forms[str(shape)]
+    text, height = forms[str(shape)]
 
     def end() -> Any:
         def free(t: float, y: Any) -> Any:
@@ -118,27 +117,10 @@ def pulse(rng: Any) -> Drawn:
             y = solved(free, [q, 0.0], (0, c), (1,))
             y = solved(pushed, y, (c, c + w), (w / 4,))
             return solved(free, y, (c + w, 10), (1,))
-        marks = sorted(
-            {
-                0.0,
-                10.0,
-                *(
-                    min(max(c + s * k * w, 0.0), 10.0)
-                    for s in (-1, 1)
-                    for k in (8.0, 30.0, 300.0, 3000.0)
-                    if k <= max(reach, 30.0)
-                ),
-            }
-        )
-        longest = [
-            max(
-                0.25 * w,
-                0.05 * min(abs(m - c) for m in pair)
-                if (pair[0] - c) * (pair[1] - c) > 0
-                else 0.25 * w,
-            )
-            for pair in pairwise(marks)
-        ]
+        # Pieces whose lengths grow with the distance from the pulse, ten or more steps in each.
+        sides = [s * w * 4.0**k for k in range(40) for s in (-1, 1)]
+        marks = sorted({0.0, 10.0, *(c + side for side in sides if 0 < c + side < 10)})
+        longest = [(b - a) / 10 for a, b in pairwise(marks)]
         return solved(pushed, [q, 0.0], marks, longest)
 
     return PENDULUM.format(more=motor(text), q=q, v=0.0, end=10.0), end
@@ -295,12 +277,12 @@ def late(*_: object) -> None:
 def main() -> None:
     """Make the runs and print what came of them."""
     given = argparse.ArgumentParser()
-    for name, value in (("count", 60), ("seed", 0), ("limit", 120)):
+    for name, value in (("count", 60), ("first", 0), ("seed", 0), ("limit", 120)):
         given.add_argument(f"--{name}", type=int, default=value)
     options = given.parse_args()
     signal.signal(signal.SIGALRM, late)
     wrong = endless = met = 0
-    for i in range(options.count):
+    for i in range(options.first, options.count):
         rng = np.random.default_rng([options.seed, i])
         kind, target = KINDS[i % len(KINDS)], TARGETS[(i // len(KINDS)) % len(TARGETS)]
         scene, end = kind(rng)
@@ -330,7 +312,9 @@ def main() -> None:
             + (f"\n{scene}" if bad else ""),
             flush=True,
         )
-    print(f"{options.count} scenes: {met} met, {wrong} met and wrong, {endless} without an end")
+    print(
+        f"{options.count - options.first} scenes: {met} met, {wrong} met and wrong, {endless} without an end"
+    )
 
 
 if __name__ == "__main__":

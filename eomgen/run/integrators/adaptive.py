@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.branches import BranchMonitor, Retry, Step
+from eomgen.run.branches import BranchMonitor, Retry
 from eomgen.run.compiled import Steps
+from eomgen.run.crossings import Step
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import (
     Adaptive,
@@ -27,7 +28,7 @@ from eomgen.run.integrators.interface import (
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.integrators.strides import Strides, continuation
 from eomgen.run.problem import FloatArray, Problem, Switching
-from eomgen.run.shaking import EVERY, Shaken
+from eomgen.run.shaking import Shaken
 
 _STALLED = 100
 """A run stops after this many steps in a row that do not advance the time."""
@@ -104,7 +105,7 @@ def advances(
         until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
         # A step that was cut is repeated in Python, which counts that.
         use = compiled if compiled and not cut and compiles() else None
-        most = min(until - here, EVERY) if stepper.shaken else until - here
+        most = min(until - here, stepper.shaken.left) if stepper.shaken else until - here
         stride = use.made(stepper, sampled, most) if use else None
         if use and stride:
             yield from use.advances(stride, sampled, stepper.is_whole, each)

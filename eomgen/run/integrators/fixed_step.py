@@ -11,7 +11,7 @@ from eomgen.run.integrators.equal_strides import EqualStrides, advances_of
 from eomgen.run.integrators.interface import Advance, Change, Resume, Stability
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
-from eomgen.run.shaking import EVERY, Shaken
+from eomgen.run.shaking import Shaken
 
 
 def count_steps(span: float, dt: float) -> float:
@@ -66,7 +66,7 @@ def advances(
     while i < steps:
         if strides and i >= first:
             given = (monitor if checked else None), problem
-            last = min(steps, i + 1 + EVERY) if shaken else steps
+            last = min(steps, i + 1 + shaken.left) if shaken else steps
             stride = strides.made(i, last, t, y, lost, *given)
             if stride:
                 shorter = partial(_shorter, change, problem)

@@ -131,7 +131,8 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         if not possible:
             return _missed(search, best, judged, target, why)
         plan = min(possible, key=lambda plan: plan.work)
-        stiff = [] if asked or set(names) & set(STIFF) else _stiff(search.case)
+        other = asked is None and search.fast.noise.any() and not set(names) & set(STIFF)
+        stiff = _stiff(search.case) if other else []
         bounded = plan is not aside and (aside or len(possible) > 1 or stiff)
         made = search.make(plan, OVERRUN * plan.cost if bounded else math.inf)
         if not made and search.broken[-1].cut:
