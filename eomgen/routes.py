@@ -22,6 +22,7 @@ class RouteSpec:
                     dynamics is differentiated and solved with the factors of M
     last            whether `auto` tries it only if all others lose too many digits
     loops           whether it is for mechanisms with constraints only
+    trees           whether it is for mechanisms without constraints only
     """
 
     about: str
@@ -31,6 +32,7 @@ class RouteSpec:
     differentiated: bool = False
     last: bool = False
     loops: bool = False
+    trees: bool = False
 
 
 ROUTES: dict[str, RouteSpec] = {
@@ -57,6 +59,14 @@ ROUTES: dict[str, RouteSpec] = {
         "embedded",
         loops=True,
     ),
+    "mixed": RouteSpec(
+        "orthogonal elimination along the joints that lose digits, articulated bodies elsewhere",
+        "mixed",
+        frame_axes=True,
+        differentiated=True,
+        last=True,
+        trees=True,
+    ),
     "orthogonal": RouteSpec(
         "orthogonal elimination on Gauss's principle: keeps digits where masses or angles are "
         "uneven",
@@ -70,4 +80,4 @@ ROUTES: dict[str, RouteSpec] = {
 
 def routes_for(loops: bool) -> list[str]:
     """The routes for mechanisms with or without constraints, in order."""
-    return [name for name, spec in ROUTES.items() if loops or not spec.loops]
+    return [n for n, spec in ROUTES.items() if not (spec.trees if loops else spec.loops)]

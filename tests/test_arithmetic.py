@@ -413,7 +413,7 @@ def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
     """A few ulps at most states, some hundred at the worst; every route is compared."""
     found = judged(scene, single=scene == "two_body")
     assert found.agreed > 55
-    assert {w.name for w in found.solvers} == {*routes_for(loops=False), BASELINE}
+    assert {w.name for w in found.solvers} == {*routes_for(loops=False), BASELINE} - {"mixed"}
     for w in found.solvers:
         assert not w.words and w.seconds and w.batch_seconds
         for errors, sample in zip(w.errors, found.samples, strict=True):

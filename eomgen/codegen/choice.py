@@ -9,14 +9,16 @@ from eomgen.derivation.supported import why_not_closed, why_not_tried
 from eomgen.dynamics.assur import with_closed_form
 from eomgen.dynamics.closed_positions import with_safe_pivots
 from eomgen.dynamics.digits import ALL, Route, digits_lost, digits_lost_by_kind
+from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.mechanism_state import Values
+from eomgen.dynamics.mixed import well_conditioned
 from eomgen.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.passes import optimise
 from eomgen.program.program import Program, cost, interpreter
 from eomgen.program.tape import TIME
 from eomgen.routes import ROUTES, routes_for
-from eomgen.scalars.floats import ArrayScalars
+from eomgen.scalars.floats import ArrayScalars, FloatScalars
 
 MOST_LOST = 4.0
 """Largest number of decimal digits of v̇ that a route may lose at the sampled states and still be
@@ -28,9 +30,11 @@ ENOUGH = 10
 """Number of correct digits of v̇ from which on no notice is given."""
 MOST_DENSE = 12
 """Rows of constraints beyond which only the route whose cost grows linearly with them is tried."""
-FEWEST, LEAST = 4, 1
-"""Smallest numbers of correct digits of v̇ at states that are not aligned, and at all; a scene that
-would have fewer is refused.
+FEWEST = 6
+"""Smallest number of correct digits of v̇ at the worst states that is enough anywhere."""
+ORDINARY, LEAST = 7, 2
+"""A scene that has fewer at the worst states is refused unless it has these numbers at states that
+are not aligned, and at all.
 """
 DERIVATIVES_A_STEP = 4
 """The derivatives of a step for which loops in closed form and projections are compared."""
@@ -175,23 +179,31 @@ def _chosen(model: Model, closed: bool) -> Choice:
     routes = {name: _route(model, attempt) for name, attempt in attempts.items()}
     judged, digits, ordinary = _judged(candidates, digits_lost(model, routes)), None, None
     if not _accepted(judged):
-        last = next(name for name, spec in ROUTES.items() if spec.last)
-        attempts[last] = _recursive(derive(model, last))
-        routes[last] = _route(model, attempts[last])
+        resorts = [n for n, spec in ROUTES.items() if spec.last and not why_not_mixed(model, n)]
+        for name in resorts:
+            attempts[name] = _recursive(derive(model, name))
+            routes[name] = _route(model, attempts[name])
         by_kind = digits_lost_by_kind(model, routes, closely=True)
         lost = {route: max(parts) for route, parts in by_kind.items()}
         judged = _judged(candidates, lost)
         if not _accepted(judged):
-            one = (
-                "aba"
-                if "aba" in lost
-                else min((n for n in lost if n != last), key=lost.__getitem__)
-            )
-            words = f"keeps digits that the other routes lose: {one} loses {lost[one]:.0f}"
-            judged.append(Candidate(last, _operations(attempts[last].alone), words))
-            digits, ordinary = _correct_digits(by_kind[last])
+            digits, ordinary = _correct_digits(by_kind["orthogonal"])
+            judged += _resorts(attempts, resorts, lost)
     best = min(_accepted(judged), key=lambda c: c.operations or 0)
     return Choice(attempts[best.route].derived, tuple(judged), digits, ordinary)
+
+
+def _resorts(
+    attempts: Mapping[str, "_Attempt"], names: Sequence[str], lost: Mapping[str, float]
+) -> list[Candidate]:
+    """The routes of last resort as candidates: `orthogonal` in any case, the others unless they
+    lose too many digits.
+    """
+    one = "aba" if "aba" in lost else min((n for n in lost if n not in names), key=lost.__getitem__)
+    words = f"keeps digits that the other routes lose: {one} loses {lost[one]:.0f}"
+    found = {name: Candidate(name, _operations(attempts[name].alone), words) for name in names}
+    others = _judged([c for n, c in found.items() if n != "orthogonal"], lost)
+    return [*others, found["orthogonal"]]
 
 
 @dataclass(frozen=True)
@@ -248,6 +260,19 @@ def why_not_loops(model: Model, route: str) -> str:
     return ""
 
 
+def why_not_mixed(model: Model, route: str) -> str:
+    """Why a model is not derived by a route of last resort; "" if it is."""
+    if route != "mixed":
+        return ""
+    if model.constraints:
+        return "not tried with loops"
+    linkage = make_linkage(model, model.defaults, FloatScalars())
+    plain = len(well_conditioned(linkage))
+    if plain == len(linkage.frames):
+        return "the same as aba: no body carries one that is much heavier"
+    return "" if plain else "the same as orthogonal: all joints carry much heavier bodies"
+
+
 def _factors(route: str) -> bool:
     return ROUTES[route].recursion == "factored"
 
@@ -274,10 +299,10 @@ def _candidate(route: str, operations: int) -> Candidate:
 def _correct_digits(lost: Sequence[float]) -> tuple[int | None, int | None]:
     """The numbers of correct digits by the route of last resort, which loses `lost` at states of
     each kind: at the worst of all, and at those that are not aligned; None if `ENOUGH`. Raises
-    `SceneError` for fewer than `LEAST` or `FEWEST`.
+    `SceneError` for too few.
     """
     correct, ordinary = (max(0, math.floor(ALL - part - SPARE)) for part in (max(lost), lost[0]))
-    if correct < LEAST or ordinary < FEWEST:
+    if correct < LEAST or (correct < FEWEST and ordinary < ORDINARY):
         raise SceneError(
             f"route: {_ILL_CONDITIONED}; with the best, 'orthogonal', "
             f"only {correct} of {ALL:.0f} digits of accelerations would be right; make "
@@ -293,6 +318,11 @@ def least_factoring(model: Model) -> int:
     difference for each of n (n + 1) / 2 pairs of these.
     """
     return sum(above + above * (above + 1) for above in model.carriers)
+
+
+def routes_of(model: Model) -> list[str]:
+    """The routes that there are for a model, in order."""
+    return [r for r in routes_for(bool(model.constraints)) if not why_not_mixed(model, r)]
 
 
 def why_not_compared(model: Model, route: str) -> str:

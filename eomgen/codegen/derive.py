@@ -59,6 +59,8 @@ def why_not_derived(model: Model, route: str) -> str:
     """Why a route does not apply to a model, with key and remedy; "" if it does."""
     if ROUTES[route].loops and not model.constraints:
         return f"route: '{route}' is for mechanisms with loops, and there are none; leave it out"
+    if ROUTES[route].trees and model.constraints:
+        return f"route: '{route}' is for mechanisms without loops, and there are some; leave it out"
     velocity = model.form == "velocity"
     if not velocity and not ROUTES[route].symbolic:
         return (

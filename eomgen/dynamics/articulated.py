@@ -15,7 +15,7 @@ for is the frame's own, and the parent's is subtracted. A driven axis is not eli
 acceleration is part of the reference, and the whole inertia is passed to the parent.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.forces import Wrench, at_parent, total
@@ -70,18 +70,25 @@ Pivots = tuple[tuple[Pivot, ...], ...]
 def articulate(kinematics: TreeKinematics, scalars: Scalars) -> Pivots:
     """The inward sweep over inertias: eliminate every free motion axis, leaves first."""
     links = kinematics.links
+    return articulate_links(links, range(len(links)), scalars)[0]
+
+
+def articulate_links(
+    links: Sequence[Link], which: Collection[int], scalars: Scalars
+) -> tuple[Pivots, list[ArticulatedInertia]]:
+    """The same for some links, and the inertia that is left of each at its frame's origin."""
     sums = [rigid_body_inertia(link, scalars.number(0.0)) for link in links]
     pivots: list[tuple[Pivot, ...]] = [()] * len(links)
-    for k in reversed(range(len(links))):
+    for k in sorted(which, reverse=True):
         link, p = links[k], sums[k]
         found = []
         for axis, _ in link.free:
             pivot, p = eliminated(p, axis, link, scalars)
             found.append(pivot)
-        pivots[k] = tuple(found)
-        if link.parent >= 0:
+        pivots[k], sums[k] = tuple(found), p
+        if link.parent in which:
             sums[link.parent] = joined(sums[link.parent], moved_to_parent(link, p, scalars))
-    return tuple(pivots)
+    return tuple(pivots), sums
 
 
 def respond(

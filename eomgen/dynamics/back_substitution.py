@@ -5,7 +5,8 @@ Equation numbers are those of `orthogonal`.
 
 from collections.abc import Mapping, Sequence
 
-from eomgen.dynamics.articulated import along, with_component
+from eomgen.dynamics import articulated
+from eomgen.dynamics.articulated import Pivot, along, with_component
 from eomgen.dynamics.kinematics import Link
 from eomgen.dynamics.rows import EliminatedAxis, EliminatedLink, undo_rotations
 from eomgen.dynamics.vectors import Vec, add, cross, dot, named, zeros
@@ -13,11 +14,16 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 
 def outwards(
-    links: Sequence[Link], found: Sequence[EliminatedLink], nv: int, scalars: Scalars
+    links: Sequence[Link],
+    found: Sequence[EliminatedLink | tuple[Pivot, ...]],
+    shares: Sequence[Scalar],
+    scalars: Scalars,
 ) -> list[Scalar]:
-    """v̇ (nv,), root to leaf: rotate the residuals back, then solve (2) for each axis."""
+    """v̇ (nv,), root to leaf: rotate the residuals back, then solve (2) for each axis. Links that
+    were eliminated as articulated bodies have pivots, and `shares` as in `articulated`.
+    """
     zero = scalars.number(0.0)
-    result = [zero] * nv
+    result = [zero] * len(shares)
     residuals: dict[int, Scalar] = {}
     reached: list[tuple[Vec, Vec]] = []
     for link, eliminated in zip(links, found, strict=True):
@@ -26,21 +32,25 @@ def outwards(
             base_angular, base_linear = reached[link.parent]
             angular = link.rotation.into(base_angular)
             linear = link.rotation.into(add(base_linear, cross(base_angular, link.arm)))
+        if not isinstance(eliminated, EliminatedLink):
+            motion = articulated.outwards(link, eliminated, (angular, linear), shares, result)
+            reached.append(motion)
+            continue
         for row in (*eliminated.empty, *(eliminated.rows if link.parent < 0 else ())):
             residuals[row.index] = -row.right
         undo_rotations(eliminated.rotations, residuals)
         for axis in reversed(eliminated.axes):
-            motion = axis.axis
+            along_axis = axis.axis
             residuals[axis.pivot] = axis.residual
             undo_rotations((*axis.gathered, *axis.rotations), residuals)
-            before = along(motion, angular, linear)
+            before = along(along_axis, angular, linear)
             if axis.rotor >= 0:
                 result[axis.velocity] = residuals[axis.rotor]
                 value = before + residuals[axis.rotor]
             else:
                 value = _value(axis, residuals, angular, linear, zero)
                 result[axis.velocity] = value - before
-            angular, linear = with_component(motion, angular, linear, value)
+            angular, linear = with_component(along_axis, angular, linear, value)
             undo_rotations(axis.before, residuals)
         angular = named(angular, f"alpha_{link.name}", scalars)
         reached.append((angular, named(linear, f"delta_{link.name}", scalars)))

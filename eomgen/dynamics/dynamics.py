@@ -29,10 +29,12 @@ from eomgen.dynamics.composite import (
     solved,
 )
 from eomgen.dynamics.embedding import Embedded
+from eomgen.dynamics.frames import Linkage
 from eomgen.dynamics.kinematics import TreeKinematics
 from eomgen.dynamics.least_constraint import LeastConstraint
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.mechanism_state import Values
+from eomgen.dynamics.mixed import well_conditioned
 from eomgen.dynamics.motion import (
     Acceleration,
     Twist,
@@ -217,9 +219,7 @@ class Dynamics(AppliedLoads):
             return LeastConstraint(
                 self,
                 self._solids,
-                solids(
-                    make_linkage(self.model, self.model.defaults, FloatScalars()), FloatScalars()
-                ),
+                solids(self._in_numbers, FloatScalars()),
                 self._applied_about_centres,
                 self._beyond_effects,
                 self._fall,
@@ -284,6 +284,10 @@ class Dynamics(AppliedLoads):
         """The same by orthogonal elimination, in the frames' own axes."""
         return self._with_gravity(self._elimination.respond(*self._applied_about_centres(tau)))
 
+    def mixed_forward(self, tau: Sequence[Scalar] | None = None) -> list[Scalar]:
+        """The same by orthogonal elimination along the joints that lose digits only."""
+        return self._with_gravity(self._mixed.respond(*self._applied_about_centres(tau)))
+
     def _applied_about_centres(
         self, tau: Sequence[Scalar] | None
     ) -> tuple[tuple[Acceleration, ...], tuple[fc.Wrench, ...], list[Scalar]]:
@@ -305,11 +309,18 @@ class Dynamics(AppliedLoads):
 
     def orthogonal_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """M⁻¹ times generalised impulses, by orthogonal elimination."""
+        return self._struck(self._elimination, impulse)
+
+    def mixed_response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
+        """The same along the joints that lose digits only."""
+        return self._struck(self._mixed, impulse)
+
+    def _struck(self, elimination: Elimination, impulse: Sequence[Scalar]) -> list[Scalar]:
         nothing, matrix = zeros(self.scalars), no_matrix(self.scalars)
         frame = Acceleration(nothing, nothing, matrix, nothing, nothing)
         still = [frame] * len(self.kinematics.links)
         wrenches = [fc.no_wrench(self.scalars)] * len(still)
-        return self._elimination.respond(still, wrenches, impulse)
+        return elimination.respond(still, wrenches, impulse)
 
     @cached_property
     def _solids(self) -> tuple[Solid | None, ...]:
@@ -317,8 +328,17 @@ class Dynamics(AppliedLoads):
 
     @cached_property
     def _elimination(self) -> Elimination:
-        ranks = ranked(make_linkage(self.model, self.model.defaults, FloatScalars()))
-        return Elimination(self.kinematics, self._solids, ranks, self.scalars)
+        return Elimination(self.kinematics, self._solids, ranked(self._in_numbers), self.scalars)
+
+    @cached_property
+    def _mixed(self) -> Elimination:
+        plain, ranks = well_conditioned(self._in_numbers), ranked(self._in_numbers)
+        return Elimination(self.kinematics, self._solids, ranks, self.scalars, plain)
+
+    @cached_property
+    def _in_numbers(self) -> Linkage:
+        """The linkage at the scene's parameters."""
+        return make_linkage(self.model, self.model.defaults, FloatScalars())
 
     @cached_property
     def _free_roots(self) -> list[int]:

@@ -46,7 +46,7 @@ Two losses remain. One is where an inertia is a small part of mass times arm squ
 where a heavy tip is in line with all joints, to less than the rounding of sines and cosines.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from eomgen.dynamics.aligned_axes import align_axes
@@ -68,6 +68,7 @@ from eomgen.dynamics.forces import (
     total,
 )
 from eomgen.dynamics.kinematics import Link, MotionAxis, TreeKinematics
+from eomgen.dynamics.mixed import ArticulatedPart
 from eomgen.dynamics.motion import Acceleration, moment_about_centre
 from eomgen.dynamics.rows import (
     Column,
@@ -102,7 +103,8 @@ SLIGHT = 1e-16
 class Elimination:
     """The elimination of (1) over the links of a tree, in their own axes.
 
-    `carried` are the bodies on the frames; wrenches act about their centres of mass.
+    `carried` are the bodies on the frames; wrenches act about their centres of mass. Links in
+    `plain`, which has all that are carried by one of them, are eliminated as articulated bodies.
     """
 
     def __init__(
@@ -111,7 +113,10 @@ class Elimination:
         carried: Sequence[Solid | None],
         ranks: Ranks,
         scalars: Scalars,
+        plain: Collection[int] = (),
     ) -> None:
+        if plain:
+            ranks = ranks.without(plain)
         self._aligned = align_axes(kinematics.links, carried, ranks, scalars)
         self._links, self._solids = self._aligned.links, self._aligned.carried
         self._carried, self._ranks = carried, ranks
@@ -119,6 +124,7 @@ class Elimination:
         self._planar = bool(kinematics.angles)
         self._rows = Rows(scalars)
         self._columns = nonzero_columns(self._links, scalars)
+        self._plain = ArticulatedPart(self._links, plain, scalars)
 
     def respond(
         self,
@@ -131,19 +137,40 @@ class Elimination:
         """
         wrenches, tau = on_frames(self._links, *self._aligned.into(wrenches, tau), self._scalars)
         rows: list[list[tuple[Row, int]]] = [[] for _ in self._links]
-        found: list[EliminatedLink] = []
+        found: list[EliminatedLink | None] = []
+        part, shares = self._plain, list(tau)
+        sums = part.biases(frame_accelerations, wrenches, [*map(self._centre, range(len(rows)))])
         for k in reversed(range(len(self._links))):
             link = self._links[k]
+            if k in part.which:
+                found.append(None)
+                p = part.inwards(k, sums, tau, shares)
+                if p is not None:
+                    self._pass_on(k, *part.handed_over(k, p, self._rows), rows, wrenches)
+                continue
             own, left = self._own_rows(k, frame_accelerations[k], wrenches[k])
             eliminated, passed = self._eliminate_link(k, own, rows[k], left, tau)
             found.append(eliminated)
             if link.parent >= 0:
-                rows[link.parent] += [(in_parent_axes(link, row), k) for row in eliminated.rows]
-                more = moved_to(self._centre(link.parent), at_parent(link, passed))
-                wrenches[link.parent] = total(wrenches[link.parent], more)
-        return self._aligned.out(outwards(self._links, found[::-1], len(tau), self._scalars))
+                self._pass_on(k, eliminated.rows, passed, rows, wrenches)
+        solved = [eliminated or part.pivots[k] for k, eliminated in enumerate(reversed(found))]
+        return self._aligned.out(outwards(self._links, solved, shares, self._scalars))
 
     # Inwards.
+
+    def _pass_on(
+        self,
+        k: int,
+        left: Sequence[Row],
+        wrench: Wrench,
+        rows: list[list[tuple[Row, int]]],
+        wrenches: list[Wrench],
+    ) -> None:
+        """Pass the rows and the wrench that are left of a link on to its parent."""
+        link = self._links[k]
+        rows[link.parent] += [(in_parent_axes(link, row), k) for row in left]
+        more = moved_to(self._centre(link.parent), at_parent(link, wrench))
+        wrenches[link.parent] = total(wrenches[link.parent], more)
 
     def _centre(self, k: int) -> Vec:
         """The centre of mass of the link's own bodies; its origin if it has none."""

@@ -3,7 +3,7 @@
 Sums of positive terms do not cancel, so that every digit is kept at any ratio of masses.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from eomgen.dynamics.frames import Linkage
@@ -91,6 +91,14 @@ class Ranks:
     heaviest: tuple[int, ...]
     beside: tuple[int, ...]
     dominant: tuple[bool, ...]
+
+    def without(self, frames: Collection[int]) -> "Ranks":
+        """The same without heaviest children of some frames."""
+        heaviest, beside = (
+            tuple(-1 if k in frames else n for k, n in enumerate(own))
+            for own in (self.heaviest, self.beside)
+        )
+        return replace(self, heaviest=heaviest, beside=beside)
 
 
 def ranked(linkage: Linkage) -> Ranks:

@@ -313,7 +313,8 @@ def main() -> None:
             flush=True,
         )
     print(
-        f"{options.count - options.first} scenes: {met} met, {wrong} met and wrong, {endless} without an end"
+        f"{options.count - options.first} scenes: {met} met, {wrong} met and wrong, "
+        f"{endless} without an end"
     )
 
 

@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 
-from eomgen.codegen.choice import why_not_compared
+from eomgen.codegen.choice import routes_of, why_not_compared
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.routes import routes_for
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.progress import Progress
 from eomgen.scene.schema import Route, Scene, Simulation
@@ -130,7 +129,7 @@ def bill(
     Raises `SceneError` or `RunError` if the scene cannot be compiled or evaluated at its start.
     """
     whole = _compiled(assembled(elaborate(counted(scene))))
-    tries = {route: _try(whole, route) for route in routes_for(bool(whole.model.constraints))}
+    tries = {route: _try(whole, route) for route in routes_of(whole.model)}
     models = [bare(scene), *(part.model for part in parts), *(m for m, _ in tries.values())]
     made: list[_Made | None] = [whole]
     for model in models:

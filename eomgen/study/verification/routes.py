@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, replace
 
-from eomgen.codegen.choice import why_not_compared, why_not_loops
+from eomgen.codegen.choice import routes_of, why_not_compared, why_not_loops
 from eomgen.codegen.system import System
 from eomgen.dynamics.closed_positions import with_safe_pivots
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.routes import routes_for
 from eomgen.run.module import GeneratedModule, load_module
 
 
@@ -24,7 +23,7 @@ def compiled(model: Model, but: str) -> tuple[dict[str, Made], dict[str, str]]:
     """Every route that the model admits except `but`, and the reasons why others are missing."""
     made: dict[str, Made] = {}
     missing: dict[str, str] = {}
-    for route in routes_for(bool(model.constraints)):
+    for route in routes_of(model):
         if route == but:
             continue
         words = why_not_compared(model, route)
