@@ -312,9 +312,8 @@ def main() -> None:
             + (f"\n{scene}" if bad else ""),
             flush=True,
         )
-    print(
-        f"{options.count - options.first} scenes: {met} met, {wrong} met and wrong, {endless} without an end"
-    )
+    count = options.count - options.first
+    print(f"{count} scenes: {met} met, {wrong} met and wrong, {endless} without an end")
 
 
 if __name__ == "__main__":
