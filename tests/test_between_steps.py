@@ -126,6 +126,15 @@ def test_a_bump_in_a_field_is_not_overlooked(shape: str) -> None:
     assert run.trajectory.y[-1] == pytest.approx([-2.0, -2.0], abs=1e-3)
 
 
+def test_a_quotient_slows_down_a_body_that_passes_it() -> None:
+    """Quotients count where a formula divides by what moves."""
+    force = "-1e4/(1 + ((x - 1.5)/6e-5)**4)"
+    run = chosen(SLIDER.format(force=force, x=0.0, v=2.75, t_end=3), 1e-3)
+    lost = 2 * 1e4 * 6e-5 * math.pi / math.sqrt(2)
+    assert run.choice.met
+    assert run.trajectory.y[-1, 1] == pytest.approx(math.sqrt(2.75**2 - lost), abs=1e-3)
+
+
 def test_a_bullet_meets_a_ball_for_a_moment() -> None:
     """The gap is a root, whose kink no polynomial follows; and in the middle there is no force."""
     run = chosen(BULLET, 1e-6)

@@ -129,7 +129,7 @@ def pulse(rng: Any) -> Drawn:
 def bump(rng: Any) -> Drawn:
     """A body that slides over a narrow hill or well."""
     w, c, v = 10 ** rng.uniform(-6, -2), rng.uniform(1, 4), rng.uniform(1, 5)
-    a = rng.uniform(-0.3, 0.3) * v * v / w
+    a = rng.uniform(-0.2, 0.2) * v * v / w  # too low to turn it back
     forms: dict[str, tuple[str, Callable[[float], float]]] = {
         "bell": (f"exp(-((x - {c!r})/{w!r})**2)", lambda s: math.exp(-s * s)),
         "sech": (f"(1 - tanh((x - {c!r})/{w!r})**2)", lambda s: 1 - math.tanh(s) ** 2),
@@ -312,10 +312,8 @@ def main() -> None:
             + (f"\n{scene}" if bad else ""),
             flush=True,
         )
-    print(
-        f"{options.count - options.first} scenes: {met} met, {wrong} met and wrong, "
-        f"{endless} without an end"
-    )
+    count = options.count - options.first
+    print(f"{count} scenes: {met} met, {wrong} met and wrong, {endless} without an end")
 
 
 if __name__ == "__main__":

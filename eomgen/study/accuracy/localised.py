@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.language.base import Table
 from eomgen.language.formula import Apply, names_in
 from eomgen.model.model import Model
 from eomgen.program.kernel import Kernel, kernel
@@ -104,6 +105,8 @@ def _applied(value: Any) -> Iterator[Apply]:
     if isinstance(value, Apply):
         yield value
         parts: Collection[Any] = value.operands
+    elif isinstance(value, Table):
+        parts = [getattr(value, name) for name in type(value).model_fields]
     elif is_dataclass(value):
         parts = [getattr(value, one.name) for one in fields(value)]
     elif isinstance(value, Mapping):
