@@ -58,6 +58,8 @@ def why_not_momenta(model: Model) -> str:
     """Why a model has no state form with momenta: the handout's derivation, for pins and free
     bodies in the plane, alone has them, without effects that are symbols to it.
     """
+    if words := why_not_plain(model):
+        return words
     for effect in model.effects:
         if not effect.is_plain(model.defaults):
             what = f"'{effect.type}' {effect.why_not_plain()}"
