@@ -67,6 +67,19 @@ def fast(problem: Problem, states: Iterable[tuple[float, FloatArray]], span: flo
     return Fast(stiff, some, decay, most)
 
 
+def growth(problem: Problem, t: float, y: FloatArray) -> float:
+    """The greatest rate at which a small deviation from a state grows, 1/s; 0 if none does, or if
+    the Jacobian is not finite.
+    """
+    try:
+        matrix = problem.jacobian(t, y)
+    except (ArithmeticError, ValueError):
+        return 0.0
+    if not np.isfinite(matrix).all():
+        return 0.0
+    return float(np.linalg.eigvals(matrix).real.max(initial=0.0))
+
+
 def step_noise(
     derivative: Callable[[float, FloatArray], FloatArray],
     jacobian: Callable[[float, FloatArray], FloatArray],

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eomgen.run.noise import Fast, fast
+from eomgen.integrators import INTEGRATORS
+from eomgen.run.noise import Fast, fast, growth
 from eomgen.run.problem import FloatArray
 from eomgen.run.sliding import SLIDES
 from eomgen.study.accuracy.estimate import (
@@ -24,6 +25,9 @@ MOST_STEPS = 2**20
 """Greatest number of equal steps in a run."""
 LOOKS = 5
 """Number of states, from start to end of a motion, at which its fast components are determined."""
+LONGEST, GROWN = 8, 3.0
+"""At the beginnings of so many of the longest steps of an implicit method it is looked whether
+deviations grow by more than exp(`GROWN`) in the step."""
 FITS = 0.2
 """A run is made again if its absolute tolerance should have been below this part of what it was."""
 SAMPLES = 2
@@ -200,10 +204,25 @@ class Search:
         tried = self.case.run(setting, most=most, due=due, like=like)
         if tried.interrupted:
             raise KeyboardInterrupt
-        finished = tried.trajectory.finished
+        finished = tried.trajectory.finished and not self._passes_over_growth(tried)
         (self.runs if finished else self.broken).append(tried)
         (self.left_out.discard if finished else self.left_out.add)(method.name)
         return finished
+
+    def _passes_over_growth(self, run: Tried) -> bool:
+        """Whether an implicit method took steps over which deviations grow many times. It damps
+        what it does not resolve, and stays at an unstable position, in all of its runs alike.
+        """
+        if INTEGRATORS[run.setting.integrator].kind != "implicit":
+            return False
+        t, y = run.trajectory.t, run.trajectory.y
+        times, _, steps = run.pace
+        longest = np.argsort(-steps[1:], kind="stable")[:LONGEST]
+        begins = np.searchsorted(t, times[longest]).clip(max=len(t) - 1).tolist()
+        return any(
+            step * growth(self.case.problem, float(t[k]), y[k]) > GROWN
+            for step, k in zip(steps[1:][longest].tolist(), begins, strict=True)
+        )
 
     def misfits(self, method: Method) -> bool:
         """Whether the absolute tolerance of the last run, by this method, was too loose, because

@@ -118,7 +118,8 @@ class Tried:
     seconds  wall time
     work     counted, in units of `cost`, by which methods are compared
     extent   (2, ny), the least and the greatest value of each state at the ends of steps
-    pace     (2, n): times, s, and the work done up to then
+    pace     (3, n): times, s, the work done up to then, and the longest step since the time
+             before, s
     """
 
     setting: Setting
@@ -248,7 +249,7 @@ class _Pace:
 
     spent  gives its work so far
     like   a run whose progress is expected of this one
-    marks  times, s, and the work done up to then
+    marks  times, s, the work done up to then, and the longest step since the one before, s
     """
 
     spent: Callable[[Tally], float]
@@ -256,16 +257,20 @@ class _Pace:
     due: float
     t_end: float
     like: Tried | None
-    marks: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
+    marks: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
+    last: float = 0.0
+    longest: float = 0.0
 
     def check(self, tally: Tally, t: float) -> None:
         """Record a step that ends at t. Raises `EndedRunError` to stop the run."""
+        self.last, self.longest = t, max(self.longest, t - self.last)
         marked = t >= self.marks[-1][0] + self.t_end / MARKS
         bounded = t < self.t_end and math.isfinite(self.most)
         if marked or bounded:
             work = self.spent(tally)
             if marked:
-                self.marks.append((t, work))
+                self.marks.append((t, work, self.longest))
+                self.longest = 0.0
             if bounded:
                 hopeless = work > SOON * self.most and work > SLOW * self.most * self._share(t)
                 if work > self.most or hopeless:
@@ -275,7 +280,7 @@ class _Pace:
 
     def made(self, work: float) -> FloatArray:
         """The progress of the whole run, which took the given `work`; see `Tried.pace`."""
-        return np.array([*self.marks, (self.t_end, work)]).T
+        return np.array([*self.marks, (self.t_end, work, self.longest)]).T
 
     def _share(self, t: float) -> float:
         return done(self.like, t, self.t_end)
