@@ -28,6 +28,8 @@ Job = tuple[int, np.ndarray]
 """The number of a chunk, and the values of its members."""
 PAUSE = 0.2
 """Time between two looks at how far the members are, s."""
+UNGUARDED = 'a script needs `if __name__ == "__main__":` around what starts workers'
+ENDED = f"a worker process ended unexpectedly: out of memory perhaps; {UNGUARDED}"
 GRACE = 2.0
 """Time that workers have to end when they are not wanted any more, s."""
 STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
@@ -75,7 +77,7 @@ def _alive() -> Iterator[None]:
         yield
     except (EOFError, OSError):
         time.sleep(PAUSE)  # a stop of all processes may come to the workers first
-        raise RunError("a worker process ended unexpectedly, out of memory perhaps") from None
+        raise RunError(ENDED) from None
 
 
 @contextmanager
@@ -89,7 +91,7 @@ def _team(count: int) -> Iterator[tuple[Counter, Mapping[Pipe, Any]]]:
             for _ in range(count):
                 here, there = start.Pipe()
                 process = start.Process(target=_work, args=(there, memory), daemon=True)
-                process.start()
+                _begin(process)
                 there.close()
                 team[here] = process
         yield counter, team
@@ -105,6 +107,18 @@ def _team(count: int) -> Iterator[tuple[Counter, Mapping[Pipe, Any]]]:
         finally:  # also if a second stop comes meanwhile
             for process in team.values():
                 process.kill()
+
+
+def _begin(process: Any) -> None:
+    """Start a process. Raises `RunError` in a script that starts workers while it is imported:
+    where processes are no copies, each imports the script, and would start its own.
+    """
+    try:
+        process.start()
+    except RuntimeError:  # this is such a process
+        raise RunError(UNGUARDED) from None
+    except (EOFError, ConnectionError):  # the one from which copies are made has ended
+        raise RunError(ENDED) from None
 
 
 def _start() -> BaseContext:
