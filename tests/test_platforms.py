@@ -18,7 +18,7 @@ from eomgen.cli import main
 from eomgen.errors import RunError
 from eomgen.native import compiler
 from eomgen.scene.importers.meshes import local
-from eomgen.sweep import storage
+from eomgen.sweep import processes, storage
 
 ROOT = Path(eomgen.__file__).parent.parent
 COMPATIBILITY = ROOT / "docs" / "compatibility.md"
@@ -53,7 +53,7 @@ def test_the_support_window_is_that_of_the_package() -> None:
     lowest = dict(text.split(">=") for text in project["dependencies"])
     lowest["python"] = project["requires-python"].removeprefix(">=")
     page = COMPATIBILITY.read_text("utf-8")
-    stated = dict(re.findall(r"^\| (\S+) \| (\d\S*) \|", page, re.MULTILINE))
+    stated = dict(re.findall(r"^\| (\S+) \| (\d\S*) \|$", page, re.MULTILINE))
     assert {name.lower(): version for name, version in stated.items()} == lowest
     ran = set(re.findall(r"^\| (3\.\d+)\.\d+ \|.*\| ran", page, re.MULTILINE))
     said = {c.rpartition(" ")[2] for c in project["classifiers"] if "Python :: 3." in c}
@@ -127,9 +127,22 @@ def test_a_script_without_its_guard_is_told_so(tmp_path: Path) -> None:
     assert done.stderr.rstrip().splitlines()[-1].endswith("around what starts workers")
 
 
+def test_where_no_process_can_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a browser: one line, and one worker runs all members."""
+    members = {"theta": [0.0, 1.0]}
+    for name in ("_multiprocessing", "multiprocessing.synchronize"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with (
+        pytest.raises(RunError, match=r"^this Python cannot start processes; give workers=1$"),
+        processes._team(2),
+    ):
+        pass
+    assert eomgen.ensemble("pendulum", members, t_end=0.1, backend="numpy").finished.all()
+
+
 def run(code: str | Path, folder: Path) -> "subprocess.CompletedProcess[str]":
-    """A process of Python in a folder, with a store of its own."""
-    env = {**os.environ, "PYTHONPATH": str(ROOT), "EOMGEN_CACHE": str(folder / "store")}
+    """A process of Python in a folder."""
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, *(["-c", code] if isinstance(code, str) else [code])]
     return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, timeout=120)
 

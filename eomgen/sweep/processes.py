@@ -84,7 +84,10 @@ def _alive() -> Iterator[None]:
 def _team(count: int) -> Iterator[tuple[Counter, Mapping[Pipe, Any]]]:
     """A counter, and processes by the pipes to them, which have ended when it is left."""
     start: Any = _start()
-    memory = start.Array("q", SIZE)
+    try:
+        memory = start.Array("q", SIZE)
+    except ImportError:  # in a browser
+        raise RunError("this Python cannot start processes; give workers=1") from None
     counter, team = Counter(memory.get_obj(), memory.get_lock()), dict[Pipe, Any]()
     try:
         with _held():
