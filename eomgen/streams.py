@@ -41,7 +41,8 @@ class Steady(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        self._try(self._stream.flush)
+        if not self._stream.closed:  # by whoever made it; an object that is finalised flushes
+            self._try(self._stream.flush)
 
     def isatty(self) -> bool:
         return self._stream.isatty()

@@ -365,7 +365,7 @@ def test_which_compiler_is_taken(fresh: Path, monkeypatch: pytest.MonkeyPatch) -
     for chosen in ("/nowhere/cc", "false", "'"):
         monkeypatch.setenv("CC", chosen)
         with pytest.raises(
-            RunError, match=r"^CC: '.*' does not run; name a C compiler or unset it$"
+            RunError, match=r"^CC: '.*' does not run; name gcc or clang, or unset it$"
         ):
             compiler.find_compiler()
     monkeypatch.delenv("CC")

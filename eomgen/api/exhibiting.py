@@ -59,7 +59,7 @@ def gallery(
 def chosen_scenes(sources: Iterable[Source]) -> tuple[Scene, ...]:
     """The scenes, read. Raises `SceneError`, or `RunError` for two of the same name."""
     scenes = tuple(map(read, sources))
-    names = [scene.name for scene in scenes]
+    names = [scene.name.casefold() for scene in scenes]  # as some file systems compare them
     for name in names:
         if names.count(name) > 1:
             raise RunError(f"gallery: two scenes are named '{name}'; rename or leave out one")

@@ -54,9 +54,10 @@ def _generate(scene: str, given: Arguments, paths: dict[Path, str]) -> bool:
     """Write or check a scene's module and add its file to `paths`; return whether it is fresh."""
     model, name = read_model(scene, given)
     path = given.output / f"{name}{check_backend(given.backend)}"
-    if path in paths:
-        raise RunError(f"{path}: would be written for {paths[path]} and for {scene}; rename one")
-    paths[path] = scene
+    one = Path(str(path).casefold())  # file systems of macOS and Windows take A and a for the same
+    if one in paths:
+        raise RunError(f"{path}: would be written for {paths[one]} and for {scene}; rename one")
+    paths[one] = scene
     if not given.check:
         check_folder(given.output)
         check_writable(path, force=given.force)

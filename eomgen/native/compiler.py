@@ -32,6 +32,10 @@ ABSENT = (
     "no C compiler was found; install gcc or clang, name one in CC, or run: "
     "pip install 'eomgen[compiled]'"
 )
+FOR_MSVC = (
+    "compiles for MSVC, where a library shows no functions unless each is marked; name a compiler "
+    "of MinGW, or unset CC and run: pip install 'eomgen[compiled]'"
+)
 LONGEST = 600.0
 """Longest time of a compilation, s."""
 
@@ -85,7 +89,8 @@ class Compiler:
 def find_compiler() -> Compiler:
     """The first compiler found of `$CC`, cc, gcc, clang and the package `ziglang`.
 
-    Raises `RunError` if there is none, or if the one in `$CC` does not run.
+    It takes arguments as gcc does: cl is none, and clang only where it does not compile for MSVC.
+    Raises `RunError` if there is none, or if the one in `$CC` does not run or is no such one.
     """
     return _found(os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
@@ -94,22 +99,41 @@ def find_compiler() -> Compiler:
 def _found(chosen: str, path: str) -> Compiler:
     if chosen.strip():
         try:
-            return _asked(tuple(shlex.split(chosen)))
+            return _asked(words(chosen))
         except (OSError, ValueError, subprocess.SubprocessError):
-            raise RunError(f"CC: '{chosen}' does not run; name a C compiler or unset it") from None
+            raise RunError(f"CC: '{chosen}' does not run; name gcc or clang, or unset it") from None
     commands = [(found,) for name in KNOWN if (found := shutil.which(name, path=path))]
     zig = (sys.executable, "-m", "ziglang", "cc")
     for command in (*commands, *([zig] if importlib.util.find_spec("ziglang") else [])):
-        with suppress(OSError, subprocess.SubprocessError):
+        with suppress(OSError, RunError, subprocess.SubprocessError):
             return _asked(command)
     raise RunError(ABSENT)
 
 
+def words(command: str, system: str = os.name) -> tuple[str, ...]:
+    r"""The program and arguments of a command as shells of a system take them: on Windows a \
+    separates folders. Raises `ValueError` if a quotation mark has no end.
+    """
+    if system != "nt":
+        return tuple(shlex.split(command))
+    return tuple(word.strip("\"'") for word in shlex.split(command, posix=False))
+
+
 def _asked(command: tuple[str, ...]) -> Compiler:
+    """A compiler by its command. Raises `RunError` if it compiles for MSVC, and what
+    `subprocess.run` raises.
+    """
     done = subprocess.run(
-        [*command, "--version"], capture_output=True, text=True, timeout=60, check=True
+        [*command, "--version"],
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=60,
+        check=True,
     )
     version, processor = done.stdout.strip(), _processor()
+    if "windows-msvc" in version:
+        raise RunError(f"{shlex.join(command)}: {FOR_MSVC}")
     gcc = "Free Software Foundation" in version
     ordering = ORDERED if gcc else ()
     tuning: tuple[str, ...] = ()
@@ -118,7 +142,8 @@ def _asked(command: tuple[str, ...]) -> Compiler:
             tuning = (*TUNING, *ordering, NOT_JOINED)
         elif "clang" in version:
             tuning = TUNING
-    about = f"{version} {platform.machine()} {sys.platform} {processor}"
+    known = processor or platform.processor()  # on Windows a family and model
+    about = f"{version} {platform.machine()} {sys.platform} {known}"
     return Compiler(command, about, tuning, ordering)
 
 

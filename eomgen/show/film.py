@@ -257,7 +257,7 @@ def _mp4(
                     process.stdin.write(picture.tobytes())
                 process.stdin.close()
                 code = process.wait()
-            except BrokenPipeError:
+            except OSError:  # it has ended: a broken pipe or, on Windows, an invalid argument
                 code = process.wait() or 1
             finally:
                 process.kill()

@@ -28,6 +28,8 @@ Job = tuple[int, np.ndarray]
 """The number of a chunk, and the values of its members."""
 PAUSE = 0.2
 """Time between two looks at how far the members are, s."""
+UNGUARDED = 'a script needs `if __name__ == "__main__":` around what starts workers'
+ENDED = f"a worker process ended unexpectedly: out of memory perhaps; {UNGUARDED}"
 GRACE = 2.0
 """Time that workers have to end when they are not wanted any more, s."""
 STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
@@ -75,21 +77,24 @@ def _alive() -> Iterator[None]:
         yield
     except (EOFError, OSError):
         time.sleep(PAUSE)  # a stop of all processes may come to the workers first
-        raise RunError("a worker process ended unexpectedly, out of memory perhaps") from None
+        raise RunError(ENDED) from None
 
 
 @contextmanager
 def _team(count: int) -> Iterator[tuple[Counter, Mapping[Pipe, Any]]]:
     """A counter, and processes by the pipes to them, which have ended when it is left."""
     start: Any = _start()
-    memory = start.Array("q", SIZE)
+    try:
+        memory = start.Array("q", SIZE)
+    except ImportError:  # in a browser
+        raise RunError("this Python cannot start processes; give workers=1") from None
     counter, team = Counter(memory.get_obj(), memory.get_lock()), dict[Pipe, Any]()
     try:
         with _held():
             for _ in range(count):
                 here, there = start.Pipe()
                 process = start.Process(target=_work, args=(there, memory), daemon=True)
-                process.start()
+                _begin(process)
                 there.close()
                 team[here] = process
         yield counter, team
@@ -105,6 +110,18 @@ def _team(count: int) -> Iterator[tuple[Counter, Mapping[Pipe, Any]]]:
         finally:  # also if a second stop comes meanwhile
             for process in team.values():
                 process.kill()
+
+
+def _begin(process: Any) -> None:
+    """Start a process. Raises `RunError` in a script that starts workers while it is imported:
+    where processes are no copies, each imports the script, and would start its own.
+    """
+    try:
+        process.start()
+    except RuntimeError:  # this is such a process
+        raise RunError(UNGUARDED) from None
+    except (EOFError, ConnectionError):  # the one from which copies are made has ended
+        raise RunError(ENDED) from None
 
 
 def _start() -> BaseContext:

@@ -13,12 +13,12 @@ import json
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.lib import format as npy
@@ -258,15 +258,14 @@ def _check_same(folder: Path, about: Mapping[str, Any]) -> None:
 @contextmanager
 def _alone(path: Path) -> Iterator[None]:
     """Hold a lock on a file, where the system has locks, which end with the process."""
-    try:
-        locks: Any = import_module("fcntl")
-    except ImportError:
+    take = _lock()
+    if take is None:
         yield
         return
     with open_kept(path) as file:
         try:
-            locks.flock(file, locks.LOCK_EX | locks.LOCK_NB)
-        except BlockingIOError:
+            take(file)
+        except (BlockingIOError, PermissionError):  # of POSIX, of Windows
             raise RunError(
                 f"{path.parent}: another process runs this sweep; wait until it ends, or choose "
                 "another folder with -o"
@@ -276,6 +275,22 @@ def _alone(path: Path) -> Iterator[None]:
         yield
 
 
+def _lock() -> Callable[[BinaryIO], object] | None:
+    """What locks an open file or raises at once; None if this system has no locks."""
+    with suppress(ImportError):
+        posix: Any = import_module("fcntl")
+        return lambda file: posix.flock(file, posix.LOCK_EX | posix.LOCK_NB)
+    with suppress(ImportError):
+        windows: Any = import_module("msvcrt")
+
+        def beyond_the_end(file: BinaryIO) -> None:  # others could not read a byte that is locked
+            file.seek(LARGEST)
+            windows.locking(file.fileno(), windows.LK_NBLCK, 1)
+
+        return beyond_the_end
+    return None
+
+
 def _resize(handle: int, size: int) -> None:
     """Make a file so long, with space on the disk for it where the system can reserve some."""
     now = os.fstat(handle).st_size
@@ -283,7 +298,7 @@ def _resize(handle: int, size: int) -> None:
     if now < size and reserve is not None:
         reserve(handle, 0, size)
     elif now != size:
-        os.truncate(handle, size)
+        os.ftruncate(handle, size)
 
 
 def _words(size: int) -> str:

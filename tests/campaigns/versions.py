@@ -1,13 +1,14 @@
 """Does the main job run with the oldest versions that pyproject.toml allows, and on the newest
 Python there is?
 
-    python tests/campaigns/versions.py [oldest] [newest]
+    python tests/campaigns/versions.py [oldest] [newest] [3.N ...]
 
-Both unless one is named. Each makes a virtual environment of its own, installs this folder, and
-there generates, simulates and verifies a few scenes and runs a small part of the tests. `oldest`:
-the lowest version of each dependency as pyproject.toml has it, on the lowest Python. `newest`: what
-the package index has, on the highest Python found here, which it names. Where Python or the index
-is missing it says NOT CHECKED and why, and counts as no failure; all else that goes wrong does.
+The first two unless some are named. Each makes a virtual environment of its own, installs this
+folder, and there generates, simulates and verifies a few scenes and runs a small part of the tests.
+`oldest`: the lowest version of each dependency as pyproject.toml has it, on the lowest Python.
+`newest`: what the package index has, on the highest Python found here, which it names. `3.14`: the
+same on that Python. Where Python or the index is missing it says NOT CHECKED and why, and counts as
+no failure; all else that goes wrong does. docs/compatibility.md has what was found.
 """
 
 import os
@@ -22,6 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent.parent
 SCENES = ("pendulum", "two_body", "tumbling_body", "bouncing_two_body")
 METHODS = ("LSODA", "Radau", "DOP853", "gragg_bulirsch_stoer", "gauss_6")
+SHOWN = ("numpy", "scipy", "sympy", "mpmath", "gmpy2", "pydantic", "matplotlib")
 TESTS = ("formula", "trajectory", "small_faults")
 RUNNERS = ("pytest", "pytest-xdist")
 """What these tests need of the packages for tests."""
@@ -52,15 +54,15 @@ def lowest(requirements: Sequence[str]) -> list[str]:
 
 
 def chosen(which: str) -> tuple[Path | None, str, list[str]]:
-    """The Python of one of the two checks, its version, and the packages with their versions."""
+    """The Python of one of the checks, its version, and the packages with their versions."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     tests = [
         text for text in project["optional-dependencies"]["test"] if text.split(">=")[0] in RUNNERS
     ]
     there = pythons()
-    if which == "newest":
-        version = max(there)
-        return there[version], f"3.{version[1]}", [t.split(">=")[0] for t in tests]
+    if which != "oldest":
+        version = max(there) if which == "newest" else (3, int(which.removeprefix("3.")))
+        return there.get(version), f"3.{version[1]}", [t.split(">=")[0] for t in tests]
     match = re.fullmatch(r">=3\.(\d+)", project["requires-python"])
     assert match is not None, project["requires-python"]
     packages = lowest([*project["dependencies"], *tests])
@@ -82,6 +84,9 @@ def check(which: str, work: Path) -> bool:
         print(f"NOT CHECKED: no package index: {index.stderr.strip().splitlines()[-1]}")
         return True
     subprocess.run([*install, *packages, ROOT], check=True, stderr=subprocess.DEVNULL)
+    code = "import sys, importlib.metadata as m; print(sys.version.split()[0], "
+    code += f"*(name + ' ' + m.version(name) for name in {SHOWN}), sep=', ')"
+    subprocess.run([own / "python", "-c", code], check=True)
     return all([main_job(own, work), small_tests(own, work)])
 
 
@@ -109,7 +114,7 @@ def small_tests(own: Path, work: Path) -> bool:
     Matplotlib of pyparsing for example, is no fault of this program.
     """
     quiet = ["-n", "2", "-W", "ignore::DeprecationWarning"]
-    files = [str(ROOT / "tests" / f"test_{name}.py") for name in TESTS]
+    files = [str(p) for name in TESTS for p in (ROOT / "tests").rglob(f"test_{name}.py")]
     done = run([own / "python", "-m", "pytest", "-p", "no:cacheprovider", *quiet, *files], work)
     print(f"{'ok' if done else 'FAILED'}  pytest {' '.join(TESTS)}", flush=True)
     return done
@@ -128,7 +133,7 @@ def run(command: Sequence[str | Path], work: Path) -> bool:
 def main() -> int:
     """All that is asked for; 1 if any failed."""
     wanted = sys.argv[1:] or ["oldest", "newest"]
-    if not set(wanted) <= {"oldest", "newest"}:
+    if not all(re.fullmatch(r"oldest|newest|3\.\d+", which) for which in wanted):
         print(__doc__)
         return 2
     good = True

@@ -3,6 +3,7 @@
 Only files in the robot file's own folder and in allowed folders are read, and none from a network.
 """
 
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,6 +36,7 @@ class Bounds:
 
 
 ABSENT, OUTSIDE = "is not there", "is outside of the file's folder"
+_DRIVE = re.compile(r"/+[A-Za-z]:")
 ELSEWHERE = (ABSENT, OUTSIDE)
 """Reasons that another folder would help against."""
 
@@ -56,7 +58,7 @@ def find_file(name: str, folders: Sequence[Path]) -> Path:
         rest = unquote(parts.path).lstrip("/")
         tried = [folder / way for folder in folders for way in (f"{parts.netloc}/{rest}", rest)]
     elif parts.scheme in ("", "file"):
-        tried = [folder / unquote(parts.path) for folder in folders]
+        tried = [folder / local(unquote(parts.path)) for folder in folders]
     else:
         raise MeshError("is not a file")
     for path in tried:
@@ -68,6 +70,11 @@ def find_file(name: str, folders: Sequence[Path]) -> Path:
         except (OSError, ValueError):
             continue
     raise MeshError(ABSENT)
+
+
+def local(path: str, system: str = os.name) -> str:
+    """The path of an address `file:` on a system: of Windows, C:/x.stl for /C:/x.stl."""
+    return path.lstrip("/") if system == "nt" and _DRIVE.match(path) else path
 
 
 def bounds_of(path: Path) -> Bounds:
