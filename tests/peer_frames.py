@@ -20,7 +20,7 @@ def stand_in(model: Model) -> Any:
     coordinates and velocities, and then other states, whose rates are not computed.
     """
     joints = [c.name for c in (*model.coordinates, *model.velocities)]
-    start = [*model.initial_q, *model.initial_v, *(state.initial for state in model.states)]
+    start = [*model.initial_q, *model.initial_v, *(state.initial for state in model.extra)]
     first, last = len(model.coordinates), len(joints)
     route = "aba" if model.rows else "orthogonal"
 
@@ -29,7 +29,7 @@ def stand_in(model: Model) -> Any:
         return np.array([*np.full(first, np.nan), *d.forward(route)(None), *y[last:] * np.nan])
 
     return SimpleNamespace(
-        STATES=(*joints, *(state.name for state in model.states)),
+        STATES=(*joints, *(state.name for state in model.extra)),
         PARAMETERS=model.defaults,
         initial_state=lambda: np.array(start),
         derivative=derivative,

@@ -130,7 +130,7 @@ URDF_MISTAKES = (
     ('joint name="elbow"', f'joint name="{"e" * 9999}"', ""),
     ('joint name="elbow"', 'joint name="shoulder_dot"', ""),
     ('type="continuous"', "", "<joint> has no type; give it"),
-    ('type="continuous"', 'type="hinge"', "unknown type 'hinge'; known: revolute"),
+    ('type="continuous"', 'type="hinge"', "unknown type 'hinge' (did you mean 'revolute'?)"),
     ('type="continuous"', 'type="revolut"', "unknown type 'revolut' (did you mean 'revolute'?)"),
     ('type="continuous"', 'type="fixed"', ""),
     ('type="continuous"', 'type="floating"', ""),

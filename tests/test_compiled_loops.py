@@ -112,9 +112,9 @@ def test_the_bits_are_those_of_python(
 @pytest.mark.parametrize("options", [RK4, DOP853])
 def test_change_points_are_passed_alike(options: dict[str, Any], compiled_steps: list[int]) -> None:
     """At the change point of a parallelogram."""
-    lengths = {"a": 0.5, "b": 0.7, "c": 0.5, "d": 0.7}
-    start = {"theta": 1.0, "psi": 1.0, "phi": -1.0, "theta_dot": 6.0}
-    compiled, python = both(BAR, t_end=0.7, parameters=lengths, state=start, **options)
+    start = "q = { theta = 1.0, psi = 1.0, phi = -1.0 }\nv = { theta_dot = 6.0 }"
+    bar = four_bar((0.5, 0.7, 0.5, 0.7), start, route=TREE)
+    compiled, python = both(bar, t_end=0.7, **options)
     assert_all_same(compiled, python)
     assert "went through 2 change points" in python.message
     assert sum(compiled_steps) > 0
@@ -134,9 +134,9 @@ def test_small_minima_are_left_to_python(
         usual(held, start, last, advance)
 
     monkeypatch.setattr(singular, "_search", noted)
-    near = {"a": 0.45, "d": 0.9499}
-    start = {"theta": 1.0, "theta_dot": 8.0}
-    compiled, python = both(BAR, t_end=1.0, parameters=near, state=start, **RK4)
+    start = "q = { theta = 1.0 }\nv = { theta_dot = 8.0 }"
+    bar = four_bar((0.45, 0.8, 0.6, 0.9499), start, route=TREE)
+    compiled, python = both(bar, t_end=1.0, **RK4)
     assert_all_same(compiled, python)
     half = len(searched) // 2
     assert half == 2 and searched[:half] == searched[half:]

@@ -12,7 +12,7 @@ from campaign import some
 import eomgen
 from eomgen.errors import RunError
 from eomgen.study.verification.states import random_state
-from eomgen.sweep import execute
+from eomgen.sweep import processes
 
 jnp = jax.numpy
 SCENES = ("two_body_forced", "tumbling_body", "human_figure")
@@ -205,4 +205,4 @@ def test_without_jax_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_sweep_beside_jax_copies_no_threads() -> None:
     """A process in which JAX runs is not forked: its threads would be missing in the copy."""
-    assert execute._start().get_start_method() == "spawn"
+    assert processes._start().get_start_method() == "spawn"

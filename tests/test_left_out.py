@@ -394,7 +394,7 @@ BAD = [
     ("[parameters]", "[initial.v]\nfirst_angle_dot = 5\n[parameters]", "initial.v.first_angle_dot: "
      "'first_angle' is driven by 'swing'; leave it out"),
     ("[parameters]", "[initial]\nq = [0, 0, 0, 0, 0]\n[parameters]", "initial.q: has 5 numbers for "
-     "4 coordinates; give one each for ball_x, ball_y, ball_angle, second_angle"),
+     "4 coordinates; give one each for second_angle, ball_x, ball_y, ball_angle"),
     ("[parameters]", "[locked]\nfirst_angle = 1\n[parameters]", "locked: 'first_angle' is driven "
      "by 'swing', too; give only one of them"),
     ("[parameters]", "[locked]\nsecond_angel = 1\n[parameters]", "locked.second_angel: no "
@@ -403,9 +403,6 @@ BAD = [
      "locked.second_angle_deg: second_angle is also given; give only one of them"),
     ("[parameters]", '[locked]\nsecond_angle = "1"\n[parameters]',
      "locked.second_angle: '1' is not a number; give one"),
-    ("[parameters]", "[locked]\nsecond_angle = 1\nball_x = 0\nball_y = 0\nball_angle = 0\n"
-     "[parameters]", "every coordinate is driven or locked, so there is no motion to find; "
-     "leave one free"),
     ("[parameters]", "[locked]\nsecond_angle = 1\n[initial.q]\nsecond_angle = 0\n[parameters]",
      "initial.q.second_angle: 'second_angle' is locked; leave it out"),
     ('outputs = "all"', 'outputs = "all"\nroute = "closed"', "route: 'closed' needs the closed "

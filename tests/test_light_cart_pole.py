@@ -57,8 +57,10 @@ def test_exact_motion() -> None:
 
 
 def test_closed_form_has_no_floor(tightest: Any) -> None:
-    """The benchmark asks for 1e-6 and the closed form came to 9.1e-12, by the same count."""
-    assert cart.error(tightest.y) < 2e-11
+    """The benchmark asks for 1e-6 and the closed form came to 9.1e-12, by the same count. Sums of
+    SciPy's steps are rounded otherwise on other processors: 2.7e-11 was seen.
+    """
+    assert cart.error(tightest.y) < 1e-10
     rows = np.rint(ROWS[:, 0] * 100).astype(int)
     np.testing.assert_allclose(tightest.y[:2, rows], ROWS[:, 1:].T, rtol=0, atol=1e-10)
 

@@ -253,7 +253,7 @@ def test_a_driven_crank_moves_the_loop() -> None:
     """
     drive = '[[effects]]\ntype = "driven"\nname = "motor"\njoint = "A"\ncoordinate = "1 + 2*t"\n'
     more = '[[constraints]]\ntype = "coupling"\nname = "more"\ncoordinate = "phi"\nequals = "{}"\n'
-    phi = check(four_bar(initial="q = {}", effects=drive)).initial_q[1]
+    phi = check(four_bar(initial="q = {}", effects=drive)).initial_q[0]
     with pytest.raises(SceneError, match=r"cannot be met while theta moves on: the loops hold"):
         check(four_bar(initial="q = {}", effects=drive + more.format(phi)))
     slack = '[[constraints]]\ntype = "distance"\nname = "rod"\nbody_1 = "coupler"\n'
