@@ -111,6 +111,7 @@ def test_a_sweep_is_locked_by_windows_too(tmp_path: Path, monkeypatch: pytest.Mo
             pass
 
 
+@pytest.mark.full
 def test_what_windows_lacks_is_done_without(tmp_path: Path) -> None:
     """No flags and calls of POSIX, no locks, and processes that are no copies."""
     done = run(LACKING, tmp_path)
