@@ -88,10 +88,14 @@ def forward_ulps(there: Sequence[Judged], route: str, model: Model) -> FloatArra
 
 
 def in_ulps(deviations: FloatArray, there: Sequence[Judged], model: Model) -> FloatArray:
-    """The deviations (n, nv) of v̇ in ulps (see `ulps`), (n,); infinite if one is not finite."""
+    """The deviations (n, nv) of v̇ in ulps (see `ulps`), (n,); infinite if one is not finite. A
+    group counts at least what its terms would give: in free fall, a hinge has no acceleration.
+    """
     true = np.array([one.vd for one in there]).T
+    terms = np.array([one.terms for one in there])
     errors = np.zeros(len(there))
     for group, scale in group_scales(true, [c.unit for c in model.velocities]):
+        scale = np.maximum(scale, np.max(terms[:, group], axis=1))
         apart = np.max(np.abs(deviations[:, group]), axis=1)
         with np.errstate(all="ignore"):
             parts = np.where(apart == 0.0, 0.0, apart / np.spacing(scale))

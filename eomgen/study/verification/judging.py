@@ -47,6 +47,8 @@ class Judged:
     """The results at a state.
 
     vd         v̇ (nv,), exact but for rounding to doubles
+    terms      sizes (nv,) of the terms of M v̇ = F - h + Jᵀ λ, each row over its own inertia: what
+               may cancel in v̇, without the condition of M
     errors     by route, the error of its v̇ (nv,), nan where it is not finite
     data       change of v̇ (nv,) by one ulp in the data
     agreed     digits to which articulated bodies and virtual work agree, in 60 digits
@@ -61,6 +63,7 @@ class Judged:
 
     state: State
     vd: FloatArray
+    terms: FloatArray
     errors: Mapping[str, FloatArray]
     data: FloatArray
     agreed: float
@@ -118,6 +121,7 @@ def judged(
         return Judged(
             state,
             doubles(exact),
+            doubles(_load_sizes(free) / np.diag(free.mass_matrix)),
             errors,
             doubles(data),
             agreed,
