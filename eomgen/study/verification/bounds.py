@@ -45,7 +45,7 @@ SOLVING = 10.0
 """Ulps, times condition number and number of velocities, allowed in a solution with M."""
 SLOPES = 1e-8 * 2.0**52
 """Error allowed in the Jacobian, ulps."""
-PART = 30.0
+PART = 8.0
 """Error allowed in a component, in units of its spread in random arithmetic."""
 SPREADS = "in spreads by rounding"
 AGREED = 14.0
@@ -244,6 +244,16 @@ def law_checks(model: Model, laws: Sequence[Broken]) -> list[Check]:
             unit, words = ("", SPREADS) if bound == PART else ("ulp", "")
             checks.append(Check(what, value, bound, unit, words, law.state.label))
     return checks
+
+
+def slope_checks(slopes: Mapping[str, float | None]) -> list[Check]:
+    """The Jacobian's worst entry, of those at some states, by their labels."""
+    found = [(value, label) for label, value in slopes.items() if value is not None]
+    if not found:
+        return []
+    # nan counts as the worst.
+    value, label = max(found, key=lambda pair: (pair[0] != pair[0], pair[0]))
+    return [Check("jacobian, each entry", value, PART, "", SPREADS, label)]
 
 
 def drift_checks(ran: Drift) -> list[Check]:

@@ -15,7 +15,15 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.extended import NOTHING, Array, doubles, extended, extended_digits, solved
+from eomgen.precision.extended import (
+    NOTHING,
+    Array,
+    doubles,
+    extended,
+    extended_digits,
+    of_unit_length,
+    solved,
+)
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.scene.effects import Gravity
@@ -92,10 +100,8 @@ def judged(
     rng = np.random.default_rng(len(state.label))
     with extended_digits():
         exact = _vd(truth, state, {})
-        whole = extended(state.y)
-        for indices in map(list, model.quaternions):
-            # Formulas of a rotation differ if rounding has changed the length of a quaternion.
-            whole[indices] = whole[indices] / _root(whole[indices] @ whole[indices])
+        # Formulas of a rotation differ if rounding has changed the length of a quaternion.
+        whole = of_unit_length(extended(state.y), model.quaternions)
         free = FreeBodies(model, state.t, whole, state.u)
         numbers = whole, state.u, dict(model.defaults)
         changed = [[_changed(x, rng) for x in numbers] for _ in range(NEAR)]
