@@ -20,10 +20,13 @@ from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
 from eomgen.precision.extended import doubles, extended, extended_digits
+from eomgen.run.failure import EndedRunError
+from eomgen.run.integrate import integrate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.scene.schema import Simulation
 from eomgen.store import generated_code, interfaced_program_of
+from eomgen.study.diagnosis import problem_of
 from eomgen.study.verification import drift as drifting
 from eomgen.study.verification import horizon as horizons
 from eomgen.study.verification import sampled as sampling
@@ -652,3 +655,20 @@ def test_an_acceleration_of_nothing_is_no_loss(monkeypatch: pytest.MonkeyPatch) 
     assert not found.missed
     still = next(one for one in found.judged if one.state.kind == "still")
     assert abs(still.vd[-1]) < 1e-30
+
+
+def test_a_run_of_a_mechanism_that_is_ended_is_not_called_singular() -> None:
+    """Nor is a way through a change point sought."""
+    model, wanted = assembled(elaborate(read("rattleback"))), read("rattleback").simulation
+    module: Any = load_module(generated_code(model).module, "ended")
+    problem, times = problem_of(module, model=model), list[float]()
+
+    def derivative(t: float, y: np.ndarray) -> np.ndarray:
+        times.append(t)
+        if len(times) > 40:
+            raise EndedRunError("enough")
+        return problem.derivative(t, y)
+
+    run = integrate(replace(problem, derivative=derivative), "DOP853", wanted.t_end)
+    assert (run.outcome.kind, run.outcome.reason) == ("ended", "enough")
+    assert max(times) <= wanted.t_end

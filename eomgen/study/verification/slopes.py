@@ -11,14 +11,7 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.extended import (
-    NOTHING,
-    Array,
-    doubles,
-    extended,
-    extended_digits,
-    of_unit_length,
-)
+from eomgen.precision.extended import Array, doubles, extended, extended_digits, of_unit_length
 from eomgen.run.problem import FloatArray
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
@@ -29,6 +22,9 @@ STEP = mpfr(2) ** -66
 """Step of central differences, for rates of order 1; their error is its square, about 1e-40."""
 SMOOTH = 1e-9
 """Greatest second difference, relative to the first difference, if there is no corner."""
+
+LEFT = 1e-17
+"""What differences leave where a slope bends, as that of |v| v at 0, of the greatest entry."""
 
 
 def worst_slope(
@@ -48,14 +44,13 @@ def worst_slope(
         return float("inf")
     here = dict(zip(names_of(model), state.y.tolist(), strict=True))
     runs = roundings.runs("jacobian", state.t, here, state.u)[at]
-    worst = 0.0
+    worst, rest = 0.0, LEFT * np.max(abs(given), initial=0.0)
     with extended_digits():
         y = of_unit_length(extended(state.y), model.quaternions)
         for direction, true in _slopes(model, truth, state, y):
             along = doubles(direction)
             error = doubles(extended(given) @ direction - true)
             terms = abs(given) @ abs(along)
-            rest = NOTHING * np.max(terms + abs(doubles(true)), initial=0.0)
             spreads: FloatArray = spread(np.tensordot(runs, along, (1, 0)))
             worst = max(worst, worst_share(error, spreads + ULP * terms + rest)[0])
     return worst
