@@ -658,7 +658,7 @@ def test_an_acceleration_of_nothing_is_no_loss(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_run_of_a_mechanism_that_is_ended_is_not_called_singular() -> None:
-    """Nor is a way through a change point sought."""
+    """No way through a change point is sought, which would call the derivative again."""
     model, wanted = assembled(elaborate(read("rattleback"))), read("rattleback").simulation
     module: Any = load_module(generated_code(model).module, "ended")
     problem, times = problem_of(module, model=model), list[float]()
@@ -671,4 +671,4 @@ def test_a_run_of_a_mechanism_that_is_ended_is_not_called_singular() -> None:
 
     run = integrate(replace(problem, derivative=derivative), "DOP853", wanted.t_end)
     assert (run.outcome.kind, run.outcome.reason) == ("ended", "enough")
-    assert max(times) <= wanted.t_end
+    assert len(times) <= 42
