@@ -20,10 +20,13 @@ from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
 from eomgen.precision.extended import doubles, extended, extended_digits
+from eomgen.run.failure import EndedRunError
+from eomgen.run.integrate import integrate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.scene.schema import Simulation
 from eomgen.store import generated_code, interfaced_program_of
+from eomgen.study.diagnosis import problem_of
 from eomgen.study.verification import drift as drifting
 from eomgen.study.verification import horizon as horizons
 from eomgen.study.verification import sampled as sampling
@@ -604,10 +607,16 @@ def test_an_interrupt_keeps_the_states_judged_so_far(
 
 
 @pytest.mark.parametrize(
-    ("output", "size", "line"),
-    [("mass_matrix", 5e-14, "each component"), ("jacobian", 1e-12, "jacobian, each row")],
+    ("output", "entry", "size", "lines"),
+    [
+        ("mass_matrix", (-1, 1), 3e-14, ["each component"]),
+        ("jacobian", (-1, 1), 1e-12, ["jacobian, each row", "jacobian, each entry"]),
+        ("jacobian", (-1, 3), 3e-14, ["jacobian, each entry"]),  # beside a greater one in its row
+    ],
 )
-def test_a_small_fault_in_a_component_is_noticed(output: str, size: float, line: str) -> None:
+def test_a_small_fault_in_a_component_is_noticed(
+    output: str, entry: tuple[int, int], size: float, lines: list[str]
+) -> None:
     """By what rounding makes of it; the bounds of whole outputs let it pass."""
     model = replace(model_of("furuta_pendulum"), outputs=in_order(OUTPUTS))
     module: Any = load_module(generated_code(model).module, "small_fault")
@@ -615,9 +624,51 @@ def test_a_small_fault_in_a_component_is_noticed(output: str, size: float, line:
 
     def wrong(*given: Any) -> Any:
         found = right(*given)
-        found[-1, 1] *= 1 + size
+        found[entry] *= 1 + size
         return found
 
     setattr(module, output, wrong)
     found = verify(model, Simulation(t_end=0.1), states=1, module=module)
-    assert [one.what for one in found.missed] == [line]
+    assert [one.what for one in found.missed] == lines
+
+
+FALLING = """
+name = "falling"
+bodies = [
+    { name = "frame", mass = 1, inertia_com = 0 },
+    { name = "hull", mass = 3, inertia_com = 0.7 },
+    { name = "mast", mass = 0.3, inertia_com = 0.025 },
+]
+effects = [{ type = "gravity", g = 9.81 }]
+joints = [
+    { name = "sway", type = "prismatic", parent = "world", child = "frame", axis = [1, 0] },
+    { name = "heave", type = "prismatic", parent = "frame", child = "hull", axis = [0, 1] },
+    { name = "pin", type = "revolute", parent = "hull", child = "mast", r_parent = [0, 0.37], r_child = [0, -0.53] },
+]
+"""  # noqa: E501
+
+
+def test_an_acceleration_of_nothing_is_no_loss(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In free fall a hinge at rest does not turn: all its terms cancel, whatever the data."""
+    monkeypatch.setattr("eomgen.study.verification.verify.compiled", lambda *_, **__: ({}, {}))
+    found = verify(model_of(FALLING), Simulation(t_end=0.1), states=1)
+    assert not found.missed
+    still = next(one for one in found.judged if one.state.kind == "still")
+    assert abs(still.vd[-1]) < 1e-30
+
+
+def test_a_run_of_a_mechanism_that_is_ended_is_not_called_singular() -> None:
+    """No way through a change point is sought, which would call the derivative again."""
+    model, wanted = assembled(elaborate(read("rattleback"))), read("rattleback").simulation
+    module: Any = load_module(generated_code(model).module, "ended")
+    problem, times = problem_of(module, model=model), list[float]()
+
+    def derivative(t: float, y: np.ndarray) -> np.ndarray:
+        times.append(t)
+        if len(times) > 40:
+            raise EndedRunError("enough")
+        return problem.derivative(t, y)
+
+    run = integrate(replace(problem, derivative=derivative), "DOP853", wanted.t_end)
+    assert (run.outcome.kind, run.outcome.reason) == ("ended", "enough")
+    assert len(times) <= 42

@@ -1,6 +1,6 @@
 """Numbers of 60 digits, by MPFR, and arrays of them: the reference for doubles."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -43,6 +43,14 @@ def zeros(*shape: int) -> Array:
 def eye() -> Array:
     """The identity matrix (3, 3)."""
     return extended(np.eye(3))
+
+
+def of_unit_length(y: Array, quaternions: Iterable[Iterable[int]]) -> Array:
+    """A state (n,) with its quaternions, given by their indices, normalised."""
+    found = y.copy()
+    for indices in map(list, quaternions):
+        found[indices] = found[indices] / (found[indices] @ found[indices]) ** mpfr(0.5)
+    return found
 
 
 def along(rate: Array, slopes: Array) -> Array:

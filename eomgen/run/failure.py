@@ -15,3 +15,7 @@ class StepFailure(RunError):
 
     def __reduce__(self) -> tuple[type, tuple[str, ...]]:
         return type(self), (self.reason, self.remedy)
+
+
+class EndedRunError(StepFailure):
+    """Raised by a callback of a run to end it; the text says why."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from eomgen.run.closed_form import ClosedForm
 from eomgen.run.compiled import Margins
-from eomgen.run.failure import StepFailure
+from eomgen.run.failure import EndedRunError, StepFailure
 from eomgen.run.margins import IN_CLOSED_FORM, NEAR, SINGULAR, Seen, rank_margin, stays_away
 from eomgen.run.projection import Projection, without
 
@@ -113,7 +113,7 @@ def watched(
                 watch.take(advance)
                 t, y = advance.t, advance.y
                 yield advance
-        except SingularPositionError:
+        except (EndedRunError, SingularPositionError):
             raise
         except StepFailure as failure:
             beyond = passage.beyond(seen, (t, y), None) if passage else None

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.integrators.interface import Advance, EndedRunError
+from eomgen.run.failure import EndedRunError
+from eomgen.run.integrators.interface import Advance
 from eomgen.run.problem import FloatArray, Problem
 
 Follow = Callable[[float, FloatArray], object]

@@ -6,8 +6,8 @@ from pkgutil import resolve_name
 
 from eomgen import integrators
 from eomgen.errors import RunError, nearest
-from eomgen.run.failure import StepFailure
-from eomgen.run.integrators.interface import Adaptive, EndedRunError, FixedStep
+from eomgen.run.failure import EndedRunError, StepFailure
+from eomgen.run.integrators.interface import Adaptive, FixedStep
 
 __all__ = [
     "INTEGRATORS",

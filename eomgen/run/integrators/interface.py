@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.run.compiled import Margins
-from eomgen.run.failure import StepFailure
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Event
 
@@ -29,10 +28,6 @@ SMALLEST_RTOL = 2.3e-14
 SHORTER = "take a smaller --dt, or an implicit or adaptive method (--integrator Radau)"
 LOOSER = "try another --integrator, or a looser --rtol and --atol"
 """Remedies for runs that fail."""
-
-
-class EndedRunError(StepFailure):
-    """Raised by a callback of a run to end it; the text says why."""
 
 
 Remark = Callable[[str], None]

@@ -15,7 +15,15 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.extended import NOTHING, Array, doubles, extended, extended_digits, solved
+from eomgen.precision.extended import (
+    NOTHING,
+    Array,
+    doubles,
+    extended,
+    extended_digits,
+    of_unit_length,
+    solved,
+)
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.scene.effects import Gravity
@@ -47,6 +55,8 @@ class Judged:
     """The results at a state.
 
     vd         v̇ (nv,), exact but for rounding to doubles
+    terms      sizes (nv,) of the terms of M v̇ = F - h + Jᵀ λ, each row over its own inertia: what
+               may cancel in v̇, without the condition of M
     errors     by route, the error of its v̇ (nv,), nan where it is not finite
     data       change of v̇ (nv,) by one ulp in the data
     agreed     digits to which articulated bodies and virtual work agree, in 60 digits
@@ -61,6 +71,7 @@ class Judged:
 
     state: State
     vd: FloatArray
+    terms: FloatArray
     errors: Mapping[str, FloatArray]
     data: FloatArray
     agreed: float
@@ -89,10 +100,8 @@ def judged(
     rng = np.random.default_rng(len(state.label))
     with extended_digits():
         exact = _vd(truth, state, {})
-        whole = extended(state.y)
-        for indices in map(list, model.quaternions):
-            # Formulas of a rotation differ if rounding has changed the length of a quaternion.
-            whole[indices] = whole[indices] / _root(whole[indices] @ whole[indices])
+        # Formulas of a rotation differ if rounding has changed the length of a quaternion.
+        whole = of_unit_length(extended(state.y), model.quaternions)
         free = FreeBodies(model, state.t, whole, state.u)
         numbers = whole, state.u, dict(model.defaults)
         changed = [[_changed(x, rng) for x in numbers] for _ in range(NEAR)]
@@ -118,6 +127,7 @@ def judged(
         return Judged(
             state,
             doubles(exact),
+            doubles(_load_sizes(free) / np.diag(free.mass_matrix)),
             errors,
             doubles(data),
             agreed,

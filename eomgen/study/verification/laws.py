@@ -19,6 +19,7 @@ from eomgen.precision.extended import (
     doubles,
     extended,
     extended_digits,
+    of_unit_length,
     solved,
     zeros,
 )
@@ -33,19 +34,16 @@ from eomgen.scene.joints.base import WORLD, Coordinate
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.judging import rest_of, ulps
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
+from eomgen.study.verification.slopes import SMOOTH, STEP
 from eomgen.study.verification.virtual_work import FreeBodies
 from eomgen.study.whole import Viewed, names_of, own_of
 
-_STEP = mpfr(2) ** -66
-"""Step of central differences, s, for rates of order 1; their error is its square, about 1e-40."""
 _LONG_STEP = mpfr(2) ** -40
 """That for slopes under constraints, whose β is itself a difference, with an error of 1e-30."""
 _LEFT = 1e-45
 """Rounding error of a difference that should be 0, relative to what is differenced."""
 _NEAR = 2
 """Neighbours of a state whose slopes are compared."""
-SMOOTH = 1e-9
-"""Greatest second difference, relative to the first difference, if there is no corner."""
 AXES = ("x", "y", "z")
 
 
@@ -98,7 +96,7 @@ def broken(model: Model, module: GeneratedModule, roundings: Roundings, state: S
     ydot = module.derivative(state.t, state.y, None, state.u or None)
     nq, nv = len(model.coordinates), len(model.velocities)
     with extended_digits():
-        y = _unit(model, extended(state.y))
+        y = of_unit_length(extended(state.y), model.quaternions)
         free = FreeBodies(model, state.t, y, state.u)
         vd = extended(ydot[nq : nq + nv])
         # Coordinates follow the velocities exactly: rounding of their rates is checked elsewhere.
@@ -322,7 +320,7 @@ def _beside(
 
     Time advances by the same step unless `still`.
     """
-    longest = _LONG_STEP if still and model.constraints else _STEP
+    longest = _LONG_STEP if still and model.constraints else STEP
     step = longest / (1 + max(map(abs, direction), default=0))
     time = mpfr(0) if still else step
     ahead = FreeBodies(model, state.t + time, y + step * direction, state.u)
@@ -377,7 +375,7 @@ def kept(model: Model, states: Sequence[State]) -> Kept:
     lost = [not (name and states) for name in names]
     with extended_digits():
         for state in states:
-            y = _unit(model, extended(state.y))
+            y = of_unit_length(extended(state.y), model.quaternions)
             free = FreeBodies(model, state.t, y, {})
             still = replace(state, u={})
             ahead, behind, step = _beside(model, still, y, free.state_rates)
@@ -406,10 +404,3 @@ def kept(model: Model, states: Sequence[State]) -> Kept:
 
 def _is_nothing(rate: Extended, scale: Extended) -> bool:
     return bool(abs(rate) <= NOTHING * scale)
-
-
-def _unit(model: Model, y: Array) -> Array:
-    """The state with its quaternions normalised in 60 digits."""
-    for indices in map(list, model.quaternions):
-        y[indices] = y[indices] / (y[indices] @ y[indices]) ** mpfr(0.5)
-    return y

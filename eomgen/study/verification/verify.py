@@ -30,6 +30,7 @@ from eomgen.study.verification.bounds import (
     loss_checks,
     matrix_checks,
     part_checks,
+    slope_checks,
 )
 from eomgen.study.verification.drift import Drift, drift
 from eomgen.study.verification.hard_states import State, closed_states, hard_states
@@ -38,6 +39,7 @@ from eomgen.study.verification.laws import broken, why_no_energy_law, why_no_mom
 from eomgen.study.verification.roundings import Roundings
 from eomgen.study.verification.routes import compiled
 from eomgen.study.verification.sampled import SampledRun, sampled
+from eomgen.study.verification.slopes import worst_slope
 from eomgen.study.verification.truth import Truth
 from eomgen.study.whole import viewed, whole_of
 
@@ -151,7 +153,12 @@ def verify(
         progress(0.85)
         shown = _of_conservation(there, firsts)
         ran = drift(model, wanted, module, given, shown, lambda x: progress(0.88 + 0.12 * x))
-        lawful = [*law_checks(bare, laws), *drift_checks(ran)]
+        slopes = {
+            one.state.label: worst_slope(bare, truth, seen, roundings, one.state)
+            for one in there
+            if _has(one, taken)
+        }
+        lawful = [*law_checks(bare, laws), *slope_checks(slopes), *drift_checks(ran)]
     ulps = {route: forward_ulps(there, route, bare) for route in modules}
     data = in_ulps(np.array([one.data for one in there]), there, bare)
     checks = (
