@@ -84,15 +84,22 @@ def distance(held: Projection, t: float, y: FloatArray) -> float:
 
 
 def crossing(
-    problem: Problem, t: float, y: FloatArray, until: float | None = None
+    problem: Problem,
+    t: float,
+    y: FloatArray,
+    until: float | None = None,
+    t_end: float = np.inf,
 ) -> Crossing | None:
     """The motion from a state on the constraints through the change point ahead, or before the time
     `until` if that is given; None if there is none, or if the motion through it is not determined.
+    None is looked for beyond `t_end`: where a motion is nearly at rest, it would be far ahead.
     """
     parts: list[Part] = []
     try:
         with np.errstate(all="ignore"):
             while len(parts) < PARTS:
+                if not t + _look(problem, t, y) < t_end:
+                    return None
                 motion = _motion(problem, t, y)
                 ahead = _ahead(problem, t, y, motion)
                 if ahead is None and until is None:
@@ -129,11 +136,16 @@ class _Motion:
         return y + moved
 
 
+def _look(problem: Problem, t: float, y: FloatArray) -> float:
+    """A small part of the time in which the change point can be reached at the least, s."""
+    held = _held(problem)
+    fastest = float(np.abs(problem.derivative(t, y)[: held.coordinates]).max())
+    return LOOK * distance(held, t, y) / fastest if fastest else np.inf
+
+
 def _motion(problem: Problem, t: float, y: FloatArray) -> _Motion:
     """The motion from a state on, by a difference over a small part of the way."""
-    held, slope = _held(problem), problem.derivative(t, y)
-    fastest = np.abs(slope[: held.coordinates]).max()
-    look = LOOK * distance(held, t, y) / fastest if fastest else np.inf
+    slope, look = problem.derivative(t, y), _look(problem, t, y)
     after = problem.projected(t + look, y + look * slope)
     return _Motion(slope, (problem.derivative(t + look, after) - slope) / look)
 

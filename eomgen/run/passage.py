@@ -51,9 +51,11 @@ class Passage:
             if margin >= FAR or margin > self._tried / AGAIN:
                 return None
             self._tried = margin
-            if margin >= SAFE and (found := crossing(self.problem, advance.t, advance.y)):
+            if margin >= SAFE and (
+                found := crossing(self.problem, advance.t, advance.y, None, self.t_end)
+            ):
                 return self._through(found, advance.t, (advance,))
-        found = crossing(self.problem, *start, advance.t if advance else None)
+        found = crossing(self.problem, *start, advance.t if advance else None, self.t_end)
         return self._through(found, start[0], ()) if found else None
 
     def _through(
