@@ -38,7 +38,7 @@ THIRDS = {
 FARTHEST = {"double": "1e6", "float": "4e4"}
 """Greatest angle, rad, for which they are."""
 ERRORS = {"double": "2.3e-16", "float": "1.2e-7"}
-"""Greatest errors of sine and cosine, as `tests/test_firmware.py` measures them."""
+"""Greatest errors of sine and cosine, as `tests/exports/test_firmware.py` measures them."""
 
 
 def files(model: Model, options: Options) -> Written:

@@ -5,7 +5,7 @@
 prints for each scene the seconds that each format took, with the pages that `pdflatex
 -halt-on-error` makes of the LaTeX and the lines that are wider than the page, if it is installed.
 It takes a minute or two on one core. The exit code is 1 if anything was refused.
-`tests/test_exposition.py` does the same for a few scenes, without `pdflatex`.
+`tests/derivation/test_exposition.py` does the same for a few scenes, without `pdflatex`.
 """
 
 import argparse

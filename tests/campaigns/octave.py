@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
+sys.path += [str(Path(__file__).parent.parent / name) for name in ("", "exports")]
 from test_matlab import SCENES, arguments, checked, files
 
 

@@ -1,6 +1,6 @@
 """A user's script with every public call, for checkers of types: `mypy --strict`, `pyright`.
 
-It is also run, by tests/test_package.py, so that what it annotates is what comes back.
+It is also run, by tests/project/test_package.py, so that what it annotates is what comes back.
 """
 
 import tempfile

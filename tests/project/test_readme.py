@@ -9,7 +9,7 @@ import pytest
 
 import eomgen
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
 API = (ROOT / "docs" / "api.md").read_text("utf-8")
 SWEEPS = (ROOT / "docs" / "sweeps.md").read_text("utf-8")

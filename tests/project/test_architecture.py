@@ -19,7 +19,7 @@ from eomgen.scene.json_schema import json_schema
 from eomgen.scene.reader import BUILT_IN, built_in_names, read_scene
 from eomgen.scene.reference import reference
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 
 
 def test_imports_go_one_way() -> None:

@@ -26,7 +26,7 @@ from eomgen.text import spelled
 
 EOMGEN = (sys.executable, "-m", "eomgen")
 QUICK = "--no-arithmetic --quick --methods rk4 --t-end 0.1 --run-time 1"
-ARM = Path(__file__).parent / "arm.urdf"
+ARM = Path(__file__).parent.parent / "arm.urdf"
 COMMANDS = {
     "list": "list",
     "show": "show pendulum",

@@ -28,8 +28,8 @@ from eomgen.show.picture_data import geometry_values, picture_data
 from eomgen.show.solid import rotation
 from eomgen.show.symbols import Sight, strokes
 
-DOCS = Path(__file__).parent.parent / "docs"
-UNTUNED = sorted((Path(__file__).parent / "untuned").glob("*.toml"))
+DOCS = Path(__file__).parent.parent.parent / "docs"
+UNTUNED = sorted((Path(__file__).parent.parent / "untuned").glob("*.toml"))
 FREE = """\
 name = "lone"
 dimensions = {n}

@@ -72,7 +72,7 @@ def generated(tmp_path: Path, name: str = "pendulum") -> bytes:
     return (out / f"{name}.py").read_bytes()
 
 
-RIGHT = (Path(__file__).parent.parent / "generated" / "pendulum.py").read_bytes()
+RIGHT = (Path(__file__).parent.parent.parent / "generated" / "pendulum.py").read_bytes()
 
 
 def test_the_store_is_the_users_own(folder: Path, tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from eomgen.scene.effects import Effect
 from eomgen.scene.reader import parse_scene
 from eomgen.study.cost.variants import removed, without_effects
 
-GENERATED = Path(__file__).parent.parent / "generated"
+GENERATED = Path(__file__).parent.parent.parent / "generated"
 
 
 @cache

@@ -462,7 +462,7 @@ def test_a_library_says_what_it_holds() -> None:
 
 def test_the_page_on_c_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its program is compiled by its command and prints what it says."""
-    page = (Path(__file__).parent.parent / "docs" / "c.md").read_text("utf-8")
+    page = (Path(__file__).parent.parent.parent / "docs" / "c.md").read_text("utf-8")
     (text,) = re.findall(r"^```c\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     command, wanted = re.findall(r"^```sh\n(.*)\n# prints (.*)\n```", page, re.MULTILINE)[0]
     (tmp_path / "main.c").write_text(text, "utf-8")

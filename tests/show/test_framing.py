@@ -19,10 +19,10 @@ from eomgen.show.outlines import extent_points
 from eomgen.show.picture import Picture, picture_of
 from eomgen.show.view import eye_axes
 
-GENERATED = Path(__file__).parent.parent / "generated"
+GENERATED = Path(__file__).parent.parent.parent / "generated"
 POSED = sorted(p.stem for p in GENERATED.glob("*.py") if "def body_poses" in p.read_text("utf-8"))
 """Built-in scenes with committed modules that give poses."""
-UNTUNED = Path(__file__).parent / "untuned"
+UNTUNED = Path(__file__).parent.parent / "untuned"
 FILLED = 1 / 3
 """Part of the picture's height or width that bodies fill in the course of a motion."""
 

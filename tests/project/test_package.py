@@ -17,7 +17,7 @@ import pytest
 
 import eomgen
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 SCRIPT = ROOT / "tests" / "typed" / "script.py"
 MAKERS = {f"templates/page/vendor/three/{name}" for name in ("build.mjs", "entry.js")}
 """What makes a vendored file; of no use where the package is installed."""

@@ -26,7 +26,7 @@ from eomgen.scene.reference import TABLES, by_type
 from eomgen.scene.schema import Scene
 from eomgen.show.figure import draw_motion as DRAWN
 
-DOCS = Path(__file__).parent.parent / "docs"
+DOCS = Path(__file__).parent.parent.parent / "docs"
 PAGES = [
     DOCS / "tutorial.md",
     DOCS / "pictures.md",

@@ -20,7 +20,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene
 from eomgen.store import generated_code
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 LARGE = (
     "car_suspension chain hanging_figure human_figure peaucellier quadruped ragdoll stiff_beam "
     "stewart_platform walker_motors"

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import some
+from crank_rocker import four_bar
 from test_compiled_steps import assert_same, both, compiler
-from test_loop_runs import four_bar
 
 import eomgen
 from eomgen.run import singular

@@ -11,9 +11,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from campaign import some
+from driven_trees import given
 from effect_cases import CASES, TRIED, Case
 from followed import follow_effects, follow_recursion, instant
-from test_driven import given
 
 import eomgen
 from eomgen.cli import main
@@ -555,7 +555,7 @@ def test_words() -> None:
 
 def test_the_handouts_equations_stand_where_the_table_says() -> None:
     """(1) to (36), each in its step of `derive two_body`, or `two_body_forced` from (29) on."""
-    page = (Path(__file__).parent.parent / "docs" / "derivation.md").read_text("utf-8")
+    page = (Path(__file__).parent.parent.parent / "docs" / "derivation.md").read_text("utf-8")
     rows = re.findall(r"^\| \((\d+)\) \| .* \| (\([^|]*) \| (`.*) \|$", page, re.MULTILINE)
     assert [int(number) for number, _, _ in rows] == list(range(1, 37))
     for scene, some_rows in (("two_body", rows[:28]), ("two_body_forced", rows[28:])):

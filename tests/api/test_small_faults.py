@@ -16,7 +16,7 @@ from eomgen.run.integrators import find_integrator
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.study.cost.bill import difference
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 POLE = """
 name = "pole"
 outputs = ["all"]
