@@ -243,6 +243,7 @@ def four_bar(
     return f"{text}[initial]\nq = {{ {start} }}\nv = {{ theta_dot = 6.0 }}\n"
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("settings", [{"integrator": "DOP853"}, {"integrator": "rk4", "dt": 0.01}])
 def test_singular_positions_change_the_coordinates(settings: dict[str, Any]) -> None:
     """With other lengths the crank comes to a dead point, or to a change point."""

@@ -69,6 +69,7 @@ def energy(theta: Any) -> Any:
     return total
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("integrator", ["DOP853", "rk4", "gauss_4", "Radau"])
 def test_a_driven_rod(integrator: str) -> None:
     """Its torque is (I + m l²) θ̈ + m g l cos θ, with any method: there is nothing to integrate."""
@@ -117,6 +118,7 @@ def test_a_driven_crank() -> None:
     np.testing.assert_allclose(coarse.saved["driving_forces"][:, 0], rough, atol=5e-2)
 
 
+@pytest.mark.every(2)
 @pytest.mark.every(2)
 @pytest.mark.parametrize("text", [ROD, BAR], ids=["tree", "loop"])
 def test_all_commands_take_what_is_driven(

@@ -243,6 +243,7 @@ PARALLELOGRAM = (0.5, 0.7, 0.5, 0.7)
 SETTINGS: tuple[dict[str, Any], ...] = ({"integrator": "DOP853"}, {"integrator": "rk4", "dt": 0.01})
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("route", ["independent", "aba", "orthogonal"])
 @pytest.mark.parametrize("settings", [*SETTINGS, {"integrator": "leapfrog", "dt": 0.005}])
 def test_change_points_are_passed(route: str, settings: dict[str, Any]) -> None:
@@ -285,6 +286,7 @@ def test_change_points_where_the_motion_is_not_determined() -> None:
         assert crossing(problem, 0.0, problem.initial) is None
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("settings", SETTINGS)
 @pytest.mark.parametrize(("route", "loops"), [("independent", "projected"), ("aba", "closed")])
 def test_dead_points_change_coordinates(route: Any, loops: str, settings: dict[str, Any]) -> None:
