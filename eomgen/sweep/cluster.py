@@ -61,7 +61,11 @@ def by_dask(task: Task, jobs: Sequence[Job], scheduler: str) -> Iterator[tuple[i
                 if not futures:
                     return
                 for future in _done(distributed, futures):
-                    yield futures.pop(future), _result(distributed, future)
+                    try:
+                        arrays = _result(distributed, future)
+                    except TimeoutError:  # its worker was lost with it: it is made again
+                        break
+                    yield futures.pop(future), arrays
                     future.release()
         except (OSError, distributed.CancelledError) as error:
             raise RunError(f"scheduler: {scheduler} is lost: {_worded(error)}; {GOES_ON}") from None
@@ -111,10 +115,15 @@ def _done(distributed: Any, futures: dict[Any, int]) -> list[Any]:
 
 
 def _result(distributed: Any, future: Any) -> Arrays:
-    """The result of a future. Raises `RunError` if the worker is not fit."""
+    """The result of a future that is done. Raises `RunError` if the worker is not fit, and
+    `TimeoutError` if it does not come, as from a worker that was lost, or an `OSError` if the
+    scheduler is.
+    """
     try:
-        arrays: Arrays = future.result()
+        arrays: Arrays = future.result(ALONE)
         return arrays
+    except (TimeoutError, import_module("distributed.comm").CommClosedError):
+        raise
     except (ImportError, AttributeError) as error:
         text = f"scheduler: a worker lacks {this_program()}; install it there: {_worded(error)}"
         raise RunError(text) from None
