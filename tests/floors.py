@@ -22,6 +22,8 @@ FLOORS = (
     "entries",
     "scalars",
     "language",
+    "subset",
+    "engine",
     "scene.joints",
     "scene.effects",
     "scene.constraints",

@@ -8,6 +8,8 @@ from pathlib import Path
 from shutil import which
 from typing import Any
 
+from eomgen.engine.printed import steps_of_pages
+
 PAGE = Path(__file__).parent.parent / "templates" / "page"
 ENGINE = ("methods.js", "adaptive.js", "contacts.js", "closure.js", "engine.js")
 NODE = which("node")
@@ -29,6 +31,7 @@ def run_in_node(
     parts = [
         '"use strict";',
         source,
+        steps_of_pages(),
         *((PAGE / name).read_text("utf-8") for name in scripts),
         "const given = JSON.parse(require('fs').readFileSync(0, 'utf8'));",
         f"process.stdout.write(JSON.stringify((() => {{\n{script}\n}})()));",

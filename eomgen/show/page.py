@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.engine.printed import steps_of_pages
 from eomgen.errors import RunError
 from eomgen.files import write_whole
 from eomgen.show.drawing_data import drawing_data
@@ -97,6 +98,7 @@ def render_page(motion: Motion, code: PageCode) -> str:
         "live": code.live,
         "data": data,
         "mechanism": code.source,
+        "steps": steps_of_pages() if code.live else "",
         "three": f"/*\n{licence}*/\n{(three / 'three.min.js').read_text(encoding='utf-8')}",
     }
     return render("page", "page.html", context, html=True)

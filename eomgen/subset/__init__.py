@@ -1,0 +1,1 @@
+"""The subset of Python in which `eomgen.engine` is written, and its printing in other languages."""
