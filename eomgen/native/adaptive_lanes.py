@@ -34,7 +34,6 @@ def sources(
 ) -> Mapping[str, str]:
     """The C sources of `native.lanes`, and of runs by DOP853."""
     values = constants(_terms)
-    del values["power"]  # the template has its root by square roots
     context = {
         "main": c_lanes.MAIN,
         "ends": [(name, values.pop(name)) for name in ("end_sum", "long_error", "short_error")],

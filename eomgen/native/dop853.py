@@ -21,7 +21,6 @@ def constants(summed: Callable[[Row], Any]) -> dict[str, object]:
         ],
         "dense": [summed(row) for row in dop853.SUMS[dop853.IN_DENSE :]],
         "safety": repr(dop853.SAFETY),
-        "power": repr(dop853.POWER),
         "smallest": repr(dop853.SMALLEST),
         "greatest": repr(dop853.GREATEST),
         "short_weight": repr(dop853.SHORT_WEIGHT),

@@ -45,7 +45,6 @@ MATRIX = np.array([[row.get(j, 0.0) for j in range(SLOPES)] for row in SUMS])
 """The factors, (22, 16): one row a sum, one column a slope."""
 SAFETY, SMALLEST, GREATEST = 0.9, 0.2, 10.0
 """Factor for the next step's length, and its bounds."""
-POWER = -1 / 8
 SHORT_WEIGHT = 0.01
 """Weight of the square of the error of order 3."""
 TOO_SHORT = "Required step size is less than spacing between numbers."
@@ -56,6 +55,11 @@ _ADDED = tuple(
 )
 
 _TERMS = written_out.terms_of((*SUMS[1:12], *SUMS[AT_END : SHORT_ERROR + 1]))
+
+
+def eighth_root(x: float) -> float:
+    """x^(1/8), with the same bits wherever there is a correctly rounded square root."""
+    return math.sqrt(math.sqrt(math.sqrt(x)))
 
 
 class DormandPrince8:
@@ -91,7 +95,7 @@ class DormandPrince8:
             y0,
             self.f,
             scale=atol + np.abs(y0) * rtol,
-            power=1 / 8,
+            root=eighth_root,
             longest=min(t_bound - self.t, max_step),
         )
         self._slopes = np.empty((SLOPES, len(y0)))
@@ -123,9 +127,9 @@ class DormandPrince8:
             error = self._error(y, last, h)
             if error < 1:
                 break
-            length *= max(SMALLEST, SAFETY * error**POWER)
+            length *= max(SMALLEST, SAFETY / eighth_root(error))
             rejected = True
-        factor = GREATEST if error == 0 else min(GREATEST, SAFETY * error**POWER)
+        factor = GREATEST if error == 0 else min(GREATEST, SAFETY / eighth_root(error))
         self.h_abs = length * (min(1.0, factor) if rejected else factor)
         self._step, self._dense = (h, y), None
         self.t_old, self.t, self.y = t, end, last
