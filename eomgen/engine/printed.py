@@ -12,7 +12,13 @@ from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
-ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (("begun", {}), ("gone_on", {}))
+ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
+    ("begun", {}),
+    ("gone_on", {}),
+    ("first_length", {}),
+    ("made_many", {"method": DOP853}),
+    ("within", {}),
+)
 """What a page that goes on live calls."""
 
 
