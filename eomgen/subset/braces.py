@@ -27,6 +27,10 @@ OPERATORS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.Gt: ">",
     ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||",
 }  # fmt: skip
+STATEMENTS = (
+    ast.Assign, ast.AnnAssign, ast.AugAssign, ast.Return, ast.Break, ast.Continue, ast.Pass,
+    ast.Expr,
+)  # fmt: skip
 ONE, TWO = ("j",), ("i_", "j")
 """The indices of entries in loops over arrays of one dimension and of two."""
 
@@ -271,6 +275,8 @@ class _Function:
                 raise NotInSubsetError(s.iter, "changes in the loop")
         if isinstance(s, ast.For | ast.While | ast.If):
             s.body, s.orelse = self._grouped(s.body), self._grouped(s.orelse)
+        elif not isinstance(s, STATEMENTS):
+            raise NotInSubsetError(s, "not in the subset")
 
     def _is_loop(self, s: ast.Assign) -> bool:
         """Whether an assignment is a loop over the entries of vectors, or a sum of them."""
@@ -556,6 +562,8 @@ class _Function:
                 raise NotInSubsetError(e, "assign it to a name first")
             return self._call(e)
         kind = self.kinds.of(e)
+        if name in ("ordered", "rows"):
+            raise NotInSubsetError(e, "assign it to a name first")
         if name == "copy":
             return self._expr(args[0], at)
         if name in ("zeros", "matrix", "whole"):

@@ -231,7 +231,8 @@ class _Expander(ast.NodeTransformer):
         return node
 
     def visit_For(self, node: ast.For) -> Any:
-        assert isinstance(node.iter, ast.Call)
+        if not isinstance(node.iter, ast.Call):
+            raise NotInSubsetError(node.iter, "loops are over range(…), or unrolled(…)")
         if called(node.iter) == "unrolled":
             values = self.needed(node.iter.args[0], "what is unrolled is not known")
             return [s for v in values for s in self.bound(node.target, v, node.body)]
