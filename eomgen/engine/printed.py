@@ -35,5 +35,6 @@ def c_source(functions: Roots) -> str:
 def steps_of_pages() -> str:
     """JavaScript: `makeSteps(STATES)` returns the functions that pages call, by name."""
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
+    names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
     return f"const makeSteps = (STATES) => {{\n{source}return {{ {names} }};\n}};\n"

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 
 from eomgen.codegen.backends import c
+from eomgen.engine import roots
 from eomgen.engine.printed import c_source
 from eomgen.exports.fmu_unit import Observed, Unit
 from eomgen.native.dop853 import constants, written_out
@@ -103,6 +104,8 @@ def _contacts(unit: Unit) -> dict[str, object]:
         "rest": slowest,
         "bounces": contacts.BOUNCES,
         "strikes": contacts.STRIKES,
-        "engine": c_source([("complementary", {})]),
+        "engine": c_source([("complementary", {}), ("begun", {}), ("gone_on", {})]),
+        "found": roots.FOUND,
+        "wanted": roots.WANTED,
         "most_events": events.MOST_EVENTS,
     }

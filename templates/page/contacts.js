@@ -24,42 +24,14 @@ const contacts = (() => {
 
   const dot = (a, b) => a.reduce((total, x, i) => total + x * b[i], 0);
 
-  // A zero between a and b of a function with these values there, by Brent's method.
+  // A zero between a and b of a function with these values there.
   function root(of, a, b, atA, atB, xtol, rtol) {
-    let [before, here, across] = [a, b, a];
-    let [atBefore, atHere, atAcross, last, step] = [atA, atB, 0, 0, 0];
-    for (let round = 0; round < 100; round += 1) {
-      if (Number.isNaN(atBefore) || Number.isNaN(atHere)) break;
-      if (atBefore && atHere && atBefore < 0 !== atHere < 0) {
-        [across, atAcross] = [before, atBefore];
-        last = step = here - before;
-      }
-      if (Math.abs(atAcross) < Math.abs(atHere)) {
-        [before, here, across] = [here, across, here];
-        [atBefore, atHere, atAcross] = [atHere, atAcross, atHere];
-      }
-      const least = (xtol + rtol * Math.abs(here)) / 2;
-      const half = (across - here) / 2;
-      if (atHere === 0 || Math.abs(half) < least) return here;
-      let found = Infinity;
-      if (Math.abs(last) > least && Math.abs(atHere) < Math.abs(atBefore)) {
-        if (before === across) found = -atHere * (here - before) / (atHere - atBefore);
-        else {
-          const one = (atBefore - atHere) / (before - here);
-          const other = (atAcross - atHere) / (across - here);
-          const over = atAcross * other - atBefore * one;
-          found = -atHere * over / (other * one * (atAcross - atBefore));
-        }
-      }
-      if (2 * Math.abs(found) < Math.min(Math.abs(last), 3 * Math.abs(half) - least)) {
-        last = step;
-        step = found;
-      } else last = step = half;
-      [before, atBefore] = [here, atHere];
-      here += Math.abs(step) > least ? step : half > 0 ? least : -least;
-      atHere = of(here);
-    }
-    throw new Error("the time of a contact is not found: take a smaller step");
+    const steps = makeSteps(0);
+    const search = { xtol, rtol };
+    let answer = steps.begun(search, a, b, atA, atB);
+    while (answer === steps.WANTED) answer = steps.gone_on(search, of(search.here));
+    if (answer !== steps.FOUND) throw new Error("the time of a contact is not found: take a smaller step");
+    return search.here;
   }
   const zero = (of, a, b) => root(of, a, b, of(a), of(b), Math.max(1e-14 * (b - a), 1e-300), 1e-15);
 
