@@ -4,20 +4,24 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from eomgen.engine import linear, roots, system
+from eomgen.engine import complementarity, least_squares, linear, roots, system
 from eomgen.subset.braces import JAVASCRIPT, C, printed
 from eomgen.subset.expander import Text
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
-ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (("begun", {}), ("gone_on", {}))
+ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
+    ("begun", {}),
+    ("gone_on", {}),
+    ("complementary", {}),
+)
 """What a page that goes on live calls."""
 
 
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    return Text.of(linear, roots, system)
+    return Text.of(linear, least_squares, complementarity, roots, system)
 
 
 def c_source(functions: Roots) -> str:
@@ -31,5 +35,6 @@ def c_source(functions: Roots) -> str:
 def steps_of_pages() -> str:
     """JavaScript: `makeSteps(STATES)` returns the functions that pages call, by name."""
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
+    names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
     return f"const makeSteps = (STATES) => {{\n{source}return {{ {names} }};\n}};\n"

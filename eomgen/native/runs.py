@@ -9,6 +9,7 @@ import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.engine.printed import Roots, c_source
 from eomgen.native import checked, equal_steps
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
@@ -20,9 +21,12 @@ from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, W
 from eomgen.run.integrators import dormand_prince_8 as dop853
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
+from eomgen.subset.braces import C
 from eomgen.templating import render
 
 MAIN = "runs.c"
+ENGINE: Roots = (("begun", {}), ("gone_on", {}))
+"""What of the engine's text steps are checked with."""
 METHODS = ("dop853", *equal_steps.METHODS)
 """The methods whose steps this library makes."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -38,6 +42,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
+        "engine": C.prelude + c_source(ENGINE),
         **constants(written_out),
         **checked.context(),
         **of_constraints(),

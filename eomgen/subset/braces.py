@@ -214,7 +214,10 @@ class _Function:
     def _product(self, sizes: Sequence[str]) -> str:
         if len(sizes) == 1:
             return self._size(sizes[0])
-        return " * ".join(s if s.isidentifier() else f"({self._size(s)})" for s in sizes)
+        return " * ".join(map(self._factor, sizes))
+
+    def _factor(self, size: str) -> str:
+        return size if size.isidentifier() else f"({self._size(size)})"
 
     def _size(self, text: str) -> str:
         return _bare(self._expr(ast.parse(text, mode="eval").body))
@@ -528,7 +531,7 @@ class _Function:
     def _at(self, array: str, kind: Kind, place: Sequence[str]) -> str:
         first, *others = place
         for size, index in zip(kind.sizes[1:], others, strict=True):
-            first = f"{first} * {self._size(size)} + {index}"
+            first = f"{first} * {self._factor(size)} + {index}"
         return f"{array}[{_bare(first)}]"
 
     def _argument(self, e: ast.expr) -> str:

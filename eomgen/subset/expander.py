@@ -23,6 +23,9 @@ OPERATORS: dict[type, Callable[..., Any]] = {
     ast.NotEq: op.ne, ast.USub: op.neg, ast.Not: op.not_,
 }  # fmt: skip
 
+LISTS = {"numbers": "zeros", "counts": "whole", "table": "matrix"}
+"""Lists in Python, and what they are in other languages."""
+
 
 class NotInSubsetError(SyntaxError):
     """Text outside the subset; the message names its line."""
@@ -182,9 +185,18 @@ class _Expander(ast.NodeTransformer):
             pairs = list(zip(parameters, node.args, strict=True))
             needed = ((p.arg, a) for p, a in pairs if is_known(p.annotation))
             known = {name: self.needed(a, f"{name} is not known") for name, a in needed}
-            node.func = ast.copy_location(ast.Name(self.make(name, known)), node)
+            node.func = ast.copy_location(ast.Name(self.make(name, known), ast.Load()), node)
             node.args = [a for p, a in pairs if p.arg not in known]
+        elif name in LISTS:
+            node.func = ast.copy_location(ast.Name(LISTS[name], ast.Load()), node)
         node.args = [self.visit(a) for a in node.args]
+        return node
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        self.generic_visit(node)
+        match node.value:
+            case ast.Subscript(array, row) if not isinstance(row, ast.Slice | ast.Tuple):
+                node.value, node.slice = array, ast.Tuple([row, node.slice], ast.Load())
         return node
 
     def _sum(self, node: ast.Call) -> ast.expr:
