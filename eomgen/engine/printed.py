@@ -1,12 +1,14 @@
 """The engine in other languages."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from eomgen.engine import complementarity, least_squares, linear, roots, system
+from eomgen.engine import adaptive, complementarity, least_squares, linear, roots, system
+from eomgen.engine.embedded import DOP853
 from eomgen.subset.braces import JAVASCRIPT, C, printed
 from eomgen.subset.expander import Text
+from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
@@ -21,7 +23,7 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    return Text.of(linear, least_squares, complementarity, roots, system)
+    return Text.of(adaptive, linear, least_squares, complementarity, roots, system)
 
 
 def c_source(functions: Roots) -> str:
@@ -38,3 +40,13 @@ def steps_of_pages() -> str:
     names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
     return f"const makeSteps = (STATES) => {{\n{source}return {{ {names} }};\n}};\n"
+
+
+@cache
+def steps_of_few(states: int) -> Callable[..., bool]:
+    """`adaptive.made` of DOP853 for few states, as Python's own numbers."""
+    source = Text.of(adaptive, system)
+    printed: Callable[..., bool] = unrolled_functions(
+        source, [("made", {"method": DOP853})], states
+    ).made_DOP853
+    return printed

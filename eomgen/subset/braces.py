@@ -47,7 +47,6 @@ class Language:
     arrays        the types of arrays of numbers, and of whole ones
     part          how a part of an array is passed on, by its name and the place where it begins
     field         how a record's field is read
-    given         how a function that the engine is given is called, by its name and arguments
     prelude       what the printed functions need
     """
 
@@ -60,7 +59,6 @@ class Language:
     arrays: tuple[str, str]
     part: str
     field: str
-    given: str
     prelude: str
 
 
@@ -74,7 +72,6 @@ C = Language(
     arrays=("double", "int64_t"),
     part="{array} + {place}",
     field="->",
-    given="{name}({of}, {arguments})",
     prelude="""#include <math.h>
 #include <stdint.h>
 
@@ -99,7 +96,6 @@ JAVASCRIPT = Language(
     arrays=("Float64", "Int32"),
     part="{array}.subarray({place})",
     field=".",
-    given="{of}.{name}({arguments})",
     prelude="""const nextAfter = (() => {
     const number = new Float64Array(1), bits = new BigInt64Array(number.buffer);
     return (t) => {
@@ -142,7 +138,7 @@ def _structures(text: Text, functions: Iterable[ast.FunctionDef]) -> Iterable[st
     for name in dict.fromkeys(kinds):
         record = text.classes.get(name)
         if record and not is_protocol(record):
-            yield "typedef struct {"
+            yield f"typedef struct {name} {{"
             for each, kind in fields_of(record).items():
                 yield f"    {_c_type(kind)}{each};"
             yield f"}} {name};"
@@ -549,14 +545,16 @@ class _Function:
 
     def _call(self, e: ast.Call, out: str = "") -> str:
         """A call of a function of the engine, or of one that it is given."""
-        arguments = ", ".join([*map(self._argument, e.args), *([out] if out else [])])
+        arguments = [*map(self._argument, e.args), *([out] if out else [])]
         if self._given(e):
             assert isinstance(e.func, ast.Attribute) and isinstance(e.func.value, ast.Name)
-            of = {"of": e.func.value.id, "name": e.func.attr, "arguments": arguments}
-            return self.to.given.format(**of)
+            of, name = e.func.value.id, e.func.attr
+            if self.to is C:
+                return f"{name}({', '.join([of, *arguments])})"
+            return f"{of}.{name}({', '.join(arguments)})"
         if called(e) not in self.made:
             raise NotInSubsetError(e, "not a function of the engine")
-        return f"{called(e)}({arguments})"
+        return f"{called(e)}({', '.join(arguments)})"
 
     def _call_of(self, e: ast.Call, at: Sequence[str]) -> str:
         name, args = called(e), e.args

@@ -16,6 +16,7 @@ from campaigns import energy
 from scipy.integrate import DOP853, RK45, solve_ivp
 from scipy.special import ellipj, ellipk
 
+from eomgen.engine import dop853_coefficients as coefficients
 from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import (
@@ -26,7 +27,6 @@ from eomgen.run.integrators import (
     gauss_6,
     implicit_midpoint,
 )
-from eomgen.run.integrators import dop853_coefficients as coefficients
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
