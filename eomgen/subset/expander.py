@@ -98,6 +98,11 @@ def called(node: ast.AST | None) -> str:
 _UNKNOWN = object()
 
 
+def _nothing(*given: Any) -> Any:
+    """An operation that the subset does not have."""
+    return _UNKNOWN
+
+
 def _copied(node: Any) -> Any:
     """A copy of a tree, or of a list of trees; quicker than `deepcopy`."""
     if isinstance(node, list):
@@ -128,7 +133,7 @@ def _value(e: ast.expr, known: Mapping[str, Any]) -> Any:
             call = op.getitem, found
         case ast.BinOp(left, operator, right) | ast.Compare(left, [operator], [right]):
             found = of(left, right)
-            call = OPERATORS[type(operator)], found
+            call = OPERATORS.get(type(operator), _nothing), found
         case ast.UnaryOp(operator, x):
             found = of(x)
             call = OPERATORS[type(operator)], found
