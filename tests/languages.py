@@ -30,16 +30,16 @@ const decoded = (x) => {
   if (x.wholes) return Int32Array.from(x.wholes);
   return Object.fromEntries(Object.entries(x.record).map(([name, each]) => [name, decoded(each)]));
 };
-const numbers = (x) => {
+const bitsOf = (x) => {
   if (x === system) return [];
   if (typeof x === "number") return [bits(x)];
   if (x instanceof Float64Array || x instanceof Int32Array) return Array.from(x, bits);
-  return Object.values(x).flatMap(numbers);
+  return Object.values(x).flatMap(bitsOf);
 };
 return given.map((args) => {
   const made = args.map(decoded);
   const result = CALLED(...made);
-  return [...numbers(made), ...(result === undefined ? [] : [bits(Number(result))])];
+  return [...bitsOf(made), ...(result === undefined ? [] : [bits(Number(result))])];
 });
 """
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from eomgen.engine import adaptive, linear, roots, system
+from eomgen.engine import adaptive, complementarity, least_squares, linear, roots, system
 from eomgen.engine.embedded import DOP853
 from eomgen.subset.braces import JAVASCRIPT, C, printed
 from eomgen.subset.expander import Text
@@ -15,6 +15,7 @@ Roots = Iterable[tuple[str, Mapping[str, Any]]]
 ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("begun", {}),
     ("gone_on", {}),
+    ("complementary", {}),
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
@@ -25,7 +26,7 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    return Text.of(adaptive, linear, roots, system)
+    return Text.of(adaptive, linear, least_squares, complementarity, roots, system)
 
 
 def c_source(functions: Roots) -> str:
@@ -39,6 +40,7 @@ def c_source(functions: Roots) -> str:
 def steps_of_pages() -> str:
     """JavaScript: `makeSteps(STATES)` returns the functions that pages call, by name."""
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
+    names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
     return f"const makeSteps = (STATES) => {{\n{source}return {{ {names} }};\n}};\n"
 

@@ -11,7 +11,7 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
 from eomgen.engine.embedded import DOP853
-from eomgen.engine.printed import c_source
+from eomgen.engine.printed import Roots, c_source
 from eomgen.native import checked, equal_steps
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
@@ -27,6 +27,8 @@ from eomgen.subset.structures import filled
 from eomgen.templating import render
 
 MAIN = "runs.c"
+ENGINE: Roots = (("begun", {}), ("gone_on", {}))
+"""What of the engine's text steps are checked with."""
 METHODS = ("dop853", *equal_steps.METHODS)
 """The methods whose steps this library makes."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -40,7 +42,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "prelude": C.prelude,
+        "engine": C.prelude + c_source(ENGINE),
         "steps": c_source([("made_many", {"method": DOP853})]),
         **checked.context(),
         **of_constraints(),

@@ -27,6 +27,10 @@ OPERATORS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.Gt: ">",
     ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||",
 }  # fmt: skip
+STATEMENTS = (
+    ast.Assign, ast.AnnAssign, ast.AugAssign, ast.Return, ast.Break, ast.Continue, ast.Pass,
+    ast.Expr,
+)  # fmt: skip
 ONE, TWO = ("j",), ("i_", "j")
 """The indices of entries in loops over arrays of one dimension and of two."""
 
@@ -206,7 +210,10 @@ class _Function:
     def _product(self, sizes: Sequence[str]) -> str:
         if len(sizes) == 1:
             return self._size(sizes[0])
-        return " * ".join(s if s.isidentifier() else f"({self._size(s)})" for s in sizes)
+        return " * ".join(map(self._factor, sizes))
+
+    def _factor(self, size: str) -> str:
+        return size if size.isidentifier() else f"({self._size(size)})"
 
     def _size(self, text: str) -> str:
         return _bare(self._expr(ast.parse(text, mode="eval").body))
@@ -267,6 +274,8 @@ class _Function:
                 raise NotInSubsetError(s.iter, "changes in the loop")
         if isinstance(s, ast.For | ast.While | ast.If):
             s.body, s.orelse = self._grouped(s.body), self._grouped(s.orelse)
+        elif not isinstance(s, STATEMENTS):
+            raise NotInSubsetError(s, "not in the subset")
 
     def _is_loop(self, s: ast.Assign) -> bool:
         """Whether an assignment is a loop over the entries of vectors, or a sum of them."""
@@ -518,7 +527,7 @@ class _Function:
     def _at(self, array: str, kind: Kind, place: Sequence[str]) -> str:
         first, *others = place
         for size, index in zip(kind.sizes[1:], others, strict=True):
-            first = f"{first} * {self._size(size)} + {index}"
+            first = f"{first} * {self._factor(size)} + {index}"
         return f"{array}[{_bare(first)}]"
 
     def _argument(self, e: ast.expr) -> str:
@@ -554,6 +563,8 @@ class _Function:
                 raise NotInSubsetError(e, "assign it to a name first")
             return self._call(e)
         kind = self.kinds.of(e)
+        if name in ("ordered", "rows"):
+            raise NotInSubsetError(e, "assign it to a name first")
         if name == "copy":
             return self._expr(args[0], at)
         if name in ("zeros", "matrix", "whole"):

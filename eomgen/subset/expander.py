@@ -22,6 +22,9 @@ OPERATORS: dict[type, Callable[..., Any]] = {
     ast.NotEq: op.ne, ast.USub: op.neg, ast.Not: op.not_,
 }  # fmt: skip
 
+LISTS = {"numbers": "zeros", "counts": "whole", "table": "matrix"}
+"""Lists in Python, and what they are in other languages."""
+
 
 class NotInSubsetError(SyntaxError):
     """Text outside the subset; the message names its line."""
@@ -95,6 +98,11 @@ def called(node: ast.AST | None) -> str:
 _UNKNOWN = object()
 
 
+def _nothing(*given: Any) -> Any:
+    """An operation that the subset does not have."""
+    return _UNKNOWN
+
+
 def _copied(node: Any) -> Any:
     """A copy of a tree, or of a list of trees; quicker than `deepcopy`."""
     if isinstance(node, list):
@@ -126,7 +134,7 @@ def _value(e: ast.expr, known: Mapping[str, Any]) -> Any:
             call = op.getitem, found
         case ast.BinOp(left, operator, right) | ast.Compare(left, [operator], [right]):
             found = of(left, right)
-            call = OPERATORS[type(operator)], found
+            call = OPERATORS.get(type(operator), _nothing), found
         case ast.UnaryOp(operator, x):
             found = of(x)
             call = OPERATORS[type(operator)], found
@@ -195,7 +203,16 @@ class _Expander(ast.NodeTransformer):
             known = {name: self.needed(a, f"{name} is not known") for name, a in needed}
             node.func = ast.copy_location(ast.Name(self.make(name, known), ast.Load()), node)
             node.args = [a for p, a in pairs if p.arg not in known]
+        elif name in LISTS:
+            node.func = ast.copy_location(ast.Name(LISTS[name], ast.Load()), node)
         node.args = [self.visit(a) for a in node.args]
+        return node
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        self.generic_visit(node)
+        match node.value:
+            case ast.Subscript(array, row) if not isinstance(row, ast.Slice | ast.Tuple):
+                node.value, node.slice = array, ast.Tuple([row, node.slice], ast.Load())
         return node
 
     def _sum(self, node: ast.Call) -> ast.expr:
@@ -250,7 +267,8 @@ class _Expander(ast.NodeTransformer):
         return node
 
     def visit_For(self, node: ast.For) -> Any:
-        assert isinstance(node.iter, ast.Call)
+        if not isinstance(node.iter, ast.Call):
+            raise NotInSubsetError(node.iter, "loops are over range(…), or unrolled(…)")
         if called(node.iter) == "unrolled":
             values = self.needed(node.iter.args[0], "what is unrolled is not known")
             return [s for v in values for s in self.bound(node.target, v, node.body)]

@@ -72,7 +72,10 @@ def given_function(
     """The function of a protocol that an expression calls, if it does."""
     match node:
         case ast.Call(ast.Attribute(ast.Name(owner), name)) if owner in kinds:
-            for d in text.classes[kinds[owner].of].body:
+            protocol = text.classes.get(kinds[owner].of)
+            if protocol is None:
+                raise NotInSubsetError(node, "not in the subset")
+            for d in protocol.body:
                 if isinstance(d, ast.FunctionDef) and d.name == name:
                     return d
             raise NotInSubsetError(node, f"{kinds[owner].of} has no function {name}")
