@@ -13,7 +13,9 @@ The text is ordinary Python with few kinds of things:
 Array statements are elementwise: `place = y + h * k[i]`, `a[i, p:] -= factor * a[p, p:]`. In Python
 NumPy runs them, in C and JavaScript they are loops; each entry has the same operations in the same
 order, and so the same bits. `place = …` makes a new array, `place[:] = …` changes one. An array has
-one name: `copy(x)`. Arrays are never resized; functions change those that they are given.
+one name: `copy(x)`. Arrays are never resized; functions change those that they are given. An index
+may be an array of whole numbers, which differ: `place[positions] += h * rates`. A record's array is
+assigned as a whole, `step.place = place`, and neither of the two is changed in place after that.
 """
 
 import math
@@ -25,8 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Known", "Matrix", "Vector", "Whole", "added", "copy", "inf", "isfinite", "larger", "matrix",
-    "nan", "next_after", "ordered", "outer", "rows", "sqrt", "unrolled", "whole", "zeros",
+    "Known", "Matrix", "Vector", "Whole", "added", "all_within", "copy", "inf", "isfinite",
+    "larger", "matrix", "nan", "next_after", "ordered", "outer", "product", "rows", "sqrt",
+    "unrolled", "whole", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]
@@ -72,6 +75,17 @@ def added(terms: Iterable[Any]) -> Any:
 def ordered(x: Vector) -> float:
     """The sum of the entries of a vector, in order, from 0 on."""
     return 0.0 + float(np.add.accumulate(x)[-1]) if len(x) else 0.0
+
+
+def all_within(x: Vector, limits: Vector) -> bool:
+    """Whether each entry of x is at most that of the limits; one that is nan is not."""
+    return bool((x <= limits).all())
+
+
+def product(a: Matrix, x: Vector) -> Vector:
+    """The matrix by the vector, each row's sum in order, from 0 on."""
+    n = len(x)
+    return 0.0 + np.add.accumulate(a * x, axis=1)[:, -1] if n else np.zeros(len(a))
 
 
 def larger(a: Vector, b: Vector | float) -> Vector:
