@@ -176,10 +176,10 @@ class _Function:
     def lines(self) -> list[str]:
         """The lines of its source."""
         self.kinds = Kinds(self.text, self.made, self.d)
+        self.changes[self.d.name] = self._changed()
         body = self._grouped(self.d.body)
         self.scalars = self._scalars(body)
         self._block(body)
-        self.changes[self.d.name] = self._changed()
         return [self._head(), *self._declared(), *self.out, "}"]
 
     # ---- the head ----

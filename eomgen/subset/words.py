@@ -14,8 +14,8 @@ Array statements are elementwise: `place = y + h * k[i]`, `a[i, p:] -= factor * 
 NumPy runs them, in C and JavaScript they are loops; each entry has the same operations in the same
 order, and so the same bits. `place = …` makes a new array, `place[:] = …` changes one. An array has
 one name: `copy(x)`. Arrays are never resized; functions change those that they are given. An index
-may be an array of whole numbers, which differ: `place[positions] += h * rates`. A record's array is
-assigned as a whole, `step.place = place`, and neither of the two is changed in place after that.
+may be an array of whole numbers, which differ: `place[positions] += h * rates`. A record's array
+may be assigned as a whole, `step.place = place`; then only one of the two is used, or none changed.
 """
 
 import math

@@ -136,7 +136,9 @@ def chosen(n: int, which: Annotated[Whole, "m"], m: int, x: Annotated[Vector, "n
     x[which] = 0.25 * some + 1.0
     x[which] += some * some
     a = matrix(n, m)
-    a[which, 1] = some
+    for i in range(1, 2):
+        a[which, i] = some
+        x[:] = x * 1.0
     a[0, :] = x[which] * 2.0
     x[0] = a[0, 0] + a[n - 1, 1]
 
