@@ -41,8 +41,9 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         **constants(written_out),
         **checked.context(),
         **of_constraints(),
+        **equal_steps.context(interface),
     }
-    main = render(c.TEMPLATES, "runs.c.jinja", context) + equal_steps.source(interface)
+    main = render(c.TEMPLATES, "runs.c.jinja", context)
     return {**c.library(program, interface), MAIN: main}
 
 
