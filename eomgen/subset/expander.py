@@ -182,7 +182,7 @@ class _Expander(ast.NodeTransformer):
             pairs = list(zip(parameters, node.args, strict=True))
             needed = ((p.arg, a) for p, a in pairs if is_known(p.annotation))
             known = {name: self.needed(a, f"{name} is not known") for name, a in needed}
-            node.func = ast.copy_location(ast.Name(self.make(name, known)), node)
+            node.func = ast.copy_location(ast.Name(self.make(name, known), ast.Load()), node)
             node.args = [a for p, a in pairs if p.arg not in known]
         node.args = [self.visit(a) for a in node.args]
         return node

@@ -180,6 +180,9 @@ class Kinds:
         if name == "outer":
             x, y = self.of(args[0]), self.of(args[1])
             return Kind("float", (*x.sizes, *y.sizes), (*(x.room or x.sizes), *(y.room or y.sizes)))
+        if name == "transposed":
+            x = self.of(args[0])
+            return Kind(x.of, x.sizes[::-1], x.room[::-1])
         if name in ("abs", "copy", "min", "max", "larger"):
             kinds = [self.of(a) for a in args]
             of = "float" if any(k.of == "float" for k in kinds) else "int"

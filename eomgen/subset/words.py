@@ -17,16 +17,17 @@ one name: `copy(x)`. Arrays are never resized; functions change those that they 
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from math import inf, isfinite, nan, sqrt
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "Known", "Matrix", "Vector", "Whole", "added", "copy", "inf", "isfinite", "larger", "matrix",
-    "nan", "next_after", "ordered", "outer", "rows", "sqrt", "unrolled", "whole", "zeros",
+    "nan", "next_after", "ordered", "outer", "rows", "sqrt", "transposed", "unrolled", "whole",
+    "with_arrays", "with_lists", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]
@@ -34,6 +35,7 @@ Matrix = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Known = Any
 T = TypeVar("T")
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 def zeros(n: int) -> Vector:
@@ -84,6 +86,11 @@ def outer(x: Vector, y: Vector) -> Matrix:
     return np.multiply.outer(x, y)
 
 
+def transposed(x: Matrix) -> Matrix:
+    """A matrix with rows as columns; it is read, not kept."""
+    return x.T
+
+
 def next_after(t: float) -> float:
     """The next number above t."""
     return math.nextafter(t, inf)
@@ -92,3 +99,25 @@ def next_after(t: float) -> float:
 def unrolled(values: Sequence[T]) -> Sequence[T]:
     """Values that are known when the text is printed: the loop over them is written out."""
     return values
+
+
+def with_arrays(other: F) -> Callable[[F], F]:
+    """Decorates a function in the place of which Python runs another one, which has the same bits
+    and is quicker there because it has no loops.
+    """
+    return lambda _: other
+
+
+def with_lists(method: str) -> Callable[[F], F]:
+    """Decorates a function in the place of which Python runs a method of its first argument, if
+    that has one: with the same bits, and quicker for few numbers, because these are in lists.
+    """
+
+    def decorated(function: F) -> F:
+        def called(first: Any, *others: Any) -> Any:
+            own = getattr(first, method, None)
+            return own(*others) if own else function(first, *others)
+
+        return cast(F, called)
+
+    return decorated
