@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
+from eomgen.engine.printed import c_source
 from eomgen.native import checked, equal_steps
 from eomgen.native.checked import Function, FunctionStructure
 from eomgen.native.constrained import address, constraints, made_margins
@@ -33,6 +34,7 @@ from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.integrators.rodas_5p_coefficients import GAMMA, IN_TIME, NODES, Row
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
+from eomgen.subset.braces import C
 from eomgen.templating import render
 
 MAIN = "implicit.c"
@@ -59,6 +61,7 @@ def sources() -> Mapping[str, str]:
     sums = [_sum(row) for row in rodas_5p.SUMS]
     context = {
         **of_constraints(),
+        "engine": C.prelude + c_source((("factored", {}), ("solve_by", {}))),
         "stages": rodas_5p.STAGES,
         "aside": repr(rodas_5p.ASIDE),
         "gamma": repr(GAMMA),
