@@ -7,6 +7,7 @@ from typing import Any
 from eomgen.engine import (
     adaptive,
     complementarity,
+    elimination,
     equal_steps,
     explicit,
     least_squares,
@@ -38,7 +39,7 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
 def text() -> Text:
     """The text of the whole engine."""
     steps = (adaptive, equal_steps, explicit, quaternions, sums)
-    return Text.of(*steps, linear, least_squares, complementarity, roots, system)
+    return Text.of(*steps, linear, elimination, least_squares, complementarity, roots, system)
 
 
 def c_source(functions: Roots) -> str:
