@@ -91,6 +91,7 @@ def javascript(text: str, made: Engine, name: str, y: np.ndarray, extra: Any = (
     return [value(row.strip().rstrip(",")) for row in rows.splitlines()]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 def test_javascript_is_the_module(scene: str, tmp_path: Path) -> None:
     """The same bits as Python's, of the derivative and of all that is computed beside it."""

@@ -65,6 +65,7 @@ def pin_wrenches(
     return np.column_stack((motion.pin_forces, moments))[c.scene.pin_rows(c.module)]
 
 
+@pytest.mark.every(2)
 def test_random_states(built_in: Compiled) -> None:
     """At many states, with forces and torques if there are any, one by one and as columns.
 
@@ -307,6 +308,7 @@ def in_momentum_form(
     return np.array([state[name] for name in wanted]), np.array([rate[name] for name in wanted])
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("form", ["momentum", "redundant"])
 @pytest.mark.parametrize(
     "scene",

@@ -74,6 +74,7 @@ def error(found: Any, wanted: np.ndarray) -> float:
     return float((difference.max(0) / np.abs(wanted).max(0)).max())
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", some(SCENES, SCENES + LARGE))
 def test_numbers_are_those_of_the_python_module(scene: str) -> None:
     """Of columns, of states mapped by vmap, and with other parameters and inputs."""

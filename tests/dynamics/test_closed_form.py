@@ -134,7 +134,7 @@ def at_digits(model: Model, q: Any) -> Dynamics:
     return Dynamics(model, Values(values, {}, list(q), still, {}, mpfr(0)), Bits())
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", POLYGONS)
 def test_polygons_close_to_50_digits(name: str) -> None:
     """All round, on the branch of the start and without a jump of an angle."""
@@ -158,6 +158,7 @@ def test_polygons_close_to_50_digits(name: str) -> None:
 MODULES = ("two bars", "a guide that turns, then a bar")
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", some(MODULES, tuple(POLYGONS)))
 def test_modules_move_as_by_projection(name: str) -> None:
     """All coordinates, velocities and accelerations, and the Jacobian by that of deviations."""

@@ -186,6 +186,7 @@ CASES += [  # the other forms need an inertia of every body
 ]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("scene", "form"), CASES)
 def test_jacobian(scene: str | int, form: str) -> None:
     """The exact Jacobian is the derivative's, differentiated in 60 digits, in every state form."""

@@ -464,6 +464,7 @@ PARTS = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", PARTS)
 def test_a_joint_is_its_parts(route: str, kind: str) -> None:
     """Joints of several coordinates move as their parts on massless bodies do."""
@@ -658,7 +659,7 @@ def upright(tree: SpatialTree) -> str:
 
 
 @pytest.mark.parametrize("seed", [*range(9), 60, 379])
-@pytest.mark.every(2)
+@pytest.mark.every(6)
 def test_the_plane_is_a_part_of_space(route: str, seed: int) -> None:
     """A planar scene stood upright in space: the same motion, forces, energies."""
     tree, text = random_spatial_tree(seed, PLANE, 5)
@@ -688,6 +689,7 @@ OUT_OF_PLANE = re.compile(
 )
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", ["acrobot", "cart_pole", "chain", "two_body_forced"])
 def test_the_plane_does_not_pay_for_space(route: str, name: str) -> None:
     """No step of a planar program is about what the plane makes zero."""
@@ -697,6 +699,7 @@ def test_the_plane_does_not_pay_for_space(route: str, name: str) -> None:
     assert any(OUT_OF_PLANE.fullmatch(word) for word in top)
 
 
+@pytest.mark.every(2)
 def test_the_plane_is_cheaper_than_space(route: str) -> None:
     """Pins and free bodies take fewer operations in the plane than upright in space."""
     paid = []

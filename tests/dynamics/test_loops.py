@@ -67,6 +67,7 @@ def test_every_route_is_mujoco(dimensions: int, seed: int) -> None:
     assert max(accelerations for accelerations, _ in found.values()) < CLOSE
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("seed", [2, 5, 9])
 def test_masses_over_12_decades(seed: int) -> None:
     """The route of last resort keeps every digit that the data have; the others do not."""

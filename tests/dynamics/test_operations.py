@@ -170,7 +170,7 @@ def test_closed_takes_every_effect(name: str, names: tuple[str, ...]) -> None:
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-11, err_msg=output)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("load", LOADS)
 def test_closed_takes_loads_at_joints(load: str) -> None:
     """The derivative, the power of the load, and what else depends on it, as by articulated bodies;

@@ -573,6 +573,7 @@ def test_the_rattleback_turns_round() -> None:
 # The bicycle: see whipple.py.
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("speed", SPEEDS)
 def test_the_linearised_bicycle(speed: int) -> None:
     """The Jacobian of the generated module on the manifold of the constraints, at every speed of

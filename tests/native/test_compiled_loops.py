@@ -151,6 +151,7 @@ def test_contacts_close_alike(compiled_steps: list[int]) -> None:
     assert python.trajectory.counts["impacts"] > 1 and sum(compiled_steps) > 5
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["leapfrog", "leapfrog_4", "leapfrog_6"])
 def test_rattle_in_c(method: str, compiled_steps: list[int]) -> None:
     """All steps but the first and the last, with the bits of Python's."""

@@ -143,6 +143,7 @@ def test_a_bullet_meets_a_ball_for_a_moment() -> None:
     assert run.trajectory.y[-1] == pytest.approx([99.993 - 1000 * back, 0, -1000, 0], abs=1e-4)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("given", [{"integrator": "DOP853"}, {"integrator": "Rodas5P"}, {}])
 def test_what_rounding_decides_is_not_met(given: dict[str, str]) -> None:
     """Whether the pendulum falls over again is decided by its last bits, not by its constants. An

@@ -82,6 +82,7 @@ def test_pulses_are_found(shape: str, method: str) -> None:
         assert run.counts["steps"] < 300
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_every_pulse_of_many_is_found(method: str) -> None:
     """A pulse in each period of 0.1 s, one hundredth of it long."""
@@ -153,7 +154,7 @@ v = { ball_y_dot = 3.0 }
 
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("scene", [QUADROTOR, ROPE], ids=["quadrotor", "rope"])
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 def test_steps_are_as_long_as_their_error_allows(scene: str, method: str) -> None:
     """A saturated controller and a taut rope take as many steps as without the check."""
     problem = as_problem(module(scene))

@@ -424,6 +424,7 @@ def hump(v):
     )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["rk4", "DOP853", "Radau"])
 def test_mass_slides_off_a_hump(name):
     """It leaves a circle of radius r at cos = 2/3 + v²/3gr."""

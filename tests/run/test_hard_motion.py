@@ -135,6 +135,7 @@ def test_quaternions_stay_unit() -> None:
 # --- long runs ----------------------------------------------------------------------------------
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("method", "dt"), [("leapfrog", 0.05), ("gauss_4", 0.2)])
 def test_symplectic_methods_keep_the_energy(method: str, dt: float) -> None:
     """The error stays in a band without drift: the last tenth of a run is like the first."""

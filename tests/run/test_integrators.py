@@ -213,7 +213,7 @@ def test_symmetric_methods_run_backwards(name):
     assert y == pytest.approx(PENDULUM.initial, abs=1e-13)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(5)
 @pytest.mark.parametrize("name", ["semi_implicit_euler", *LEAPFROGS, *GAUSS])
 def test_symplectic_energy_is_bounded_without_trend(name):
     trajectory = run(PENDULUM, name, 200.0, dt=0.05)
@@ -283,6 +283,7 @@ PLANET = Problem(
 )
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", [*GAUSS, *LEAPFROGS])
 def test_angular_momentum_of_a_planet_is_kept(name):
     """Eccentricity 0.6, 5 revolutions; the momentum is 0.8, and bilinear."""
@@ -488,6 +489,7 @@ def test_blow_up_keeps_the_finite_rows(name):
     assert trajectory.counts["steps"] > 50
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", GENERAL)
 @pytest.mark.parametrize(
     "error",
@@ -969,6 +971,7 @@ def test_canonical_momenta_tell_the_same_motion(tumbling):
     assert problem.jacobian(0.0, y) == pytest.approx(np.array(columns).T, abs=1e-8)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("form", "name"), energy.RUNS)
 def test_energy_over_many_periods(tumbling, form, name):
     """A short version of `campaigns/energy.py`, which runs 1e5 of them."""

@@ -79,6 +79,7 @@ def test_a_stopped_run_keeps_a_unit_row() -> None:
         assert off_unit(asked, run.y) < 1e-15
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("method", "order", "steps"),
     [

@@ -176,6 +176,7 @@ def test_functions_with_corners_are_refused() -> None:
         recurrences(finish(tape, {"derivative": Output((1,), nodes)}, ()), ["x"])
 
 
+@pytest.mark.every(2)
 @compiler
 @pytest.mark.parametrize(("scene", "end"), [("double_pendulum", 1.0), ("tumbling_body", 0.3)])
 def test_runs_end_where_they_should(scene: str, end: float) -> None:

@@ -105,6 +105,7 @@ def in_page(code: LiveCode, name: str, t: Any, y: Any, table: dict[str, Any]) ->
     return np.array(run_in_node(code.source, script, given))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", SCENES)
 def test_functions_equal_those_of_the_module(name: str) -> None:
     """Errors of the rates of positions, and of those of the other states, are relative to the
@@ -133,7 +134,7 @@ def test_functions_equal_those_of_the_module(name: str) -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("name", "method", "dt"), RUNS)
 def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) -> None:
     """Same method, same step; scenes that are not chaotic within the time."""

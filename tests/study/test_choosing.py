@@ -136,6 +136,7 @@ def test_a_difference_is_no_accident_of_its_moment() -> None:
     assert difference(struck, motion(np.array([0.0, 1.0]), np.array([0.0, -1.0])), np.ones(1)) == 0
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("scene", "targets"),
     [("pendulum", (1e-3, 1e-6, 1e-9)), ("two_body", (1e-3, 1e-8)), ("double_pendulum", (1e-4,))],

@@ -289,6 +289,7 @@ def test_what_takes_energy_is_named() -> None:
     assert not keeps.energy and keeps.takers == ("drive", "cord") and keeps.momentum == ()
 
 
+@pytest.mark.full
 def test_all_joints_with_drive_rotor_and_spring_are_verified() -> None:
     """Driven coordinates, their powers, and inputs among all else."""
     found = verify(*scene_of(SCREW), states=1)
@@ -337,6 +338,7 @@ joints = [{ name = "j", type = "free", child = "a" }]
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("case", some([*QUIET][::2], [*QUIET]))
 def test_where_quantities_vanish_no_rounding_of_the_judge_counts(case: str) -> None:
     """Terms that cancel, drives at rest, what acts for a while: good modules pass."""
@@ -380,6 +382,7 @@ def good() -> tuple[tuple[Model, Simulation], str]:
     return (model, wanted), source
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("fault", some([*FAULTS][::2], [*FAULTS]))
 def test_a_fault_in_a_module_is_caught(fault: str) -> None:
     """Each seeded in a copy of a good module, in one place."""
