@@ -350,6 +350,7 @@ g = 9.81
         assert apart(J[:, i], column) < ROUNDING
 
 
+@pytest.mark.full
 def test_weights_that_vanish_refuse_nothing() -> None:
     """`orthogonal` weighs some rows by 1e-200: their products may vanish, and no derivative is
     refused for that.

@@ -134,7 +134,7 @@ def at_digits(model: Model, q: Any) -> Dynamics:
     return Dynamics(model, Values(values, {}, list(q), still, {}, mpfr(0)), Bits())
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", POLYGONS)
 def test_polygons_close_to_50_digits(name: str) -> None:
     """All round, on the branch of the start and without a jump of an angle."""
@@ -189,6 +189,7 @@ FORMULAS = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", FORMULAS)
 def test_closed_formulas(name: str) -> None:
     """Positions, velocities and accelerations around the circle are those of the closed formulas,

@@ -96,6 +96,7 @@ def about(inertia: np.ndarray, mass: float, r: np.ndarray) -> np.ndarray:
 # One joint at a time.
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("axis", [X, -Y, Z, np.array([2, -1, 2]) / 3, np.array([1, 2, -2]) / 3])
 def test_revolute(route: str, axis: np.ndarray) -> None:
     """(a·I a + n² J) q̈ = τ + a · (arm × m g), with I about the pin; a = E axis."""
@@ -518,6 +519,7 @@ NAMES = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("dimensions", "kind"), NAMES)
 def test_names(dimensions: int, kind: str) -> None:
     """Of coordinates and velocities, as they are by themselves and as a scene gives them."""

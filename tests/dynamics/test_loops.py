@@ -147,6 +147,7 @@ def left_out(*kept: str) -> tuple[str, ...]:
     return ("jacobian", *(name for name in OUTPUTS if name not in kept))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("dimensions", "route"), [(PLANE, "independent"), (SPACE, "aba")])
 def test_a_module_is_the_solver(dimensions: int, route: str) -> None:
     """As code: accelerations, wrenches, residuals, and projections that change nothing."""

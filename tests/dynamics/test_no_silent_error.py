@@ -59,7 +59,7 @@ def case(number: int) -> tuple[int, int, list[float], bool]:
 
 
 @settings(
-    max_examples=some(6, 100_000),
+    max_examples=some(4, 100_000),
     deadline=None,
     derandomize=True,
     database=None,
@@ -174,6 +174,7 @@ def test_most_are_right() -> None:
     assert outcomes == {"right": COUNT}
 
 
+@pytest.mark.full
 def test_it_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
     """Articulated bodies alone are silently wrong."""
 

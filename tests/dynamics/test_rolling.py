@@ -552,6 +552,7 @@ def test_a_tippe_top_that_rolls() -> None:
     assert energy == pytest.approx(energy[0], rel=1e-10)
 
 
+@pytest.mark.full
 def test_the_rattleback_turns_round() -> None:
     """With the parameters of Kane and Levinson 1982, energy kept. Spun the other way it goes on."""
     made = module("rattleback")
@@ -573,7 +574,7 @@ def test_the_rattleback_turns_round() -> None:
 # The bicycle: see whipple.py.
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(5)
 @pytest.mark.parametrize("speed", SPEEDS)
 def test_the_linearised_bicycle(speed: int) -> None:
     """The Jacobian of the generated module on the manifold of the constraints, at every speed of

@@ -379,6 +379,7 @@ def assert_equal_programs(a: Engine, b: Engine, seed: int, digits: int) -> None:
             assert apart(found, other) < 10.0**-digits, output
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("seed", "most"), CLOSED)
 def test_closed_is_aba(seed: int, most: int) -> None:
     """SymPy's own solution and the recursion, to 50 digits, on planar trees of up to 5 bodies."""

@@ -412,7 +412,7 @@ def wrench(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> np.ndarra
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("geometry", GEOMETRY)
 @pytest.mark.parametrize("law", [SPRING, HERTZ, (*HUNT, *RUB)])
-@pytest.mark.every(6)
+@pytest.mark.every(7)
 def test_the_change_of_energy_is_the_power_of_the_contacts(
     law: tuple[str, ...], geometry: str, dimensions: int
 ) -> None:
@@ -439,6 +439,7 @@ def test_the_change_of_energy_is_the_power_of_the_contacts(
     assert worked > 0.1
 
 
+@pytest.mark.every(6)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("geometry", GEOMETRY)
 def test_jacobians_are_those_of_central_differences(geometry: str, dimensions: int) -> None:

@@ -93,7 +93,7 @@ def at_random(e: Engine, seed: int) -> tuple[np.ndarray, dict[str, float], Any]:
 
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize(("dimensions", "seed"), FEW)
-@pytest.mark.every(5)
+@pytest.mark.every(8)
 def test_as_the_undriven_scene(dimensions: int, seed: int, route: str) -> None:
     """At the same motion: M, V, G, F are its free rows, and f'' takes its part of M into V; the
     same forces keep the same motion; what else there is is the same.
@@ -180,7 +180,7 @@ def test_jacobians(dimensions: int, seed: int, route: str, tangents: bool) -> No
         assert apart(jacobian[:, i], along(rates, p, unit)) < digits, names[i]
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("dimensions", "seed"), FEW)
 def test_energy_is_accounted_for(dimensions: int, seed: int) -> None:
     """dE/dt is the sum of the effects' powers, driving force times rate among them."""

@@ -276,7 +276,7 @@ VARIANTS = [
 
 
 @pytest.mark.parametrize(("scene", "more"), VARIANTS)
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_jacobian_and_energy(scene: str, more: str) -> None:
     """Jacobians as central differences have them; dE/dt is the power of what has no potential."""
     for route in ("aba", "ldl"):

@@ -158,6 +158,7 @@ def test_what_is_wrong_gets_the_same_answer(given: dict[str, Any]) -> None:
         assert same(one, other), (one, other)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", ["two_body", "steering_particles", "chain_in_wind"])
 def test_times_of_every_kind(scene: str) -> None:
     """Where nothing depends on time it may be anything; else it is a finite number, or an array of

@@ -94,6 +94,7 @@ def chosen(scene: str, accuracy: float, **given: Any) -> eomgen.Run:
     return run
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("width", [5e-4, 1e-6])
 def test_a_pulse_in_time_is_not_overlooked(width: float) -> None:
     """All tolerances step over it, by some seconds; so their runs agreed."""

@@ -98,6 +98,7 @@ coordinate = "q{i}"
 )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("moving", [1, 2])
 def test_newtons_cradle(moving: int) -> None:
     """As many swing out as swung in, as far, half a period later; the others hang still."""

@@ -64,6 +64,7 @@ def module(scene: str):
     return load_module(compile_scene(parse_scene(scene)))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("shape", PULSES)
 def test_pulses_are_found(shape: str, method: str) -> None:
@@ -210,6 +211,7 @@ def tree(seed: int) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(60 if FULL else 1))
 def test_brief_contacts_of_random_trees(seed: int) -> None:
     """As close to a run with very short steps as a run with 1000 steps, except where the motion

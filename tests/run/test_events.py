@@ -253,6 +253,7 @@ def cradle(moving, e, balls=5):
     return mechanism(places, speeds, normals, -np.ones(balls - 1), bounce=e)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", ["rk4", "DOP853", "LSODA"])
 @pytest.mark.parametrize("moving", [1, 2, 3])
 def test_newtons_cradle(name, moving):
@@ -458,6 +459,7 @@ def every_solution(matrix, offset):
             yield left
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", [complementary, lambda m, o: _lemke(m, o, np.abs(o).max())])
 @pytest.mark.parametrize("rank", [6, 3])
 def test_forces_push_and_never_pull(method, rank):
@@ -509,6 +511,7 @@ def airy(names=("gravity", "air", "ground")):
     return problem, Powers(names, powers, lambda t, y: float(y[2:] @ y[2:] / 2))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("names", [("gravity", "air", "ground"), ("gravity", "air")])
 def test_works_sum_to_the_change_of_energy(names):
     """At every row, through drag, impacts, sliding and rest; the ground has its own work."""

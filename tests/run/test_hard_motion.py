@@ -188,6 +188,7 @@ GOING_ON = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", GOING_ON)
 def test_a_run_goes_on_to_the_same_bytes(method: str) -> None:
     """A run that ended twice on the way, not at ends of steps, agrees with one that did not."""

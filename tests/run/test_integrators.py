@@ -248,6 +248,7 @@ def test_euler_gains_energy():
     assert energy[-1] - energy[0] > 0.05
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", GAUSS)
 @pytest.mark.parametrize("dt", [0.05, 0.2])
 def test_gauss_conserves_quadratic_invariants(name, dt):

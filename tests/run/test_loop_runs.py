@@ -87,6 +87,7 @@ def test_symmetric_projection_keeps_energy(route: str) -> None:
     np.testing.assert_allclose(back.y[-1] * [1, 1, 1, -1, -1, -1], there.y[0], atol=1e-11)
 
 
+@pytest.mark.full
 def test_rattle_keeps_energy_where_symmetry_does_not() -> None:
     """A crank that goes round in one direction: the energy of RATTLE has no trend, and its error is
     of order 2. Forces that depend on velocities are refused.

@@ -142,6 +142,7 @@ def test_each_wrong_rule_shows() -> None:
     assert min(residual(program, wrong) for wrong in faults(system)) > 1e-20
 
 
+@pytest.mark.every(2)
 @compiler
 @pytest.mark.parametrize("small", [0, 64])
 def test_compiled_coefficients(small: int, monkeypatch: pytest.MonkeyPatch) -> None:

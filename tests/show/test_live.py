@@ -366,6 +366,7 @@ def test_loads_have_the_power_of_their_effects() -> None:
         np.testing.assert_allclose(total, powers[:, k], rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("form", ["momentum", "redundant"])
 def test_rows_of_momenta_are_converted(form: Any) -> None:
     """A run in momenta, converted, has the poses and the energy of that run, but for the error of

@@ -221,6 +221,7 @@ def test_beyond_the_floor_of_adaptive_methods(target: float) -> None:
     assert error(floor, true.y[-1], true.scale) > target
 
 
+@pytest.mark.full
 def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lorenz's over 50 s grows an error by 1e19: no run in doubles is right, and once DOP853 as
     tight as it goes is wrong, no other method is asked; gauss_6 only for so long that its error
@@ -366,6 +367,7 @@ def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert (tmp_path / "pendulum.npz").exists()
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     "integrator", some(["DOP853", "BDF"], ["RK45", "DOP853", "LSODA", "BDF", "Radau"])
 )

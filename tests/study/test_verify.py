@@ -423,6 +423,7 @@ LOOP_FAULTS = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("fault", some(["", "λ"], ["", *LOOP_FAULTS]))
 def test_loops_are_verified_by_their_own_rows(fault: str) -> None:
     """A slider-crank, against virtual work with multipliers: sound, and with a fault."""
