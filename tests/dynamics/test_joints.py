@@ -661,7 +661,7 @@ def upright(tree: SpatialTree) -> str:
 
 
 @pytest.mark.parametrize("seed", [*range(9), 60, 379])
-@pytest.mark.every(6)
+@pytest.mark.every(8)
 def test_the_plane_is_a_part_of_space(route: str, seed: int) -> None:
     """A planar scene stood upright in space: the same motion, forces, energies."""
     tree, text = random_spatial_tree(seed, PLANE, 5)

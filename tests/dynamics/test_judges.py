@@ -112,6 +112,7 @@ def faults(tree: SpatialTree) -> Iterator[tuple[str, SpatialTree]]:
     yield "gravity", replace(tree, gravity=tree.gravity + 1e-5)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("judge", ["newton_euler", *JUDGES])
 def test_each_judge_notices_a_small_mistake(judge: str) -> None:
     """A mistake is in the tree that one judge reads; `solve` reads the right one."""

@@ -130,7 +130,7 @@ def test_not_refused(number: int) -> None:
     assert tried(*case(number)) == "right", ONCE_REFUSED[number]
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 def test_a_run_with_few_digits_stops_where_they_are_lost() -> None:
     """A tree that keeps two digits in line and twelve elsewhere: it starts in line and stops, and
     starts elsewhere and runs.

@@ -253,7 +253,7 @@ def assert_as_solved(
 
 
 @by_module
-@pytest.mark.every(5)
+@pytest.mark.every(7)
 def test_module_at_its_own_parameters(dimensions: int, seed: int, route: str) -> None:
     """Every output of a module against the solver; joint space against the accelerations."""
     tree, e = made(dimensions, seed, route)
@@ -300,7 +300,7 @@ FORCE = "applied_force"
 
 
 @by_module
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_module_at_other_parameters(dimensions: int, seed: int, route: str) -> None:
     """Parameters by name and in order: as the solver has a tree of other numbers."""
     tree, e = made(dimensions, seed, route)

@@ -116,6 +116,7 @@ def test_a_pulse_in_time_is_not_overlooked(width: float) -> None:
     assert run.trajectory.y[-1] == pytest.approx(y, abs=1e-4)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     "shape", ["exp(-((x - 3)/w)**2)", "(1 - tanh((x - 3)/w)**2)", "1/(1 + ((x - 3)/w)**4)"]
 )

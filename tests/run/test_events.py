@@ -336,6 +336,7 @@ def test_block_slides_on_a_slope(name):
     assert [(e.t, e.kind) for e in trajectory.events] == [(0.0, "rest")]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["Radau", "BDF", "LSODA"])
 def test_block_comes_to_a_stop_on_a_slope(name):
     """Pushed up a slope that holds it: it moves v²/2g(sin + mu cos), then creeps as documented."""
@@ -353,7 +354,7 @@ def shaken(t):
 
 
 @pytest.mark.parametrize("name", A_FEW)
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_mass_leaves_a_shaken_table(name):
     """It lifts when the table accelerates downward by more than g, flies, and lands again."""
     problem = mechanism([0.0], [1.2], [[1.0]], force=weight, ground=shaken, bounce=0.0)

@@ -222,6 +222,7 @@ def test_legs_of_no_whole_step_keep_what_the_next_goes_on_from(method: str) -> N
     assert run.y[-1].tobytes() == whole.y[-1].tobytes()
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("method", "rtol"), [("DOP853", 1e-8), ("gragg_bulirsch_stoer", 1e-6)])
 def test_a_step_that_the_end_cut_short_is_not_gone_on_from(method: str, rtol: float) -> None:
     """Even if it was rejected and retried with another length, which depends on the end, too."""

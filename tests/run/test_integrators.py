@@ -474,6 +474,7 @@ def raising(error):
     return replace(BLOW_UP, derivative=derivative)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", GENERAL)
 def test_blow_up_keeps_the_finite_rows(name):
     # LSODA stops one rounding before t = 1; the others stop at it or pass it.
