@@ -18,9 +18,7 @@ TOGETHER = {
 }
 """Files whose tests ask for the same compiled scenes: these are made once a process."""
 GROUPS = {name: group for group, names in TOGETHER.items() for name in names}
-FIRST = (
-    "closed effects laws events closed_projected no_silent_error orthogonal cli choosing".split()
-)
+FIRST = "closed effects verify laws loop_runs choosing closed_form integrators native".split()
 """Groups and files that take longest, so that no process is left with one of them at the end."""
 
 
