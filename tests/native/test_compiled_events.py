@@ -157,6 +157,7 @@ def test_a_contact_that_closes_and_opens_in_a_step_is_seen() -> None:
     alike(HELD, integrator="DOP853", parameters={"push": 13.0}, rtol=1e-2)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", [WHEEL, TURNING, "bouncing_two_body"])
 def test_a_run_goes_on_in_either(scene: str) -> None:
     """What one has begun the other continues, also where a step is to end before a pulse."""

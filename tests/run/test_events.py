@@ -251,6 +251,7 @@ def cradle(moving, e, balls=5):
     return mechanism(places, speeds, normals, -np.ones(balls - 1), bounce=e)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", ["rk4", "DOP853", "LSODA"])
 @pytest.mark.parametrize("moving", [1, 2, 3])
 def test_newtons_cradle(name, moving):
@@ -333,6 +334,7 @@ def test_block_slides_on_a_slope(name):
     assert [(e.t, e.kind) for e in trajectory.events] == [(0.0, "rest")]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["Radau", "BDF", "LSODA"])
 def test_block_comes_to_a_stop_on_a_slope(name):
     """Pushed up a slope that holds it: it moves v²/2g(sin + mu cos), then creeps as documented."""
@@ -350,7 +352,7 @@ def shaken(t):
 
 
 @pytest.mark.parametrize("name", A_FEW)
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_mass_leaves_a_shaken_table(name):
     """It lifts when the table accelerates downward by more than g, flies, and lands again."""
     problem = mechanism([0.0], [1.2], [[1.0]], force=weight, ground=shaken, bounce=0.0)
@@ -422,6 +424,7 @@ def hump(v):
     )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["rk4", "DOP853", "Radau"])
 def test_mass_slides_off_a_hump(name):
     """It leaves a circle of radius r at cos = 2/3 + v²/3gr."""
@@ -465,6 +468,7 @@ def airy(names=("gravity", "air", "ground")):
     return problem, Powers(names, powers, lambda t, y: float(y[2:] @ y[2:] / 2))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("names", [("gravity", "air", "ground"), ("gravity", "air")])
 def test_works_sum_to_the_change_of_energy(names):
     """At every row, through drag, impacts, sliding and rest; the ground has its own work."""

@@ -90,6 +90,7 @@ TOGETHER: dict[str, Any] = {"integrator": "rk4", "dt": 0.01, "t_end": 0.5, "back
 COMPILED = pytest.mark.skipif(CC is None, reason="there is no C compiler")
 
 
+@pytest.mark.every(2)
 @COMPILED
 @pytest.mark.parametrize("asked", [TOGETHER, {**QUICK, "backend": "c", "samples": 7}])
 def test_members_that_run_together(asked: Any, tmp_path: Path) -> None:
