@@ -10,10 +10,12 @@ import numpy as np
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.native import checked, equal_steps
-from eomgen.native.constrained import address, constraints, made_margins
+from eomgen.native.constrained import address as where
+from eomgen.native.constrained import constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
 from eomgen.native.dop853 import constants, written_out
 from eomgen.native.functions import restricted
+from eomgen.native.memory import address, placed
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
@@ -85,6 +87,9 @@ class CompiledSteps:
         self._constants = usual_constants(module, "derivative", p)
         self._inputs = kernels.given(u)
         self._states = kernels.states
+        self._held = 0, 0
+        if self._constants is not None and self._inputs is not None:
+            self._held = ctypes.addressof(self._constants), self._inputs.ctypes.data
         self._library, self._call = library, library.dop853
         self._call.restype = ctypes.c_int
         self._call.argtypes = [_POINTER, _POINTER, _WHOLE, _REAL, _REAL, *[_POINTER] * 5]
@@ -97,8 +102,7 @@ class CompiledSteps:
             return None
         if not set(needed) <= self._checks.keys():
             return None
-        held = ctypes.cast(self._constants, _POINTER), self._inputs.ctypes.data
-        return partial(self._dop853, held)
+        return self._dop853
 
     def equal(self, name: str, problem: Problem) -> EqualSteps | None:
         """The same for methods with equal steps."""
@@ -111,7 +115,6 @@ class CompiledSteps:
 
     def _dop853(
         self,
-        held: tuple[Any, int],
         t: float,
         y: Array,
         memory: Mapping[str, float | Array],
@@ -129,28 +132,29 @@ class CompiledSteps:
     ) -> Stride:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
-        ends, lengths = np.empty((2, most))
-        states, slopes, losses = np.empty((3, most, ny))
-        derivatives, sampled, switches, gap_checks = np.empty((4, most), np.int64)
+        each, whole = (most,), (most, ny)
         watch, pointed = checked.watch(self._checks, watched, sizes)
-        switched, values = np.empty(most), np.empty((most, watch.switching.count))
+        (ends, lengths, states, slopes, losses, switched, values, terms), at = placed(
+            [each, each, whole, whole, whole, each]
+            + [(most, watch.switching.count), (most if dense else 0, 7, ny)]
+        )
+        (derivatives, sampled, switches, gap_checks), counted = placed([each] * 4, np.int64)
         rows, made = np.empty((len(times), ny)), ctypes.c_int64()
-        terms = np.empty((most if dense else 0, 7, ny))
         margins = made_margins(constrained, most)
         keeps = constraints(self._checks, constrained, self._inputs, ny)
-        arrays: list[Any] = [ends, lengths, states, slopes, losses, switched, values, terms]
-        arrays += [margins[1:]]
-        arrays += [derivatives, sampled, switches, gap_checks, times, rows]
-        records = _Records(*(array.ctypes.data for array in arrays), len(times))
-        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end, dense, address(keeps))
+        arrays = [margins[1:], times, rows]
+        to_margins, *beside = map(address, arrays)
+        records = _Records(*at, to_margins, *counted, *beside, len(times))
         start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
+        atol_at, *begun = map(address, (atol, *start))
+        settings = _Settings(*self._held, atol_at, rtol, longest, t_end, dense, where(keeps))
         why = self._call(
             ctypes.byref(settings),
             ctypes.byref(watch),
             most,
             t,
             float(memory["h_abs"]),
-            *(array.ctypes.data for array in start),
+            *begun,
             ctypes.byref(records),
             ctypes.byref(made),
         )

@@ -8,7 +8,7 @@ every machine on which its derivative has them, and also when C makes its steps:
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 from itertools import cycle
 from typing import Any, Literal
 
@@ -94,15 +94,6 @@ class DormandPrince8:
             power=1 / 8,
             longest=min(t_bound - self.t, max_step),
         )
-        self._slopes = np.empty((SLOPES, len(y0)))
-        self._sums = np.empty((len(SUMS), len(y0)))
-        products = np.empty_like(self._sums)
-        self._parts = [
-            (slope, factors, products[-len(factors) :], self._sums[-len(factors) :])
-            for slope, factors in zip(self._slopes, _ADDED, strict=True)
-        ]
-        few = 0 < len(y0) <= written_out.MOST
-        self._written = written_out.written_out(len(y0), _TERMS) if few else None
         self._step = (0.0, y0)
         self._dense: Callable[[FloatArray | float], FloatArray] | None = None
 
@@ -134,6 +125,29 @@ class DormandPrince8:
         if end >= self.t_bound:
             self.status = "finished"
         return None
+
+    @cached_property
+    def _slopes(self) -> FloatArray:
+        return np.empty((SLOPES, len(self.y)))
+
+    @cached_property
+    def _sums(self) -> FloatArray:
+        return np.empty((len(SUMS), len(self.y)))
+
+    @cached_property
+    def _parts(self) -> list[tuple[FloatArray, ...]]:
+        """For each slope its place, its factors, and the products and sums that it changes."""
+        products = np.empty_like(self._sums)
+        return [
+            (slope, factors, products[-len(factors) :], self._sums[-len(factors) :])
+            for slope, factors in zip(self._slopes, _ADDED, strict=True)
+        ]
+
+    @cached_property
+    def _written(self) -> written_out.Stages | None:
+        """The stages written out, for few states."""
+        few = 0 < len(self.y) <= written_out.MOST
+        return written_out.written_out(len(self.y), _TERMS) if few else None
 
     def _attempt(self, t: float, y: FloatArray, h: float) -> FloatArray:
         """Compute slopes 0 to 11 of a step and the sums over them; returns the change of y."""
