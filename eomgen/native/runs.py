@@ -135,8 +135,7 @@ class CompiledSteps:
         each, whole = (most,), (most, ny)
         watch, pointed = checked.watch(self._checks, watched, sizes)
         (ends, lengths, states, slopes, losses, switched, values, terms), at = placed(
-            [each, each, whole, whole, whole, each]
-            + [(most, watch.switching.count), (most if dense else 0, 7, ny)]
+            [each, each, *[whole] * 3, each, (most, watch.switching.count), (dense * most, 7, ny)]
         )
         (derivatives, sampled, switches, gap_checks), counted = placed([each] * 4, np.int64)
         rows, made = np.empty((len(times), ny)), ctypes.c_int64()

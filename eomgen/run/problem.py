@@ -177,7 +177,7 @@ class Problem:
         object.__setattr__(self, "initial", initial)
 
     def having(self, **functions: Any) -> "Problem":
-        """The same problem with other functions, quickly: its initial state is not checked again."""
+        """The same problem with other functions; its initial state is not checked again."""
         made = object.__new__(Problem)
         made.__dict__.update(self.__dict__, **functions)
         return made

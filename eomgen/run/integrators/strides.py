@@ -144,13 +144,14 @@ class Strides:
         must make the next one.
 
         Compiled steps end before one that would reach the end, unless they are series. So that one
-        is asked for alone, by its length.
+        is asked for alone, by its length; but where steps are looked at within, Python counts what
+        that takes only if it is done.
         """
         t, until, longest = stepper.solver.t, stepper.until, stepper.longest
         if self._method.series or t + min(stepper.solver.h_abs, longest) < until:
             return longest, until, most
-        left = until - t
-        return (left, np.inf, 1) if t + left == until else None
+        left, looked = until - t, self._problem.closed_form is not None
+        return (left, np.inf, 1) if t + left == until and not looked else None
 
     def _passes_nothing(self, branches: BranchMonitor, solver: Any, stride: Stride) -> bool:
         """Whether steps pass over nothing; else Python makes the next one, and then fewer are made
