@@ -24,8 +24,3 @@ def constants(summed: Callable[[Row], Any]) -> dict[str, object]:
         "greatest": repr(DOP853.greatest),
         "short_weight": repr(DOP853.short_weight),
     }
-
-
-def written_out(row: Row) -> str:
-    """A sum over slopes. It begins with 0 and so is never -0, as where all factors are added."""
-    return " + ".join(["0.0", *(f"{a!r} * k[{j}][j]" for j, a in row)])
