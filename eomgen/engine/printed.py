@@ -4,7 +4,18 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from eomgen.engine import adaptive, complementarity, least_squares, linear, roots, system
+from eomgen.engine import (
+    adaptive,
+    complementarity,
+    equal_steps,
+    explicit,
+    least_squares,
+    linear,
+    quaternions,
+    roots,
+    sums,
+    system,
+)
 from eomgen.engine.embedded import DOP853
 from eomgen.subset.braces import JAVASCRIPT, C, printed
 from eomgen.subset.expander import Text
@@ -26,7 +37,8 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    return Text.of(adaptive, linear, least_squares, complementarity, roots, system)
+    steps = (adaptive, equal_steps, explicit, quaternions, sums)
+    return Text.of(*steps, linear, least_squares, complementarity, roots, system)
 
 
 def c_source(functions: Roots) -> str:

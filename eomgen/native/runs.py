@@ -42,17 +42,14 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "engine": C.prelude + c_source([("begun", {}), ("gone_on", {})]),
+        "engine": C.prelude + c_source([("begun", {}), ("gone_on", {}), *equal_steps.STEPS]),
         "steps": c_source([("made_many", {"method": DOP853})]),
         **checked.context(),
         **of_constraints(),
+        **equal_steps.context(interface),
     }
-    main = render(c.TEMPLATES, "runs.c.jinja", context) + equal_steps.source(interface)
+    main = render(c.TEMPLATES, "runs.c.jinja", context)
     return {**c.library(program, interface), MAIN: main}
-
-
-class _System(ctypes.Structure):
-    _fields_ = (("k", _POINTER), ("u", _POINTER))
 
 
 class _Checks(ctypes.Structure):
@@ -140,7 +137,7 @@ class CompiledSteps:
         margins = made_margins(constrained, most)
         keeps = constraints(self._checks, constrained, self._inputs, ny)
         at = filled(Progress(t, length=float(memory["h_abs"])))
-        system, run = _System(*held), filled(Bounds(atol, rtol, longest, t_end, dense))
+        system, run = equal_steps.System(*held), filled(Bounds(atol, rtol, longest, t_end, dense))
         checks = _Checks(
             *(ctypes.addressof(each) for each in (system, run, watch)),
             address(keeps),

@@ -8,7 +8,10 @@ from functools import cache
 from eomgen.subset.expander import NotInSubsetError, Text, called
 
 ARRAYS = {"Vector": "float", "Matrix": "float", "Whole": "int"}
-FUNCTIONS = {"sqrt": "float", "next_after": "float", "isfinite": "int", "ordered": "float"}
+FUNCTIONS = {
+    "sqrt": "float", "next_after": "float", "isfinite": "int", "ordered": "float",
+    "all_within": "int",
+}  # fmt: skip
 """The kinds of what functions of numbers, or of whole arrays, return."""
 
 
@@ -151,11 +154,12 @@ class Kinds:
         at = indices(e)
         if len(at) > len(whole.sizes):
             raise NotInSubsetError(e, "has too many indices")
-        parts = [
-            (length(i, s), r)
-            for i, s, r in zip(at, whole.sizes, whole.room or whole.sizes, strict=False)
-            if isinstance(i, ast.Slice)
-        ]
+        parts: list[tuple[str, str]] = []
+        for i, n, most in zip(at, whole.sizes, whole.room or whole.sizes, strict=False):
+            if isinstance(i, ast.Slice):
+                parts.append((length(i, n), most))
+            elif (chosen := self.of(i)).is_array:
+                parts.append((chosen.sizes[0], chosen.sizes[0]))
         rest = whole.sizes[len(at) :]
         sizes, room = ((*(part[n] for part in parts), *rest) for n in (0, 1))
         return Kind(whole.of, sizes, room)
@@ -185,6 +189,9 @@ class Kinds:
         if name == "outer":
             x, y = self.of(args[0]), self.of(args[1])
             return Kind("float", (*x.sizes, *y.sizes), (*(x.room or x.sizes), *(y.room or y.sizes)))
+        if name == "product":
+            rows = self.of(args[0])
+            return Kind("float", rows.sizes[:1], rows.room[:1])
         if name in ("abs", "copy", "min", "max", "larger"):
             kinds = [self.of(a) for a in args]
             of = "float" if any(k.of == "float" for k in kinds) else "int"

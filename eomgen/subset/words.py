@@ -14,7 +14,9 @@ The text is ordinary Python with few kinds of things:
 Array statements are elementwise: `place = y + h * k[i]`, `a[i, p:] -= factor * a[p, p:]`. In Python
 NumPy runs them, in C and JavaScript they are loops; each entry has the same operations in the same
 order, and so the same bits. `place = …` makes a new array, `place[:] = …` changes one. An array has
-one name: `copy(x)`. Arrays are never resized; functions change those that they are given.
+one name: `copy(x)`. Arrays are never resized; functions change those that they are given. An index
+may be an array of whole numbers, which differ: `place[positions] += h * rates`. A record's array
+may be assigned as a whole, `step.place = place`; then only one of the two is used, or none changed.
 
 Where few numbers are taken one by one, lists are several times as fast in Python as arrays:
 `numbers`, `counts` and `table`, of which an entry is `a[i][j]`. Elsewhere they are arrays too, and
@@ -31,9 +33,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Known", "Matrix", "Row", "Vector", "Whole", "added", "combined", "copy", "counts", "inf",
-    "isfinite", "larger", "matrix", "nan", "next_after", "numbers", "ordered", "outer", "rows",
-    "sqrt", "table", "unrolled", "whole", "zeros",
+    "Known", "Matrix", "Row", "Vector", "Whole", "added", "all_within", "combined", "copy",
+    "counts", "inf", "isfinite", "larger", "matrix", "nan", "next_after", "numbers", "ordered",
+    "outer", "product", "rows", "sqrt", "table", "unrolled", "whole", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]
@@ -117,6 +119,17 @@ def combined(row: Row, k: Any) -> Vector:
 def ordered(x: Vector) -> float:
     """The sum of the entries of a vector, in order, from 0 on."""
     return 0.0 + _sums(x).item(-1) if len(x) else 0.0
+
+
+def all_within(x: Vector, limits: Vector) -> bool:
+    """Whether each entry of x is at most that of the limits; one that is nan is not."""
+    return bool((x <= limits).all())
+
+
+def product(a: Matrix, x: Vector) -> Vector:
+    """The matrix by the vector, each row's sum in order, from 0 on."""
+    n = len(x)
+    return 0.0 + np.add.accumulate(a * x, axis=1)[:, -1] if n else np.zeros(len(a))
 
 
 def larger(a: Vector, b: Vector | float) -> Vector:

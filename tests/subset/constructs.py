@@ -9,6 +9,7 @@ from eomgen.subset.words import (
     Vector,
     Whole,
     added,
+    all_within,
     copy,
     inf,
     isfinite,
@@ -18,6 +19,7 @@ from eomgen.subset.words import (
     next_after,
     ordered,
     outer,
+    product,
     rows,
     sqrt,
     unrolled,
@@ -48,6 +50,10 @@ class System(Protocol):
 
     def size(self, y: Annotated[Vector, "STATES"]) -> float:
         """A number."""
+        ...
+
+    def count(self) -> int:
+        """Without arguments."""
         ...
 
     def halve(self, y: Annotated[Vector, "STATES"]) -> None:
@@ -111,6 +117,32 @@ def matrices(n: int, m: int, a: Annotated[Matrix, "n", "m"], x: Annotated[Vector
     a[:, :] += other
 
 
+def products(n: int, m: int, a: Annotated[Matrix, "n", "m"], x: Annotated[Vector, "m"]) -> int:
+    """A matrix by a vector, and whether entries are within limits."""
+    found = product(a, x)
+    half = 0.5 * found
+    small = all_within(abs(half), found)
+    scale = larger(half, 1.0)
+    lower = all_within(found - half, scale * 2.0)
+    b = matrix(m, n)
+    b[0, :] = product(a, x * 2.0)
+    a[:, 0] = b[0]
+    return small + 2 * lower
+
+
+def chosen(n: int, which: Annotated[Whole, "m"], m: int, x: Annotated[Vector, "n"]) -> None:
+    """Entries at several places."""
+    some = copy(x[which])
+    x[which] = 0.25 * some + 1.0
+    x[which] += some * some
+    a = matrix(n, m)
+    for i in range(1, 2):
+        a[which, i] = some
+        x[:] = x * 1.0
+    a[0, :] = x[which] * 2.0
+    x[0] = a[0, 0] + a[n - 1, 1]
+
+
 def whole_numbers(n: int, order: Annotated[Whole, "n"], x: Annotated[Vector, "n"]) -> int:
     """Arrays of whole numbers, as places."""
     turned = whole(n)
@@ -128,7 +160,8 @@ def records(memory: Memory, h: float) -> bool:
     memory.steps += 1
     for i in range(memory.n):
         memory.order[i] += 1
-    memory.y[:] = memory.y * h
+    there = memory.y * h
+    memory.y = there
     moved(memory.n, memory.y)
     return memory.steps > 3
 
@@ -147,7 +180,7 @@ def with_given(system: System, t: float, y: Annotated[Vector, "STATES"]) -> floa
         k[i] = system.derivative(t + 0.1 * i, place)
     system.halve(y)
     y[:] = y + k[0] * k[2]
-    return system.size(y)
+    return system.size(y) + system.count()
 
 
 def known(method: Known, x: float) -> float:

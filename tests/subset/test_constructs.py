@@ -31,6 +31,9 @@ class Python:
     def size(self, y: Any) -> float:
         return float(y[0] + y[1])
 
+    def count(self) -> int:
+        return 3
+
     def halve(self, y: Any) -> None:
         y /= 2.0
 
@@ -44,12 +47,14 @@ static void derivative(System *s, double t, const double *y, double *out) {
     for (int j = 0; j < 2; j++) out[j] = y[j] * y[j] - t * y[j];
 }
 static double size(System *s, const double *y) { (void)s; return y[0] + y[1]; }
+static int64_t count(System *s) { (void)s; return 3; }
 static void halve(System *s, double *y) { (void)s; y[0] /= 2.0, y[1] /= 2.0; }
 """,
     """const STATES = 2;
 const system = {
   derivative: (t, y, out) => y.forEach((x, j) => (out[j] = x * x - t * x)),
   size: (y) => y[0] + y[1],
+  count: () => 3,
   halve: (y) => { y[0] /= 2; y[1] /= 2; },
 };
 """,
@@ -69,6 +74,8 @@ CASES: dict[str, list[list[Any]]] = {
     "numbers": [[a, b, n] for a in (-2.5, 0.0, 1.25) for b in (-1.0, 0.0, 3.5) for n in (0, 1, 6)],
     "vectors": [[n, some(n), some(n)] for n in (1, 2, 7)],
     "matrices": [[n, m, some(n, m), some(m)] for n, m in ((2, 3), (4, 2), (5, 5))],
+    "products": [[n, m, some(n, m), some(m)] for n, m in ((2, 3), (4, 2), (5, 1))],
+    "chosen": [[N + 1, np.array(which), 3, some(N + 1)] for which in ([4, 0, 2], [1, 2, 4])],
     "whole_numbers": [[N, np.array([2, 0, 3, 1]), some(N)]],
     "records": [
         [constructs.Memory(N, 0.5, steps, some(N), np.arange(N)), 0.25] for steps in (0, 3)
@@ -108,6 +115,11 @@ REFUSED = {
     "t = missing + 1.0": "not in the subset",
     "t = x.sum()": "not in the subset",
     "t = ordered(x) + 1.0": "to a name first",
+    "z = product(a, x) + x": "to a name first",
+    "x[:] = product(a, x * 2.0)": "while it is read",
+    "x[which] = x[others]": "shifted",
+    "for j_ in range(n): pass": "the name of an index",
+    "i_ = 1": "the name of an index",
     "z = x[::2] * 1.0": "no steps",
     "z = x + a": "different dimensions",
     "z = x[0, 1]": "too many indices",
@@ -122,7 +134,7 @@ REFUSED = {
     "z = [x]": "not in the subset",
     "t = added(v for v in x)": "not known",
     "for i in unrolled(range(n)): pass": "not known",
-    "f(n, x, a)": "calls itself",
+    "f(n, x, a, which, others)": "calls itself",
     "m = abs(n)": "whole number",
     "a[0] += 1 if 0 < n < 2 else 2": "not in the subset",
 }
@@ -131,7 +143,10 @@ REFUSED = {
 @pytest.mark.parametrize("statement", REFUSED)
 def test_what_is_refused(statement: str) -> None:
     """An error names the line."""
-    head = 'def f(n: int, x: Annotated[Vector, "n"], a: Annotated[Matrix, "n", "n"]) -> None:'
+    head = (
+        'def f(n: int, x: Annotated[Vector, "n"], a: Annotated[Matrix, "n", "n"],'
+        ' which: Annotated[Whole, "n"], others: Annotated[Whole, "n"]) -> None:'
+    )
     (function,) = ast.parse(f"{head}\n    {statement}\n").body
     assert isinstance(function, ast.FunctionDef)
     with pytest.raises(NotInSubsetError, match=f"(?s)line [12].*{REFUSED[statement]}"):
