@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 
 from eomgen.codegen.backends import c
 from eomgen.engine import roots
-from eomgen.engine.printed import c_source
+from eomgen.engine.embedded import DOP853
+from eomgen.engine.printed import Roots, c_source
 from eomgen.exports.fmu_unit import Observed, Unit
-from eomgen.native.dop853 import constants, written_out
 from eomgen.run import contacts, events, projection
 from eomgen.subset.braces import C
 from eomgen.templating import render, templates_folder
@@ -57,9 +57,19 @@ def _main(unit: Unit, token: str) -> str:
         "switching": [(n, s) for n, s, _, _ in _observed(unit.switches, len(interface.contacts))],
         **_closure(unit),
         **_contacts(unit),
-        **constants(written_out),
+        "steps": c_source(_steps(unit)),
+        "slopes": len(DOP853.nodes),
     }
     return render("fmu", "unit.c.jinja", context)
+
+
+def _steps(unit: Unit) -> Roots:
+    """What of the engine's text steps are made with: states within steps only where events are."""
+    method = {"method": DOP853}
+    roots: Roots = (("first_length", {}), ("made", method))
+    if unit.switches or unit.interface.contacts:
+        roots = (*roots, ("interpolate", method), ("within", {}))
+    return roots
 
 
 def _observed(parts: Sequence[Observed], start: int) -> list[tuple[str, int, int, Sequence[int]]]:

@@ -11,7 +11,6 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
 from eomgen.engine.embedded import DOP853
-from eomgen.engine.printed import Roots, c_source
 from eomgen.native import checked, equal_steps
 from eomgen.native.constrained import address as where
 from eomgen.native.constrained import constraints, made_margins
@@ -24,13 +23,10 @@ from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, W
 from eomgen.run.integrators.dormand_prince_8 import interpolated
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
-from eomgen.subset.braces import C
 from eomgen.subset.structures import filled, structure
 from eomgen.templating import render
 
 MAIN = "runs.c"
-ENGINE: Roots = (("begun", {}), ("gone_on", {}))
-"""What of the engine's text steps are checked with."""
 METHODS = ("dop853", *equal_steps.METHODS)
 """The methods whose steps this library makes."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -38,13 +34,17 @@ _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C sources of the derivative and of the methods that step with it."""
+    # Imported here because runs whose library is in the store do without the printer.
+    from eomgen.engine.printed import c_source
+    from eomgen.subset.braces import C
+
     program, interface = restricted(program, interface, ("derivative",))
     context = {
         "prefix": interface.name,
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "engine": C.prelude + c_source([*ENGINE, *equal_steps.STEPS]),
+        "engine": C.prelude + c_source([("begun", {}), ("gone_on", {}), *equal_steps.STEPS]),
         "steps": c_source([("made_many", {"method": DOP853})]),
         **checked.context(),
         **of_constraints(),
