@@ -1,23 +1,41 @@
 """The engine in other languages."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from eomgen.engine import equal_steps, explicit, linear, quaternions, roots, sums, system
+from eomgen.engine import (
+    adaptive,
+    complementarity,
+    equal_steps,
+    explicit,
+    least_squares,
+    linear,
+    quaternions,
+    roots,
+    sums,
+    system,
+)
+from eomgen.engine.embedded import DOP853
 from eomgen.subset.braces import JAVASCRIPT, C, printed
 from eomgen.subset.expander import Text
+from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
-ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (("begun", {}), ("gone_on", {}))
+ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
+    ("begun", {}),
+    ("gone_on", {}),
+    ("complementary", {}),
+)
 """What a page that goes on live calls."""
 
 
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    return Text.of(equal_steps, explicit, linear, quaternions, roots, sums, system)
+    steps = adaptive, equal_steps, explicit, sums, quaternions, system
+    return Text.of(*steps, linear, least_squares, complementarity, roots)
 
 
 def c_source(functions: Roots) -> str:
@@ -31,5 +49,16 @@ def c_source(functions: Roots) -> str:
 def steps_of_pages() -> str:
     """JavaScript: `makeSteps(STATES)` returns the functions that pages call, by name."""
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
+    names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
     return f"const makeSteps = (STATES) => {{\n{source}return {{ {names} }};\n}};\n"
+
+
+@cache
+def steps_of_few(states: int) -> Callable[..., bool]:
+    """`adaptive.made` of DOP853 for few states, as Python's own numbers."""
+    source = Text.of(adaptive, system)
+    printed: Callable[..., bool] = unrolled_functions(
+        source, [("made", {"method": DOP853})], states
+    ).made_DOP853
+    return printed

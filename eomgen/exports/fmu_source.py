@@ -4,9 +4,12 @@ import hashlib
 from collections.abc import Mapping, Sequence
 
 from eomgen.codegen.backends import c
+from eomgen.engine import roots
+from eomgen.engine.printed import c_source
 from eomgen.exports.fmu_unit import Observed, Unit
 from eomgen.native.dop853 import constants, written_out
-from eomgen.run import complementarity, contacts, events, projection
+from eomgen.run import contacts, events, projection
+from eomgen.subset.braces import C
 from eomgen.templating import render, templates_folder
 
 HEADERS = ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h")
@@ -35,6 +38,7 @@ def _main(unit: Unit, token: str) -> str:
     held = c.context(unit.program, interface)["held"]
     context = {
         "prefix": interface.name,
+        "prelude": C.prelude.strip(),
         "token": token,
         "states": len(interface.states),
         "inputs": len(interface.inputs),
@@ -100,7 +104,8 @@ def _contacts(unit: Unit) -> dict[str, object]:
         "rest": slowest,
         "bounces": contacts.BOUNCES,
         "strikes": contacts.STRIKES,
-        "rounding": repr(complementarity.ROUNDING),
-        "consistent": repr(complementarity.CONSISTENT),
+        "engine": c_source([("complementary", {}), ("begun", {}), ("gone_on", {})]),
+        "found": roots.FOUND,
+        "wanted": roots.WANTED,
         "most_events": events.MOST_EVENTS,
     }

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from eomgen.engine import roots
 from eomgen.native.module import outputs_of, usual_constants
-from eomgen.run import branches, crossings, enclosing, roots
+from eomgen.run import branches, crossings, enclosing
 from eomgen.run.compiled import Array, Watched
 from eomgen.run.events import GAP_CHECKS
 
@@ -65,7 +66,8 @@ def context() -> dict[str, Any]:
         "together": repr(crossings.TOGETHER),
         "located": repr(crossings.LOCATED),
         "root_rtol": repr(roots.RTOL),
-        "most_iterations": roots.MOST,
+        "found": roots.FOUND,
+        "wanted": roots.WANTED,
         "gap_checks": [repr(share) for share in GAP_CHECKS],
     }
 

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 
 from eomgen.codegen.interface import Interface
-from eomgen.engine.equal_steps import MADE_ALL, Course, Kept
+from eomgen.engine.adaptive import MADE
+from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.explicit import EULER, LEAPFROG_4, LEAPFROG_6, RUNGE_KUTTA_4
-from eomgen.engine.printed import c_source
+from eomgen.engine.printed import Roots
 from eomgen.native.checked import Function
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.run.compiled import Array, Constrained, EqualSteps, EqualStride
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.problem import Problem
-from eomgen.subset.braces import C
 from eomgen.subset.structures import filled, take
 
 COMPOSITIONS = (LEAPFROG_4, LEAPFROG_6)
@@ -28,10 +28,8 @@ LEAPFROGS = {"leapfrog": 1, **{each.name: len(each.parts) for each in COMPOSITIO
 _TABLEAUS = (EULER, RUNGE_KUTTA_4)
 METHODS = {**{each.name: each.stages for each in _TABLEAUS}, "semi_implicit_euler": 2, **LEAPFROGS}
 """The derivatives in a step, by the name of the method."""
-COMPOSED: list[tuple[str, Mapping[str, Any]]] = [
-    ("composed", {"of": each}) for each in COMPOSITIONS
-]
-_STEPS: list[tuple[str, Mapping[str, Any]]] = [
+COMPOSED: Roots = [("composed", {"of": each}) for each in COMPOSITIONS]
+STEPS: Roots = [
     *(("runge_kutta", {"method": each}) for each in _TABLEAUS),
     *(("semi_implicit_euler", {}), ("leapfrog", {}), *COMPOSED, ("equal_steps", {})),
 ]
@@ -45,7 +43,7 @@ _CALLS = {
 
 
 class System(ctypes.Structure):
-    """See `templates/c/equal_steps.c.jinja`."""
+    """See `templates/c/runs.c.jinja`."""
 
     _fields_ = tuple((name, _POINTER) for name in ("k", "u", "rates"))
 
@@ -54,7 +52,6 @@ def context(interface: Interface) -> dict[str, Any]:
     """The values of the template."""
     states = list(enumerate(interface.states))
     return {
-        "engine": C.prelude + c_source(_STEPS),
         "methods": [(name, _CALLS.get(name)) for name in METHODS],
         "positions": [i for i, state in states if state.position],
         "others": [i for i, state in states if not state.position],
@@ -154,7 +151,7 @@ def made(
         course.rate,
         course.place,
         course.slope,
-        usual=why == MADE_ALL,
+        usual=why == MADE,
         iterations=kept.iterations[:n] if iterates else None,
         margins=margins[: n + 1] if constrained else None,
     )

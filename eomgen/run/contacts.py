@@ -12,9 +12,10 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from eomgen.run.complementarity import complementary
+from eomgen.engine.complementarity import complementary
 from eomgen.run.failure import StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
+from eomgen.subset.words import numbers
 
 TOLERANCE = 1e-9
 """Contacts with gaps below this touch, and may penetrate by this at the start; in sizes."""
@@ -147,14 +148,15 @@ class Holding:
         Raises `StepFailure` if no forces keep the contacts from closing.
         """
         matrix, offset, columns = self._system(t, y, self.units)
-        forces = complementary(matrix, offset)
-        if forces is None:
+        found = numbers(len(offset))
+        if not complementary(len(offset), matrix.tolist(), offset.tolist(), found):
             names = ", ".join(self.contacts.names[k] for k in self.held)
             raise StepFailure(
                 f"no contact forces at t = {t:.6g} keep {names} from closing (strong friction can "
                 "cause this)",
                 "take less friction, or another contact law",
             )
+        forces = np.array(found)
         result = columns[:, 0] + (columns[:, 1:] - columns[:, :1]) @ forces
         left = matrix @ forces + offset
         scale = max(float(np.abs(columns[self._gaps, 0]).max()), self._motion_acceleration)

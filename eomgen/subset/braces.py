@@ -49,8 +49,6 @@ class Language:
     arrays        the types of arrays of numbers, and of whole ones
     part          how a part of an array is passed on, by its name and the place where it begins
     field         how a record's field is read
-    given         how a function that the engine is given is called, by its name, its owner and
-                  arguments, and all of these
     prelude       what the printed functions need
     """
 
@@ -63,7 +61,6 @@ class Language:
     arrays: tuple[str, str]
     part: str
     field: str
-    given: str
     prelude: str
 
 
@@ -77,7 +74,6 @@ C = Language(
     arrays=("double", "int64_t"),
     part="{array} + {place}",
     field="->",
-    given="{name}({all})",
     prelude="""#include <math.h>
 #include <stdint.h>
 
@@ -102,7 +98,6 @@ JAVASCRIPT = Language(
     arrays=("Float64", "Int32"),
     part="{array}.subarray({place})",
     field=".",
-    given="{of}.{name}({arguments})",
     prelude="""const nextAfter = (() => {
     const number = new Float64Array(1), bits = new BigInt64Array(number.buffer);
     return (t) => {
@@ -217,7 +212,10 @@ class _Function:
     def _product(self, sizes: Sequence[str]) -> str:
         if len(sizes) == 1:
             return self._size(sizes[0])
-        return " * ".join(s if s.isidentifier() else f"({self._size(s)})" for s in sizes)
+        return " * ".join(map(self._factor, sizes))
+
+    def _factor(self, size: str) -> str:
+        return size if size.isidentifier() else f"({self._size(size)})"
 
     def _size(self, text: str) -> str:
         return _bare(self._expr(ast.parse(text, mode="eval").body))
@@ -257,7 +255,6 @@ class _Function:
                 continue
             (target,) = s.targets
             if isinstance(target, ast.Name):
-                self._check_name(target)
                 self.kinds.declare(target.id, s.value)
             if not self._is_loop(s):
                 made.append(s)
@@ -267,16 +264,11 @@ class _Function:
                 made.append([s])
         return made
 
-    def _check_name(self, name: ast.Name) -> None:
-        if name.id in TWO:
-            raise NotInSubsetError(name, "is the name of an index of loops over arrays")
-
     def _prepare(self, s: ast.stmt) -> None:
         """Declare loop variables, and group the statements inside."""
         if isinstance(s, ast.For):
             if called(s.iter) != "range" or not isinstance(s.target, ast.Name) or s.orelse:
                 raise NotInSubsetError(s, "loops are over range(…), or unrolled(…)")
-            self._check_name(s.target)
             self.kinds.names.setdefault(s.target.id, INT)
             assert isinstance(s.iter, ast.Call)
             stored = _stored(s.body)
@@ -366,12 +358,12 @@ class _Function:
         self.depth += 1
         for s in group:
             (target,), value = s.targets, s.value
+            self._check_loop(target, value)
             if called(value) in GATHERED:
                 assert isinstance(value, ast.Call)
                 entries = _bare(" <= ".join(self._expr(a, ONE) for a in value.args))
                 self._line(f"{self._expr(target)} {GATHERED[called(value)][1]} {entries};")
                 continue
-            self._check_overlap(target, value)
             word = ""
             if isinstance(target, ast.Name) and target.id in self.scalars - declared:
                 word = f"{self.to.number} "
@@ -383,8 +375,12 @@ class _Function:
     def _for(self, index: str, size: str) -> str:
         return f"for ({self.to.whole} {index} = 0; {index} < {self._size(size)}; {index}++)"
 
-    def _check_overlap(self, target: ast.expr, value: ast.expr) -> None:
-        """NumPy computes all before it writes: parts of one array must not be shifted."""
+    def _check_loop(self, target: ast.expr, value: ast.expr) -> None:
+        """NumPy computes all before it writes: parts of one array must not be shifted. A printed
+        loop has indices of its own.
+        """
+        if {*TWO} & _names(target, value):
+            raise NotInSubsetError(value, "has the name of an index of loops over arrays")
         for n in ast.walk(value):
             if not isinstance(n, ast.Subscript) or _base(n) != _base(target):
                 continue
@@ -467,6 +463,7 @@ class _Function:
 
     def _product_of(self, target: ast.expr, a: ast.expr, x: ast.expr) -> None:
         """A matrix by a vector, row by row."""
+        self._check_loop(a, x)
         if _base(target) in _names(a, x):
             raise NotInSubsetError(x, "an array would change while it is read")
         self._line(f"{self._for('i_', self.kinds.of(a).sizes[0])} {{")
@@ -478,8 +475,9 @@ class _Function:
 
     def _change(self, target: ast.expr, op: str, value: ast.expr) -> None:
         kind = self.kinds.of(target)
-        self._check_overlap(target, value)
         loops = TWO[-len(kind.sizes) :] if kind.sizes else ()
+        if loops:
+            self._check_loop(target, value)
         for depth, (index, size) in enumerate(zip(loops, kind.sizes, strict=True)):
             self._line("    " * depth + self._for(index, size))
         pad = "    " * len(loops)
@@ -566,7 +564,7 @@ class _Function:
     def _at(self, array: str, kind: Kind, place: Sequence[str]) -> str:
         first, *others = place
         for size, index in zip(kind.sizes[1:], others, strict=True):
-            first = f"{first} * {self._size(size)} + {index}"
+            first = f"{first} * {self._factor(size)} + {index}"
         return f"{array}[{_bare(first)}]"
 
     def _argument(self, e: ast.expr) -> str:
@@ -584,15 +582,16 @@ class _Function:
 
     def _call(self, e: ast.Call, out: str = "") -> str:
         """A call of a function of the engine, or of one that it is given."""
-        arguments = ", ".join([*map(self._argument, e.args), *([out] if out else [])])
+        arguments = [*map(self._argument, e.args), *([out] if out else [])]
         if self._given(e):
             assert isinstance(e.func, ast.Attribute) and isinstance(e.func.value, ast.Name)
             of, name = e.func.value.id, e.func.attr
-            all_ = ", ".join(filter(None, (of, arguments)))
-            return self.to.given.format(of=of, name=name, arguments=arguments, all=all_)
+            if self.to is C:
+                return f"{name}({', '.join([of, *arguments])})"
+            return f"{of}.{name}({', '.join(arguments)})"
         if called(e) not in self.made:
             raise NotInSubsetError(e, "not a function of the engine")
-        return f"{called(e)}({arguments})"
+        return f"{called(e)}({', '.join(arguments)})"
 
     def _call_of(self, e: ast.Call, at: Sequence[str]) -> str:
         name, args = called(e), e.args

@@ -9,7 +9,6 @@ import ast
 import inspect
 import operator as op
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
@@ -22,6 +21,9 @@ OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Mod: op.mod, ast.Lt: op.lt, ast.Gt: op.gt, ast.LtE: op.le, ast.GtE: op.ge, ast.Eq: op.eq,
     ast.NotEq: op.ne, ast.USub: op.neg, ast.Not: op.not_,
 }  # fmt: skip
+
+LISTS = {"numbers": "zeros", "counts": "whole", "table": "matrix"}
+"""Lists in Python, and what they are in other languages."""
 
 
 class NotInSubsetError(SyntaxError):
@@ -70,7 +72,7 @@ class Text:
                 raise NotInSubsetError(self.functions[name], "calls itself")
             if own not in made:
                 open_.append(own)
-                d = deepcopy(self.functions[name])
+                d = _copied(self.functions[name])
                 d.name, d.args.args = own, [a for a in d.args.args if a.arg not in known]
                 d.body = _Expander({**self.constants, **known}, self, make).block(d.body)
                 made[own] = d
@@ -96,6 +98,21 @@ def called(node: ast.AST | None) -> str:
 _UNKNOWN = object()
 
 
+def _nothing(*given: Any) -> Any:
+    """An operation that the subset does not have."""
+    return _UNKNOWN
+
+
+def _copied(node: Any) -> Any:
+    """A copy of a tree, or of a list of trees; quicker than `deepcopy`."""
+    if isinstance(node, list):
+        return [_copied(x) for x in node]
+    if not isinstance(node, ast.AST):
+        return node
+    made = type(node)(**{name: _copied(x) for name, x in ast.iter_fields(node)})
+    return ast.copy_location(made, node)
+
+
 def _value(e: ast.expr, known: Mapping[str, Any]) -> Any:
     """The value of an expression of what is known; `_UNKNOWN` if it is of another form."""
 
@@ -116,7 +133,7 @@ def _value(e: ast.expr, known: Mapping[str, Any]) -> Any:
             call = op.getitem, found
         case ast.BinOp(left, operator, right) | ast.Compare(left, [operator], [right]):
             found = of(left, right)
-            call = OPERATORS[type(operator)], found
+            call = OPERATORS.get(type(operator), _nothing), found
         case ast.UnaryOp(operator, x):
             found = of(x)
             call = OPERATORS[type(operator)], found
@@ -135,8 +152,7 @@ class _Expander(ast.NodeTransformer):
 
     def value(self, node: ast.expr) -> Any:
         """The value of an expression, or `_UNKNOWN`."""
-        names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)} - FUNCTIONS.keys()
-        return _value(node, self.known) if names <= self.known.keys() else _UNKNOWN
+        return _value(node, self.known)
 
     def needed(self, node: ast.expr, why: str) -> Any:
         """The value of an expression that must be known."""
@@ -151,7 +167,7 @@ class _Expander(ast.NodeTransformer):
         names, values = (target.elts, value) if several else ([target], [value])  # type: ignore[attr-defined]
         before = dict(self.known)
         self.known |= {n.id: v for n, v in zip(names, values, strict=True)}
-        made = deepcopy(node)
+        made = _copied(node)
         made = self.block(made) if isinstance(made, list) else self.visit(made)
         self.known = before
         return made
@@ -175,6 +191,8 @@ class _Expander(ast.NodeTransformer):
         name = called(node)
         if name == "added":
             return self._sum(node)
+        if name == "combined":
+            return self._combined(node)
         if name in self.text.functions:
             parameters = self.text.functions[name].args.args
             if node.keywords or len(parameters) != len(node.args):
@@ -184,7 +202,16 @@ class _Expander(ast.NodeTransformer):
             known = {name: self.needed(a, f"{name} is not known") for name, a in needed}
             node.func = ast.copy_location(ast.Name(self.make(name, known), ast.Load()), node)
             node.args = [a for p, a in pairs if p.arg not in known]
+        elif name in LISTS:
+            node.func = ast.copy_location(ast.Name(LISTS[name], ast.Load()), node)
         node.args = [self.visit(a) for a in node.args]
+        return node
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        self.generic_visit(node)
+        match node.value:
+            case ast.Subscript(array, row) if not isinstance(row, ast.Slice | ast.Tuple):
+                node.value, node.slice = array, ast.Tuple([row, node.slice], ast.Load())
         return node
 
     def _sum(self, node: ast.Call) -> ast.expr:
@@ -198,6 +225,14 @@ class _Expander(ast.NodeTransformer):
         for term in rest:
             total = ast.copy_location(ast.BinOp(total, ast.Add(), term), node)
         return total
+
+    def _combined(self, node: ast.Call) -> ast.expr:
+        row, k = node.args
+        total: ast.expr = ast.Constant(0.0)
+        for j, a in self.needed(row, "the row is not known"):
+            term = ast.Subscript(self.visit(_copied(k)), ast.Constant(j), ast.Load())
+            total = ast.BinOp(total, ast.Add(), ast.BinOp(ast.Constant(a), ast.Mult(), term))
+        return ast.copy_location(total, node)
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         node.test = self.visit(node.test)

@@ -7,6 +7,7 @@ The text is ordinary Python with few kinds of things:
   `Annotated[Matrix, "n", "n"]`, where n is an argument, or a size that the printer is given;
 - `Known`: what is a Python object when the text is printed, such as a tableau. Functions are
   printed once for each, and loops over `unrolled(...)` of it are written out;
+- sums with factors that are known: `combined(row, k)`;
 - assignments, `if`, `while`, `for … in range(…)`, `break`, `continue`, `return`, and calls of other
   functions of the text. A protocol names the functions that the engine is given.
 
@@ -16,10 +17,15 @@ order, and so the same bits. `place = …` makes a new array, `place[:] = …` c
 one name: `copy(x)`. Arrays are never resized; functions change those that they are given. An index
 may be an array of whole numbers, which differ: `place[positions] += h * rates`. A record's array
 may be assigned as a whole, `step.place = place`; then only one of the two is used, or none changed.
+
+Where few numbers are taken one by one, lists are several times as fast in Python as arrays:
+`numbers`, `counts` and `table`, of which an entry is `a[i][j]`. Elsewhere they are arrays too, and
+Python gives functions that take entries only either of them.
 """
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from math import inf, isfinite, nan, sqrt
 from typing import Any, TypeVar
 
@@ -27,9 +33,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Known", "Matrix", "Vector", "Whole", "added", "all_within", "copy", "inf", "isfinite",
-    "larger", "matrix", "nan", "next_after", "ordered", "outer", "product", "rows", "sqrt",
-    "unrolled", "whole", "zeros",
+    "Known", "Matrix", "Row", "Vector", "Whole", "added", "all_within", "combined", "copy",
+    "counts", "inf", "isfinite", "larger", "matrix", "nan", "next_after", "numbers", "ordered",
+    "outer", "product", "rows", "sqrt", "table", "unrolled", "whole", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]
@@ -37,6 +43,19 @@ Matrix = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Known = Any
 T = TypeVar("T")
+
+
+_sum, _sums = np.add.reduce, np.add.accumulate
+
+
+class Row(tuple[tuple[int, float], ...]):
+    """Some factors, each with its number, ascending: those of a sum."""
+
+    @cached_property
+    def column(self) -> Matrix:
+        """All factors up to the last one, with 0 where there is none, (n, 1)."""
+        factors = dict(self)
+        return np.array([[factors.get(j, 0.0)] for j in range(max(factors) + 1)])
 
 
 def zeros(n: int) -> Vector:
@@ -52,6 +71,21 @@ def whole(n: int) -> Whole:
 def matrix(rows: int, columns: int) -> Matrix:
     """A matrix of zeros."""
     return np.zeros((rows, columns))
+
+
+def numbers(n: int) -> Any:
+    """A list of n zeros."""
+    return [0.0] * n
+
+
+def counts(n: int) -> Any:
+    """A list of n whole numbers, which are 0."""
+    return [0] * n
+
+
+def table(rows: int, columns: int) -> Any:
+    """Rows of zeros, in lists."""
+    return [[0.0] * columns for _ in range(rows)]
 
 
 def rows(many: int, n: int) -> Any:
@@ -72,9 +106,19 @@ def added(terms: Iterable[Any]) -> Any:
     return total
 
 
+def combined(row: Row, k: Any) -> Vector:
+    """The sum of vectors k[j] times the factors of a row, in order, from 0 on."""
+    column = row.column
+    products: Matrix = column * k[: len(column)]
+    # NumPy would add a single column pairwise.
+    is_one = products.shape[1] == 1
+    total: Vector = 0.0 + _sums(products)[-1] if is_one else _sum(products, initial=0.0)
+    return total
+
+
 def ordered(x: Vector) -> float:
     """The sum of the entries of a vector, in order, from 0 on."""
-    return 0.0 + float(np.add.accumulate(x)[-1]) if len(x) else 0.0
+    return 0.0 + _sums(x).item(-1) if len(x) else 0.0
 
 
 def all_within(x: Vector, limits: Vector) -> bool:

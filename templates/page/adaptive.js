@@ -41,6 +41,7 @@ const adaptive = (() => {
       [8, -0.4226823213237919], [9, -0.1521609496625161], [10, 0.20136540080403034], [11, 0.02265179219836082]],
   ];
 
+  const eighthRoot = (x) => Math.sqrt(Math.sqrt(Math.sqrt(x)));
   const dormandPrince = (ny) => {
     const slopes = NODES.map(() => new Float64Array(ny));
     const [state, here, last] = [0, 0, 0].map(() => new Float64Array(ny));
@@ -81,10 +82,10 @@ const adaptive = (() => {
         for (let k = 0; k < ny; k += 1) last[k] = here[k] + h * sum(SUMS[12], k);
         const error = errorOf(h);
         if (!(error < 1)) {
-          length = h * (error >= 1 ? Math.max(SMALLEST, SAFETY * error ** (-1 / 8)) : SMALLEST);
+          length = h * (error >= 1 ? Math.max(SMALLEST, SAFETY / eighthRoot(error)) : SMALLEST);
           continue;
         }
-        const factor = error === 0 ? GREATEST : Math.min(GREATEST, SAFETY * error ** (-1 / 8));
+        const factor = error === 0 ? GREATEST : Math.min(GREATEST, SAFETY / eighthRoot(error));
         length = h === rest && h < length ? Math.max(length, h * factor) : h * factor;
         for (let k = 0; k < ny; k += 1) change[k] += h * sum(SUMS[12], k);
         for (let k = 0; k < ny; k += 1) here[k] = y[k] + change[k];

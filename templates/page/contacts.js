@@ -12,154 +12,26 @@ const contacts = (() => {
   const STRONG = 2 ** 400;
   const BOUNCES = 100;
   const STRIKES = 5000;
-  const ROUNDING = 1e-10;
-  const CONSISTENT = 1e-6;
   const TOGETHER = 1e-9;
   const largest = (values) => values.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
 
-  // f with 0 <= f, 0 <= a = matrix f + offset, f_i a_i = 0; null if none is found. Murty's pivoting
-  // with least squares of least norm, so that redundant contacts share the load; else Lemke's method.
+  // f with 0 <= f, 0 <= a = matrix f + offset, f_i a_i = 0; null if none is found.
   function complementary(matrix, offset) {
-    const n = offset.length;
-    const scale = largest(offset);
-    if (!offset.some((x) => x < 0)) return new Array(n).fill(0);
-    if (!Number.isFinite(scale) || !matrix.flat().every(Number.isFinite)) return null;
-    const acts = offset.map((x) => x < 0);
-    for (let round = 0; round < 4 * n + 4; round += 1) {
-      const at = [...acts.keys()].filter((i) => acts[i]);
-      const forces = new Array(n).fill(0);
-      const found = leastSquares(at.map((i) => at.map((j) => matrix[i][j])), at.map((i) => -offset[i]));
-      at.forEach((i, k) => (forces[i] = found[k]));
-      const left = offset.map((x, i) => dot(matrix[i], forces) + x);
-      const pull = -ROUNDING * largest(forces);
-      const wrong = acts.findIndex((on, i) => (on ? forces[i] < pull : left[i] < -ROUNDING * scale));
-      if (wrong < 0) {
-        if (at.every((i) => Math.abs(left[i]) <= CONSISTENT * scale)) return forces.map((f) => Math.max(f, 0));
-        break;
-      }
-      acts[wrong] = !acts[wrong];
-    }
-    return lemke(matrix, offset, scale);
+    const forces = new Float64Array(offset.length);
+    return makeSteps(0).complementary(offset.length, Float64Array.from(matrix.flat()), Float64Array.from(offset), forces)
+      ? Array.from(forces) : null;
   }
 
   const dot = (a, b) => a.reduce((total, x, i) => total + x * b[i], 0);
 
-  // The solution x of least norm of |matrix x - wanted| least, by a singular value decomposition with
-  // one-sided Jacobi rotations (Golub, Van Loan, Matrix Computations, section 8.6.3).
-  function leastSquares(matrix, wanted) {
-    const n = wanted.length;
-    if (n === 0) return [];
-    if (n === 1 && matrix[0][0]) return [wanted[0] / matrix[0][0]];
-    // Columns u_j of matrix V, rotated until they are orthogonal; columns v_j of V.
-    const u = matrix.map((_, j) => matrix.map((row) => row[j]));
-    const v = matrix.map((_, j) => matrix.map((__, i) => (i === j ? 1 : 0)));
-    for (let sweep = 0, turned = true; turned && sweep < 60; sweep += 1) {
-      turned = false;
-      for (let p = 0; p < n; p += 1) {
-        for (let q = p + 1; q < n; q += 1) {
-          const [a, b, c] = [dot(u[p], u[p]), dot(u[q], u[q]), dot(u[p], u[q])];
-          if (Math.abs(c) <= 1e-16 * Math.sqrt(a * b) || c === 0) continue;
-          turned = true;
-          const zeta = (b - a) / (2 * c);
-          const tangent = (zeta < 0 ? -1 : 1) / (Math.abs(zeta) + Math.sqrt(1 + zeta * zeta));
-          const cosine = 1 / Math.sqrt(1 + tangent * tangent);
-          const sine = cosine * tangent;
-          for (const w of [u, v]) {
-            for (let i = 0; i < n; i += 1) {
-              const [x, y] = [w[p][i], w[q][i]];
-              w[p][i] = cosine * x - sine * y;
-              w[q][i] = sine * x + cosine * y;
-            }
-          }
-        }
-      }
-    }
-    const squares = u.map((column) => dot(column, column));
-    const most = Math.sqrt(Math.max(...squares));
-    const solution = new Array(n).fill(0);
-    squares.forEach((square, j) => {
-      if (!(Math.sqrt(square) > ROUNDING * most)) return;
-      const along = dot(u[j], wanted) / square;
-      for (let i = 0; i < n; i += 1) solution[i] += along * v[j][i];
-    });
-    return solution;
-  }
-
-  // Lemke's method: an artificial variable gives a feasible basis and is then eliminated.
-  function lemke(matrix, offset, scale) {
-    const n = offset.length;
-    const table = offset.map((x, i) => [
-      ...offset.map((_, j) => (i === j ? 1 : 0)), ...matrix[i].map((a) => -a), -1, x,
-    ]);
-    const basis = [...offset.keys()];
-    let entering = 2 * n;
-    let row = offset.indexOf(Math.min(...offset));
-    for (let round = 0; round < 20 * n + 20; round += 1) {
-      const pivot = table[row][entering];
-      table[row] = table[row].map((x) => x / pivot);
-      table.forEach((line, i) => {
-        const factor = line[entering];
-        if (i !== row && factor) table[i] = line.map((x, j) => x - factor * table[row][j]);
-      });
-      const leaving = basis[row];
-      basis[row] = entering;
-      if (leaving === 2 * n) {
-        const forces = new Array(2 * n + 1).fill(0);
-        basis.forEach((variable, i) => (forces[variable] = table[i][2 * n + 1]));
-        const found = forces.slice(n, 2 * n).map((f) => Math.max(f, 0));
-        const holds = offset.every((x, i) => dot(matrix[i], found) + x >= -CONSISTENT * scale);
-        return holds ? found : null;
-      }
-      entering = leaving < n ? leaving + n : leaving - n;
-      const column = table.map((line) => line[entering]);
-      const bound = ROUNDING * largest(column);
-      const rows = [...column.keys()].filter((i) => column[i] > bound);
-      if (!rows.length) return null; // a ray: there is no solution
-      const ratios = rows.map((i) => table[i][2 * n + 1] / column[i]);
-      const limit = Math.min(...ratios) + ROUNDING * scale;
-      const least = rows.filter((_, k) => ratios[k] <= limit);
-      // The artificial variable first, or the method cycles at degenerate vertices.
-      row = least.find((i) => basis[i] === 2 * n) ?? least[0];
-    }
-    return null;
-  }
-
-  // A zero between a and b of a function with these values there, by Brent's method.
+  // A zero between a and b of a function with these values there.
   function root(of, a, b, atA, atB, xtol, rtol) {
-    let [before, here, across] = [a, b, a];
-    let [atBefore, atHere, atAcross, last, step] = [atA, atB, 0, 0, 0];
-    for (let round = 0; round < 100; round += 1) {
-      if (Number.isNaN(atBefore) || Number.isNaN(atHere)) break;
-      if (atBefore && atHere && atBefore < 0 !== atHere < 0) {
-        [across, atAcross] = [before, atBefore];
-        last = step = here - before;
-      }
-      if (Math.abs(atAcross) < Math.abs(atHere)) {
-        [before, here, across] = [here, across, here];
-        [atBefore, atHere, atAcross] = [atHere, atAcross, atHere];
-      }
-      const least = (xtol + rtol * Math.abs(here)) / 2;
-      const half = (across - here) / 2;
-      if (atHere === 0 || Math.abs(half) < least) return here;
-      let found = Infinity;
-      if (Math.abs(last) > least && Math.abs(atHere) < Math.abs(atBefore)) {
-        if (before === across) found = -atHere * (here - before) / (atHere - atBefore);
-        else {
-          const one = (atBefore - atHere) / (before - here);
-          const other = (atAcross - atHere) / (across - here);
-          const over = atAcross * other - atBefore * one;
-          found = -atHere * over / (other * one * (atAcross - atBefore));
-        }
-      }
-      if (2 * Math.abs(found) < Math.min(Math.abs(last), 3 * Math.abs(half) - least)) {
-        last = step;
-        step = found;
-      } else last = step = half;
-      [before, atBefore] = [here, atHere];
-      here += Math.abs(step) > least ? step : half > 0 ? least : -least;
-      atHere = of(here);
-    }
-    throw new Error("the time of a contact is not found: take a smaller step");
+    const steps = makeSteps(0);
+    const search = { xtol, rtol };
+    let answer = steps.begun(search, a, b, atA, atB);
+    while (answer === steps.WANTED) answer = steps.gone_on(search, of(search.here));
+    if (answer !== steps.FOUND) throw new Error("the time of a contact is not found: take a smaller step");
+    return search.here;
   }
   const zero = (of, a, b) => root(of, a, b, of(a), of(b), Math.max(1e-14 * (b - a), 1e-300), 1e-15);
 

@@ -1,21 +1,25 @@
-"""Random complementarity problems of contact forces in three places: Python, the C of FMI units,
-the page's JavaScript.
+"""Random complementarity problems of contact forces by the engine's text in three languages: Python
+as it stands, C, JavaScript.
 
     python tests/campaigns/contact_forces.py [COUNT] [SEED]
 
-Says how many have no solution that is found, how many need Lemke's method, how many agree in every
-bit, and which do not agree.
+Says how many have no solution that is found, how many need Lemke's method, and which do not agree
+in every bit.
 """
 
 import sys
 from pathlib import Path
 from unittest import mock
 
+import numpy as np
+
 sys.path.append(str(Path(__file__).parent.parent))
 
-from complementarity import drawn, in_c, in_javascript, in_python, same
+from complementarity import drawn, solution
+from languages import results
 
-from eomgen.run import complementarity
+from eomgen.engine import complementarity
+from eomgen.engine.printed import text
 
 
 def main() -> None:
@@ -23,15 +27,16 @@ def main() -> None:
     count = int(sys.argv[1]) if sys.argv[1:] else 20_000
     seed = int(sys.argv[2]) if sys.argv[2:] else 1
     problems = drawn(count, seed)
-    lemke = mock.Mock(side_effect=complementarity._lemke)
-    with mock.patch.object(complementarity, "_lemke", lemke):
-        right = in_python(problems)
-    print(f"{count} problems: {right.count(None)} without forces, {lemke.call_count} by Lemke")
+    lemke = mock.Mock(side_effect=complementarity.by_lemke)
+    with mock.patch.object(complementarity, "by_lemke", lemke):
+        none = sum(solution(*problem) is None for problem in problems)
+    print(f"{count} problems: {none} without forces, {lemke.call_count} by Lemke")
+    cases = [[len(b), a, b, np.zeros(len(b))] for a, b in problems]
+    python, c, javascript = results(text(), "complementary", cases)
     wrong = 0
-    for name, found in (("C", in_c(problems)), ("JavaScript", in_javascript(problems))):
-        differ = [k for k, pair in enumerate(zip(right, found, strict=True)) if not same(*pair)]
-        bits = sum(a == b for a, b in zip(right, found, strict=True))
-        print(f"{name}: {len(differ)} differ {differ[:10]}; {bits} equal in every bit", flush=True)
+    for name, found in (("C", c), ("JavaScript", javascript)):
+        differ = [k for k, pair in enumerate(zip(python, found, strict=True)) if pair[0] != pair[1]]
+        print(f"{name}: {len(differ)} differ in a bit {differ[:10]}", flush=True)
         wrong += len(differ)
     sys.exit(wrong > 0)
 

@@ -2,19 +2,15 @@
 
 import io
 import zipfile
-from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from campaign import some
-from complementarity import Forces, Problem, drawn, in_c, in_javascript, in_python, same
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from importer import begun, exchanged, instance
-from live import NODE
 
 import eomgen
 from eomgen.cli import main
@@ -206,18 +202,3 @@ def test_units_have_their_dimensions(folder: Path) -> None:
     description = read_model_description(str(unit(folder, "cart_pole")))
     units = {each.name: each.baseUnit for each in description.unitDefinitions}
     assert (units["J"].kg, units["J"].m, units["J"].s) == (1, 2, -2)
-
-
-@pytest.mark.parametrize("solve", [in_c, in_javascript])
-def test_contact_forces_are_found_as_in_python(
-    solve: Callable[[Sequence[Problem]], list[Forces]],
-) -> None:
-    """Of unsymmetric problems, of which one in four needs Lemke's method: those of units and those
-    of the page. `tests/campaigns/contact_forces.py` has more of them.
-    """
-    if solve is in_javascript and NODE is None:
-        pytest.skip("needs node, which runs JavaScript")
-    problems = drawn(some(200, 2000), 1)
-    right, found = in_python(problems), solve(problems)
-    assert 0 < right.count(None) < len(right) / 2
-    assert all(map(same, right, found))

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from scipy.optimize import brentq
 
 from eomgen.errors import RunError
 from eomgen.run import events
-from eomgen.run.complementarity import _lemke, complementary
 from eomgen.run.contacts import TOLERANCE
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
@@ -441,47 +439,6 @@ def test_mass_slides_off_a_hump(name):
     np.testing.assert_allclose(
         trajectory.y[after:, 1], cosine - speed * sine * t - G * t**2 / 2, atol=1e-8
     )
-
-
-# --- complementarity ----------------------------------------------------------------------------
-
-
-def every_solution(matrix, offset):
-    """All solutions, by trying each set of contacts that push."""
-    for acts in product((False, True), repeat=len(offset)):
-        acts = np.array(acts)
-        forces = np.zeros(len(offset))
-        forces[acts] = np.linalg.lstsq(matrix[np.ix_(acts, acts)], -offset[acts], rcond=None)[0]
-        left = matrix @ forces + offset
-        if forces.min() > -1e-9 and left.min() > -1e-9 and np.abs(left[acts]).max(initial=0) < 1e-9:
-            yield left
-
-
-@pytest.mark.parametrize("method", [complementary, lambda m, o: _lemke(m, o, np.abs(o).max())])
-@pytest.mark.parametrize("rank", [6, 3])
-def test_forces_push_and_never_pull(method, rank):
-    """Accelerations agree with those of an exhaustive search over sets of contacts."""
-    noise = np.random.default_rng(rank)
-    pushed = 0
-    for _ in range(100):
-        rows = noise.normal(size=(6, rank))
-        matrix = rows @ rows.T
-        offset = rows @ noise.normal(size=rank) + 0.3 * noise.random(6) * (rank == 6)
-        if offset.min() >= 0:
-            continue
-        solutions = list(every_solution(matrix, offset))
-        forces = method(matrix, offset)
-        assert solutions
-        assert forces.min() >= 0
-        np.testing.assert_allclose(matrix @ forces + offset, solutions[0], atol=1e-8)
-        pushed += 1
-    assert pushed > 50
-
-
-def test_there_may_be_no_forces():
-    assert complementary(np.array([[-1.0]]), np.array([-1.0])) is None
-    assert complementary(np.zeros((2, 2)), np.array([1.0, -1.0])) is None
-    assert complementary(np.array([[np.nan]]), np.array([-1.0])) is None
 
 
 # --- works --------------------------------------------------------------------------------------

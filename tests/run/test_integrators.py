@@ -16,6 +16,7 @@ from campaigns import energy
 from scipy.integrate import DOP853, RK45, solve_ivp
 from scipy.special import ellipj, ellipk
 
+from eomgen.engine import dop853_coefficients as coefficients
 from eomgen.engine.explicit import RUNGE_KUTTA_4 as TABLEAU
 from eomgen.engine.tableau import ButcherTableau, density, size, trees
 from eomgen.errors import RunError
@@ -28,7 +29,6 @@ from eomgen.run.integrators import (
     gauss_6,
     implicit_midpoint,
 )
-from eomgen.run.integrators import dop853_coefficients as coefficients
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.integrators.explicit import runge_kutta
 from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer

@@ -15,7 +15,6 @@ from eomgen.model.elaborate import elaborate
 from eomgen.model.interactive import OUTPUTS, interactive, switches_of
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.run.complementarity import complementary
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import parse_scene
@@ -473,27 +472,6 @@ def test_what_fails_is_a_sentence() -> None:
     assert 0 < found["t"] < 10 and found["more"] == [0, 0] and found["again"] == 100
     assert found["second"].startswith("mass of link") and "change the parameters" in found["second"]
     assert found["energy"] == {"kinetic": None, "potential": None}
-
-
-def test_contact_forces_are_those_of_python() -> None:
-    """The same solutions of complementarity problems, among them singular and unsymmetric ones."""
-    random = np.random.default_rng(3)
-    problems = []
-    for n in (1, 2, 3, 5, 8):
-        for rank in range(1, n + 1):
-            rows = random.normal(size=(n, rank))
-            matrix = rows @ rows.T + (0.05 * random.normal(size=(n, n)) if rank == n else 0)
-            offset = matrix @ random.normal(size=n) - 0.1 * (rank == n)
-            problems.append((matrix, offset))
-    expected = [complementary(*problem) for problem in problems]
-    script = "return given.map(([matrix, offset]) => contacts.complementary(matrix, offset));"
-    given = [[m.tolist(), o.tolist()] for m, o in problems]
-    found = run_in_node("const mechanism = null;", script, given)
-    assert sum(f is not None and np.any(f > 0) for f in expected) > 10
-    for mine, theirs in zip(found, expected, strict=True):
-        assert (mine is None) == (theirs is None)
-        if theirs is not None:
-            np.testing.assert_allclose(mine, theirs, rtol=1e-7, atol=1e-8 * np.abs(theirs).max())
 
 
 def test_a_stored_page_is_the_derived_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:

@@ -39,3 +39,4 @@ def test_root_search() -> None:
     """Points of searches, with values that are anything."""
     searches = [roots.Search(1e-12, roots.RTOL, *x) for x in SEEDED.normal(size=(50, 8))]
     same("gone_on", [[search, float(SEEDED.normal())] for search in searches])
+    same("begun", [[search, *SEEDED.normal(size=4).tolist()] for search in searches])
