@@ -1,6 +1,7 @@
 """The page's mechanism and engine in node: against the Python module and `simulate`."""
 
 from dataclasses import replace
+from math import factorial, floor
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,17 @@ from live import NODE, run_in_node
 
 import eomgen
 from eomgen.api.given import model_of, read
+from eomgen.codegen.backends.javascript import mechanism
+from eomgen.codegen.interface import interface_of
+from eomgen.codegen.live import live_system
+from eomgen.errors import RunError
 from eomgen.language.formula import parse
 from eomgen.model.elaborate import elaborate
 from eomgen.model.interactive import OUTPUTS, interactive, switches_of
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.run.module import GeneratedModule, load_module
+from eomgen.run.integrate import integrate
+from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import parse_scene
 from eomgen.show.live import live_table, velocity_rows
@@ -155,6 +161,64 @@ def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) 
     assert np.abs((np.array(found["y"]) - expected) / scale).max() <= TOLERANCE
     kinds = [(event.kind, event.contact) for event in run.trajectory.events]
     assert [(event["kind"], event["contact"]) for event in found["events"]] == kinds
+
+
+SINE = """
+const turn = 6.283185307179586;
+const factors = given.factors;
+Math.sin = (x) => {
+  const r = x - turn * Math.floor(x / turn + 0.5);
+  let sum = 0;
+  for (const factor of factors) sum = sum * (r * r) + factor;
+  return sum * r;
+};
+Math.cos = (x) => Math.sin(x + 1.5707963267948966);
+"""
+FACTORS = [(-1) ** k / factorial(2 * k + 1) for k in range(12, -1, -1)]
+EXPLICIT = ("euler", "semi_implicit_euler", "leapfrog", "leapfrog_4", "leapfrog_6", "rk4")
+FREE = ("pendulum", "double_pendulum", "spinning_top")
+
+
+def sine(x: float) -> float:
+    """As in `SINE`, for a mathematical library differs in last digits from that of node."""
+    turn, total = 6.283185307179586, 0.0
+    r = x - turn * floor(x / turn + 0.5)
+    for factor in FACTORS:
+        total = total * (r * r) + factor
+    return total * r
+
+
+@pytest.mark.parametrize("name", some(FREE, built_in_names()))
+def test_explicit_steps_have_the_bits_of_python(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With each method that suits the scene, the same program, sines of arithmetic alone."""
+    model = model_of(read(name), name)
+    found, table = live_system(model), page_of(name)[1]
+    source = mechanism(found.system.program, interface_of(found.system))
+    monkeypatch.setattr("math.sin", sine)
+    monkeypatch.setattr("math.cos", lambda x: sine(x + 1.5707963267948966))
+    module = load_module(python_module(found.system))
+    exact: Any = eomgen.load(eomgen.generate(name, form="velocity"))
+    problem = as_problem(module, start=lambda y: np.array(table["initial"]))
+    problem = replace(problem, jacobian=exact.jacobian)
+    if problem.contacts or problem.projection:
+        pytest.skip("contacts and loops have steps of their own")
+    script = f"""{SINE}
+    return given.methods.map((liveMethod) => {{
+      const engine = makeEngine(mechanism, {{ ...given.data, liveMethod }});
+      engine.advance(0.2);
+      return engine.method === liveMethod ? Array.from(engine.y) : null;
+    }});
+    """
+    table |= {"liveStep": 0.002}
+    given = {"data": table, "factors": FACTORS, "methods": EXPLICIT}
+    mine = dict(zip(EXPLICIT, run_in_node(source, script, given), strict=True))
+    for method, y in mine.items():
+        try:
+            run = integrate(problem, method, 0.2, dt=0.002, unstable=True)
+        except RunError:
+            assert y is None and method.startswith("leapfrog"), method
+            continue
+        assert y == run.y[-1].tolist(), method
 
 
 STOP = """
