@@ -18,6 +18,7 @@ from eomgen.subset.words import (
     Whole,
     combined,
     copy,
+    inf,
     larger,
     matrix,
     next_after,
@@ -115,6 +116,39 @@ class Checks(Protocol):
 def eighth_root(x: float) -> float:
     """x^(1/8), with the same bits wherever there is a square root."""
     return sqrt(sqrt(sqrt(x)))
+
+
+def first_length(
+    system: System,
+    run: Bounds,
+    t: float,
+    y: Annotated[Vector, "STATES"],
+    slope: Annotated[Vector, "STATES"],
+    longest: float,
+) -> float:
+    """The length of the first step from y, s: section II.4, (a) to (f)."""
+    if len(y) == 0:
+        return longest
+    scale = run.atol + abs(y) * run.rtol
+    a = y / scale
+    b = slope / scale
+    first = ordered(a * a)
+    second = ordered(b * b)
+    size = sqrt(first / len(y))
+    speed = sqrt(second / len(y))
+    trial = 1e-6
+    if size >= 1e-5 and speed >= 1e-5 and speed < inf:
+        trial = 0.01 * size / speed
+    trial = min(trial, longest)
+    place = y + trial * slope
+    ahead = system.derivative(t + trial, place)
+    c = (ahead - slope) / scale
+    third = ordered(c * c)
+    bend = sqrt(third / len(y)) / trial
+    length = max(1e-6, trial * 1e-3)
+    if speed > 1e-15 or bend > 1e-15:
+        length = eighth_root(0.01 / max(speed, bend))
+    return min(min(100.0 * trial, length), longest)
 
 
 def attempted(

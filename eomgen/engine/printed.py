@@ -36,6 +36,9 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("begun", {}),
     ("gone_on", {}),
     ("complementary", {}),
+    ("first_length", {}),
+    ("made_many", {"method": DOP853}),
+    ("within", {}),
 )
 """What a page that goes on live calls."""
 
@@ -43,8 +46,8 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    steps = adaptive, equal_steps, explicit, sums, quaternions, system
-    return Text.of(*steps, linear, least_squares, complementarity, roots)
+    steps = (adaptive, equal_steps, explicit, quaternions, sums)
+    return Text.of(*steps, linear, least_squares, complementarity, roots, system)
 
 
 def c_source(functions: Roots) -> str:

@@ -33,7 +33,7 @@ STATEMENTS = (
 )  # fmt: skip
 GATHERED = {"ordered": ("0.0", "+="), "all_within": ("1", "&=")}
 """What entries are gathered by, one after another: what is begun with, and what is done."""
-ONE, TWO = ("j",), ("i_", "j")
+ONE, TWO = ("j_",), ("i_", "j_")
 """The indices of entries in loops over arrays of one dimension and of two."""
 
 
@@ -255,6 +255,7 @@ class _Function:
                 continue
             (target,) = s.targets
             if isinstance(target, ast.Name):
+                self._check_name(target)
                 self.kinds.declare(target.id, s.value)
             if not self._is_loop(s):
                 made.append(s)
@@ -264,11 +265,16 @@ class _Function:
                 made.append([s])
         return made
 
+    def _check_name(self, name: ast.Name) -> None:
+        if name.id in TWO:
+            raise NotInSubsetError(name, "is the name of an index of loops over arrays")
+
     def _prepare(self, s: ast.stmt) -> None:
         """Declare loop variables, and group the statements inside."""
         if isinstance(s, ast.For):
             if called(s.iter) != "range" or not isinstance(s.target, ast.Name) or s.orelse:
                 raise NotInSubsetError(s, "loops are over range(…), or unrolled(…)")
+            self._check_name(s.target)
             self.kinds.names.setdefault(s.target.id, INT)
             assert isinstance(s.iter, ast.Call)
             stored = _stored(s.body)
@@ -354,16 +360,16 @@ class _Function:
         for s in group:
             if called(s.value) in GATHERED:
                 self._line(f"{self._expr(s.targets[0])} = {GATHERED[called(s.value)][0]};")
-        self._line(self._for("j", self._span(group[0])) + " {")
+        self._line(self._for("j_", self._span(group[0])) + " {")
         self.depth += 1
         for s in group:
             (target,), value = s.targets, s.value
-            self._check_loop(target, value)
             if called(value) in GATHERED:
                 assert isinstance(value, ast.Call)
                 entries = _bare(" <= ".join(self._expr(a, ONE) for a in value.args))
                 self._line(f"{self._expr(target)} {GATHERED[called(value)][1]} {entries};")
                 continue
+            self._check_overlap(target, value)
             word = ""
             if isinstance(target, ast.Name) and target.id in self.scalars - declared:
                 word = f"{self.to.number} "
@@ -375,12 +381,8 @@ class _Function:
     def _for(self, index: str, size: str) -> str:
         return f"for ({self.to.whole} {index} = 0; {index} < {self._size(size)}; {index}++)"
 
-    def _check_loop(self, target: ast.expr, value: ast.expr) -> None:
-        """NumPy computes all before it writes: parts of one array must not be shifted. A printed
-        loop has indices of its own.
-        """
-        if {*TWO} & _names(target, value):
-            raise NotInSubsetError(value, "has the name of an index of loops over arrays")
+    def _check_overlap(self, target: ast.expr, value: ast.expr) -> None:
+        """NumPy computes all before it writes: parts of one array must not be shifted."""
         for n in ast.walk(value):
             if not isinstance(n, ast.Subscript) or _base(n) != _base(target):
                 continue
@@ -455,7 +457,7 @@ class _Function:
             return
         if len(kind.sizes) == 1:  # of whole numbers, or a vector of zeros
             fill = called(value) == "whole"
-            self._line(self._for("j", kind.sizes[0]))
+            self._line(self._for("j_", kind.sizes[0]))
             entry = "0" if fill else _bare(self._expr(value, ONE))
             self._line(f"    {self._expr(target, ONE)} = {entry};")
             return
@@ -463,21 +465,19 @@ class _Function:
 
     def _product_of(self, target: ast.expr, a: ast.expr, x: ast.expr) -> None:
         """A matrix by a vector, row by row."""
-        self._check_loop(a, x)
         if _base(target) in _names(a, x):
             raise NotInSubsetError(x, "an array would change while it is read")
         self._line(f"{self._for('i_', self.kinds.of(a).sizes[0])} {{")
         entry = self._expr(target, ("i_",))
         self._line(f"    {entry} = 0.0;")
-        self._line(f"    {self._for('j', self.kinds.of(x).sizes[0])}")
+        self._line(f"    {self._for('j_', self.kinds.of(x).sizes[0])}")
         self._line(f"        {entry} += {self._expr(a, TWO)} * {self._expr(x, ONE)};")
         self._line("}")
 
     def _change(self, target: ast.expr, op: str, value: ast.expr) -> None:
         kind = self.kinds.of(target)
+        self._check_overlap(target, value)
         loops = TWO[-len(kind.sizes) :] if kind.sizes else ()
-        if loops:
-            self._check_loop(target, value)
         for depth, (index, size) in enumerate(zip(loops, kind.sizes, strict=True)):
             self._line("    " * depth + self._for(index, size))
         pad = "    " * len(loops)

@@ -107,10 +107,11 @@ def _copied(node: Any) -> Any:
     """A copy of a tree, or of a list of trees; quicker than `deepcopy`."""
     if isinstance(node, list):
         return [_copied(x) for x in node]
-    if not isinstance(node, ast.AST):
+    if not isinstance(node, ast.AST) or isinstance(node, ast.expr_context):
         return node
-    made = type(node)(**{name: _copied(x) for name, x in ast.iter_fields(node)})
-    return ast.copy_location(made, node)
+    made = type(node)()
+    vars(made).update((name, _copied(x)) for name, x in vars(node).items())
+    return made
 
 
 def _value(e: ast.expr, known: Mapping[str, Any]) -> Any:

@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from eomgen.subset.expander import NotInSubsetError, Text, called
 
@@ -54,6 +55,7 @@ def of_annotation(node: ast.expr | None) -> Kind:
     raise NotInSubsetError(node, "not a kind of the subset")
 
 
+@cache
 def fields_of(record: ast.ClassDef) -> dict[str, Kind]:
     """The kinds of a record's fields."""
     found = (d for d in record.body if isinstance(d, ast.AnnAssign))

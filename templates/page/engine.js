@@ -45,7 +45,16 @@ const makeEngine = (mechanism, data) => {
     if (engine.grip) pullAt(t, y);
     return mechanism.derivative(t, y, engine.p, engine.u);
   };
-  const free = { ny, positions, others, steps, f: derivative };
+  const free = {
+    ny,
+    positions,
+    others,
+    steps,
+    f: derivative,
+    placed: (t, y) => projected(t, y),
+    given: () => [engine.grip ? NaN : 0, ...engine.p, ...engine.u], // a pull is never as it was
+    corners: Boolean(mechanism.switchingFunctions),
+  };
   let problem = free;
 
   function unit(y) {
@@ -157,11 +166,13 @@ const makeEngine = (mechanism, data) => {
     }
     const end = mark();
     const length = regular ? engine.dt : end - t;
-    const found = change(problem, t, y, length);
-    const next = y.slice();
-    const rest = lost.slice();
-    steps.add_compensated({ value: next, lost: rest }, found);
-    projected(end, next);
+    const found = change(problem, t, y, change.free ? end : length);
+    const next = change.free ? found.slice() : y.slice();
+    const rest = change.free ? new Float64Array(ny) : lost.slice();
+    if (!change.free) {
+      steps.add_compensated({ value: next, lost: rest }, found);
+      projected(end, next);
+    }
     if (!next.every(Number.isFinite)) throw new Error("the state overflows or is not a number: take a smaller step");
     if (law && cutAtContact(t, y, next, length)) return;
     engine.t = end;
@@ -178,6 +189,7 @@ const makeEngine = (mechanism, data) => {
     const state = (s) => {
       if (s <= 0) return y;
       if (s >= length) return next;
+      if (change.free) return change(problem, t, y, t + s).slice();
       const within = change(problem, t, y, s);
       return projected(t + s, y.map((x, k) => x + within[k]));
     };

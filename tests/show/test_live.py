@@ -1,7 +1,7 @@
 """The page's mechanism and engine in node: against the Python module and `simulate`."""
 
+import re
 from dataclasses import replace
-from math import factorial, floor
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,6 @@ from live import NODE, run_in_node
 
 import eomgen
 from eomgen.api.given import model_of, read
-from eomgen.codegen.backends.javascript import mechanism
-from eomgen.codegen.interface import interface_of
 from eomgen.codegen.live import live_system
 from eomgen.errors import RunError
 from eomgen.language.formula import parse
@@ -163,54 +161,92 @@ def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) 
     assert [(event["kind"], event["contact"]) for event in found["events"]] == kinds
 
 
-SINE = """
-const turn = 6.283185307179586;
-const factors = given.factors;
-Math.sin = (x) => {
-  const r = x - turn * Math.floor(x / turn + 0.5);
-  let sum = 0;
-  for (const factor of factors) sum = sum * (r * r) + factor;
-  return sum * r;
+SAME_SINES = """
+const sum_ = (x, sign) => {
+  let s = 1;
+  for (let n = 16; n > 0; n--) s = 1 - x * x / (2 * n * (2 * n + sign)) * s;
+  return s;
 };
-Math.cos = (x) => Math.sin(x + 1.5707963267948966);
+const sin_ = (x) => x * sum_(x, 1);
+const cos_ = (x) => sum_(x, -1);
 """
-FACTORS = [(-1) ** k / factorial(2 * k + 1) for k in range(12, -1, -1)]
+
+
+def series(x: float, sign: int) -> float:
+    """The series of a sine, divided by x, or of a cosine, with the bits of `SAME_SINES`."""
+    s = 1.0
+    for n in range(16, 0, -1):
+        s = 1 - x * x / (2 * n * (2 * n + sign)) * s
+    return s
+
+
+def with_same_sines(name: str, **more: Any) -> tuple[str, dict[str, Any], GeneratedModule]:
+    """The code of a scene's page and its data, and the same program in Python."""
+    code, table = page_of(name, **more)
+    source = SAME_SINES + re.sub(r"Math\.(sin|cos)\(", r"\1_(", code.source)
+    system = live_system(model_of(read(name), name), ()).system
+    module = load_module(re.sub(r"\b(sin|cos)\(", r"\1_(", python_module(system)))
+    vars(module).update(sin_=lambda x: x * series(x, 1), cos_=lambda x: series(x, -1))
+    return source, table, module
+
+
+TREES = some(
+    ["tumbling_body"],
+    [
+        "two_body",
+        "double_pendulum",
+        "spinning_top",
+        "chain",
+        "tumbling_body",
+        "cart_pole",
+        "puma560",
+    ],
+)
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_dop853_makes_the_steps_of_python(name: str) -> None:
+    """The state at each mark of the page is that of the interpolant there, to the bit: from one
+    program, with one sine.
+    """
+    script = """
+    const rows = [];
+    const engine = makeEngine(mechanism, given);
+    engine.onSample = (t, y) => rows.push([t, ...y]);
+    engine.advance(1.0);
+    return { rows, error: engine.error, method: engine.method };
+    """
+    source, table, module = with_same_sines(name, liveMethod="DOP853", liveStep=0.01)
+    found = run_in_node(source, script, table)
+    assert found["error"] is None and found["method"] == "DOP853"
+    # The end of a run shortens its last steps.
+    run = integrate(as_problem(module), "DOP853", 1.3, rtol=1e-9, atol=1e-12, samples=131)
+    rows = np.array(found["rows"])
+    assert rows[:, 0].tolist() == run.t[1:101].tolist()
+    assert rows[:, 1:].tobytes() == np.ascontiguousarray(run.y[1:101]).tobytes()
+
+
 EXPLICIT = ("euler", "semi_implicit_euler", "leapfrog", "leapfrog_4", "leapfrog_6", "rk4")
 FREE = ("pendulum", "double_pendulum", "spinning_top")
 
 
-def sine(x: float) -> float:
-    """As in `SINE`, for a mathematical library differs in last digits from that of node."""
-    turn, total = 6.283185307179586, 0.0
-    r = x - turn * floor(x / turn + 0.5)
-    for factor in FACTORS:
-        total = total * (r * r) + factor
-    return total * r
-
-
 @pytest.mark.parametrize("name", some(FREE, built_in_names()))
-def test_explicit_steps_have_the_bits_of_python(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With each method that suits the scene, the same program, sines of arithmetic alone."""
-    model = model_of(read(name), name)
-    found, table = live_system(model), page_of(name)[1]
-    source = mechanism(found.system.program, interface_of(found.system))
-    monkeypatch.setattr("math.sin", sine)
-    monkeypatch.setattr("math.cos", lambda x: sine(x + 1.5707963267948966))
-    module = load_module(python_module(found.system))
+def test_explicit_steps_have_the_bits_of_python(name: str) -> None:
+    """With each method that suits the scene, from one program, with one sine."""
+    source, table, module = with_same_sines(name, liveStep=0.002)
     exact: Any = eomgen.load(eomgen.generate(name, form="velocity"))
     problem = as_problem(module, start=lambda y: np.array(table["initial"]))
     problem = replace(problem, jacobian=exact.jacobian)
     if problem.contacts or problem.projection:
         pytest.skip("contacts and loops have steps of their own")
-    script = f"""{SINE}
-    return given.methods.map((liveMethod) => {{
-      const engine = makeEngine(mechanism, {{ ...given.data, liveMethod }});
+    script = """
+    return given.methods.map((liveMethod) => {
+      const engine = makeEngine(mechanism, { ...given.data, liveMethod });
       engine.advance(0.2);
       return engine.method === liveMethod ? Array.from(engine.y) : null;
-    }});
+    });
     """
-    table |= {"liveStep": 0.002}
-    given = {"data": table, "factors": FACTORS, "methods": EXPLICIT}
+    given = {"data": table, "methods": EXPLICIT}
     mine = dict(zip(EXPLICIT, run_in_node(source, script, given), strict=True))
     for method, y in mine.items():
         try:

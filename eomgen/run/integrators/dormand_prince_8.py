@@ -16,7 +16,7 @@ import numpy as np
 from eomgen.engine.adaptive import (
     Bounds,
     Progress,
-    eighth_root,
+    first_length,
     interpolate,
     made,
     round_off,
@@ -24,7 +24,6 @@ from eomgen.engine.adaptive import (
 )
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import steps_of_few
-from eomgen.run.integrators.first_length import first_length
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.problem import FloatArray
 
@@ -67,17 +66,10 @@ class DormandPrince8:
         self.t_old = self.t
         self.status: Literal["running", "finished", "failed"] = "running"
         self.f, self.lost = fun(self.t, y0), np.zeros(len(y0))
-        self.h_abs = first_length(
-            fun,
-            self.t,
-            y0,
-            self.f,
-            scale=atol + np.abs(y0) * rtol,
-            root=eighth_root,
-            longest=min(t_bound - self.t, max_step),
-        )
         self._system = _System(fun)
         self._bounds = Bounds(np.zeros(len(y0)) + atol, rtol, max_step)
+        longest = min(t_bound - self.t, max_step)
+        self.h_abs = first_length(self._system, self._bounds, self.t, y0, self.f, longest)
         self._k: Any = np.zeros((len(DOP853.nodes), len(y0)))
         if len(y0) <= FEW:
             self._k = list(self._k)
