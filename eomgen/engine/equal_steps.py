@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
+from eomgen.engine.adaptive import MADE, UNUSUAL
 from eomgen.engine.explicit import Method, Step
 from eomgen.engine.quaternions import normalised
 from eomgen.engine.sums import Sum, add_compensated
 from eomgen.subset.words import Matrix, Vector, Whole, all_within, ordered
-
-MADE_ALL, UNUSUAL = 0, 2
 
 
 @dataclass(slots=True)
@@ -102,4 +101,4 @@ def equal_steps(
         kept.states[n] = at.value
         kept.losses[n] = at.lost
         kept.made = n + 1
-    return MADE_ALL
+    return MADE

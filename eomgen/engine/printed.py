@@ -25,6 +25,15 @@ from eomgen.subset.unrolled import unrolled_functions
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
 ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
+    ("runge_kutta", {"method": explicit.EULER}),
+    ("runge_kutta", {"method": explicit.RUNGE_KUTTA_4}),
+    ("semi_implicit_euler", {}),
+    ("leapfrog", {}),
+    ("composed", {"of": explicit.LEAPFROG_4}),
+    ("composed", {"of": explicit.LEAPFROG_6}),
+    ("constant_rates", {}),
+    ("add_compensated", {}),
+    ("normalised", {}),
     ("begun", {}),
     ("gone_on", {}),
     ("complementary", {}),
@@ -51,11 +60,14 @@ def c_source(functions: Roots) -> str:
 
 @cache
 def steps_of_pages() -> str:
-    """JavaScript: `makeSteps(STATES)` returns the functions that pages call, by name."""
+    """JavaScript: `makeSteps(STATES, POSITIONS, OTHERS)` returns what pages call, by name. Of these
+    numbers those are given that are needed.
+    """
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
     names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
-    return f"const makeSteps = (STATES) => {{\n{source}return {{ {names} }};\n}};\n"
+    head = "const makeSteps = (STATES, POSITIONS, OTHERS) =>"
+    return f"{head} {{\n{source}return {{ {names} }};\n}};\n"
 
 
 @cache

@@ -4,9 +4,11 @@
 const makeEngine = (mechanism, data) => {
   const ny = data.states.length;
   const kinds = data.states.map((state) => state.kind);
-  const positions = [...kinds.keys()].filter((i) => kinds[i] === "position");
-  const others = [...kinds.keys()].filter((i) => kinds[i] !== "position");
+  const positions = Int32Array.from([...kinds.keys()].filter((i) => kinds[i] === "position"));
+  const others = Int32Array.from([...kinds.keys()].filter((i) => kinds[i] !== "position"));
   const quaternions = data.quaternions ?? [];
+  const places = Int32Array.from(quaternions.flat());
+  const steps = makeSteps(ny, positions.length, others.length);
   const defaults = (table) => Float64Array.from(table, (x) => x.value);
   const space = data.dimensions === 3;
   const PULL = 20; // rate at which a pulled point follows the pointer, rad/s
@@ -47,6 +49,7 @@ const makeEngine = (mechanism, data) => {
     ny,
     positions,
     others,
+    steps,
     f: derivative,
     placed: (t, y) => projected(t, y),
     given: () => [engine.grip ? NaN : 0, ...engine.p, ...engine.u], // a pull is never as it was
@@ -55,10 +58,9 @@ const makeEngine = (mechanism, data) => {
   let problem = free;
 
   function unit(y) {
+    if (steps.normalised(quaternions.length, places, y)) return y;
     for (const four of quaternions) {
-      const [a, b, c, d] = four.map((k) => y[k]);
-      let length = Math.sqrt(a * a + b * b + c * c + d * d);
-      if (!(length > 1e-100 && length < 1e100)) length = Math.hypot(a, b, c, d);
+      const length = Math.hypot(...four.map((k) => y[k]));
       if (Number.isFinite(length)) for (const k of four) y[k] /= length;
     }
     return y;
@@ -165,18 +167,12 @@ const makeEngine = (mechanism, data) => {
     const end = mark();
     const length = regular ? engine.dt : end - t;
     const found = change(problem, t, y, change.free ? end : length);
-    const next = new Float64Array(ny);
-    const rest = new Float64Array(ny);
-    if (change.free) next.set(found);
-    for (let k = 0; !change.free && k < ny; k += 1) {
-      // Knuth's two-sum.
-      const add = found[k] + lost[k];
-      const total = y[k] + add;
-      const part = total - y[k];
-      next[k] = total;
-      rest[k] = (y[k] - (total - part)) + (add - part);
+    const next = change.free ? found.slice() : y.slice();
+    const rest = change.free ? new Float64Array(ny) : lost.slice();
+    if (!change.free) {
+      steps.add_compensated({ value: next, lost: rest }, found);
+      projected(end, next);
     }
-    if (!change.free) projected(end, next);
     if (!next.every(Number.isFinite)) throw new Error("the state overflows or is not a number: take a smaller step");
     if (law && cutAtContact(t, y, next, length)) return;
     engine.t = end;
