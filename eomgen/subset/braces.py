@@ -27,7 +27,7 @@ OPERATORS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.Gt: ">",
     ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||",
 }  # fmt: skip
-ONE, TWO = ("j",), ("i_", "j")
+ONE, TWO = ("j_",), ("i_", "j_")
 """The indices of entries in loops over arrays of one dimension and of two."""
 
 
@@ -169,10 +169,10 @@ class _Function:
     def lines(self) -> list[str]:
         """The lines of its source."""
         self.kinds = Kinds(self.text, self.made, self.d)
+        self.changes[self.d.name] = self._changed()
         body = self._grouped(self.d.body)
         self.scalars = self._scalars(body)
         self._block(body)
-        self.changes[self.d.name] = self._changed()
         return [self._head(), *self._declared(), *self.out, "}"]
 
     # ---- the head ----
@@ -350,7 +350,7 @@ class _Function:
         for s in group:
             if called(s.value) == "ordered":
                 self._line(f"{self._expr(s.targets[0])} = 0.0;")
-        self._line(self._for("j", self._span(group[0])) + " {")
+        self._line(self._for(*ONE, self._span(group[0])) + " {")
         self.depth += 1
         for s in group:
             (target,), value = s.targets, s.value
@@ -431,7 +431,7 @@ class _Function:
             return
         if len(kind.sizes) == 1:  # of whole numbers, or a vector of zeros
             fill = called(value) == "whole"
-            self._line(self._for("j", kind.sizes[0]))
+            self._line(self._for(*ONE, kind.sizes[0]))
             entry = "0" if fill else _bare(self._expr(value, ONE))
             self._line(f"    {self._expr(target, ONE)} = {entry};")
             return
