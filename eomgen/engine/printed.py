@@ -4,7 +4,15 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from eomgen.engine import complementarity, least_squares, linear, roots, system
+from eomgen.engine import (
+    complementarity,
+    contact_times,
+    contacts,
+    least_squares,
+    linear,
+    roots,
+    system,
+)
 from eomgen.subset.braces import JAVASCRIPT, C, printed
 from eomgen.subset.expander import Text
 
@@ -21,7 +29,7 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    return Text.of(linear, least_squares, complementarity, roots, system)
+    return Text.of(linear, least_squares, complementarity, roots, contacts, contact_times, system)
 
 
 def c_source(functions: Roots) -> str:
