@@ -18,12 +18,12 @@ from eomgen.subset.expander import Text
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
-ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
-    ("begun", {}),
-    ("gone_on", {}),
-    ("complementary", {}),
-)
+CONTACTS = ("begin", "deepest", "press", "strike", "release", "settle", "closing", "opening")
+"""What is called for rigid contacts."""
+ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = tuple((name, {}) for name in CONTACTS)
 """What a page that goes on live calls."""
+CODES = ("TOLERANCE", "ENDLESS", "NO_FORCES", "UNHELD")
+"""The constants that it needs."""
 
 
 @cache
@@ -41,8 +41,9 @@ def c_source(functions: Roots) -> str:
 
 @cache
 def steps_of_pages() -> str:
-    """JavaScript: `makeSteps(STATES)` returns the functions that pages call, by name."""
+    """JavaScript: `makeSteps(STATES, CONTACTS, PRESSED)` returns the functions that pages call."""
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
-    names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
+    codes = "".join(f", {name}: {text().constants[name]!r}" for name in CODES)
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
-    return f"const makeSteps = (STATES) => {{\n{source}return {{ {names} }};\n}};\n"
+    made = f"{{\n{source}return {{ {names}{codes} }};\n}};\n"
+    return f"const makeSteps = (STATES, CONTACTS, PRESSED) => {made}"

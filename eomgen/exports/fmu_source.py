@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from eomgen.codegen.backends import c
 from eomgen.engine import contacts
-from eomgen.engine.printed import c_source
+from eomgen.engine.printed import CONTACTS, c_source
 from eomgen.exports.fmu_unit import Observed, Unit
 from eomgen.native.dop853 import constants, written_out
 from eomgen.run import events, projection
@@ -17,8 +17,6 @@ MAIN = "fmi3-unit.c"
 """The source to compile, which includes the others. No scene has a - in its name."""
 DRIFT = 1e-9
 """In model exchange a state that is farther off its constraints, in sizes, is moved back."""
-OF_CONTACTS = ("begin", "deepest", "strike", "release", "settle", "closing", "opening")
-"""The functions of the engine that units with rigid contacts call."""
 RTOL = 1e-10
 """Relative tolerance of steps of co-simulation, if the importer gives none."""
 
@@ -101,6 +99,6 @@ def _contacts(unit: Unit) -> dict[str, object]:
         "endless": contacts.ENDLESS,
         "no_forces": contacts.NO_FORCES,
         "share": repr(events.GAP_CHECKS[1]),
-        "engine": c_source((name, {}) for name in OF_CONTACTS),
+        "engine": c_source((name, {}) for name in CONTACTS),
         "most_events": events.MOST_EVENTS,
     }
