@@ -148,8 +148,8 @@ def integrate(
             asked, method, problem, remarks.append, compiled=compiled, each=each, dense=dense
         )
 
-    gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else events.GAP_CHECKS
-    stepper = events.Stepper(begin, gap_checks, calls.derivatives.of)
+    share = 1.0 if isinstance(method, FixedStep) else events.GAP_CHECKS[1]
+    stepper = events.Stepper(begin, share, calls.derivatives.of)
     passage = None
     if counted.projection and counted.contacts is None and not repairs:
         passage = Passage(

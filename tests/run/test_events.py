@@ -8,9 +8,11 @@ import pytest
 from campaign import some
 from scipy.optimize import brentq
 
+from eomgen.engine.contact_times import first_zero
+from eomgen.engine.contacts import TOLERANCE
+from eomgen.engine.roots import Search
 from eomgen.errors import RunError
 from eomgen.run import events
-from eomgen.run.contacts import TOLERANCE
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.problem import Contacts, Problem
@@ -385,7 +387,13 @@ def test_what_flies_off_is_not_struck_again_where_it_was():
     def gap(s):
         return 1e-16 + 0.0032 * s - 5 * s**2 if s > 1e-15 else math.copysign(1e-16, 1e-16 - s)
 
-    at = events._first_zero(gap, lambda s: 0.0032 - 10 * s, 0.0, 0.1, (1e-16, gap(0.1)))
+    class Falling:  # the state is the time
+        state = staticmethod(lambda s: np.array([s]))
+        gaps = staticmethod(lambda t, y: np.array([gap(y[0])]))
+        rates = staticmethod(lambda t, y: np.array([0.0032 - 10 * y[0]]))
+
+    given = (Falling, Falling, None, Search(), 0.0, 0, 0.0)
+    at = first_zero(*given, 0.0, 0.1, 1e-16, gap(0.1))
     assert at == pytest.approx(0.00064, rel=1e-9)
 
 
