@@ -7,6 +7,7 @@ such loops only are numbers there.
 import ast
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -170,10 +171,11 @@ class _Function:
     def lines(self) -> list[str]:
         """The lines of its source."""
         self.kinds = Kinds(self.text, self.made, self.d)
+        whole = deepcopy(self.d)
         body = self._grouped(self.d.body)
         self.scalars = self._scalars(body)
         self._block(body)
-        self.changes[self.d.name] = self._changed()
+        self.changes[self.d.name] = self._changed(whole)
         return [self._head(), *self._declared(), *self.out, "}"]
 
     # ---- the head ----
@@ -221,10 +223,10 @@ class _Function:
     def _size(self, text: str) -> str:
         return _bare(self._expr(ast.parse(text, mode="eval").body))
 
-    def _changed(self) -> set[str]:
+    def _changed(self, whole: ast.FunctionDef) -> set[str]:
         """The arrays among the arguments that the function, or one that it calls, changes."""
         found = set()
-        for n in ast.walk(self.d):
+        for n in ast.walk(whole):
             if isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store):
                 found.add(_base(n))
             elif isinstance(n, ast.Call):
