@@ -12,6 +12,7 @@ from eomgen.engine import (
     elimination,
     equal_steps,
     explicit,
+    implicit,
     least_squares,
     linear,
     quaternions,
@@ -56,7 +57,7 @@ CODES = {
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    steps = (adaptive, equal_steps, explicit, quaternions, sums)
+    steps = (adaptive, equal_steps, explicit, implicit, quaternions, sums)
     solved = (linear, elimination, least_squares, complementarity, roots)
     return Text.of(*steps, *solved, contacts, contact_times, system)
 

@@ -102,8 +102,9 @@ def copy(x: Vector) -> Vector:
 
 def added(terms: Iterable[Any]) -> Any:
     """The sum of terms, in order."""
-    total, *others = terms
-    for term in others:
+    rest = iter(terms)
+    total = next(rest)
+    for term in rest:
         total = total + term
     return total
 
