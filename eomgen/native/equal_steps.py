@@ -22,6 +22,8 @@ from eomgen.templating import render
 LEAPFROGS = {"leapfrog": 1, **{name: len(parts) for name, parts in PARTS.items()}}
 METHODS = {"euler": 1, "semi_implicit_euler": 2, "runge_kutta_4": len(TABLEAU.b), **LEAPFROGS}
 """The derivatives in a step, by the name of the method."""
+SCALAR = {"number": "double", "zero": "0.0"}
+"""How templates of methods write numbers, for one state."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _MADE_ALL = 0
 
@@ -44,20 +46,28 @@ class Stride(ctypes.Structure):
 
 def source(interface: Interface) -> str:
     """The C source of the methods, which follows that of `templates/c/runs.c.jinja`."""
+    context = {
+        **methods(interface),
+        **SCALAR,
+        "derivative": f"{interface.name}_derivative",
+        "unit": "unit(",
+    }
+    return render(c.TEMPLATES, "equal_steps.c.jinja", context)
+
+
+def methods(interface: Interface) -> dict[str, Any]:
+    """The values of `templates/c/explicit_methods.c.jinja`, but for its numbers and derivative."""
     rows = zip(TABLEAU.a[1:], TABLEAU.c[1:], strict=True)
     states = list(enumerate(interface.states))
-    context = {
-        "prefix": interface.name,
+    return {
         "methods": list(METHODS),
         "compositions": compositions(),
-        "unit": "unit(",
         "positions": [i for i, state in states if state.position],
         "others": [i for i, state in states if not state.position],
         "stages": [(i, repr(float(node)), _sum(row)) for i, (row, node) in enumerate(rows, 1)],
         "count": len(TABLEAU.b),
         "end_sum": _sum(TABLEAU.b),
     }
-    return render(c.TEMPLATES, "equal_steps.c.jinja", context)
 
 
 def compositions() -> list[tuple[str, list[str]]]:

@@ -59,6 +59,7 @@ def sources() -> Mapping[str, str]:
     sums = [_sum(row) for row in rodas_5p.SUMS]
     context = {
         **of_constraints(),
+        **equal_steps.SCALAR,
         "stages": rodas_5p.STAGES,
         "aside": repr(rodas_5p.ASIDE),
         "gamma": repr(GAMMA),
