@@ -34,7 +34,7 @@ def composed(name: str, order: int) -> FixedStep:
         one = leapfrog.prepare(problem)
 
         def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
-            total = np.zeros(len(y))
+            total = np.zeros_like(y)
             for part in parts:
                 total = total + one(problem, t, y + total, part * h)
                 t += part * h

@@ -89,7 +89,7 @@ def advances(
             monitor.check(checked, t, y, step, length)
             if i == steps:
                 monitor.finish(checked, t, y, step, length)
-        y, lost = _sum(y, step + lost)
+        y, lost = two_sum(y, step + lost)
         y = problem.projected(end, y)
         t, regular = end, True
         if shaken:
@@ -108,7 +108,7 @@ def _shorter(change: Change, problem: Problem, t: float, y: FloatArray, end: flo
     return problem.projected(end, y + change(problem, t, y, end - t)) if end > t else y
 
 
-def _sum(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+def two_sum(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The rounded sum and its rounding error, exactly (Knuth's two-sum)."""
     total = a + b
     rest = total - a

@@ -66,7 +66,9 @@ def rates_of(problem: Problem) -> FloatArray:
 
 
 def _product(matrix: FloatArray, values: FloatArray) -> FloatArray:
-    """matrix @ values, summed term by term, as in compiled code."""
+    """matrix @ values, of one state or of columns, summed term by term, as in compiled code."""
+    if values.ndim == 2:
+        matrix = matrix[:, :, None]
     return np.asarray(np.add.accumulate(matrix * values, axis=1)[:, -1])
 
 
