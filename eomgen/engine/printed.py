@@ -21,7 +21,7 @@ from eomgen.engine import (
     system,
 )
 from eomgen.engine.embedded import DOP853
-from eomgen.subset.braces import JAVASCRIPT, C, printed
+from eomgen.subset.braces import JAVASCRIPT, C, Language, printed
 from eomgen.subset.expander import Text
 from eomgen.subset.unrolled import unrolled_functions
 
@@ -62,11 +62,11 @@ def text() -> Text:
     return Text.of(*steps, *solved, contacts, contact_times, system)
 
 
-def c_source(functions: Roots) -> str:
-    """C of functions and of all that they call. What includes it defines STATES, `System` and its
+def c_source(functions: Roots, language: Language = C) -> str:
+    """C, or another language like it, of functions and of all that they call. What includes it defines STATES, `System` and its
     functions, such as `void derivative(const System *, double t, const double *y, double *rates)`.
     """
-    return printed(text(), functions, C)
+    return printed(text(), functions, language)
 
 
 @cache

@@ -7,7 +7,7 @@ such loops only are numbers there.
 import ast
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from eomgen.subset.expander import NotInSubsetError, Text, called
@@ -45,6 +45,7 @@ class Language:
     function      how a function begins, by its result, name and arguments
     number, whole types of numbers
     infinite      how infinity is written
+    literal       how a number is, where it is not its digits alone
     names         how functions of numbers are called
     array         how a local array is declared, by type, name and size
     arrays        the types of arrays of numbers, and of whole ones
@@ -63,6 +64,12 @@ class Language:
     part: str
     field: str
     prelude: str
+    literal: str = "{}"
+
+    @property
+    def is_c(self) -> bool:
+        """Whether it is C, or C with vectors in place of numbers."""
+        return self.field == "->"
 
 
 C = Language(
@@ -86,6 +93,8 @@ static inline double next_after(double t) {
 }
 """,
 )
+VECTORS = replace(C, number="V", arrays=("V", "int64_t"), literal="N({})")
+"""C with a type V of vectors in place of numbers: text without decisions makes several at once."""
 JAVASCRIPT = Language(
     function="function {name}({arguments}) {{",
     number="let",
@@ -116,26 +125,22 @@ def printed(
     text: Text,
     roots: Iterable[tuple[str, Mapping[str, Any]]],
     language: Language,
-    *,
-    records: bool = True,
 ) -> str:
     """The source of functions of the engine and of all that they call, those called first. Each is
     given with values of its `Known` parameters.
-
-    records  whether C's structures of the records are declared
 
     Raises `NotInSubsetError` for text outside the subset.
     """
     functions = text.expanded(roots)
     made = {d.name: d for d in functions}
-    lines = list(_structures(text, made.values())) if records and language is C else []
+    lines = list(_structures(text, made.values(), language.number)) if language.is_c else []
     changes: dict[str, set[str]] = {}
     for d in functions:
         lines += ["", *_Function(text, made, d, language, changes).lines()]
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _structures(text: Text, functions: Iterable[ast.FunctionDef]) -> Iterable[str]:
+def _structures(text: Text, functions: Iterable[ast.FunctionDef], number: str) -> Iterable[str]:
     """C's structures of the records that are arguments."""
     kinds = (of_annotation(a.annotation).of for d in functions for a in d.args.args)
     for name in dict.fromkeys(kinds):
@@ -143,12 +148,12 @@ def _structures(text: Text, functions: Iterable[ast.FunctionDef]) -> Iterable[st
         if record and not is_protocol(record):
             yield f"typedef struct {name} {{"
             for each, kind in fields_of(record).items():
-                yield f"    {_c_type(kind)}{each};"
+                yield f"    {_c_type(kind, number)}{each};"
             yield f"}} {name};"
 
 
-def _c_type(kind: Kind) -> str:
-    of = {"float": "double", "int": "int64_t"}.get(kind.of, kind.of)
+def _c_type(kind: Kind, number: str) -> str:
+    of = {"float": number, "int": "int64_t"}.get(kind.of, kind.of)
     return f"{of} {'*' if kind.is_array or kind.of not in ('float', 'int') else ''}"
 
 
@@ -183,18 +188,18 @@ class _Function:
     def _head(self) -> str:
         arguments = self.kinds.arguments.items()
         shown = [name for name, _ in arguments]
-        if self.to is C:
+        if self.to.is_c:
             kept = self.changes[self.d.name]
             shown = [
-                f"{'' if name in kept or not kind.is_array else 'const '}{_c_type(kind)}"
+                f"{'' if name in kept or not kind.is_array else 'const '}{_c_type(kind, self.to.number)}"
                 f"{'restrict ' if kind.is_array else ''}{name}"
                 for name, kind in arguments
             ]
         result = of_annotation(self.d.returns)
         return self.to.function.format(
-            result="void" if result == NOTHING else _c_type(result).strip(),
+            result="void" if result == NOTHING else _c_type(result, self.to.number).strip(),
             name=self.d.name,
-            arguments=", ".join(shown) or ("void" if self.to is C else ""),
+            arguments=", ".join(shown) or ("void" if self.to.is_c else ""),
         )
 
     def _declared(self) -> list[str]:
@@ -475,7 +480,7 @@ class _Function:
             raise NotInSubsetError(x, "an array would change while it is read")
         self._line(f"{self._for('i_', self.kinds.of(a).sizes[0])} {{")
         entry = self._expr(target, ("i_",))
-        self._line(f"    {entry} = 0.0;")
+        self._line(f"    {entry} = {self._number(0.0)};")
         self._line(f"    {self._for('j_', self.kinds.of(x).sizes[0])}")
         self._line(f"        {entry} += {self._expr(a, TWO)} * {self._expr(x, ONE)};")
         self._line("}")
@@ -537,7 +542,8 @@ class _Function:
             return str(int(value))
         if math.isinf(value):
             return self.to.infinite if value > 0 else f"(-{self.to.infinite})"
-        return f"({value!r})" if value < 0 else repr(value)
+        shown = f"({value!r})" if value < 0 else repr(value)
+        return self.to.literal.format(shown) if isinstance(value, float) else shown
 
     def _entry(self, e: ast.expr, at: Sequence[str]) -> str:
         """A number, an entry of an array, or a whole array by its name."""
@@ -592,7 +598,7 @@ class _Function:
         if self._given(e):
             assert isinstance(e.func, ast.Attribute) and isinstance(e.func.value, ast.Name)
             of, name = e.func.value.id, e.func.attr
-            if self.to is C:
+            if self.to.is_c:
                 return f"{name}({', '.join([of, *arguments])})"
             return f"{of}.{name}({', '.join(arguments)})"
         if called(e) not in self.made:
@@ -611,7 +617,7 @@ class _Function:
         if name == "copy":
             return self._expr(args[0], at)
         if name in ("zeros", "matrix", "whole"):
-            return "0.0"
+            return self._number(0.0)
         if name == "transposed":
             return self._expr(args[0], at[::-1])
         if name == "outer":
