@@ -34,28 +34,26 @@ class IntegratorSpec:
 
 
 _OWN: Mapping[str, IntegratorSpec] = {
-    "euler": IntegratorSpec("explicit Euler, order 1", "explicit", "euler:INTEGRATOR"),
+    "euler": IntegratorSpec("explicit Euler, order 1", "explicit", "explicit:EULER_STEPS"),
     "semi_implicit_euler": IntegratorSpec(
-        "symplectic Euler, order 1", "symplectic", "semi_implicit_euler:INTEGRATOR"
+        "symplectic Euler, order 1", "symplectic", "explicit:SEMI_IMPLICIT_EULER"
     ),
     "leapfrog": IntegratorSpec(
-        "Störmer-Verlet, order 2", "symplectic", "leapfrog:INTEGRATOR", rattle=True
+        "Störmer-Verlet, order 2", "symplectic", "leapfrog:LEAPFROG", rattle=True
     ),
     "leapfrog_4": IntegratorSpec(
         "leapfrog composed to order 4, by Suzuki",
         "symplectic",
-        "composed:LEAPFROG_4",
+        "leapfrog:FOUR",
         rattle=True,
     ),
     "leapfrog_6": IntegratorSpec(
         "leapfrog composed to order 6, by Kahan and Li",
         "symplectic",
-        "composed:LEAPFROG_6",
+        "leapfrog:SIX",
         rattle=True,
     ),
-    "rk4": IntegratorSpec(
-        "classical Runge-Kutta method, order 4", "explicit", "runge_kutta_4:INTEGRATOR"
-    ),
+    "rk4": IntegratorSpec("classical Runge-Kutta method, order 4", "explicit", "explicit:RK4"),
     "implicit_midpoint": IntegratorSpec(
         "implicit midpoint rule, order 2", "symplectic", "implicit_midpoint:INTEGRATOR"
     ),

@@ -20,7 +20,8 @@ from eomgen.subset.structures import filled, take
 
 BY_BITS = """
 const view = new DataView(new ArrayBuffer(8));
-const bits = (x) => (view.setFloat64(0, x), view.getBigUint64(0).toString(16));
+const ofBits = (x) => (view.setFloat64(0, x), view.getBigUint64(0).toString(16));
+const bits = (x) => (x === x ? ofBits(x) : "7ff8000000000000");
 const number = (hex) => (view.setBigUint64(0, BigInt("0x" + hex)), view.getFloat64(0));
 const decoded = (x) => {
   if (typeof x === "string") return number(x);
@@ -30,27 +31,30 @@ const decoded = (x) => {
   if (x.wholes) return Int32Array.from(x.wholes);
   return Object.fromEntries(Object.entries(x.record).map(([name, each]) => [name, decoded(each)]));
 };
-const numbers = (x) => {
+const bitsOf = (x) => {
   if (x === system) return [];
   if (typeof x === "number") return [bits(x)];
   if (x instanceof Float64Array || x instanceof Int32Array) return Array.from(x, bits);
-  return Object.values(x).flatMap(numbers);
+  return Object.values(x).flatMap(bitsOf);
 };
 return given.map((args) => {
   const made = args.map(decoded);
   const result = CALLED(...made);
-  return [...numbers(made), ...(result === undefined ? [] : [bits(Number(result))])];
+  return [...bitsOf(made), ...(result === undefined ? [] : [bits(Number(result))])];
 });
 """
 
 
 @dataclass
 class Given:
-    """A protocol's functions: an object in Python, and the same in C and JavaScript."""
+    """A protocol's functions: an object in Python, and the same in C and JavaScript. Those in C
+    that need the engine's structures follow it.
+    """
 
     python: Any
     c: str = "typedef struct { int none; } System;\n"
     javascript: str = "const system = {};\n"
+    c_after: str = ""
 
 
 NONE = Given(None)
@@ -90,7 +94,7 @@ def _in_c(text: Text, name: str, cases: Any, known: Any, given: Given) -> list[l
     shared = printed(text, [(name, known)], C).replace(
         f"static inline {_result(text, name)} {own}(", f"{_result(text, name)} {own}("
     )
-    source = "\n".join((C.prelude, given.c, shared))
+    source = "\n".join((C.prelude, given.c, shared, given.c_after))
     library = compiled_library(source, lambda: {"engine.c": source}, "engine.c")
     call, found = library[own], []
     call.restype = {"void": None, "double": ctypes.c_double}.get(

@@ -1,26 +1,50 @@
 """The engine in other languages."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
 from eomgen.engine import (
+    adaptive,
     complementarity,
     contact_times,
     contacts,
+    equal_steps,
+    explicit,
     least_squares,
     linear,
+    quaternions,
     roots,
+    sums,
     system,
 )
+from eomgen.engine.embedded import DOP853
 from eomgen.subset.braces import JAVASCRIPT, C, printed
 from eomgen.subset.expander import Text
+from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
-CONTACTS = ("begin", "deepest", "press", "strike", "release", "settle", "closing", "opening")
+CONTACTS: Roots = tuple(
+    (name, {})
+    for name in (
+        "begin",
+        "deepest",
+        "press",
+        "strike",
+        "release",
+        "settle",
+        "closing",
+        "opening",
+    )
+)
 """What is called for rigid contacts."""
-ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = tuple((name, {}) for name in CONTACTS)
+ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
+    *CONTACTS,
+    ("first_length", {}),
+    ("made_many", {"method": DOP853}),
+    ("within", {}),
+)
 """What a page that goes on live calls."""
 CODES = ("TOLERANCE", "ENDLESS", "NO_FORCES", "UNHELD")
 """The constants that it needs."""
@@ -29,7 +53,9 @@ CODES = ("TOLERANCE", "ENDLESS", "NO_FORCES", "UNHELD")
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    return Text.of(linear, least_squares, complementarity, roots, contacts, contact_times, system)
+    steps = (adaptive, equal_steps, explicit, quaternions, sums)
+    rigid = (least_squares, complementarity, roots, contacts, contact_times)
+    return Text.of(*steps, linear, *rigid, system)
 
 
 def c_source(functions: Roots) -> str:
@@ -47,3 +73,13 @@ def steps_of_pages() -> str:
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
     made = f"{{\n{source}return {{ {names}{codes} }};\n}};\n"
     return f"const makeSteps = (STATES, CONTACTS, PRESSED) => {made}"
+
+
+@cache
+def steps_of_few(states: int) -> Callable[..., bool]:
+    """`adaptive.made` of DOP853 for few states, as Python's own numbers."""
+    source = Text.of(adaptive, system)
+    printed: Callable[..., bool] = unrolled_functions(
+        source, [("made", {"method": DOP853})], states
+    ).made_DOP853
+    return printed

@@ -16,8 +16,8 @@ from eomgen.native import lanes
 from eomgen.native.dop853 import constants
 from eomgen.native.lanes import Columns, Lanes, columns_of
 from eomgen.program.program import Program
-from eomgen.run.integrators.dop853_coefficients import Row
 from eomgen.run.problem import FloatArray
+from eomgen.subset.words import Row
 from eomgen.templating import render
 
 MAIN = "adaptive_lanes.c"
@@ -34,7 +34,6 @@ def sources(
 ) -> Mapping[str, str]:
     """The C sources of `native.lanes`, and of runs by DOP853."""
     values = constants(_terms)
-    del values["power"]  # the template has its root by square roots
     context = {
         "main": c_lanes.MAIN,
         "ends": [(name, values.pop(name)) for name in ("end_sum", "long_error", "short_error")],
@@ -48,7 +47,7 @@ def sources(
 
 def _terms(row: Row) -> list[tuple[int, str]]:
     """The slopes in a sum, and their factors."""
-    return [(j, repr(row[j])) for j in sorted(row) if row[j]]
+    return [(j, repr(a)) for j, a in row if a]
 
 
 class _Common(ctypes.Structure):

@@ -13,7 +13,6 @@ import numpy as np
 from eomgen.native.checked import Function, FunctionStructure
 from eomgen.run import margins, projection
 from eomgen.run.compiled import Array, Constrained
-from eomgen.run.problem import USUAL_LENGTH
 
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _FIELDS = ("residuals", "position", "velocity", "margins")
@@ -34,10 +33,7 @@ class Constraints(ctypes.Structure):
 
 def context() -> dict[str, Any]:
     """The values of the template."""
-    low, high = USUAL_LENGTH
     return {
-        "shortest": repr(low),
-        "longest": repr(high),
         "most_projections": projection.MOST,
         "met": repr(projection.MET),
         "close": repr(projection.CLOSE),

@@ -1,4 +1,8 @@
-"""Steps of equal length in compiled code, with the bits of the same steps made in Python."""
+"""Steps of equal length in compiled code, with the bits of the same steps made in Python.
+
+They are `eomgen.engine.equal_steps`; the methods of this module are compiled with each scene's
+derivative.
+"""
 
 import ctypes
 from collections.abc import Mapping, Sequence
@@ -7,66 +11,51 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.engine.equal_steps import MADE_ALL, Course, Kept
+from eomgen.engine.explicit import EULER, LEAPFROG_4, LEAPFROG_6, RUNGE_KUTTA_4
 from eomgen.native.checked import Function
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.run.compiled import Array, Constrained, EqualSteps, EqualStride
-from eomgen.run.integrators.composed import PARTS
-from eomgen.run.integrators.leapfrog import rates_of
-from eomgen.run.integrators.runge_kutta_4 import TABLEAU
-from eomgen.run.integrators.tableau import terms
+from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.problem import Problem
-from eomgen.templating import render
+from eomgen.subset.structures import filled, take
 
-LEAPFROGS = {"leapfrog": 1, **{name: len(parts) for name, parts in PARTS.items()}}
-METHODS = {"euler": 1, "semi_implicit_euler": 2, "runge_kutta_4": len(TABLEAU.b), **LEAPFROGS}
+COMPOSITIONS = (LEAPFROG_4, LEAPFROG_6)
+LEAPFROGS = {"leapfrog": 1, **{each.name: len(each.parts) for each in COMPOSITIONS}}
+_TABLEAUS = (EULER, RUNGE_KUTTA_4)
+METHODS = {**{each.name: each.stages for each in _TABLEAUS}, "semi_implicit_euler": 2, **LEAPFROGS}
 """The derivatives in a step, by the name of the method."""
-_POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-_MADE_ALL = 0
+COMPOSED: list[tuple[str, Mapping[str, Any]]] = [
+    ("composed", {"of": each}) for each in COMPOSITIONS
+]
+STEPS: list[tuple[str, Mapping[str, Any]]] = [
+    *(("runge_kutta", {"method": each}) for each in _TABLEAUS),
+    *(("semi_implicit_euler", {}), ("leapfrog", {}), *COMPOSED, ("equal_steps", {})),
+]
+_POINTER, _REAL = ctypes.c_void_p, ctypes.c_double
+_AT, _SPLIT = "t, y, h, step", "(int64_t *)positions, (int64_t *)others, m->system->rates"
+_CALLS = {
+    **{each.name: f"runge_kutta_{each.name}(m->system, {_AT})" for each in _TABLEAUS},
+    "semi_implicit_euler": f"semi_implicit_euler(m->system, positions, {_AT})",
+    "leapfrog": f"leapfrog(m->system, &(Split){{ {_SPLIT} }}, {_AT})",
+}
 
 
-class Stride(ctypes.Structure):
-    """See `templates/c/equal_stride.c.jinja`."""
+class System(ctypes.Structure):
+    """See `templates/c/runs.c.jinja`."""
 
-    _fields_ = (
-        *((name, _POINTER) for name in ("k", "u", "allowed")),
-        *((name, _REAL) for name in ("t_start", "t_end", "dt")),
-        ("before", _WHOLE),
-        ("most", _WHOLE),
-        ("more", _POINTER),
-        ("held", _POINTER),
-        *((name, _POINTER) for name in ("rate", "place", "slope", "ends", "states", "losses")),
-        ("margins", _POINTER),
-        ("iterations", _POINTER),
-    )
+    _fields_ = tuple((name, _POINTER) for name in ("k", "u", "rates"))
 
 
-def source(interface: Interface) -> str:
-    """The C source of the methods, which follows that of `templates/c/runs.c.jinja`."""
-    rows = zip(TABLEAU.a[1:], TABLEAU.c[1:], strict=True)
+def context(interface: Interface) -> dict[str, Any]:
+    """The values of the template."""
     states = list(enumerate(interface.states))
-    context = {
-        "prefix": interface.name,
-        "methods": list(METHODS),
-        "compositions": compositions(),
-        "unit": "unit(",
+    return {
+        "methods": [(name, _CALLS.get(name)) for name in METHODS],
         "positions": [i for i, state in states if state.position],
         "others": [i for i, state in states if not state.position],
-        "stages": [(i, repr(float(node)), _sum(row)) for i, (row, node) in enumerate(rows, 1)],
-        "count": len(TABLEAU.b),
-        "end_sum": _sum(TABLEAU.b),
     }
-    return render(c.TEMPLATES, "equal_steps.c.jinja", context)
-
-
-def compositions() -> list[tuple[str, list[str]]]:
-    """The parts of each method that is composed of leapfrog steps."""
-    return [(name, [repr(part) for part in parts]) for name, parts in PARTS.items()]
-
-
-def _sum(row: Sequence[float]) -> str:
-    return " + ".join(f"{float(factor)!r} * k[{j}][j]" for j, factor in terms(row))
 
 
 def steps(
@@ -80,18 +69,20 @@ def steps(
     """The steps of a method, at the constants of parameters and at inputs; `functions` keep
     constraints.
     """
-    more = np.ascontiguousarray(rates_of(problem)) if name in LEAPFROGS else None
-    held = ctypes.cast(constants, _POINTER), inputs, more, functions
-    return partial(made, library[f"steps_{name}"], METHODS[name], *held)
+    rates = split_of(problem).rates if name in LEAPFROGS else np.empty(0)
+    system = System(ctypes.cast(constants, _POINTER), inputs.ctypes.data, rates.ctypes.data)
+    system.kept = constants, inputs, rates
+    held = inputs, functions, sum(problem.quaternions, ())
+    return partial(made, library[f"steps_{name}"], METHODS[name], system, *held)
 
 
 def made(
     call: Any,
     calls: int,
-    constants: Any,
+    system: ctypes.Structure,
     inputs: Array | None,
-    more: Any,
     functions: Mapping[str, Function],
+    quaternions: Sequence[int],
     t: float,
     y: Array,
     lost: Array,
@@ -107,53 +98,60 @@ def made(
 ) -> EqualStride:
     """Make steps, with the arguments of `run.compiled.EqualSteps`.
 
-    call   the method's function
-    calls  derivatives in a step, or in an iteration if it `iterates`
-    more   what only this method needs, an array or a structure
-    functions  that keep constraints, by name
+    call    the method's function
+    calls   derivatives in a step, or in an iteration if it `iterates`
+    system  what the method is given
+    functions    that keep constraints, by name
+    quaternions  the four states of each, one after another
     """
-    call.restype = ctypes.c_int
-    call.argtypes = [_REAL, *[_POINTER] * 4]
-    ny, count = len(y), ctypes.c_int64()
-    rate, allowed = np.array(limits[0]), np.ascontiguousarray(limits[1])
+    call.restype = ctypes.c_int64
+    call.argtypes = [_POINTER, _POINTER, _REAL, *[_POINTER] * 4]
+    ny = len(y)
     start = [np.ascontiguousarray(array) for array in (y, lost)]
-    place, slope = np.empty((2, ny))
-    ends, (states, losses) = np.empty(most), np.empty((2, most, ny))
-    iterations = np.empty(most, np.int64) if iterates else None
     margins = made_margins(constrained, most)
     keeps = constraints(functions, constrained, inputs, ny)
-    arrays = (rate, place, slope, ends, states, losses)
-    stride = Stride(
-        constants,
-        None if inputs is None else inputs.ctypes.data,
-        allowed.ctypes.data,
-        t_start,
-        t_end,
-        dt,
-        made,
-        most,
-        more.ctypes.data if isinstance(more, np.ndarray) else more and ctypes.addressof(more),
-        address(keeps),
-        *(array.ctypes.data for array in (*arrays, margins[1:])),
-        None if iterations is None else iterations.ctypes.data,
+    course = Course(
+        t_start=t_start,
+        t_end=t_end,
+        dt=dt,
+        before=made,
+        most=most,
+        rate=np.array(limits[0]),
+        allowed=np.ascontiguousarray(limits[1]),
+        place=np.empty(ny),
+        slope=np.empty(ny),
+        many=len(quaternions) // 4,
+        quaternions=np.array(quaternions, np.int64),
     )
+    kept = Kept(
+        made=0,
+        most=most,
+        ends=np.empty(most),
+        states=np.empty((most, ny)),
+        losses=np.empty((most, ny)),
+        iterations=np.empty(most, np.int64),
+        margins=margins[1:],
+    )
+    left = filled(kept)
     why = call(
+        ctypes.byref(system),
+        address(keeps),
         t,
-        start[0].ctypes.data,
-        start[1].ctypes.data,
-        ctypes.byref(stride),
-        ctypes.byref(count),
+        *(array.ctypes.data for array in start),
+        ctypes.byref(filled(course)),
+        ctypes.byref(left),
     )
-    n = count.value
+    take(kept, left)
+    n = kept.made
     return EqualStride(
-        ends[:n],
-        states[:n],
-        losses[:n],
+        kept.ends[:n],
+        kept.states[:n],
+        kept.losses[:n],
         calls,
-        rate,
-        place,
-        slope,
-        usual=why == _MADE_ALL,
-        iterations=None if iterations is None else iterations[:n],
+        course.rate,
+        course.place,
+        course.slope,
+        usual=why == MADE_ALL,
+        iterations=kept.iterations[:n] if iterates else None,
         margins=margins[: n + 1] if constrained else None,
     )

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
+from eomgen.engine.printed import c_source
 from eomgen.native import checked, equal_steps
 from eomgen.native.checked import Function, FunctionStructure
 from eomgen.native.constrained import address, constraints, made_margins
@@ -33,6 +34,7 @@ from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.integrators.rodas_5p_coefficients import GAMMA, IN_TIME, NODES, Row
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
+from eomgen.subset.braces import C
 from eomgen.templating import render
 
 MAIN = "implicit.c"
@@ -74,9 +76,8 @@ def sources() -> Mapping[str, str]:
         "greatest": repr(rodas_5p.GREATEST),
         "negligible": repr(rodas_5p.NEGLIGIBLE),
         "least_error": repr(rodas_5p.LEAST_ERROR),
-        "unit": "unit(((const iteration *)run->more)->of, ",
-        "methods_of_rattle": list(equal_steps.LEAPFROGS),
-        "compositions": equal_steps.compositions(),
+        "engine": C.prelude + c_source([*equal_steps.COMPOSED, ("equal_steps", {})]),
+        "compositions": [each.name for each in equal_steps.COMPOSITIONS],
         "most_of_rattle": rattle.MOST,
         "rattle_roundoff": repr(rattle.ROUNDOFF),
         "rattle_noise": repr(rattle.NOISE),
@@ -169,6 +170,7 @@ class CompiledImplicit:
             return
         if len(self._functions) < len(beside):
             return
+        self._quaternions = sum(problem.quaternions, ())
         quaternions = np.array(problem.quaternions, np.int64)
         self._kept = constants, others, inputs, quaternions, libraries
         self._system = System(
@@ -207,8 +209,8 @@ class CompiledImplicit:
         )
         with_them.kept = self, reals, wholes
         call = self._methods[f"steps_{name}"]
-        held = self._inputs, with_them, functions
-        return partial(equal_steps.made, call, stages, None, *held, iterates=True)
+        held = with_them, self._inputs, functions, self._quaternions
+        return partial(equal_steps.made, call, stages, *held, iterates=True)
 
 
 def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:

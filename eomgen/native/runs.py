@@ -9,19 +9,21 @@ import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
+from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import Roots, c_source
 from eomgen.native import checked, equal_steps
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
-from eomgen.native.dop853 import constants, written_out
 from eomgen.native.functions import restricted
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
-from eomgen.run.integrators import dormand_prince_8 as dop853
+from eomgen.run.integrators.dormand_prince_8 import interpolated
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.subset.braces import C
+from eomgen.subset.structures import filled
 from eomgen.templating import render
 
 MAIN = "runs.c"
@@ -30,8 +32,6 @@ ENGINE: Roots = (("begun", {}), ("gone_on", {}))
 METHODS = ("dop853", *equal_steps.METHODS)
 """The methods whose steps this library makes."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-_UNUSUAL = 2
-"""What C returns before a step that Python must make."""
 
 
 def sources(program: Program, interface: Interface) -> Mapping[str, str]:
@@ -42,31 +42,24 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "engine": C.prelude + c_source(ENGINE),
-        **constants(written_out),
+        "engine": C.prelude + c_source([*ENGINE, *equal_steps.STEPS]),
+        "steps": c_source([("made_many", {"method": DOP853})]),
         **checked.context(),
         **of_constraints(),
+        **equal_steps.context(interface),
     }
-    main = render(c.TEMPLATES, "runs.c.jinja", context) + equal_steps.source(interface)
+    main = render(c.TEMPLATES, "runs.c.jinja", context)
     return {**c.library(program, interface), MAIN: main}
 
 
-class _Settings(ctypes.Structure):
-    _fields_ = (
-        *((name, _POINTER) for name in ("k", "u", "atol")),
-        *((name, _REAL) for name in ("rtol", "longest", "t_end")),
-        ("dense", _WHOLE),
-        ("held", _POINTER),
-    )
+class _Checks(ctypes.Structure):
+    """`Checks` of `templates/c/checks.c.jinja`."""
 
-
-class _Records(ctypes.Structure):
     _fields_ = (
-        *((name, _POINTER) for name in ("ends", "lengths", "states", "slopes", "losses")),
-        *((name, _POINTER) for name in ("switched", "values", "terms", "margins")),
-        *((name, _POINTER) for name in ("derivatives", "sampled")),
-        *((name, _POINTER) for name in ("switches", "gap_checks", "times", "rows")),
-        ("count", _WHOLE),
+        *((name, _POINTER) for name in ("system", "run", "watch", "held")),
+        ("now", _REAL),
+        *((name, _POINTER) for name in ("margins", "switched", "values")),
+        *((name, _POINTER) for name in ("switches", "gap_checks")),
     )
 
 
@@ -91,8 +84,7 @@ class CompiledSteps:
         self._inputs = kernels.given(u)
         self._states = kernels.states
         self._library, self._call = library, library.dop853
-        self._call.restype = ctypes.c_int
-        self._call.argtypes = [_POINTER, _POINTER, _WHOLE, _REAL, _REAL, *[_POINTER] * 5]
+        self._call.restype, self._call.argtypes = _WHOLE, [_POINTER] * 8
 
     def named(self, name: str, needed: Sequence[str] = ()) -> Steps | None:
         """The steps of a method that are checked with some functions; None if there are none for
@@ -135,32 +127,32 @@ class CompiledSteps:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
         ends, lengths = np.empty((2, most))
-        states, slopes, losses = np.empty((3, most, ny))
         derivatives, sampled, switches, gap_checks = np.empty((4, most), np.int64)
+        states, slopes, losses = np.empty((3, most, ny))
+        terms, rows = np.empty((most if dense else 0, 7, ny)), np.empty((len(times), ny))
+        arrays = (ends, lengths, derivatives, sampled, states, slopes, losses, terms, times, rows)
+        kept = Records(*arrays, len(times), most)
         watch, pointed = checked.watch(self._checks, watched, sizes)
         switched, values = np.empty(most), np.empty((most, watch.switching.count))
-        rows, made = np.empty((len(times), ny)), ctypes.c_int64()
-        terms = np.empty((most if dense else 0, 7, ny))
         margins = made_margins(constrained, most)
         keeps = constraints(self._checks, constrained, self._inputs, ny)
-        arrays: list[Any] = [ends, lengths, states, slopes, losses, switched, values, terms]
-        arrays += [margins[1:]]
-        arrays += [derivatives, sampled, switches, gap_checks, times, rows]
-        records = _Records(*(array.ctypes.data for array in arrays), len(times))
-        settings = _Settings(*held, atol.ctypes.data, rtol, longest, t_end, dense, address(keeps))
-        start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
-        why = self._call(
-            ctypes.byref(settings),
-            ctypes.byref(watch),
-            most,
-            t,
-            float(memory["h_abs"]),
-            *(array.ctypes.data for array in start),
-            ctypes.byref(records),
-            ctypes.byref(made),
+        at = filled(Progress(t, length=float(memory["h_abs"])))
+        system, run = equal_steps.System(*held), filled(Bounds(atol, rtol, longest, t_end, dense))
+        checks = _Checks(
+            *(ctypes.addressof(each) for each in (system, run, watch)),
+            address(keeps),
+            *(0.0, margins[1:].ctypes.data, switched.ctypes.data, values.ctypes.data),
+            *(switches.ctypes.data, gap_checks.ctypes.data),
         )
-        del pointed, keeps
-        n = made.value
+        start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
+        records = filled(kept)
+        why = self._call(
+            *(ctypes.addressof(each) for each in (system, checks, run, at)),
+            *(array.ctypes.data for array in start),
+            ctypes.addressof(records),
+        )
+        del pointed, keeps, records
+        n: int = at.made
         passed = int(sampled[n - 1]) if n else 0
         return Stride(
             ends[:n],
@@ -173,15 +165,13 @@ class CompiledSteps:
             values[:n],
             switches[:n],
             gap_checks[:n],
-            usual=why != _UNUSUAL,
-            within=partial(_within, t, y, ends, states, terms) if dense else None,
+            usual=why != UNUSUAL,
+            within=partial(_within, t, y, kept) if dense else None,
             margins=margins[: n + 1] if constrained else None,
         )
 
 
-def _within(
-    t: float, y: Array, ends: Array, states: Array, terms: Array, i: int, time: float
-) -> Array:
+def _within(t: float, y: Array, kept: Records, i: int, time: float) -> Array:
     """The state at a time in step number i of those that begin at t with the state y."""
-    start, first = (float(ends[i - 1]), states[i - 1]) if i else (t, y)
-    return dop853.interpolated(start, float(ends[i]) - start, first, terms[i], time)
+    start, first = (float(kept.ends[i - 1]), kept.states[i - 1]) if i else (t, y)
+    return interpolated(start, float(kept.ends[i]) - start, first, kept.terms[i], time)

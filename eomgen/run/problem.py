@@ -3,11 +3,13 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.engine import quaternions
 from eomgen.errors import RunError
 from eomgen.run.closed_form import ClosedForm
 from eomgen.run.compiled import Compiled, Series
@@ -39,7 +41,7 @@ def unexplained(t: float, y: FloatArray, initial: FloatArray) -> None:
     """An `Explain` without a model: it knows no reason."""
 
 
-USUAL_LENGTH = (1e-100, 1e100)
+USUAL_LENGTH = (quaternions.SHORTEST, quaternions.LONGEST)
 """Bounds of lengths whose squares neither overflow nor underflow."""
 SHORTEST = 1e-150
 """A quaternion shorter than this gives no orientation: its square underflows."""
@@ -186,22 +188,19 @@ class Problem:
         return y if self.projection is None else self.projection.onto(t, y, self.unit)
 
     def unit(self, y: FloatArray) -> FloatArray:
-        """The state `y` (ny,) with normalised quaternions; those that are not finite stay as is.
-
-        The exact motion stays on the unit sphere. A step leaves it by its error, and projection to
-        the nearest point of the sphere keeps the order of the method: Hairer, Lubich, Wanner,
-        Geometric Numerical Integration, section IV.4.
-        """
+        """The state `y` (ny,) with normalised quaternions; those that are not finite stay as is."""
         if not self.quaternions:
             return y
-        values = y.tolist()
-        for indices in self.quaternions:
-            a, b, c, d = (values[i] for i in indices)
-            # Like this also in compiled steps, for the same bits.
-            length = math.sqrt(a * a + b * b + c * c + d * d)
-            if not USUAL_LENGTH[0] < length < USUAL_LENGTH[1]:
-                length = math.hypot(a, b, c, d)
-            if math.isfinite(length):
-                for i in indices:
-                    values[i] /= length
+        values: Any = y.tolist()
+        if not quaternions.normalised(len(self.quaternions), self._places, values):
+            values = y.tolist()
+            for indices in self.quaternions:
+                length = math.hypot(*(values[i] for i in indices))
+                if math.isfinite(length):
+                    for i in indices:
+                        values[i] /= length
         return np.array(values)
+
+    @cached_property
+    def _places(self) -> Any:
+        return [i for indices in self.quaternions for i in indices]

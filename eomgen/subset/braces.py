@@ -27,6 +27,12 @@ OPERATORS: dict[type, str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.Gt: ">",
     ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&", ast.Or: "||",
 }  # fmt: skip
+STATEMENTS = (
+    ast.Assign, ast.AnnAssign, ast.AugAssign, ast.Return, ast.Break, ast.Continue, ast.Pass,
+    ast.Expr,
+)  # fmt: skip
+GATHERED = {"ordered": ("0.0", "+="), "all_within": ("1", "&=")}
+"""What entries are gathered by, one after another: what is begun with, and what is done."""
 ONE, TWO = ("j_",), ("i_", "j_")
 """The indices of entries in loops over arrays of one dimension and of two."""
 
@@ -43,7 +49,6 @@ class Language:
     arrays        the types of arrays of numbers, and of whole ones
     part          how a part of an array is passed on, by its name and the place where it begins
     field         how a record's field is read
-    given         how a function that the engine is given is called, by its name and arguments
     prelude       what the printed functions need
     """
 
@@ -56,7 +61,6 @@ class Language:
     arrays: tuple[str, str]
     part: str
     field: str
-    given: str
     prelude: str
 
 
@@ -70,7 +74,6 @@ C = Language(
     arrays=("double", "int64_t"),
     part="{array} + {place}",
     field="->",
-    given="{name}({of}, {arguments})",
     prelude="""#include <math.h>
 #include <stdint.h>
 
@@ -95,7 +98,6 @@ JAVASCRIPT = Language(
     arrays=("Float64", "Int32"),
     part="{array}.subarray({place})",
     field=".",
-    given="{of}.{name}({arguments})",
     prelude="""const nextAfter = (() => {
     const number = new Float64Array(1), bits = new BigInt64Array(number.buffer);
     return (t) => {
@@ -138,7 +140,7 @@ def _structures(text: Text, functions: Iterable[ast.FunctionDef]) -> Iterable[st
     for name in dict.fromkeys(kinds):
         record = text.classes.get(name)
         if record and not is_protocol(record):
-            yield "typedef struct {"
+            yield f"typedef struct {name} {{"
             for each, kind in fields_of(record).items():
                 yield f"    {_c_type(kind)}{each};"
             yield f"}} {name};"
@@ -253,6 +255,7 @@ class _Function:
                 continue
             (target,) = s.targets
             if isinstance(target, ast.Name):
+                self._check_name(target)
                 self.kinds.declare(target.id, s.value)
             if not self._is_loop(s):
                 made.append(s)
@@ -262,11 +265,16 @@ class _Function:
                 made.append([s])
         return made
 
+    def _check_name(self, name: ast.Name) -> None:
+        if name.id in TWO:
+            raise NotInSubsetError(name, "is the name of an index of loops over arrays")
+
     def _prepare(self, s: ast.stmt) -> None:
         """Declare loop variables, and group the statements inside."""
         if isinstance(s, ast.For):
             if called(s.iter) != "range" or not isinstance(s.target, ast.Name) or s.orelse:
                 raise NotInSubsetError(s, "loops are over range(…), or unrolled(…)")
+            self._check_name(s.target)
             self.kinds.names.setdefault(s.target.id, INT)
             assert isinstance(s.iter, ast.Call)
             stored = _stored(s.body)
@@ -274,12 +282,14 @@ class _Function:
                 raise NotInSubsetError(s.iter, "changes in the loop")
         if isinstance(s, ast.For | ast.While | ast.If):
             s.body, s.orelse = self._grouped(s.body), self._grouped(s.orelse)
+        elif not isinstance(s, STATEMENTS):
+            raise NotInSubsetError(s, "not in the subset")
 
     def _is_loop(self, s: ast.Assign) -> bool:
-        """Whether an assignment is a loop over the entries of vectors, or a sum of them."""
-        if called(s.value) == "ordered":
+        """Whether an assignment is a loop over the entries of vectors, or gathers them."""
+        if called(s.value) in GATHERED:
             return isinstance(s.targets[0], ast.Name)
-        if called(s.value) in ("rows", "matrix", "whole") or self._given(s.value):
+        if called(s.value) in ("rows", "matrix", "whole", "product") or self._given(s.value):
             return False
         return len(self.kinds.of(s.targets[0]).sizes) == 1
 
@@ -287,7 +297,7 @@ class _Function:
         return given_function(e, self.kinds.names, self.text)
 
     def _span(self, s: ast.Assign) -> str:
-        if called(s.value) == "ordered":
+        if called(s.value) in GATHERED:
             assert isinstance(s.value, ast.Call)
             return self.kinds.of(s.value.args[0]).sizes[0]
         return self.kinds.of(s.targets[0]).sizes[0]
@@ -297,7 +307,7 @@ class _Function:
         if self._span(s) != self._span(group[0]):
             return False
         written = {_base(one.targets[0]) for one in group}
-        sums = {_base(one.targets[0]) for one in group if called(one.value) == "ordered"}
+        sums = {_base(one.targets[0]) for one in group if called(one.value) in GATHERED}
         parts = {_base(n) for n in ast.walk(s) if isinstance(n, ast.Subscript) and not _is_whole(n)}
         read = _names(s.value) | {_base(s.targets[0])}
         mine = {_base(s.targets[0])} if isinstance(s.targets[0], ast.Subscript) else set()
@@ -348,15 +358,16 @@ class _Function:
         """The loop of a group of statements."""
         declared: set[str] = set()
         for s in group:
-            if called(s.value) == "ordered":
-                self._line(f"{self._expr(s.targets[0])} = 0.0;")
-        self._line(self._for(*ONE, self._span(group[0])) + " {")
+            if called(s.value) in GATHERED:
+                self._line(f"{self._expr(s.targets[0])} = {GATHERED[called(s.value)][0]};")
+        self._line(self._for("j_", self._span(group[0])) + " {")
         self.depth += 1
         for s in group:
             (target,), value = s.targets, s.value
-            if called(value) == "ordered":
+            if called(value) in GATHERED:
                 assert isinstance(value, ast.Call)
-                self._line(f"{self._expr(target)} += {_bare(self._expr(value.args[0], ONE))};")
+                entries = _bare(" <= ".join(self._expr(a, ONE) for a in value.args))
+                self._line(f"{self._expr(target)} {GATHERED[called(value)][1]} {entries};")
                 continue
             self._check_overlap(target, value)
             word = ""
@@ -373,9 +384,20 @@ class _Function:
     def _check_overlap(self, target: ast.expr, value: ast.expr) -> None:
         """NumPy computes all before it writes: parts of one array must not be shifted."""
         for n in ast.walk(value):
-            is_part = isinstance(n, ast.Subscript) and _base(n) == _base(target)
-            if is_part and _starts(n) != _starts(target):
+            if not isinstance(n, ast.Subscript) or _base(n) != _base(target):
+                continue
+            if self._starts(n) != self._starts(target):
                 raise NotInSubsetError(value, "shifted parts of one array: copy() one of them")
+
+    def _starts(self, e: ast.expr) -> list[str]:
+        """Where a part begins along each dimension; nothing where it is a single place."""
+        places = []
+        for i in indices(e) if isinstance(e, ast.Subscript) else []:
+            if isinstance(i, ast.Slice):
+                places.append(ast.unparse(i.lower or ast.Constant(0)))
+            else:
+                places.append(ast.unparse(i) if self.kinds.of(i).is_array else "")
+        return [*places, "0", "0"][:2]
 
     def _statement(self, s: ast.stmt) -> None:
         match s:
@@ -429,13 +451,28 @@ class _Function:
                 return
         if called(value) == "rows":
             return
+        if called(value) == "product":
+            assert isinstance(value, ast.Call)
+            self._product_of(target, *value.args)
+            return
         if len(kind.sizes) == 1:  # of whole numbers, or a vector of zeros
             fill = called(value) == "whole"
-            self._line(self._for(*ONE, kind.sizes[0]))
+            self._line(self._for("j_", kind.sizes[0]))
             entry = "0" if fill else _bare(self._expr(value, ONE))
             self._line(f"    {self._expr(target, ONE)} = {entry};")
             return
         self._change(target, "", value)
+
+    def _product_of(self, target: ast.expr, a: ast.expr, x: ast.expr) -> None:
+        """A matrix by a vector, row by row."""
+        if _base(target) in _names(a, x):
+            raise NotInSubsetError(x, "an array would change while it is read")
+        self._line(f"{self._for('i_', self.kinds.of(a).sizes[0])} {{")
+        entry = self._expr(target, ("i_",))
+        self._line(f"    {entry} = 0.0;")
+        self._line(f"    {self._for('j_', self.kinds.of(x).sizes[0])}")
+        self._line(f"        {entry} += {self._expr(a, TWO)} * {self._expr(x, ONE)};")
+        self._line("}")
 
     def _change(self, target: ast.expr, op: str, value: ast.expr) -> None:
         kind = self.kinds.of(target)
@@ -519,7 +556,9 @@ class _Function:
                 j = rest.pop(0)
                 place.append(f"({self._expr(i.lower)} + {j})" if i.lower else j)
             else:
-                place.append(_bare(self._expr(i)) if len(whole.sizes) == 1 else self._expr(i))
+                chosen = [rest.pop(0)] if self.kinds.of(i).is_array else []
+                shown = self._expr(i, chosen)
+                place.append(_bare(shown) if len(whole.sizes) == 1 else shown)
         return self._at(self._entry(e.value, ()), whole, place)
 
     def _at(self, array: str, kind: Kind, place: Sequence[str]) -> str:
@@ -543,14 +582,16 @@ class _Function:
 
     def _call(self, e: ast.Call, out: str = "") -> str:
         """A call of a function of the engine, or of one that it is given."""
-        arguments = ", ".join([*map(self._argument, e.args), *([out] if out else [])])
+        arguments = [*map(self._argument, e.args), *([out] if out else [])]
         if self._given(e):
             assert isinstance(e.func, ast.Attribute) and isinstance(e.func.value, ast.Name)
-            of = {"of": e.func.value.id, "name": e.func.attr, "arguments": arguments}
-            return self.to.given.format(**of)
+            of, name = e.func.value.id, e.func.attr
+            if self.to is C:
+                return f"{name}({', '.join([of, *arguments])})"
+            return f"{of}.{name}({', '.join(arguments)})"
         if called(e) not in self.made:
             raise NotInSubsetError(e, "not a function of the engine")
-        return f"{called(e)}({arguments})"
+        return f"{called(e)}({', '.join(arguments)})"
 
     def _call_of(self, e: ast.Call, at: Sequence[str]) -> str:
         name, args = called(e), e.args
@@ -559,6 +600,8 @@ class _Function:
                 raise NotInSubsetError(e, "assign it to a name first")
             return self._call(e)
         kind = self.kinds.of(e)
+        if name in (*GATHERED, "rows", "product"):
+            raise NotInSubsetError(e, "assign it to a name first")
         if name == "copy":
             return self._expr(args[0], at)
         if name in ("zeros", "matrix", "whole"):
@@ -594,17 +637,9 @@ def _is_whole(e: ast.expr) -> bool:
     return not isinstance(e, ast.Subscript)
 
 
-def _starts(e: ast.AST) -> list[str]:
-    """Where a part begins along each dimension; nothing where it is a single place."""
-    given = indices(e) if isinstance(e, ast.Subscript) else []
-    places = [
-        ast.unparse(i.lower or ast.Constant(0)) if isinstance(i, ast.Slice) else "" for i in given
-    ]
-    return [*places, "0", "0"][:2]
-
-
 def _names(*nodes: ast.AST) -> set[str]:
-    return {n.id for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name)}
+    found = (n for node in nodes for n in ast.walk(node))
+    return {ast.unparse(n) for n in found if isinstance(n, ast.Name | ast.Attribute)}
 
 
 def _bare(text: str) -> str:

@@ -3,11 +3,15 @@
 import ast
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from eomgen.subset.expander import NotInSubsetError, Text, called
 
 ARRAYS = {"Vector": "float", "Matrix": "float", "Whole": "int"}
-FUNCTIONS = {"sqrt": "float", "next_after": "float", "isfinite": "int", "ordered": "float"}
+FUNCTIONS = {
+    "sqrt": "float", "next_after": "float", "isfinite": "int", "ordered": "float",
+    "all_within": "int",
+}  # fmt: skip
 """The kinds of what functions of numbers, or of whole arrays, return."""
 
 
@@ -51,6 +55,7 @@ def of_annotation(node: ast.expr | None) -> Kind:
     raise NotInSubsetError(node, "not a kind of the subset")
 
 
+@cache
 def fields_of(record: ast.ClassDef) -> dict[str, Kind]:
     """The kinds of a record's fields."""
     found = (d for d in record.body if isinstance(d, ast.AnnAssign))
@@ -70,7 +75,10 @@ def given_function(
     """The function of a protocol that an expression calls, if it does."""
     match node:
         case ast.Call(ast.Attribute(ast.Name(owner), name)) if owner in kinds:
-            for d in text.classes[kinds[owner].of].body:
+            protocol = text.classes.get(kinds[owner].of)
+            if protocol is None:
+                raise NotInSubsetError(node, "not in the subset")
+            for d in protocol.body:
                 if isinstance(d, ast.FunctionDef) and d.name == name:
                     return d
             raise NotInSubsetError(node, f"{kinds[owner].of} has no function {name}")
@@ -146,11 +154,12 @@ class Kinds:
         at = indices(e)
         if len(at) > len(whole.sizes):
             raise NotInSubsetError(e, "has too many indices")
-        parts = [
-            (length(i, s), r)
-            for i, s, r in zip(at, whole.sizes, whole.room or whole.sizes, strict=False)
-            if isinstance(i, ast.Slice)
-        ]
+        parts: list[tuple[str, str]] = []
+        for i, n, most in zip(at, whole.sizes, whole.room or whole.sizes, strict=False):
+            if isinstance(i, ast.Slice):
+                parts.append((length(i, n), most))
+            elif (chosen := self.of(i)).is_array:
+                parts.append((chosen.sizes[0], chosen.sizes[0]))
         rest = whole.sizes[len(at) :]
         sizes, room = ((*(part[n] for part in parts), *rest) for n in (0, 1))
         return Kind(whole.of, sizes, room)
@@ -180,6 +189,9 @@ class Kinds:
         if name == "outer":
             x, y = self.of(args[0]), self.of(args[1])
             return Kind("float", (*x.sizes, *y.sizes), (*(x.room or x.sizes), *(y.room or y.sizes)))
+        if name == "product":
+            rows = self.of(args[0])
+            return Kind("float", rows.sizes[:1], rows.room[:1])
         if name in ("abs", "copy", "min", "max", "larger"):
             kinds = [self.of(a) for a in args]
             of = "float" if any(k.of == "float" for k in kinds) else "int"

@@ -7,13 +7,16 @@ The text is ordinary Python with few kinds of things:
   `Annotated[Matrix, "n", "n"]`, where n is an argument, or a size that the printer is given;
 - `Known`: what is a Python object when the text is printed, such as a tableau. Functions are
   printed once for each, and loops over `unrolled(...)` of it are written out;
+- sums with factors that are known: `combined(row, k)`;
 - assignments, `if`, `while`, `for … in range(…)`, `break`, `continue`, `return`, and calls of other
   functions of the text. A protocol names the functions that the engine is given.
 
 Array statements are elementwise: `place = y + h * k[i]`, `a[i, p:] -= factor * a[p, p:]`. In Python
 NumPy runs them, in C and JavaScript they are loops; each entry has the same operations in the same
 order, and so the same bits. `place = …` makes a new array, `place[:] = …` changes one. An array has
-one name: `copy(x)`. Arrays are never resized; functions change those that they are given.
+one name: `copy(x)`. Arrays are never resized; functions change those that they are given. An index
+may be an array of whole numbers, which differ: `place[positions] += h * rates`. A record's array
+may be assigned as a whole, `step.place = place`; then only one of the two is used, or none changed.
 
 Where few numbers are taken one by one, lists are several times as fast in Python as arrays:
 `numbers`, `counts` and `table`, of which an entry is `a[i][j]`. Elsewhere they are arrays too, and
@@ -22,6 +25,7 @@ Python gives functions that take entries only either of them.
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from math import inf, isfinite, nan, sqrt
 from typing import Any, TypeVar
 
@@ -29,9 +33,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Known", "Matrix", "Vector", "Whole", "added", "copy", "counts", "inf", "isfinite", "larger",
-    "matrix", "nan", "next_after", "numbers", "ordered", "outer", "rows", "sqrt", "table",
-    "unrolled", "whole", "zeros",
+    "Known", "Matrix", "Row", "Vector", "Whole", "added", "all_within", "combined", "copy",
+    "counts", "inf", "isfinite", "larger", "matrix", "nan", "next_after", "numbers", "ordered",
+    "outer", "product", "rows", "sqrt", "table", "unrolled", "whole", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]
@@ -39,6 +43,19 @@ Matrix = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Known = Any
 T = TypeVar("T")
+
+
+_sum, _sums = np.add.reduce, np.add.accumulate
+
+
+class Row(tuple[tuple[int, float], ...]):
+    """Some factors, each with its number, ascending: those of a sum."""
+
+    @cached_property
+    def column(self) -> Matrix:
+        """All factors up to the last one, with 0 where there is none, (n, 1)."""
+        factors = dict(self)
+        return np.array([[factors.get(j, 0.0)] for j in range(max(factors) + 1)])
 
 
 def zeros(n: int) -> Vector:
@@ -89,9 +106,30 @@ def added(terms: Iterable[Any]) -> Any:
     return total
 
 
+def combined(row: Row, k: Any) -> Vector:
+    """The sum of vectors k[j] times the factors of a row, in order, from 0 on."""
+    column = row.column
+    products: Matrix = column * k[: len(column)]
+    # NumPy would add a single column pairwise.
+    is_one = products.shape[1] == 1
+    total: Vector = 0.0 + _sums(products)[-1] if is_one else _sum(products, initial=0.0)
+    return total
+
+
 def ordered(x: Vector) -> float:
     """The sum of the entries of a vector, in order, from 0 on."""
-    return 0.0 + float(np.add.accumulate(x)[-1]) if len(x) else 0.0
+    return 0.0 + _sums(x).item(-1) if len(x) else 0.0
+
+
+def all_within(x: Vector, limits: Vector) -> bool:
+    """Whether each entry of x is at most that of the limits; one that is nan is not."""
+    return bool((x <= limits).all())
+
+
+def product(a: Matrix, x: Vector) -> Vector:
+    """The matrix by the vector, each row's sum in order, from 0 on."""
+    n = len(x)
+    return 0.0 + np.add.accumulate(a * x, axis=1)[:, -1] if n else np.zeros(len(a))
 
 
 def larger(a: Vector, b: Vector | float) -> Vector:

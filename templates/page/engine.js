@@ -43,7 +43,15 @@ const makeEngine = (mechanism, data) => {
     if (engine.grip) pullAt(t, y);
     return mechanism.derivative(t, y, engine.p, engine.u);
   };
-  const free = { ny, positions, others, f: derivative };
+  const free = {
+    ny,
+    positions,
+    others,
+    f: derivative,
+    placed: (t, y) => projected(t, y),
+    given: () => [engine.grip ? NaN : 0, ...engine.p, ...engine.u], // a pull is never as it was
+    corners: Boolean(mechanism.switchingFunctions),
+  };
   let problem = free;
 
   function unit(y) {
@@ -156,10 +164,11 @@ const makeEngine = (mechanism, data) => {
     }
     const end = mark();
     const length = regular ? engine.dt : end - t;
-    const found = change(problem, t, y, length);
+    const found = change(problem, t, y, change.free ? end : length);
     const next = new Float64Array(ny);
     const rest = new Float64Array(ny);
-    for (let k = 0; k < ny; k += 1) {
+    if (change.free) next.set(found);
+    for (let k = 0; !change.free && k < ny; k += 1) {
       // Knuth's two-sum.
       const add = found[k] + lost[k];
       const total = y[k] + add;
@@ -167,7 +176,7 @@ const makeEngine = (mechanism, data) => {
       next[k] = total;
       rest[k] = (y[k] - (total - part)) + (add - part);
     }
-    projected(end, next);
+    if (!change.free) projected(end, next);
     if (!next.every(Number.isFinite)) throw new Error("the state overflows or is not a number: take a smaller step");
     if (law && cutAtContact(t, y, next, length)) return;
     engine.t = end;
@@ -184,6 +193,7 @@ const makeEngine = (mechanism, data) => {
     const state = (s) => {
       if (s <= 0) return y;
       if (s >= length) return next;
+      if (change.free) return change(problem, t, y, t + s).slice();
       const within = change(problem, t, y, s);
       return projected(t + s, y.map((x, k) => x + within[k]));
     };

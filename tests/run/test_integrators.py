@@ -16,6 +16,9 @@ from campaigns import energy
 from scipy.integrate import DOP853, RK45, solve_ivp
 from scipy.special import ellipj, ellipk
 
+from eomgen.engine import dop853_coefficients as coefficients
+from eomgen.engine.explicit import RUNGE_KUTTA_4 as TABLEAU
+from eomgen.engine.tableau import ButcherTableau, density, size, trees
 from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import (
@@ -26,12 +29,10 @@ from eomgen.run.integrators import (
     gauss_6,
     implicit_midpoint,
 )
-from eomgen.run.integrators import dop853_coefficients as coefficients
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
+from eomgen.run.integrators.explicit import runge_kutta
 from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
-from eomgen.run.integrators.runge_kutta_4 import TABLEAU
-from eomgen.run.integrators.tableau import ButcherTableau, density, size, trees
 from eomgen.run.problem import Problem
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import Outcome
@@ -706,7 +707,9 @@ def test_wrong_tableau_is_refused(change, message):
 
 def test_tableau_of_lower_order_serves():
     heun = ButcherTableau(a=((0, 0), (1, 0)), b=(1 / 2, 1 / 2), c=(0, 1), order=2)
-    assert heun.change(lambda t, y: y, 0.0, np.array([1.0]), 0.1) == pytest.approx([0.105])
+    growing = replace(PENDULUM, derivative=lambda t, y: y)
+    change = runge_kutta(heun).prepare(growing)
+    assert change(growing, 0.0, np.ones(2), 0.1) == pytest.approx([0.105, 0.105])
     with pytest.raises(ValueError, match="not of order 3"):
         replace(heun, order=3)
 

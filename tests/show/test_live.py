@@ -1,5 +1,6 @@
 """The page's mechanism and engine in node: against the Python module and `simulate`."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,12 +11,14 @@ from live import NODE, run_in_node
 
 import eomgen
 from eomgen.api.given import model_of, read
+from eomgen.codegen.live import live_system
 from eomgen.language.formula import parse
 from eomgen.model.elaborate import elaborate
 from eomgen.model.interactive import OUTPUTS, interactive, switches_of
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.run.module import GeneratedModule, load_module
+from eomgen.run.integrate import integrate
+from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import parse_scene
 from eomgen.show.live import live_table, velocity_rows
@@ -155,6 +158,65 @@ def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) 
     assert np.abs((np.array(found["y"]) - expected) / scale).max() <= TOLERANCE
     kinds = [(event.kind, event.contact) for event in run.trajectory.events]
     assert [(event["kind"], event["contact"]) for event in found["events"]] == kinds
+
+
+SAME_SINES = """
+const sum_ = (x, sign) => {
+  let s = 1;
+  for (let n = 16; n > 0; n--) s = 1 - x * x / (2 * n * (2 * n + sign)) * s;
+  return s;
+};
+const sin_ = (x) => x * sum_(x, 1);
+const cos_ = (x) => sum_(x, -1);
+"""
+
+
+def series(x: float, sign: int) -> float:
+    """The series of a sine, divided by x, or of a cosine, with the bits of `SAME_SINES`."""
+    s = 1.0
+    for n in range(16, 0, -1):
+        s = 1 - x * x / (2 * n * (2 * n + sign)) * s
+    return s
+
+
+TREES = some(
+    ["tumbling_body"],
+    [
+        "two_body",
+        "double_pendulum",
+        "spinning_top",
+        "chain",
+        "tumbling_body",
+        "cart_pole",
+        "puma560",
+    ],
+)
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_dop853_makes_the_steps_of_python(name: str) -> None:
+    """The state at each mark of the page is that of the interpolant there, to the bit: from one
+    program, with one sine.
+    """
+    script = """
+    const rows = [];
+    const engine = makeEngine(mechanism, given);
+    engine.onSample = (t, y) => rows.push([t, ...y]);
+    engine.advance(1.0);
+    return { rows, error: engine.error, method: engine.method };
+    """
+    code, table = page_of(name, liveMethod="DOP853", liveStep=0.01)
+    source = re.sub(r"Math\.(sin|cos)\(", r"\1_(", code.source)
+    found = run_in_node(SAME_SINES + source, script, table)
+    assert found["error"] is None and found["method"] == "DOP853"
+    system = live_system(model_of(read(name), name), ()).system
+    module = load_module(re.sub(r"\b(sin|cos)\(", r"\1_(", python_module(system)))
+    vars(module).update(sin_=lambda x: x * series(x, 1), cos_=lambda x: series(x, -1))
+    # The end of a run shortens its last steps.
+    run = integrate(as_problem(module), "DOP853", 1.3, rtol=1e-9, atol=1e-12, samples=131)
+    rows = np.array(found["rows"])
+    assert rows[:, 0].tolist() == run.t[1:101].tolist()
+    assert rows[:, 1:].tobytes() == np.ascontiguousarray(run.y[1:101]).tobytes()
 
 
 STOP = """

@@ -1,70 +1,51 @@
 """The method of Dormand and Prince of order 8 with dense output of order 7, known as DOP853.
 
-Hairer, Norsett, Wanner, Solving ODEs I, sections II.5 and II.6; steps are chosen as in SciPy's
-DOP853. The sums over slopes are taken term by term in a fixed order. So a run has the same bits on
-every machine on which its derivative has them, and also when C makes its steps: see
-`eomgen.native.runs` and `templates/c/runs.c.jinja`, which repeats this arithmetic line by line.
+Its steps are those of `eomgen.engine.adaptive`, which also C and the page make: a run has the same
+bits on every machine on which its derivative has them.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
-from itertools import cycle
 from typing import Any, Literal
 
 import numpy as np
 
-from eomgen.run.integrators import dop853_written_out as written_out
-from eomgen.run.integrators.dop853_coefficients import (
-    DENSE,
-    DENSE_STAGES,
-    END,
-    ERROR_5,
-    NODES,
-    ORDER_3,
-    STAGES,
-    Row,
+from eomgen.engine.adaptive import (
+    Bounds,
+    Progress,
+    first_length,
+    interpolate,
+    made,
+    round_off,
+    within,
 )
-from eomgen.run.integrators.first_length import first_length
+from eomgen.engine.embedded import DOP853
+from eomgen.engine.printed import steps_of_few
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.problem import FloatArray
 
-SUMS: tuple[Row, ...] = (
-    *STAGES,
-    END,
-    ERROR_5,
-    {i: END.get(i, 0.0) - ORDER_3.get(i, 0.0) for i in {**END, **ORDER_3}},
-    *DENSE_STAGES,
-    *DENSE,
-)
-"""All sums over the slopes of a step, by their factors."""
-AT_END, LONG_ERROR, SHORT_ERROR, AT_DENSE, IN_DENSE = 12, 13, 14, 15, 18
-"""The numbers of these sums from `END` on, and of the first of `DENSE_STAGES` and of `DENSE`."""
-SLOPES = len(NODES)
-MATRIX = np.array([[row.get(j, 0.0) for j in range(SLOPES)] for row in SUMS])
-"""The factors, (22, 16): one row a sum, one column a slope."""
-SAFETY, SMALLEST, GREATEST = 0.9, 0.2, 10.0
-"""Factor for the next step's length, and its bounds."""
-POWER = -1 / 8
-SHORT_WEIGHT = 0.01
-"""Weight of the square of the error of order 3."""
+FEW = 12
+"""Greatest number of states for which Python's own numbers are quicker than NumPy."""
+MANY = 128
+"""After this many steps they are worth their printing."""
 TOO_SHORT = "Required step size is less than spacing between numbers."
+_made: Counter[int] = Counter()
+"""Steps made so far, by the number of states."""
 
-# The parts of sums to which slope j adds: stage j + 1 and all sums behind it.
-_ADDED = tuple(
-    np.ascontiguousarray(MATRIX[(j + 1 if j < 12 else j + 3) :, j, None]) for j in range(SLOPES)
-)
 
-_TERMS = written_out.terms_of((*SUMS[1:12], *SUMS[AT_END : SHORT_ERROR + 1]))
+@dataclass(frozen=True, slots=True)
+class _System:
+    derivative: Callable[[float, FloatArray], FloatArray]
 
 
 class DormandPrince8:
     """A solver of y' = fun(t, y) from `t0` on, with the interface of SciPy's.
 
     Its state consists of `t`, `y`, the length `h_abs` of the next step in s, the slope `f` at t, y,
-    and what rounding took from y, `lost`. That is added to the next change, or else the errors of
-    these sums would limit the accuracy (Hairer, Lubich, Wanner, Geometric Numerical Integration,
-    section VIII.5).
+    and what rounding took from y, `lost`, which is added to the next change.
     """
 
     nlu = 0
@@ -80,132 +61,68 @@ class DormandPrince8:
         atol: float | FloatArray,
         max_step: float = math.inf,
     ) -> None:
-        self.fun, self.rtol, self.atol, self.max_step = fun, rtol, atol, max_step
+        self.fun = fun
         self.t, self.y, self.t_bound = float(t0), y0, t_bound
         self.t_old = self.t
         self.status: Literal["running", "finished", "failed"] = "running"
         self.f, self.lost = fun(self.t, y0), np.zeros(len(y0))
-        self.h_abs = first_length(
-            fun,
-            self.t,
-            y0,
-            self.f,
-            scale=atol + np.abs(y0) * rtol,
-            power=1 / 8,
-            longest=min(t_bound - self.t, max_step),
-        )
-        self._slopes = np.empty((SLOPES, len(y0)))
-        self._sums = np.empty((len(SUMS), len(y0)))
-        products = np.empty_like(self._sums)
-        self._parts = [
-            (slope, factors, products[-len(factors) :], self._sums[-len(factors) :])
-            for slope, factors in zip(self._slopes, _ADDED, strict=True)
-        ]
-        few = 0 < len(y0) <= written_out.MOST
-        self._written = written_out.written_out(len(y0), _TERMS) if few else None
-        self._step = (0.0, y0)
+        self._system = _System(fun)
+        self._bounds = Bounds(np.zeros(len(y0)) + atol, rtol, max_step)
+        longest = min(t_bound - self.t, max_step)
+        self.h_abs = first_length(self._system, self._bounds, self.t, y0, self.f, longest)
+        self._k: Any = np.zeros((len(DOP853.nodes), len(y0)))
+        if len(y0) <= FEW:
+            self._k = list(self._k)
+        self._at, self._start = Progress(), y0
+        self._made = self._how()
         self._dense: Callable[[FloatArray | float], FloatArray] | None = None
 
     def step(self) -> str | None:
         """Make a step; returns why it failed, or None."""
-        t, y = self.t, self.y
-        shortest = 10 * abs(math.nextafter(t, math.inf) - t)
-        length = max(min(self.h_abs, self.max_step), shortest)
-        rejected = False
-        while True:
-            if length < shortest or math.isnan(length):
-                self.status = "failed"
-                return TOO_SHORT
-            end = min(t + length, self.t_bound)
-            h = length = end - t
-            change = self._attempt(t, y, h) + self.lost
-            last = y + change
-            error = self._error(y, last, h)
-            if error < 1:
-                break
-            length *= max(SMALLEST, SAFETY * error**POWER)
-            rejected = True
-        factor = GREATEST if error == 0 else min(GREATEST, SAFETY * error**POWER)
-        self.h_abs = length * (min(1.0, factor) if rejected else factor)
-        self._step, self._dense = (h, y), None
-        self.t_old, self.t, self.y = t, end, last
-        self.f, rest = self.fun(end, last), last - y
-        self.lost = (y - (last - rest)) + (change - rest)
-        if end >= self.t_bound:
+        t, y, k = self.t, self.y, self._k
+        at, raw, change = self._at, np.empty(y.shape), np.empty(y.shape)
+        k[0], at.t, at.length, self._bounds.until = self.f, t, self.h_abs, self.t_bound
+        if self._is_new:
+            self._made = self._how()
+        if not self._made(self._system, self._bounds, at, y, self.lost, k, change, raw):
+            self.status = "failed"
+            return TOO_SHORT
+        self.h_abs, self._start, self._dense = at.length, y, None
+        self.t_old, self.t, self.y = t, at.end, raw
+        k[DOP853.last] = self.f = self.fun(at.end, raw)
+        self.lost = np.empty(y.shape)
+        round_off(y, raw, change, self.lost)
+        if at.end >= self.t_bound:
             self.status = "finished"
         return None
 
-    def _attempt(self, t: float, y: FloatArray, h: float) -> FloatArray:
-        """Compute slopes 0 to 11 of a step and the sums over them; returns the change of y."""
-        sums = self._sums
-        if self._written:
-            later, end, long, short = self._written(self.fun, t, h, y.tolist(), self.f.tolist())
-            self._first = [self.f, *later]
-            sums[LONG_ERROR], sums[SHORT_ERROR] = long, short
-            return np.asarray(h * np.array(end))
-        sums.fill(0.0)
-        self._add(0, self.f)
-        for i in range(1, 12):
-            self._add(i, self.fun(t + NODES[i] * h, y + h * sums[i]))
-        return np.asarray(h * sums[AT_END])
-
-    def _add(self, j: int, slope: FloatArray) -> None:
-        """Take slope j, and add its part to all sums that have one."""
-        kept, factors, products, sums = self._parts[j]
-        kept[:] = slope
-        np.multiply(factors, kept, products)
-        np.add(sums, products, sums)
-
-    def _error(self, y: FloatArray, last: FloatArray, h: float) -> float:
-        """The error estimate of a step, relative to the tolerance."""
-        if not len(y):
-            return 0.0
-        scale = self.atol + np.maximum(np.abs(y), np.abs(last)) * self.rtol
-        both = self._sums[LONG_ERROR : SHORT_ERROR + 1] / scale
-        long, short = np.add.accumulate(both * both, axis=1)[:, -1].tolist()
-        size = math.sqrt((long + SHORT_WEIGHT * short) * len(y))
-        return float(h * long / size) if size else 0.0
+    def _how(self) -> Callable[..., bool]:
+        """The function that makes a step: for few states it is printed once it pays off."""
+        ny = len(self.y)
+        self._is_new = 0 < ny <= FEW and _made[ny] < MANY
+        _made[ny] += self._is_new
+        return steps_of_few(ny) if 0 < ny <= FEW and not self._is_new else partial(made, DOP853)
 
     def dense_output(self) -> Callable[[FloatArray | float], FloatArray]:
         """The states within the last step, as a function of times: (m,) -> (ny, m), or one."""
         if self._dense is None:
-            self._dense = self._interpolant()
+            at, y = self._at, self._start
+            terms = np.empty((7, len(y)))
+            interpolate(DOP853, self._system, at, y, self.y, self._k, terms)
+            self._dense = partial(interpolated, at.t, at.h, y, terms)
         return self._dense
-
-    def _interpolant(self) -> Callable[[FloatArray | float], FloatArray]:
-        h, y = self._step
-        start, sums = self.t_old, self._sums
-        if self._written:
-            sums.fill(0.0)
-            for j, slope in enumerate(self._first):
-                self._add(j, slope)
-        self._add(12, self.f)
-        for i in range(13, SLOPES):
-            row = AT_DENSE + i - 13
-            self._add(i, self.fun(start + NODES[i] * h, y + h * sums[row]))
-        change, first = self.y - y, self._slopes[0]
-        terms = np.empty((7, len(y)))
-        terms[0] = change
-        terms[1] = h * first - change
-        terms[2] = 2 * change - h * (self.f + first)
-        terms[3:] = h * sums[IN_DENSE:]
-
-        return partial(interpolated, start, h, y, list(terms))
 
 
 def interpolated(
-    start: float, h: float, y: FloatArray, terms: Sequence[FloatArray], times: FloatArray | float
+    start: float, h: float, y: FloatArray, terms: FloatArray, times: FloatArray | float
 ) -> FloatArray:
-    """The states at times within a step of length h from `y` at `start`, from the terms (ny,) of
+    """The states at times within a step of length h from `y` at `start`, from the terms (7, ny) of
     its interpolant.
     """
-    one = isinstance(times, float)
-    x: Any = (times - start) / h if one else (np.asarray(times)[..., None] - start) / h
-    found = np.zeros((len(y),) if one else (*np.shape(times), len(y)))
-    for term, factor in zip(reversed(terms), cycle((x, 1 - x)), strict=False):
-        found += term
-        found *= factor
-    return (found + y).T
+    place = np.empty((*np.shape(times), len(y)))
+    each: Any = np.asarray(times)[..., None]
+    within(Progress(start, h), y, terms, each, place)
+    return place.T
 
 
 INTEGRATOR = Adaptive(

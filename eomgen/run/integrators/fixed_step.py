@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from eomgen.engine.sums import Sum, add_compensated
 from eomgen.run.compiled import EqualSteps
 from eomgen.run.integrators.equal_strides import EqualStrides, advances_of
 from eomgen.run.integrators.interface import Advance, Change, Resume, Stability
@@ -43,8 +44,7 @@ def advances(
 
     Steps end at t_start + i dt and at `t_end`; if `t` lies between, the first one is shorter.
     Quaternions are normalised after every step. The state within a step is that after a shorter
-    step. Sums are compensated: the rounding error of each is added to the next step's change, or it
-    would accumulate in long runs (Hairer, Lubich, Wanner, Geometric Numerical Integration, VIII.5).
+    step. Sums are compensated.
 
     checked    the problem by whose Jacobian the stability of steps is checked; None for no check
     stability  the method's stability function, if it has one
@@ -89,8 +89,9 @@ def advances(
             monitor.check(checked, t, y, step, length)
             if i == steps:
                 monitor.finish(checked, t, y, step, length)
-        y, lost = _sum(y, step + lost)
-        y = problem.projected(end, y)
+        total = Sum(y, lost)
+        add_compensated(total, step)
+        y, lost = problem.projected(end, total.value), total.lost
         t, regular = end, True
         if shaken:
             lost = lost + shaken.error(t, y, length, 1)
@@ -106,10 +107,3 @@ def _continuation(t: float, y: FloatArray, lost: FloatArray) -> Resume:
 def _shorter(change: Change, problem: Problem, t: float, y: FloatArray, end: float) -> FloatArray:
     """The state at `end` by a single step from `t`."""
     return problem.projected(end, y + change(problem, t, y, end - t)) if end > t else y
-
-
-def _sum(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The rounded sum and its rounding error, exactly (Knuth's two-sum)."""
-    total = a + b
-    rest = total - a
-    return total, (a - (total - rest)) + (b - rest)

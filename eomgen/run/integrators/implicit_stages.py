@@ -17,10 +17,10 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.engine.tableau import ButcherTableau
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.elimination import factored, product
 from eomgen.run.integrators.interface import FixedStep
-from eomgen.run.integrators.tableau import ButcherTableau
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import Projection
 from eomgen.run.tangents import tangents

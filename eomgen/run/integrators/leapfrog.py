@@ -1,15 +1,18 @@
-"""Leapfrog, or Störmer-Verlet: half a drift, kick, half a drift. Order 2, explicit, symplectic.
+"""Leapfrog, or Störmer-Verlet, explicit and symplectic, and its compositions to orders 4 and 6.
 
-Hairer, Lubich, Wanner, Geometric Numerical Integration, section I.1.4, variant B. It evaluates one
-derivative per step. It requires v' to depend on positions and time only, and q' to be v times a
-constant matrix: particles, a single pendulum, a chain of masses and springs, but no mass matrix
-that depends on positions and no damping. With constraints the step is that of `rattle`.
+It evaluates one derivative per step. It requires v' to depend on positions and time only, and q' to
+be v times a constant matrix: particles, a single pendulum, a chain of masses and springs, but no
+mass matrix that depends on positions and no damping. With constraints the step is that of `rattle`,
+and a composition of such is symplectic too (Reich, SIAM J. Numer. Anal. 33 (1996) 475-491).
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
+from eomgen.engine import explicit
+from eomgen.engine.explicit import LEAPFROG_4, LEAPFROG_6, Composition, Split, Step
 from eomgen.errors import RunError
 from eomgen.run.integrators import rattle
 from eomgen.run.integrators.interface import Change, FixedStep
@@ -24,50 +27,64 @@ _SAME = 1e-6
 def prepare(problem: Problem) -> Change:
     """Return `change(problem, t, y, h) -> y(t + h) - y(t)`, (ny,), for this problem.
 
-    Raises `RunError` if the Jacobian at the initial state, or at a few seeded random states, shows
-    that the problem does not separate into drift and kick.
+    Raises `RunError` as `split_of`.
     """
     if problem.projection is not None:
         return rattle.prepare(problem)
-    positions = list(problem.positions)
-    others = [i for i in range(len(problem.states)) if i not in problem.positions]
-    _check(problem, positions, others)
-    rates = rates_of(problem)
+    split, step = split_of(problem), Step()
 
     def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
-        velocities = y[others]
-        middle = y.copy()
-        middle[positions] += h / 2 * _product(rates, velocities)
-        kick = h * problem.derivative(t + h / 2, middle)[others]
-        found = np.empty_like(y)
-        found[others] = kick
-        found[positions] = h * _product(rates, velocities + kick / 2)
-        return found
+        explicit.leapfrog(problem, split, t, y, h, step)
+        return step.change
 
     return change
 
 
-INTEGRATOR = FixedStep(prepare, order=2, compiled="leapfrog", solves=True)
+@dataclass(frozen=True)
+class _Of:
+    """A method's steps of a problem, as compositions take them."""
+
+    change: Change
+    problem: Problem
+
+    def changed(self, t: float, y: FloatArray, h: float, step: Step) -> int:
+        """A step, without iterations."""
+        step.change = self.change(self.problem, t, y, h)
+        return 1
 
 
-def rates_of(problem: Problem) -> FloatArray:
-    """The constant matrix by which velocities (and all other states that are not positions) are
-    multiplied to give the rates of the positions.
+def composed(of: Composition) -> FixedStep:
+    """A method whose steps are made of leapfrog steps."""
+
+    def prepare_composed(problem: Problem) -> Change:
+        one, step = prepare(problem), Step()
+
+        def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
+            explicit.composed(of, _Of(one, problem), t, y, h, step)
+            return step.change
+
+        return change
+
+    return FixedStep(prepare_composed, order=of.order, compiled=of.name, solves=True)
+
+
+LEAPFROG = FixedStep(prepare, order=2, compiled="leapfrog", solves=True)
+FOUR, SIX = composed(LEAPFROG_4), composed(LEAPFROG_6)
+
+
+def split_of(problem: Problem) -> Split:
+    """The positions of a problem, its other states, and how these move them.
+
+    Raises `RunError` if the Jacobian at the initial state, or at a few seeded random states, shows
+    that the problem does not separate into drift and kick.
     """
     positions = list(problem.positions)
     others = [i for i in range(len(problem.states)) if i not in problem.positions]
+    _check(problem, positions, others)
     rates = np.empty((len(positions), len(others)))
-    start = problem.initial.copy()
-    for column, state in enumerate(others):
-        start[others] = 0.0
-        start[state] = 1.0
-        rates[:, column] = problem.derivative(0.0, start)[positions]
-    return rates
-
-
-def _product(matrix: FloatArray, values: FloatArray) -> FloatArray:
-    """matrix @ values, summed term by term, as in compiled code."""
-    return np.asarray(np.add.accumulate(matrix * values, axis=1)[:, -1])
+    split = Split(np.array(positions, np.int64), np.array(others, np.int64), rates)
+    explicit.constant_rates(problem, split.positions, split.others, problem.initial, rates)
+    return split
 
 
 def _check(problem: Problem, positions: list[int], others: list[int]) -> None:

@@ -5,7 +5,7 @@ if and only if every rooted tree of up to p nodes has the elementary weight 1/γ
 Wanner, Solving ODEs I, theorem II.2.13. The order conditions are generated from the trees.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations_with_replacement, product
@@ -14,10 +14,12 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.problem import FloatArray
-
+FloatArray = NDArray[np.float64]
 Tree = tuple["Tree", ...]
 """A rooted tree: the subtrees of its root, in a fixed order; a single node is ()."""
+
+Terms = tuple[tuple[int, float], ...]
+"""The factors of a sum over slopes, with the numbers of these."""
 
 ROUNDOFF = 1e-14
 """Allowed error of an order condition, relative to the sum of the magnitudes of its terms."""
@@ -25,7 +27,7 @@ ROUNDOFF = 1e-14
 
 @dataclass(frozen=True)
 class ButcherTableau:
-    """Coefficients of a method of s stages: a (s, s), weights b (s,), nodes c (s,).
+    """Coefficients of a method of s stages: a (s, s), weights b (s,), nodes c (s,); its name.
 
     Raises `ValueError` if a row of a does not sum to its node, or if the condition of a rooted tree
     of up to `order` nodes does not hold to roundoff. There are 8 such trees for order 4, 37 for
@@ -36,6 +38,7 @@ class ButcherTableau:
     b: tuple[float, ...]
     c: tuple[float, ...]
     order: int
+    name: str = ""
 
     def __post_init__(self) -> None:
         a, b, c = self.arrays
@@ -70,21 +73,20 @@ class ButcherTableau:
         a, b, c = (np.array(part, dtype=np.float64) for part in (self.a, self.b, self.c))
         return a, b, c
 
-    def change(
-        self,
-        derivative: Callable[[float, FloatArray], FloatArray],
-        t: float,
-        y: FloatArray,
-        h: float,
-    ) -> FloatArray:
-        """Return y(t + h) - y(t), (ny,), for an explicit method.
+    @property
+    def stages(self) -> int:
+        """The number of its derivatives in a step."""
+        return len(self.b)
 
-        Sums are taken term by term, for the same bits on every machine and in compiled steps.
-        """
-        slopes = [derivative(t + self.c[0] * h, y)]
-        for row, node in zip(self.a[1:], self.c[1:], strict=True):
-            slopes.append(derivative(t + node * h, y + h * _sum(row, slopes)))
-        return h * _sum(self.b, slopes)
+    @cached_property
+    def rows(self) -> tuple[Terms, ...]:
+        """The factors of the slopes for each stage that are not 0, with their numbers, in order."""
+        return tuple(map(_terms, self.a))
+
+    @cached_property
+    def sums(self) -> Terms:
+        """Those of the step."""
+        return _terms(self.b)
 
     def stability(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """The stability function R(z) of an explicit method at z = hλ (n,).
@@ -98,17 +100,8 @@ class ButcherTableau:
         return np.asarray(1 + z * (b @ stages))
 
 
-def terms(row: Sequence[float]) -> list[tuple[int, float]]:
-    """The factors of a sum over slopes that are not 0, with their numbers, in order."""
-    return [(j, factor) for j, factor in enumerate(row) if factor]
-
-
-def _sum(row: Sequence[float], slopes: Sequence[FloatArray]) -> FloatArray:
-    """The sum of the slopes by their factors, in order; some factor must not be 0."""
-    total, *others = (factor * slopes[j] for j, factor in terms(row))
-    for term in others:
-        total = total + term
-    return total
+def _terms(row: Sequence[float]) -> Terms:
+    return tuple((j, float(factor)) for j, factor in enumerate(row) if factor)
 
 
 @cache

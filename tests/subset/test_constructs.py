@@ -1,0 +1,154 @@
+"""Each construct of the engine's subset in three languages; and what is refused, with its line."""
+
+import ast
+from dataclasses import dataclass
+from typing import Any
+
+import constructs
+import numpy as np
+import pytest
+from languages import NONE, Given, results
+
+from eomgen.subset.braces import JAVASCRIPT, C, printed
+from eomgen.subset.expander import NotInSubsetError, Text
+
+TEXT = Text.of(constructs)
+SEEDED = np.random.default_rng(2)
+N = 4
+
+
+def some(*shape: int) -> Any:
+    """Random numbers."""
+    return SEEDED.normal(size=shape)
+
+
+class Python:
+    """The functions of `constructs.System`."""
+
+    def derivative(self, t: float, y: Any) -> Any:
+        return y * y - t * y
+
+    def size(self, y: Any) -> float:
+        return float(y[0] + y[1])
+
+    def count(self) -> int:
+        return 3
+
+    def halve(self, y: Any) -> None:
+        y /= 2.0
+
+
+GIVEN = Given(
+    Python(),
+    """#define STATES 2
+typedef struct { int none; } System;
+static void derivative(System *s, double t, const double *y, double *out) {
+    (void)s;
+    for (int j = 0; j < 2; j++) out[j] = y[j] * y[j] - t * y[j];
+}
+static double size(System *s, const double *y) { (void)s; return y[0] + y[1]; }
+static int64_t count(System *s) { (void)s; return 3; }
+static void halve(System *s, double *y) { (void)s; y[0] /= 2.0, y[1] /= 2.0; }
+""",
+    """const STATES = 2;
+const system = {
+  derivative: (t, y, out) => y.forEach((x, j) => (out[j] = x * x - t * x)),
+  size: (y) => y[0] + y[1],
+  count: () => 3,
+  halve: (y) => { y[0] /= 2; y[1] /= 2; },
+};
+""",
+)
+
+
+@dataclass(frozen=True)
+class Method:
+    """Known when it is printed."""
+
+    name: str
+    factors: tuple[float, ...]
+    extra: bool
+
+
+CASES: dict[str, list[list[Any]]] = {
+    "numbers": [[a, b, n] for a in (-2.5, 0.0, 1.25) for b in (-1.0, 0.0, 3.5) for n in (0, 1, 6)],
+    "vectors": [[n, some(n), some(n)] for n in (1, 2, 7)],
+    "matrices": [[n, m, some(n, m), some(m)] for n, m in ((2, 3), (4, 2), (5, 5))],
+    "products": [[n, m, some(n, m), some(m)] for n, m in ((2, 3), (4, 2), (5, 1))],
+    "chosen": [[N + 1, np.array(which), 3, some(N + 1)] for which in ([4, 0, 2], [1, 2, 4])],
+    "whole_numbers": [[N, np.array([2, 0, 3, 1]), some(N)]],
+    "records": [
+        [constructs.Memory(N, 0.5, steps, some(N), np.arange(N)), 0.25] for steps in (0, 3)
+    ],
+    "with_given": [[GIVEN, 0.3, some(2)]],
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_same_bits(name: str) -> None:
+    """Python, C and JavaScript leave and return the same."""
+    python, *others = results(
+        TEXT, name, CASES[name], given=GIVEN if name == "with_given" else NONE
+    )
+    assert others == [python, python]
+
+
+@pytest.mark.parametrize("extra", [False, True])
+def test_what_is_known(extra: bool) -> None:
+    """Loops over what is known are written out, and decided tests are left away."""
+    method = Method(f"three_{extra}", (0.5, 3.0, 1.25), extra)
+    python, *others = results(TEXT, "known", [[x] for x in (-1.5, 2.0)], {"method": method})
+    assert others == [python, python]
+    assert ("if" in printed(TEXT, [("known", {"method": method})], C)) == extra
+
+
+REFUSED = {
+    "y = x": "second name",
+    "y = a[0]": "second name",
+    "x[1:] = x[:3]": "shifted",
+    "x[1:] += x[0] * x[1:]": "shifted",
+    "m = 1 / n": "a quotient of whole numbers",
+    "m = n // 2": "a quotient of whole numbers",
+    "m = n % 2": "a quotient of whole numbers",
+    "text = 'word'": "not in the subset",
+    "t = 1.0; t = x * 2.0": "another kind",
+    "t = missing + 1.0": "not in the subset",
+    "t = x.sum()": "not in the subset",
+    "t = ordered(x) + 1.0": "to a name first",
+    "z = product(a, x) + x": "to a name first",
+    "x[:] = product(a, x * 2.0)": "while it is read",
+    "x[which] = x[others]": "shifted",
+    "for j_ in range(n): pass": "the name of an index",
+    "i_ = 1": "the name of an index",
+    "z = x[::2] * 1.0": "no steps",
+    "z = x + a": "different dimensions",
+    "z = x[0, 1]": "too many indices",
+    "n = 0.5": "another kind",
+    "for v in x: pass": "range",
+    "for i in range(n): n += 1": "changes in the loop",
+    "for i in range(0, n, 2): pass": "1 or -1",
+    "with x: pass": "not in the subset",
+    "try:\n        pass\n    finally:\n        pass": "not in the subset",
+    "t, u = 1.0, 2.0": "not in the subset",
+    "z = lambda: x": "not in the subset",
+    "z = [x]": "not in the subset",
+    "t = added(v for v in x)": "not known",
+    "for i in unrolled(range(n)): pass": "not known",
+    "f(n, x, a, which, others)": "calls itself",
+    "m = abs(n)": "whole number",
+    "a[0] += 1 if 0 < n < 2 else 2": "not in the subset",
+}
+
+
+@pytest.mark.parametrize("statement", REFUSED)
+def test_what_is_refused(statement: str) -> None:
+    """An error names the line."""
+    head = (
+        'def f(n: int, x: Annotated[Vector, "n"], a: Annotated[Matrix, "n", "n"],'
+        ' which: Annotated[Whole, "n"], others: Annotated[Whole, "n"]) -> None:'
+    )
+    (function,) = ast.parse(f"{head}\n    {statement}\n").body
+    assert isinstance(function, ast.FunctionDef)
+    with pytest.raises(NotInSubsetError, match=f"(?s)line [12].*{REFUSED[statement]}"):
+        for language in (C, JAVASCRIPT):
+            printed(Text({"f": function}), [("f", {})], language)
