@@ -51,6 +51,8 @@ class Text:
         for module in modules:
             text.constants |= {n: x for n, x in vars(module).items() if n.isupper()}
             for d in ast.parse(inspect.getsource(module)).body:
+                if getattr(d, "name", "") in text.functions.keys() | text.classes.keys():
+                    raise NotInSubsetError(d, "another module of the text has this name")
                 if isinstance(d, ast.FunctionDef):
                     text.functions[d.name] = d
                     text.python[d.name] = getattr(module, d.name)
