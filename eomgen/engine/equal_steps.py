@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
+from eomgen.engine.adaptive import MADE, UNUSUAL
 from eomgen.engine.explicit import Method, Step
 from eomgen.engine.quaternions import normalised
 from eomgen.engine.sums import Sum, add_compensated
 from eomgen.subset.words import Matrix, Vector, Whole, all_within, ordered
-
-MADE_ALL, UNUSUAL = 0, 2
 
 
 @dataclass(slots=True)
@@ -47,7 +46,7 @@ class Kept:
     margins: Annotated[Vector, "most"]
 
 
-class Held(Protocol):
+class Constrained(Protocol):
     """What is held along the way: flags of the processor, and constraints if there are any."""
 
     def clear(self) -> None:
@@ -70,7 +69,7 @@ class Held(Protocol):
 
 
 def equal_steps(
-    held: Held, method: Method, t: float, at: Sum, course: Course, step: Step, kept: Kept
+    held: Constrained, method: Method, t: float, at: Sum, course: Course, step: Step, kept: Kept
 ) -> int:
     """Steps from t on. Ends before a step whose rate jumps, or one with anything unusual: these are
     made elsewhere.
@@ -102,4 +101,4 @@ def equal_steps(
         kept.states[n] = at.value
         kept.losses[n] = at.lost
         kept.made = n + 1
-    return MADE_ALL
+    return MADE

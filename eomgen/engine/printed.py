@@ -7,6 +7,9 @@ from typing import Any
 from eomgen.engine import (
     adaptive,
     complementarity,
+    contact_times,
+    contacts,
+    elimination,
     equal_steps,
     explicit,
     least_squares,
@@ -23,22 +26,39 @@ from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
+CONTACTS = ("begin", "deepest", "press", "strike", "release", "settle", "closing", "opening")
+"""What is called for rigid contacts."""
 ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
-    ("begun", {}),
-    ("gone_on", {}),
-    ("complementary", {}),
+    ("runge_kutta", {"method": explicit.EULER}),
+    ("runge_kutta", {"method": explicit.RUNGE_KUTTA_4}),
+    ("semi_implicit_euler", {}),
+    ("leapfrog", {}),
+    ("composed", {"of": explicit.LEAPFROG_4}),
+    ("composed", {"of": explicit.LEAPFROG_6}),
+    ("constant_rates", {}),
+    ("add_compensated", {}),
+    ("normalised", {}),
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
+    *((name, {}) for name in CONTACTS),
 )
 """What a page that goes on live calls."""
+CODES = {
+    "TOLERANCE": contacts.TOLERANCE,
+    "ENDLESS": contacts.ENDLESS,
+    "NO_FORCES": contacts.NO_FORCES,
+    "UNHELD": contact_times.UNHELD,
+}
+"""The constants that it needs."""
 
 
 @cache
 def text() -> Text:
     """The text of the whole engine."""
     steps = (adaptive, equal_steps, explicit, quaternions, sums)
-    return Text.of(*steps, linear, least_squares, complementarity, roots, system)
+    solved = (linear, elimination, least_squares, complementarity, roots)
+    return Text.of(*steps, *solved, contacts, contact_times, system)
 
 
 def c_source(functions: Roots) -> str:
@@ -50,11 +70,14 @@ def c_source(functions: Roots) -> str:
 
 @cache
 def steps_of_pages() -> str:
-    """JavaScript: `makeSteps(STATES)` returns the functions that pages call, by name."""
+    """JavaScript: `makeSteps(STATES, POSITIONS, OTHERS, CONTACTS, PRESSED)` returns what pages
+    call, by name. Of these numbers those are given that are needed.
+    """
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
-    names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
+    codes = "".join(f", {name}: {value!r}" for name, value in CODES.items())
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
-    return f"const makeSteps = (STATES) => {{\n{source}return {{ {names} }};\n}};\n"
+    head = "const makeSteps = (STATES, POSITIONS, OTHERS, CONTACTS, PRESSED) =>"
+    return f"{head} {{\n{source}return {{ {names}{codes} }};\n}};\n"
 
 
 @cache

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from eomgen.codegen.interface import Interface
-from eomgen.engine.equal_steps import MADE_ALL, Course, Kept
+from eomgen.engine.adaptive import MADE
+from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.explicit import EULER, LEAPFROG_4, LEAPFROG_6, RUNGE_KUTTA_4
+from eomgen.engine.printed import Roots
 from eomgen.native.checked import Function
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.run.compiled import Array, Constrained, EqualSteps, EqualStride
@@ -26,10 +28,8 @@ LEAPFROGS = {"leapfrog": 1, **{each.name: len(each.parts) for each in COMPOSITIO
 _TABLEAUS = (EULER, RUNGE_KUTTA_4)
 METHODS = {**{each.name: each.stages for each in _TABLEAUS}, "semi_implicit_euler": 2, **LEAPFROGS}
 """The derivatives in a step, by the name of the method."""
-COMPOSED: list[tuple[str, Mapping[str, Any]]] = [
-    ("composed", {"of": each}) for each in COMPOSITIONS
-]
-STEPS: list[tuple[str, Mapping[str, Any]]] = [
+COMPOSED: Roots = [("composed", {"of": each}) for each in COMPOSITIONS]
+STEPS: Roots = [
     *(("runge_kutta", {"method": each}) for each in _TABLEAUS),
     *(("semi_implicit_euler", {}), ("leapfrog", {}), *COMPOSED, ("equal_steps", {})),
 ]
@@ -151,7 +151,7 @@ def made(
         course.rate,
         course.place,
         course.slope,
-        usual=why == MADE_ALL,
+        usual=why == MADE,
         iterations=kept.iterations[:n] if iterates else None,
         margins=margins[: n + 1] if constrained else None,
     )

@@ -4,9 +4,11 @@
 const makeEngine = (mechanism, data) => {
   const ny = data.states.length;
   const kinds = data.states.map((state) => state.kind);
-  const positions = [...kinds.keys()].filter((i) => kinds[i] === "position");
-  const others = [...kinds.keys()].filter((i) => kinds[i] !== "position");
+  const positions = Int32Array.from([...kinds.keys()].filter((i) => kinds[i] === "position"));
+  const others = Int32Array.from([...kinds.keys()].filter((i) => kinds[i] !== "position"));
   const quaternions = data.quaternions ?? [];
+  const places = Int32Array.from(quaternions.flat());
+  const steps = makeSteps(ny, positions.length, others.length);
   const defaults = (table) => Float64Array.from(table, (x) => x.value);
   const space = data.dimensions === 3;
   const PULL = 20; // rate at which a pulled point follows the pointer, rad/s
@@ -35,7 +37,7 @@ const makeEngine = (mechanism, data) => {
   let lost = new Float64Array(ny); // rounding errors of the last sums
   let [start, goal, cost] = [0, 0, NaN];
   let [regular, closed, repeated] = [true, [], 0];
-  let [law, held, change] = [null, null, null];
+  let [law, change] = [null, null];
 
   // ---- The problem ----
 
@@ -47,6 +49,7 @@ const makeEngine = (mechanism, data) => {
     ny,
     positions,
     others,
+    steps,
     f: derivative,
     placed: (t, y) => projected(t, y),
     given: () => [engine.grip ? NaN : 0, ...engine.p, ...engine.u], // a pull is never as it was
@@ -55,10 +58,9 @@ const makeEngine = (mechanism, data) => {
   let problem = free;
 
   function unit(y) {
+    if (steps.normalised(quaternions.length, places, y)) return y;
     for (const four of quaternions) {
-      const [a, b, c, d] = four.map((k) => y[k]);
-      let length = Math.sqrt(a * a + b * b + c * c + d * d);
-      if (!(length > 1e-100 && length < 1e100)) length = Math.hypot(a, b, c, d);
+      const length = Math.hypot(...four.map((k) => y[k]));
       if (Number.isFinite(length)) for (const k of four) y[k] /= length;
     }
     return y;
@@ -71,15 +73,15 @@ const makeEngine = (mechanism, data) => {
     if (!table.length) return null;
     const sizes = table.map((c) => (c.unit === "m" ? data.size ?? 1 : 1));
     const switches = table.map((c) => data.effects.find((e) => e.name === c.effect)?.switch ?? null);
-    const relative = (values) => Array.from(values, (x, k) => x / sizes[k]);
     const given = (t, y) => [t, y, engine.p, engine.u];
     return contacts.make({
       names: table.map((c) => c.name),
       sizes,
       ny,
       active: (k) => switches[k] === null || engine.p[switches[k]] !== 0,
-      gaps: (t, y) => relative(mechanism.gaps(...given(t, y))),
-      rates: (t, y) => relative(mechanism.gapRates(...given(t, y))),
+      many: mechanism.held(...given(engine.t, engine.y), table.map(() => 0)).length,
+      gaps: (t, y) => mechanism.gaps(...given(t, y)),
+      rates: (t, y) => mechanism.gapRates(...given(t, y)),
       impact: (t, y, k, bounce) =>
         mechanism.impact(...given(t, y), [...table.map((_, i) => (i === k ? 1 : 0)), bounce]),
       held: (t, y, forces) => {
@@ -116,8 +118,7 @@ const makeEngine = (mechanism, data) => {
   function renew() {
     lost.fill(0);
     regular = engine.t === start;
-    held = law?.now.held.length ? law.holding(law.now.held, engine.t, engine.y.slice()) : null;
-    problem = held ? { ...free, f: (t, y) => held.solve(t, y).result.subarray(0, ny) } : free;
+    problem = law?.held().length ? { ...free, f: law.derivative } : free;
   }
 
   function restart() {
@@ -151,8 +152,9 @@ const makeEngine = (mechanism, data) => {
   // One step to the next mark, or to the contact that comes first.
   function makeStep() {
     const { t, y } = engine;
-    if (law && law.now.held.some((k) => !law.active(k))) {
-      note(law.release(t, y, law.now.held.filter((k) => !law.active(k))));
+    const off = law ? law.held().filter((k) => !law.active(k)) : [];
+    if (off.length) {
+      note(law.release(t, y, off));
       renew();
     }
     if (closed.length) {
@@ -165,18 +167,12 @@ const makeEngine = (mechanism, data) => {
     const end = mark();
     const length = regular ? engine.dt : end - t;
     const found = change(problem, t, y, change.free ? end : length);
-    const next = new Float64Array(ny);
-    const rest = new Float64Array(ny);
-    if (change.free) next.set(found);
-    for (let k = 0; !change.free && k < ny; k += 1) {
-      // Knuth's two-sum.
-      const add = found[k] + lost[k];
-      const total = y[k] + add;
-      const part = total - y[k];
-      next[k] = total;
-      rest[k] = (y[k] - (total - part)) + (add - part);
+    const next = change.free ? found.slice() : y.slice();
+    const rest = change.free ? new Float64Array(ny) : lost.slice();
+    if (!change.free) {
+      steps.add_compensated({ value: next, lost: rest }, found);
+      projected(end, next);
     }
-    if (!change.free) projected(end, next);
     if (!next.every(Number.isFinite)) throw new Error("the state overflows or is not a number: take a smaller step");
     if (law && cutAtContact(t, y, next, length)) return;
     engine.t = end;
@@ -198,7 +194,7 @@ const makeEngine = (mechanism, data) => {
       return projected(t + s, y.map((x, k) => x + within[k]));
     };
     const closing = law.closing(t, length, state);
-    const opening = held ? law.opening(held, t, length, state) : null;
+    const opening = law.opening(t, length, state);
     if (!closing && !opening) return false;
     const first = closing && !(opening && opening.s < closing.s) ? closing : opening;
     if (first.s > 0) {

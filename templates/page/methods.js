@@ -1,97 +1,42 @@
 // `methods`: those with equal steps: the arithmetic of `eomgen.run.integrators`, sums in the same order.
 // `change(problem, t, y, h)` returns y(t + h) - y(t); the next call may reuse the array.
 //
-// problem: {ny, positions, others, f(t, y)}; f returns an array that its next call may reuse.
+// problem: {ny, positions, others, steps, f(t, y)}; f returns an array that its next call may reuse, and
+// `steps` are the functions of the engine.
 
 const methods = (() => {
   const EPS = 2 ** -52;
   const NEWTON = { most: 30, roundoff: 4 * EPS, noise: 1e-10, nothing: 1e-13, small: 1e-9 };
   const SLOW = 10; // with more iterations than these, the next step takes another Jacobian
 
-  const explicit = (a, b, c) => (ny) => {
-    const slopes = c.map(() => new Float64Array(ny));
-    const state = new Float64Array(ny);
-    const change = new Float64Array(ny);
-    // The sum of the slopes by their factors, in order, those that are 0 left out.
-    const sum = (row, k) => {
-      let total = 0;
-      let first = true;
-      for (let j = 0; j < row.length; j += 1) {
-        if (row[j] === 0) continue;
-        const term = row[j] * slopes[j][k];
-        total = first ? term : total + term;
-        first = false;
-      }
-      return total;
-    };
+  // Explicit methods are the engine's own: `of(steps, system, problem, y)` gives one that makes a step.
+  const explicit = (of) => (ny) => {
+    const step = { change: new Float64Array(ny), place: new Float64Array(ny), slope: new Float64Array(ny) };
+    const system = { f: null, derivative: (t, y, rates) => rates.set(system.f(t, y)) };
+    let make = null;
     return (problem, t, y, h) => {
-      slopes[0].set(problem.f(t + c[0] * h, y));
-      for (let i = 1; i < c.length; i += 1) {
-        for (let k = 0; k < ny; k += 1) state[k] = y[k] + h * sum(a[i], k);
-        slopes[i].set(problem.f(t + c[i] * h, state));
-      }
-      for (let k = 0; k < ny; k += 1) change[k] = h * sum(b, k);
-      return change;
+      system.f = problem.f;
+      make ??= of(problem.steps, system, problem, y);
+      make(t, y, h, step);
+      return step.change;
     };
   };
-
-  const euler = explicit([[0]], [1], [0]);
-  // Hairer, Norsett, Wanner, Solving ODEs I, table II.1.2.
-  const rungeKutta = explicit(
-    [[], [1 / 2], [0, 1 / 2], [0, 0, 1]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0, 1 / 2, 1 / 2, 1]);
-
-  // Kick the velocities, then drift with the new ones.
-  const semiImplicitEuler = (ny) => {
-    const kick = new Float64Array(ny);
-    const state = new Float64Array(ny);
-    return (problem, t, y, h) => {
-      const slope = problem.f(t, y);
-      for (let k = 0; k < ny; k += 1) kick[k] = h * slope[k];
-      for (const k of problem.positions) kick[k] = 0;
-      for (let k = 0; k < ny; k += 1) state[k] = y[k] + kick[k];
-      const drift = problem.f(t, state);
-      for (const k of problem.positions) kick[k] = h * drift[k];
-      return kick;
-    };
+  const leapfrogs = (steps, system, { positions, others }, y) => {
+    const rates = new Float64Array(positions.length * others.length);
+    steps.constant_rates(system, positions, others, y, rates);
+    const split = { positions, others, rates };
+    return { changed: (t, z, h, step) => (steps.leapfrog(system, split, t, z, h, step), 1) };
   };
 
-  // Half a drift, kick, half a drift, for rates of positions that are velocities times constants.
-  const leapfrog = (ny) => {
-    const state = new Float64Array(ny);
-    const change = new Float64Array(ny);
-    let rates = null;
-    return (problem, t, y, h) => {
-      const { positions, others } = problem;
-      rates ??= ratesOf(problem, y);
-      const drift = (row, velocity) => {
-        let total = rates[row][0] * velocity(0);
-        for (let j = 1; j < others.length; j += 1) total += rates[row][j] * velocity(j);
-        return total;
-      };
-      state.set(y);
-      positions.forEach((k, i) => {
-        state[k] += h / 2 * drift(i, (j) => y[others[j]]);
-      });
-      const slope = problem.f(t + h / 2, state);
-      for (const k of others) change[k] = h * slope[k];
-      positions.forEach((k, i) => {
-        change[k] = h * drift(i, (j) => y[others[j]] + change[others[j]] / 2);
-      });
-      return change;
-    };
-  };
-
-  // The constant matrix by which all states but positions are multiplied for the positions' rates.
-  function ratesOf({ positions, others, f }, y) {
-    const state = Float64Array.from(y);
-    const rates = positions.map(() => new Float64Array(others.length));
-    others.forEach((_, column) => {
-      others.forEach((k, j) => (state[k] = j === column ? 1 : 0));
-      const slope = f(0, state);
-      positions.forEach((k, row) => (rates[row][column] = slope[k]));
-    });
-    return rates;
-  }
+  const euler = explicit((steps, system) => (...given) => steps.runge_kutta_euler(system, ...given));
+  const rungeKutta = explicit((steps, system) => (...given) => steps.runge_kutta_rk4(system, ...given));
+  const semiImplicitEuler = explicit((steps, system, { positions }) => (...given) =>
+    steps.semi_implicit_euler(system, positions, ...given));
+  const leapfrog = explicit((...given) => leapfrogs(...given).changed);
+  const composed = (name) => explicit((steps, ...given) => {
+    const parts = leapfrogs(steps, ...given);
+    return (...more) => steps[`composed_${name}`](parts, ...more);
+  });
 
   // Implicit methods of s stages, solved by Newton's method to roundoff. Their equations are those of
   // `run.integrators.implicit_stages`. The Jacobian is by differences and is kept while it serves:
@@ -268,6 +213,8 @@ const methods = (() => {
     { name: "euler", about: "explicit Euler, order 1", make: euler },
     { name: "semi_implicit_euler", about: "symplectic Euler, order 1", make: semiImplicitEuler },
     { name: "leapfrog", about: "Störmer-Verlet, order 2", make: leapfrog, separable: true },
+    { name: "leapfrog_4", about: "leapfrog composed to order 4", make: composed("leapfrog_4"), separable: true },
+    { name: "leapfrog_6", about: "leapfrog composed to order 6", make: composed("leapfrog_6"), separable: true },
     { name: "rk4", about: "classical Runge-Kutta method, order 4", make: rungeKutta },
     { name: "implicit_midpoint", about: "implicit midpoint rule, order 2", make: midpoint },
     { name: "gauss_4", about: "Gauss collocation, order 4", make: gauss4 },

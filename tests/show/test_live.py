@@ -12,6 +12,7 @@ from live import NODE, run_in_node
 import eomgen
 from eomgen.api.given import model_of, read
 from eomgen.codegen.live import live_system
+from eomgen.errors import RunError
 from eomgen.language.formula import parse
 from eomgen.model.elaborate import elaborate
 from eomgen.model.interactive import OUTPUTS, interactive, switches_of
@@ -107,6 +108,7 @@ def in_page(code: LiveCode, name: str, t: Any, y: Any, table: dict[str, Any]) ->
     return np.array(run_in_node(code.source, script, given))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", SCENES)
 def test_functions_equal_those_of_the_module(name: str) -> None:
     """Errors of the rates of positions, and of those of the other states, are relative to the
@@ -135,7 +137,7 @@ def test_functions_equal_those_of_the_module(name: str) -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("name", "method", "dt"), RUNS)
 def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) -> None:
     """Same method, same step; scenes that are not chaotic within the time."""
@@ -179,6 +181,16 @@ def series(x: float, sign: int) -> float:
     return s
 
 
+def with_same_sines(name: str, **more: Any) -> tuple[str, dict[str, Any], GeneratedModule]:
+    """The code of a scene's page and its data, and the same program in Python."""
+    code, table = page_of(name, **more)
+    source = SAME_SINES + re.sub(r"Math\.(sin|cos)\(", r"\1_(", code.source)
+    system = live_system(model_of(read(name), name), ()).system
+    module = load_module(re.sub(r"\b(sin|cos)\(", r"\1_(", python_module(system)))
+    vars(module).update(sin_=lambda x: x * series(x, 1), cos_=lambda x: series(x, -1))
+    return source, table, module
+
+
 TREES = some(
     ["tumbling_body"],
     [
@@ -205,18 +217,45 @@ def test_dop853_makes_the_steps_of_python(name: str) -> None:
     engine.advance(1.0);
     return { rows, error: engine.error, method: engine.method };
     """
-    code, table = page_of(name, liveMethod="DOP853", liveStep=0.01)
-    source = re.sub(r"Math\.(sin|cos)\(", r"\1_(", code.source)
-    found = run_in_node(SAME_SINES + source, script, table)
+    source, table, module = with_same_sines(name, liveMethod="DOP853", liveStep=0.01)
+    found = run_in_node(source, script, table)
     assert found["error"] is None and found["method"] == "DOP853"
-    system = live_system(model_of(read(name), name), ()).system
-    module = load_module(re.sub(r"\b(sin|cos)\(", r"\1_(", python_module(system)))
-    vars(module).update(sin_=lambda x: x * series(x, 1), cos_=lambda x: series(x, -1))
     # The end of a run shortens its last steps.
     run = integrate(as_problem(module), "DOP853", 1.3, rtol=1e-9, atol=1e-12, samples=131)
     rows = np.array(found["rows"])
     assert rows[:, 0].tolist() == run.t[1:101].tolist()
     assert rows[:, 1:].tobytes() == np.ascontiguousarray(run.y[1:101]).tobytes()
+
+
+EXPLICIT = ("euler", "semi_implicit_euler", "leapfrog", "leapfrog_4", "leapfrog_6", "rk4")
+FREE = ("pendulum", "double_pendulum", "spinning_top")
+
+
+@pytest.mark.parametrize("name", some(FREE, built_in_names()))
+def test_explicit_steps_have_the_bits_of_python(name: str) -> None:
+    """With each method that suits the scene, from one program, with one sine."""
+    source, table, module = with_same_sines(name, liveStep=0.002)
+    exact: Any = eomgen.load(eomgen.generate(name, form="velocity"))
+    problem = as_problem(module, start=lambda y: np.array(table["initial"]))
+    problem = replace(problem, jacobian=exact.jacobian)
+    if problem.contacts or problem.projection:
+        pytest.skip("contacts and loops have steps of their own")
+    script = """
+    return given.methods.map((liveMethod) => {
+      const engine = makeEngine(mechanism, { ...given.data, liveMethod });
+      engine.advance(0.2);
+      return engine.method === liveMethod ? Array.from(engine.y) : null;
+    });
+    """
+    given = {"data": table, "methods": EXPLICIT}
+    mine = dict(zip(EXPLICIT, run_in_node(source, script, given), strict=True))
+    for method, y in mine.items():
+        try:
+            run = integrate(problem, method, 0.2, dt=0.002, unstable=True)
+        except RunError:
+            assert y is None and method.startswith("leapfrog"), method
+            continue
+        assert y == run.y[-1].tolist(), method
 
 
 STOP = """
@@ -426,6 +465,7 @@ def test_loads_have_the_power_of_their_effects() -> None:
         np.testing.assert_allclose(total, powers[:, k], rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("form", ["momentum", "redundant"])
 def test_rows_of_momenta_are_converted(form: Any) -> None:
     """A run in momenta, converted, has the poses and the energy of that run, but for the error of
