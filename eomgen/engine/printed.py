@@ -27,7 +27,9 @@ from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
-CONTACTS = ("begin", "deepest", "press", "strike", "release", "settle", "closing", "opening")
+CONTACTS: Roots = [
+    (name, {}) for name in "begin deepest press strike release settle closing opening".split()
+]
 """What is called for rigid contacts."""
 ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("runge_kutta", {"method": explicit.EULER}),
@@ -42,7 +44,7 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
-    *((name, {}) for name in CONTACTS),
+    *CONTACTS,
 )
 """What a page that goes on live calls."""
 CODES = {
@@ -63,8 +65,8 @@ def text() -> Text:
 
 
 def c_source(functions: Roots, language: Language = C) -> str:
-    """C, or another language like it, of functions and of all that they call. What includes it defines STATES, `System` and its
-    functions, such as `void derivative(const System *, double t, const double *y, double *rates)`.
+    """C, or another language like it, of functions and of all that they call. What includes it
+    defines STATES, `System` and its functions, such as `void derivative(const System *, double t, const double *y, double *rates)`.
     """
     return printed(text(), functions, language)
 

@@ -133,7 +133,9 @@ def printed(
     """
     functions = text.expanded(roots)
     made = {d.name: d for d in functions}
-    lines = list(_structures(text, made.values(), language.number)) if language.is_c else []
+    lines = []
+    if language.is_c:
+        lines += _structures(text, made.values(), language.number)
     changes: dict[str, set[str]] = {}
     for d in functions:
         lines += ["", *_Function(text, made, d, language, changes).lines()]
