@@ -18,9 +18,7 @@ TOGETHER = {
 }
 """Files whose tests ask for the same compiled scenes: these are made once a process."""
 GROUPS = {name: group for group, names in TOGETHER.items() for name in names}
-FIRST = (
-    "closed effects laws events closed_projected no_silent_error orthogonal cli choosing".split()
-)
+FIRST = "closed effects verify laws loop_runs choosing closed_form integrators native".split()
 """Groups and files that take longest, so that no process is left with one of them at the end."""
 
 
@@ -90,9 +88,13 @@ def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _short_timing() -> Iterator[None]:
-    """Calls and runs are timed as seldom as may be: no test asks how long something took."""
+def _in_short() -> Iterator[None]:
+    """Calls and runs are timed as seldom as may be: no test asks how long something took. And C is
+    compiled without optimisation, which takes a third of the time and changes no bit:
+    `test_no_optimisation_changes_a_bit` of the native code shows that.
+    """
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("eomgen.native.library.LEVELS", ("-O0", "-O0"))
         patch.setattr("eomgen.study.timing.TIMING", 0.0)
         patch.setattr("eomgen.study.accuracy.work_precision.REPEATS", 0.0)
         yield

@@ -81,9 +81,10 @@ def _in_python(text: Text, name: str, cases: Any, known: Any, given: Given) -> l
     function, found = text.python[name], []
     for case in cases:
         made = deepcopy([given.python if x is given else x for x in case])
-        names = [a.arg for a in text.functions[name].args.args if a.arg not in known]
+        left = iter(made)
+        names = [a.arg for a in text.functions[name].args.args]
         with np.errstate(all="ignore"):
-            result = function(**dict(zip(names, made, strict=True)), **known)
+            result = function(*(known[n] if n in known else next(left) for n in names))
         made = [x for x, of in zip(made, case, strict=True) if of is not given]
         found.append(_numbers(made) + ([] if result is None else [_bits(result)]))
     return found

@@ -17,12 +17,10 @@ from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import state_names
-from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.outputs import OUTPUTS
-from eomgen.program.program import Program
 from eomgen.run.checks import (
     check_no_step,
     check_samples,
@@ -225,15 +223,16 @@ def run_sweep(
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     state_names: tuple[str, ...] = functions.STATES
     times, dt, every = _times(plan)
-    program = _program(plan, reporter)
+    in_c = _compiles(plan, reporter)
     many = plan.backend == "c" or len(plan.design.values) >= MANY
-    together = program is not None and many and _run_together(plan.setting.integrator, functions)
+    together = in_c and many and _run_together(plan.setting.integrator, functions)
     task = Task(
         model=model,
         source=module.source,
-        program=program,
-        at_once=program is not None and many,
+        compiled=in_c,
+        at_once=in_c and many,
         together=together,
+        threads=in_c and many and _mostly_in_c(plan.setting.integrator, functions),
         names=plan.design.names,
         kinds=tuple(_kind(name, model, state_names, reporter) for name in plan.design.names),
         parameters=plan.parameters,
@@ -314,13 +313,12 @@ def _kind(name: str, model: Model, states: Sequence[str], reporter: Reporter) ->
     raise AssertionError(name)
 
 
-def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] | None:
-    """The program from which members are compiled; None if they run in Python."""
+def _compiles(plan: SweepPlan, reporter: Reporter) -> bool:
+    """Whether members run in compiled code where that pays."""
     from eomgen.native.compiler import find_compiler
-    from eomgen.store import interfaced_program_of
 
     if plan.backend == "numpy" or plan.varying is not None:
-        return None
+        return False
     if plan.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
         method = plan.setting.integrator
         reporter.note(f"steps of {method} are not compiled, but their derivatives are")
@@ -330,8 +328,8 @@ def _program(plan: SweepPlan, reporter: Reporter) -> tuple[Program, Interface] |
         if plan.backend == "c":
             raise
         reporter.note(f"the sweep is not compiled: {error}")
-        return None
-    return interfaced_program_of(plan.model)
+        return False
+    return True
 
 
 def _run_together(integrator: str, functions: Any) -> bool:
@@ -345,6 +343,17 @@ def _run_together(integrator: str, functions: Any) -> bool:
     return integrator == "rk4" or not any(hasattr(functions, name) for name in switching)
 
 
+def _mostly_in_c(integrator: str, functions: Any) -> bool:
+    """Whether Python does so little in members that run one by one that threads serve them: if
+    compiled code makes almost all steps. Rigid contacts are held in Python, and steps of adaptive
+    methods that pass over a corner are repeated there.
+    """
+    method = find_integrator(integrator)
+    if not method.compiled or getattr(functions, "CONTACTS", ()):
+        return False
+    return isinstance(method, FixedStep) or not hasattr(functions, "switching_functions")
+
+
 def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:
     """The task with its kernels compiled, or without them if that fails. With the backend "c" it
     raises `RunError` instead.
@@ -355,5 +364,5 @@ def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:
         if plan.backend == "c":
             raise
         reporter.note(f"the sweep is not compiled: {error}")
-        return replace(task, program=None, at_once=False, together=False)
+        return replace(task, compiled=False, at_once=False, together=False, threads=False)
     return task

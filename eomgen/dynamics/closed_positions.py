@@ -3,17 +3,19 @@
 import random
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import takewhile
 
 import numpy as np
 
 from eomgen.dynamics.closure import Array, Closure
 from eomgen.dynamics.clusters import clusters_of, span
-from eomgen.dynamics.constraints import rows_of
 from eomgen.language.formula import Formula, names_in
 from eomgen.model.model import Model
 from eomgen.scene.constraints import ConstraintTable
 
+Place = tuple[Array, Array]
+"""A position (nq,) and J there."""
 STEP = 0.15
 """The distance of positions, rad, or in sizes of the mechanism."""
 WALKS = 4
@@ -30,24 +32,28 @@ SAFE = 0.02
 
 def closed_positions(model: Model) -> tuple[Array, ...]:
     """Closed positions (nq,): walks along the freedoms."""
-    return tuple(q for walk in range(WALKS) for q, _ in _walk(model, walk))
+    return tuple(q for walk in _walks(model) for q, _ in walk)
 
 
 def regular_positions(model: Model) -> tuple[Array, ...]:
     """The same without those near singular positions, where any elimination loses digits."""
-    found = [part for walk in range(WALKS) for part in _walk(model, walk)]
-    return tuple(q for q, matrix in found if _regularity(matrix) >= REGULAR)
+    return tuple(q for walk in _walks(model) for q, matrix in walk if _is_regular(matrix))
 
 
 def reached_positions(model: Model) -> tuple[Array, ...]:
     """The closed positions from the assembled one to the first singular one, where a run ends, in
     each walk.
     """
-    return tuple(q for walk in range(WALKS) for q, _ in _reached(model, walk))
+    return tuple(q for q, _ in _reached(model))
 
 
-def _reached(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
-    return takewhile(lambda part: _regularity(part[1]) >= REGULAR, _walk(model, walk))
+def _reached(model: Model) -> Iterator[Place]:
+    for walk in _walks(model):
+        yield from takewhile(lambda place: _is_regular(place[1]), walk)
+
+
+def _is_regular(matrix: Array) -> bool:
+    return _regularity(matrix) >= REGULAR
 
 
 def _regularity(matrix: Array) -> float:
@@ -59,7 +65,19 @@ def _regularity(matrix: Array) -> float:
     return float(sizes[-1] / sizes[0])
 
 
-def _walk(model: Model, walk: int) -> Iterator[tuple[Array, Array]]:
+def _walks(model: Model) -> tuple[tuple[Place, ...], ...]:
+    """All walks. They are the same for each way to write the equations, and those that are compared
+    ask for them one after another.
+    """
+    return _walked(replace(model, pivots=(), blocks=(), route="auto", outputs=(), notices=()))
+
+
+@lru_cache(maxsize=2)
+def _walked(model: Model) -> tuple[tuple[Place, ...], ...]:
+    return tuple(tuple(_walk(model, walk)) for walk in range(WALKS))
+
+
+def _walk(model: Model, walk: int) -> Iterator[Place]:
     """Positions along a walk with their J. It ends near a singular one, where a run ends too:
     beyond, a linkage may go on in another way than the one it was assembled in.
     """
@@ -101,10 +119,9 @@ def with_safe_pivots(model: Model) -> Model:
         return replace(model, pivots=())
     start = relative_pivots(closure.jacobian(np.array(model.initial_q)), model.pivots)
     safe = np.abs(start) >= SAFE
-    for walk in range(WALKS):
-        for _, matrix in _reached(model, walk):
-            found = relative_pivots(matrix, model.pivots)
-            safe &= (np.abs(found) >= SAFE) & (np.sign(found) == np.sign(start))
+    for _, matrix in _reached(model):
+        found = relative_pivots(matrix, model.pivots)
+        safe &= (np.abs(found) >= SAFE) & (np.sign(found) == np.sign(start))
     fit = {row for (row, _), is_safe in zip(model.pivots, safe, strict=True) if is_safe}
     kept = [rows for rows in _rows_by_cluster(model) if rows <= fit]
     pivots = tuple(pair for pair in model.pivots if any(pair[0] in rows for rows in kept))
@@ -128,7 +145,7 @@ def _rows_by_cluster(model: Model) -> list[set[int]]:
     d = Closure.of(model).dynamics(np.array(model.initial_q))
     clusters = clusters_of(d)
     found: dict[int, set[int]] = {}
-    for i, row in enumerate(rows_of(d)):
+    for i, row in enumerate(d.rows):
         _, frames = span(d, row)
         first = next(c.frames[0] for c in clusters if frames & set(c.frames))
         found.setdefault(first, set()).add(i)

@@ -82,7 +82,12 @@ class Closure:
 
     def both(self, q: Array) -> tuple[Array, Array]:
         """`residuals` and `jacobian`."""
-        return self.residuals(q), self.jacobian(q)
+        try:
+            d = self.dynamics(q)
+            found, rows = constraints.residuals(d), jacobian_of(d)
+        except (ArithmeticError, ValueError):
+            return self.residuals(q), self.jacobian(q)
+        return np.array(found) / self._units, self._in_sizes(rows)
 
     def jacobian(self, q: Array) -> Array:
         """J (nc, nv) in sizes."""
@@ -102,7 +107,7 @@ class Closure:
         closed by. A wheel is put on the ground without rolling there.
         """
         try:
-            rows = constraints.rows_of(self.dynamics(q))
+            rows = self.dynamics(q).rows
         except (ArithmeticError, ValueError):
             return self.jacobian(q)
         held = np.array([[row.residual is not None] for row in rows], dtype=bool)

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from eomgen.dynamics.articulated import along
-from eomgen.dynamics.constraints import position_rates, rows_of
+from eomgen.dynamics.constraints import position_rates
 from eomgen.dynamics.forces import at_parent
 from eomgen.dynamics.kinematics import Link
 from eomgen.dynamics.loads import power_of, wrench_of
@@ -37,7 +37,7 @@ def clusters_of(d: MechanismState) -> tuple[Cluster, ...]:
     """The clusters of a mechanism's constraints, in the order of their first frames."""
     links = d.kinematics.links
     found: list[tuple[int, set[int]]] = []
-    for row in rows_of(d):
+    for row in d.rows:
         base, frames = span(d, row)
         while True:  # merge with those that share frames, until none does
             shared = [other for other in found if other[1] & frames]
@@ -79,7 +79,7 @@ def jacobian_of(d: MechanismState) -> list[list[Scalar]]:
 
     The wrenches of a row's loads are carried inwards to its base only: beyond, they cancel.
     """
-    return [_derivatives(d, row)[: d.nv] for row in rows_of(d)]
+    return [_derivatives(d, row)[: d.nv] for row in d.rows]
 
 
 def accelerations_at_rest(d: MechanismState) -> list[Scalar]:
@@ -102,7 +102,7 @@ def _of_pins(d: MechanismState) -> dict[str, Scalar]:
     found: dict[str, Scalar] = {}
     if d.dimensions == 3 or d.model.driven:
         return found
-    rows = {name: row for (name, _), row in zip(d.model.rows, rows_of(d), strict=True)}
+    rows = {name: row for (name, _), row in zip(d.model.rows, d.rows, strict=True)}
     frames = accelerations(d.in_world, _in_world(d), d.v, None, zeros(d.scalars), d.scalars)
     for loop in d.model.loops:
         own = [name for name, _ in loop.row_names(2)]
@@ -150,7 +150,7 @@ def _by_duals(d: MechanismState) -> list[Scalar]:
     )
     state = MechanismState(model, moving, dual, "world")
     found = []
-    for row in rows_of(state):
+    for row in state.rows:
         rate = _inner_rate(state, row)
         found.append((rate if row.drift is None else rate + row.drift).rate)
     return found

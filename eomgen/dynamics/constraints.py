@@ -11,28 +11,18 @@ from dataclasses import dataclass
 from eomgen.dynamics.loads import generalised, power_of, scaled
 from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.scalars.protocol import Scalar, Scalars
-from eomgen.scene.constraints.base import Row
 from eomgen.scene.effects.base import Load
-
-
-def rows_of(d: MechanismState) -> list[Row]:
-    """The rows of all constraints but those that follow from others, in the order of the model's
-    `rows`.
-    """
-    found = [row for constraint in d.model.constraints for row in constraint.rows(d)]
-    names = [name for name, _ in d.model.every_row]
-    return [row for name, row in zip(names, found, strict=True) if name not in d.model.dropped]
 
 
 def residuals(d: MechanismState) -> list[Scalar]:
     """g of each row, m or rad; 0 for a row of velocities alone."""
-    return [d.scalars.number(0.0) if row.residual is None else row.residual for row in rows_of(d)]
+    return [d.scalars.number(0.0) if row.residual is None else row.residual for row in d.rows]
 
 
 def rates(d: MechanismState) -> list[Scalar]:
     """ġ of each row, m/s or rad/s."""
     found = []
-    for row in rows_of(d):
+    for row in d.rows:
         rate = power_of(d, row.loads)
         found.append(rate if row.drift is None else rate + row.drift)
     return found
@@ -40,7 +30,7 @@ def rates(d: MechanismState) -> list[Scalar]:
 
 def held(d: MechanismState, multipliers: Sequence[Scalar]) -> list[Scalar]:
     """Jᵀ λ: the generalised forces of the constraints, with the rows of driven velocities."""
-    pairs = zip(rows_of(d), multipliers, strict=True)
+    pairs = zip(d.rows, multipliers, strict=True)
     return generalised(d, [x for row, force in pairs for x in scaled(row.loads, force)])
 
 
@@ -91,7 +81,7 @@ def relative(d: MechanismState, pivots: Sequence[Scalar], sizes: Sequence[Scalar
     for kind, size in zip(kinds, sizes, strict=True):
         sums[kind] = sums[kind] + size if kind in sums else size
     shares = [pivot / sums[kind] for kind, pivot in zip(kinds, pivots, strict=True)]
-    own = [row.margin for row in rows_of(d)]
+    own = [row.margin for row in d.rows]
     return [x if m is None else x * m for x, m in zip(shares, own, strict=True)]
 
 

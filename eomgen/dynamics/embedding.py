@@ -16,7 +16,6 @@ from eomgen.dynamics.constraints import (
     rates,
     relative,
     residuals,
-    rows_of,
 )
 from eomgen.dynamics.embedded import Articulated, Response, articulate, respond
 from eomgen.dynamics.forces import Wrench, no_wrench
@@ -57,7 +56,7 @@ class Embedded(NullSpace):
     def _rows_by_cluster(self) -> dict[Cluster, list[int]]:
         """The rows of each cluster that are kept by multipliers."""
         found: dict[Cluster, list[int]] = {cluster: [] for cluster in clusters_of(self._d)}
-        for i, row in enumerate(rows_of(self._d)):
+        for i, row in enumerate(self._d.rows):
             _, frames = span(self._d, row)
             if i not in self._order:
                 cluster = next(c for c in found if frames & set(c.frames))

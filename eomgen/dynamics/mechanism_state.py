@@ -23,7 +23,7 @@ from eomgen.model.model import JointIndex, Model, dofs_of
 from eomgen.model.partials import gradient_of, partials_of
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars
-from eomgen.scene.constraints.base import Partials
+from eomgen.scene.constraints.base import Partials, Row
 from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
@@ -255,6 +255,15 @@ class MechanismState:
     def origins(self) -> Origins:
         """Origins of the frames in the world, m."""
         return frame_origins(self.kinematics, self.scalars)
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """The rows of all constraints but those that follow from others, in the order of the
+        model's `rows`.
+        """
+        found = [row for constraint in self.model.constraints for row in constraint.rows(self)]
+        names, dropped = (name for name, _ in self.model.every_row), self.model.dropped
+        return tuple(row for name, row in zip(names, found, strict=True) if name not in dropped)
 
     def centre(self, body: int) -> Vec:
         """Centre of mass of a body in the world, m."""

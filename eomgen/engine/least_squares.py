@@ -27,7 +27,7 @@ def shortest(
     rows = counts(n)
     columns = counts(n)
     z = numbers(n)
-    rank = eliminated(n, a, rows, columns)
+    rank = reduced(n, a, rows, columns)
     for i in range(n):
         z[i] = b[rows[i]]
     if rank < n:
@@ -50,7 +50,7 @@ def shortest(
         x[columns[i]] = z[i]
 
 
-def eliminated(
+def reduced(
     n: int,
     a: Annotated[Matrix, "n", "n"],
     rows: Annotated[Whole, "n"],

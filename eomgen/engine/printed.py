@@ -7,6 +7,9 @@ from typing import Any
 from eomgen.engine import (
     adaptive,
     complementarity,
+    contact_times,
+    contacts,
+    elimination,
     equal_steps,
     explicit,
     least_squares,
@@ -23,6 +26,8 @@ from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
+CONTACTS = ("begin", "deepest", "press", "strike", "release", "settle", "closing", "opening")
+"""What is called for rigid contacts."""
 ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("runge_kutta", {"method": explicit.EULER}),
     ("runge_kutta", {"method": explicit.RUNGE_KUTTA_4}),
@@ -33,21 +38,22 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("constant_rates", {}),
     ("add_compensated", {}),
     ("normalised", {}),
-    ("begun", {}),
-    ("gone_on", {}),
-    ("complementary", {}),
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
+    *((name, {}) for name in CONTACTS),
 )
 """What a page that goes on live calls."""
+CODES = ("TOLERANCE", "ENDLESS", "NO_FORCES", "UNHELD")
+"""The constants that it needs."""
 
 
 @cache
 def text() -> Text:
     """The text of the whole engine."""
     steps = (adaptive, equal_steps, explicit, quaternions, sums)
-    return Text.of(*steps, linear, least_squares, complementarity, roots, system)
+    solved = (linear, elimination, least_squares, complementarity, roots)
+    return Text.of(*steps, *solved, contacts, contact_times, system)
 
 
 def c_source(functions: Roots) -> str:
@@ -59,14 +65,14 @@ def c_source(functions: Roots) -> str:
 
 @cache
 def steps_of_pages() -> str:
-    """JavaScript: `makeSteps(STATES, POSITIONS, OTHERS)` returns what pages call, by name. Of these
-    numbers those are given that are needed.
+    """JavaScript: `makeSteps(STATES, POSITIONS, OTHERS, CONTACTS, PRESSED)` returns what pages
+    call, by name. Of these numbers those are given that are needed.
     """
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
-    names += f", FOUND: {roots.FOUND}, WANTED: {roots.WANTED}"
+    codes = "".join(f", {name}: {getattr(contacts, name)!r}" for name in CODES)
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
-    head = "const makeSteps = (STATES, POSITIONS, OTHERS) =>"
-    return f"{head} {{\n{source}return {{ {names} }};\n}};\n"
+    head = "const makeSteps = (STATES, POSITIONS, OTHERS, CONTACTS, PRESSED) =>"
+    return f"{head} {{\n{source}return {{ {names}{codes} }};\n}};\n"
 
 
 @cache

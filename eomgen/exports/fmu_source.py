@@ -4,11 +4,11 @@ import hashlib
 from collections.abc import Mapping, Sequence
 
 from eomgen.codegen.backends import c
-from eomgen.engine import roots
-from eomgen.engine.printed import c_source
+from eomgen.engine import contacts
+from eomgen.engine.embedded import DOP853
+from eomgen.engine.printed import CONTACTS, Roots, c_source
 from eomgen.exports.fmu_unit import Observed, Unit
-from eomgen.native.dop853 import constants, written_out
-from eomgen.run import contacts, events, projection
+from eomgen.run import events, projection
 from eomgen.subset.braces import C
 from eomgen.templating import render, templates_folder
 
@@ -57,9 +57,19 @@ def _main(unit: Unit, token: str) -> str:
         "switching": [(n, s) for n, s, _, _ in _observed(unit.switches, len(interface.contacts))],
         **_closure(unit),
         **_contacts(unit),
-        **constants(written_out),
+        "steps": c_source(_steps(unit)),
+        "slopes": len(DOP853.nodes),
     }
     return render("fmu", "unit.c.jinja", context)
+
+
+def _steps(unit: Unit) -> Roots:
+    """What of the engine's text steps are made with: states within steps only where events are."""
+    method = {"method": DOP853}
+    roots: Roots = (("first_length", {}), ("made", method))
+    if unit.switches or unit.interface.contacts:
+        roots = (*roots, ("interpolate", method), ("within", {}))
+    return roots
 
 
 def _observed(parts: Sequence[Observed], start: int) -> list[tuple[str, int, int, Sequence[int]]]:
@@ -88,24 +98,17 @@ def _closure(unit: Unit) -> dict[str, object]:
 
 def _contacts(unit: Unit) -> dict[str, object]:
     held, rest = unit.function("held"), unit.simulation.rest_speed
-    slowest = f"sqrt(2 * {contacts.RISE!r} * most)" if rest is None else f"{rest!r} / gap_sizes[c]"
+    sizes = [unit.size if contact.unit == "m" else 1.0 for contact in unit.interface.contacts]
     return {
         "held_size": held.shape[0] if held else 0,
         "contact_names": [contact.name for contact in unit.interface.contacts],
-        "gap_sizes": [
-            repr(unit.size if contact.unit == "m" else 1.0) for contact in unit.interface.contacts
-        ],
+        "gap_sizes": list(map(repr, sizes)),
+        "rest": ["-1.0" if rest is None else repr(rest / size) for size in sizes],
         "tolerance": repr(contacts.TOLERANCE),
-        "still": repr(contacts.STILL),
-        "parting": repr(contacts.PARTING),
-        "alpha": repr(contacts.ALPHA),
-        "away": repr(contacts.AWAY),
-        "strong": repr(contacts.STRONG),
-        "rest": slowest,
-        "bounces": contacts.BOUNCES,
-        "strikes": contacts.STRIKES,
-        "engine": c_source([("complementary", {}), ("begun", {}), ("gone_on", {})]),
-        "found": roots.FOUND,
-        "wanted": roots.WANTED,
+        "struck": contacts.STRUCK,
+        "endless": contacts.ENDLESS,
+        "no_forces": contacts.NO_FORCES,
+        "share": repr(events.GAP_CHECKS[1]),
+        "engine": c_source((name, {}) for name in CONTACTS),
         "most_events": events.MOST_EVENTS,
     }

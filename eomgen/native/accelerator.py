@@ -8,12 +8,15 @@ about twice as long as with the better of the two from the start on.
 
 import ctypes
 import math
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
-from functools import cache, cached_property, partial
+from functools import cache, partial
+from threading import RLock
 from typing import Any
 
 from eomgen.codegen.backends import c
@@ -44,7 +47,8 @@ class _Library:
     price         time to compile, s
     fail          called with the error of a compiler
 
-    `paid` is the time that Python took until it was compiled, and that of compiling, s.
+    `paid` is the time that Python took until it was compiled, and that of compiling, s. Threads may
+    share it.
     """
 
     def __init__(
@@ -54,21 +58,28 @@ class _Library:
         self._fail = fail
         self._looked, self._over, self.paid = False, False, 0.0
         self._found: ctypes.CDLL | None = None
+        self._spent, self._lock = 0.0, RLock()
+
+    def beyond(self, more: float) -> ctypes.CDLL | None:
+        """The same as `after` the time of all runs so far, if Python has taken so much more, s."""
+        self._spent += more
+        return self.after(self._spent)
 
     def after(self, spent: float) -> ctypes.CDLL | None:
         """The library, if it is there or Python has taken so long, s, that compiling pays."""
-        if self._over:
+        if self._over and self._found:
             return self._found
-        if not self._looked:
-            self._looked = True
-            with suppress(RunError):  # no compiler: said only if the run is a long one
-                self._found = kept_library(self._about)
-                self._over = self._found is not None
-        if spent > self._price and not self._over:
-            try:
-                self.compile()
-            except RunError as error:
-                self._fail(str(error))
+        with self._lock:
+            if not self._looked:
+                self._looked = True
+                with suppress(RunError):  # no compiler: said only if the run is a long one
+                    self._found = kept_library(self._about)
+                    self._over = self._found is not None
+            if spent > self._price and not self._over:
+                try:
+                    self.compile()
+                except RunError as error:
+                    self._fail(str(error))
         return self._found
 
     @property
@@ -79,9 +90,12 @@ class _Library:
 
     def compile(self) -> None:
         """Compile it now, unless it is in the store. Raises `RunError`."""
-        self._over, begun = True, time.perf_counter()
-        self._found = compiled_library(self._about, self._sources, self._main)
-        self.paid = self._price + time.perf_counter() - begun
+        with self._lock:
+            if self._found is not None:
+                return
+            self._over, begun = True, time.perf_counter()
+            self._found = compiled_library(self._about, self._sources, self._main)
+            self.paid = self._price + time.perf_counter() - begun
 
 
 class Accelerator:
@@ -102,7 +116,8 @@ class Accelerator:
         program: tuple[Program, Interface] | None = None,
     ) -> None:
         self._model, self._module, self._values = model, module, (parameters, inputs)
-        self._program = program
+        self._of_model = cache(lambda: program or interfaced_program_of(model))
+        self._lock = RLock()
         self._begun: float | None = None
         self._at_once = False
         self._libraries: dict[str, _Library] = {}
@@ -194,13 +209,18 @@ class Accelerator:
         """The same powers, which are compiled once that pays."""
         return replace(powers, powers=self.function("effect_powers", powers.powers))
 
-    def compile(self) -> None:
-        """Compile the steps now, unless they are in the store, and each function at its first call.
+    def compile(self, names: Sequence[str] = ("derivative",)) -> None:
+        """Compile the steps now, with the functions of these names, at the same time, unless they
+        are in the store; and each other function at its first call.
 
         Raises `RunError` if there is no compiler, or if it fails.
         """
         self._at_once = True
-        self._library("derivative").compile()
+        libraries = [self._library(name) for name in names]
+        if any(library.missing for library in libraries):
+            self._of_model()  # which all of them need
+        with ThreadPoolExecutor(min(len(libraries), os.cpu_count() or 1)) as pool:
+            list(pool.map(_Library.compile, libraries))
 
     def _compilable(self, module: Any, origin: Any) -> functions.Compilable:
         return functions.Compilable(module, self._values, origin, self._look, self._start)
@@ -231,7 +251,7 @@ class Accelerator:
             return self._of_steps
         if self._at_once:
             return lambda spent: self._library(name).after(math.inf)
-        return lambda spent: self._library(name).after(spent)
+        return self._library(name).beyond
 
     def _of_steps(self, spent: float) -> ctypes.CDLL | None:
         """The library of the steps; they take as long as the run."""
@@ -268,30 +288,32 @@ class Accelerator:
         if self._begun is None:
             self._begun = now
         needed = {name: self._library(name) for name in names}
-        needed[implicit.METHODS_LIBRARY] = self._methods
+        needed[implicit.METHODS_LIBRARY] = self._library(implicit.METHODS_LIBRARY)
         pays = self._at_once or now - self._begun > sum(each.missing for each in needed.values())
         spent = math.inf if pays else 0.0
         found = {name: library.after(spent) for name, library in needed.items()}
         there = {name: library for name, library in found.items() if library is not None}
         return there if len(there) == len(found) else None
 
-    @cached_property
-    def _methods(self) -> _Library:
-        """The library of implicit methods, the same for all models."""
-        price = STARTING + AN_OPERATION * implicit.OPERATIONS
-        about = f"implicit methods {package_digest()}"
-        return _Library(about, implicit.sources, implicit.MAIN, price, self._fail)
-
     def _library(self, name: str) -> _Library:
-        if name not in self._libraries:
-            self._libraries[name] = _Library(
-                library_key(self._model, name),
-                partial(self._sources, name),
-                {"derivative": runs.MAIN, "taylor": taylor.MAIN}.get(name, c.MAIN),
-                STARTING + AN_OPERATION * self._module.COST.get(name, {"total": 0})["total"],
-                self._fail,
-            )
-        return self._libraries[name]
+        """That of a function, or that of implicit methods, which is the same for all models."""
+        with self._lock:
+            if name not in self._libraries:
+                self._libraries[name] = self._made(name)
+            return self._libraries[name]
+
+    def _made(self, name: str) -> _Library:
+        if name == implicit.METHODS_LIBRARY:
+            price = STARTING + AN_OPERATION * implicit.OPERATIONS
+            about = f"implicit methods {package_digest()}"
+            return _Library(about, implicit.sources, implicit.MAIN, price, self._fail)
+        return _Library(
+            library_key(self._model, name),
+            partial(self._sources, name),
+            {"derivative": runs.MAIN, "taylor": taylor.MAIN}.get(name, c.MAIN),
+            STARTING + AN_OPERATION * self._module.COST.get(name, {"total": 0})["total"],
+            self._fail,
+        )
 
     def _sources(self, name: str) -> Mapping[str, str]:
         """The sources of a function's library; with the derivative are the steps."""
@@ -301,9 +323,6 @@ class Accelerator:
         if name == "taylor":
             return taylor.sources(program, interface)
         return functions.sources(program, interface, name)
-
-    def _of_model(self) -> tuple[Program, Interface]:
-        return self._program or interfaced_program_of(self._model)
 
     def _fail(self, why: str) -> None:
         self.notice = why

@@ -1,6 +1,6 @@
 """Runs of many members at once by DOP853, one in each lane of vector registers.
 
-Steps are those of `run.integrators.dormand_prince_8`, to rounding: sums are fused, and sine and
+Steps are those of `engine.adaptive`, to rounding: sums are fused, and sine and
 cosine are those of `native.lanes`.
 """
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c, c_lanes
 from eomgen.codegen.interface import Interface
+from eomgen.engine.embedded import DOP853
 from eomgen.native import lanes
-from eomgen.native.dop853 import constants
 from eomgen.native.lanes import Columns, Lanes, columns_of
 from eomgen.program.program import Program
 from eomgen.run.problem import FloatArray
@@ -33,11 +33,21 @@ def sources(
     program: Program, interface: Interface, outputs: tuple[str, ...] = ()
 ) -> Mapping[str, str]:
     """The C sources of `native.lanes`, and of runs by DOP853."""
-    values = constants(_terms)
+    many, last = len(DOP853.nodes), DOP853.last
+    stages = [(i, _terms(row)) for i, row in enumerate(DOP853.stages)]
+    ends = (DOP853.end, DOP853.long_error, DOP853.short_error)
     context = {
         "main": c_lanes.MAIN,
-        "ends": [(name, values.pop(name)) for name in ("end_sum", "long_error", "short_error")],
-        **values,
+        "slopes": many,
+        "nodes": list(map(repr, DOP853.nodes)),
+        "stages": stages[1:last],
+        "ends": zip(("end_sum", "long_error", "short_error"), map(_terms, ends), strict=True),
+        "dense_stages": stages[last + 1 :],
+        "dense": list(map(_terms, DOP853.dense)),
+        "safety": repr(DOP853.safety),
+        "smallest": repr(DOP853.smallest),
+        "greatest": repr(DOP853.greatest),
+        "short_weight": repr(DOP853.short_weight),
         "paces": PACES,
         "most_steps": MOST_STEPS,
     }

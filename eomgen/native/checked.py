@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from eomgen.engine import roots
+from eomgen.native.memory import address, placed
 from eomgen.native.module import outputs_of, usual_constants
 from eomgen.run import branches, crossings, enclosing
 from eomgen.run.compiled import Array, Watched
@@ -19,6 +20,7 @@ from eomgen.run.events import GAP_CHECKS
 
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _INTERVALS = len(enclosing.INNER) + 1
+_FACTORS, _INNER = (np.ascontiguousarray(x) for x in (enclosing.FACTORS, enclosing.INNER))
 _MOST_PARTS = crossings.MOST_EVALUATIONS // 4 + 2
 """Parts of a step that wait at one time, at most: each first one takes four evaluations, or three
 of one alone, and each more six."""
@@ -92,30 +94,28 @@ def watch(
     found: Mapping[str, Function], watched: Watched | None, sizes: Array | None
 ) -> tuple[Watch, list[Any]]:
     """What `templates/c/checks.c.jinja` is given, and the arrays that it points to."""
-    made, arrays = Watch(clear=math.inf, switched=-math.inf), dict[str, Any]()
+    made = Watch(clear=math.inf, switched=-math.inf)
+    kept: list[Any] = []
+    if watched is None and sizes is None:
+        return made, kept
+    made.factors, made.inner = address(_FACTORS), address(_INNER)
     switching = contacts = 0
-    values = np.empty((3, 0))
     if watched:
         made.clear, made.switched, made.timed = watched.clear, watched.switched, watched.timed
     if watched and watched.ends:
         (made.earlier, before), (_, start) = watched.ends
-        switching, values = len(start), np.array((before, start, start))
+        values, angles = np.array((before, start, start)), np.array(watched.angles, np.int64)
+        switching, made.angled = len(start), len(angles)
         made.switching = FunctionStructure(*found["switching_functions"])
-        arrays["angles"] = np.array(watched.angles, np.int64)
-        made.angled = len(watched.angles)
+        made.angles, at = address(angles), address(values)
+        for i in range(3):
+            made.values[i] = at + 8 * switching * i
+        kept += [values, angles]
     if sizes is not None:
-        contacts, arrays["sizes"] = len(sizes), sizes
+        contacts, made.sizes = len(sizes), address(sizes)
         made.gaps, made.rates = (FunctionStructure(*found[name]) for name in ("gaps", "gap_rates"))
     parts = _MOST_PARTS + 1
-    arrays |= {
-        "factors": np.ascontiguousarray(enclosing.FACTORS),
-        "inner": np.ascontiguousarray(enclosing.INNER),
-        "room": np.empty((1 + parts * (_INTERVALS + 1)) * switching + 3 * contacts),
-        "asked": np.empty(parts * switching, np.int64),
-        "kinds": np.empty(switching, np.intc),
-    }
-    for name, array in arrays.items():
-        setattr(made, name, array.ctypes.data)
-    for i, row in enumerate(values):
-        made.values[i] = row.ctypes.data
-    return made, [*arrays.values(), values]
+    shapes = [((1 + parts * (_INTERVALS + 1)) * switching + 3 * contacts,), (parts * switching,)]
+    # Memory of numbers of 8 bytes, whatever C takes them for.
+    (room, asked, kinds), (made.room, made.asked, made.kinds) = placed([*shapes, (switching,)])
+    return made, [*kept, sizes, room, asked, kinds]

@@ -35,8 +35,8 @@ PROJECTION = {
 Value = Callable[..., FloatArray]
 """A function of time, state and further arguments, such as the derivative."""
 Look = Callable[[float], ctypes.CDLL | None]
-"""Returns the library of a function if it is there, or if calls in Python have taken so long, s,
-that it is compiled now."""
+"""Returns the library of a function if it is there, or is compiled now because calls in Python have
+taken long enough; it is told how much longer they have, s."""
 
 INTERVAL = 5e-3
 """Time in Python, s, after which a library is asked for again."""
@@ -164,7 +164,7 @@ class Compilable:
 
         `extra` makes the kernel's further numbers from the arguments after time and state.
         """
-        look, spent, due = self.look(name), 0.0, 0.0
+        look, spent, due = self.look(name), 0.0, 0.0  # the time since the last look, s
         compiled: Callable[..., FloatArray | None] | None = None
 
         def value(t: float, y: FloatArray, *more: Any) -> FloatArray:
@@ -173,8 +173,8 @@ class Compilable:
                 found = compiled(t, y, *((extra(*more),) if extra else ()))
                 return python(t, y, *more) if found is None else found
             if spent >= due:
-                due = spent + INTERVAL
                 library = look(spent)
+                due, spent = INTERVAL, 0.0
                 if library is not None:
                     compiled = compiled_function(
                         self.module, library, name, *self.values, origin=self.origin

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
-from eomgen.engine.printed import c_source
+from eomgen.engine.printed import Roots, c_source
 from eomgen.native import checked, equal_steps
 from eomgen.native.checked import Function, FunctionStructure
 from eomgen.native.constrained import address, constraints, made_margins
@@ -40,6 +40,9 @@ from eomgen.templating import render
 MAIN = "implicit.c"
 NEEDED = ("derivative", "jacobian")
 """The functions that the methods call."""
+ELIMINATION: Roots = (("factored", {}), ("solve_by", {}))
+EQUAL_STEPS: Roots = (*equal_steps.COMPOSED, ("equal_steps", {}))
+"""What of the engine's text this library has."""
 SYMMETRIC = ("constraint_jacobian", "constraint_rates")
 """Further functions for symmetric projection."""
 METHODS = ("rodas_5p",)
@@ -76,7 +79,8 @@ def sources() -> Mapping[str, str]:
         "greatest": repr(rodas_5p.GREATEST),
         "negligible": repr(rodas_5p.NEGLIGIBLE),
         "least_error": repr(rodas_5p.LEAST_ERROR),
-        "engine": C.prelude + c_source([*equal_steps.COMPOSED, ("equal_steps", {})]),
+        "engine": C.prelude + c_source(EQUAL_STEPS),
+        "elimination": c_source(ELIMINATION),
         "compositions": [each.name for each in equal_steps.COMPOSITIONS],
         "most_of_rattle": rattle.MOST,
         "rattle_roundoff": repr(rattle.ROUNDOFF),

@@ -5,7 +5,7 @@ The width is that of the widest registers that this processor has. It changes no
 
 import ctypes
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -78,7 +78,7 @@ class _Times(ctypes.Structure):
 
 
 class Lanes:
-    """The library of some sources, for vectors of `lanes` doubles.
+    """The library of some sources, for vectors of `lanes` doubles; `about` determines them.
 
     Arrays have a column for each of n states. Constants and inputs have as many columns, or one for
     all. Raises `RunError` if there is no compiler, or if it fails.
@@ -87,12 +87,18 @@ class Lanes:
     main = c_lanes.MAIN
     """The source that includes the others."""
 
-    def __init__(self, texts: Mapping[str, str], lanes: int | None = None) -> None:
+    def __init__(
+        self,
+        texts: Mapping[str, str] | Callable[[], Mapping[str, str]],
+        lanes: int | None = None,
+        about: str = "",
+    ) -> None:
         lanes = lanes or width()
-        about = f"lanes {lanes} {sorted(texts.items())!r}"
+        sources = texts if callable(texts) else lambda: texts
+        about = f"lanes {lanes} {about or sorted(sources().items())!r}"
         fused = ("-mfma",) if lanes == 2 < width() else ()  # as those that are wider
         flags = (f"-DWIDTH={lanes}", *FLAGS[lanes], *fused, *find_compiler().ordering)
-        self.library = compiled_library(about, lambda: texts, self.main, *flags)
+        self.library = compiled_library(about, sources, self.main, *flags)
         sizes = (_LONG * 5).in_dll(self.library, "sizes")
         self.states, self.inputs, self.parameters, self.constants, self.lanes = sizes
         text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(self.library, "outputs")))

@@ -11,24 +11,22 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
 from eomgen.engine.embedded import DOP853
-from eomgen.engine.printed import Roots, c_source
 from eomgen.native import checked, equal_steps
-from eomgen.native.constrained import address, constraints, made_margins
+from eomgen.native.constrained import address as where
+from eomgen.native.constrained import constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import restricted
+from eomgen.native.memory import address, placed
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators.dormand_prince_8 import interpolated
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
-from eomgen.subset.braces import C
-from eomgen.subset.structures import filled
+from eomgen.subset.structures import filled, structure
 from eomgen.templating import render
 
 MAIN = "runs.c"
-ENGINE: Roots = (("begun", {}), ("gone_on", {}))
-"""What of the engine's text steps are checked with."""
 METHODS = ("dop853", *equal_steps.METHODS)
 """The methods whose steps this library makes."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -36,13 +34,17 @@ _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C sources of the derivative and of the methods that step with it."""
+    # Imported here because runs whose library is in the store do without the printer.
+    from eomgen.engine.printed import c_source
+    from eomgen.subset.braces import C
+
     program, interface = restricted(program, interface, ("derivative",))
     context = {
         "prefix": interface.name,
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "engine": C.prelude + c_source([*ENGINE, *equal_steps.STEPS]),
+        "engine": C.prelude + c_source([("begun", {}), ("gone_on", {}), *equal_steps.STEPS]),
         "steps": c_source([("made_many", {"method": DOP853})]),
         **checked.context(),
         **of_constraints(),
@@ -83,6 +85,9 @@ class CompiledSteps:
         self._constants = usual_constants(module, "derivative", p)
         self._inputs = kernels.given(u)
         self._states = kernels.states
+        self._held = 0, 0
+        if self._constants is not None and self._inputs is not None:
+            self._held = ctypes.addressof(self._constants), self._inputs.ctypes.data
         self._library, self._call = library, library.dop853
         self._call.restype, self._call.argtypes = _WHOLE, [_POINTER] * 8
 
@@ -94,8 +99,7 @@ class CompiledSteps:
             return None
         if not set(needed) <= self._checks.keys():
             return None
-        held = ctypes.cast(self._constants, _POINTER), self._inputs.ctypes.data
-        return partial(self._dop853, held)
+        return self._dop853
 
     def equal(self, name: str, problem: Problem) -> EqualSteps | None:
         """The same for methods with equal steps."""
@@ -108,7 +112,6 @@ class CompiledSteps:
 
     def _dop853(
         self,
-        held: tuple[Any, int],
         t: float,
         y: Array,
         memory: Mapping[str, float | Array],
@@ -126,29 +129,32 @@ class CompiledSteps:
     ) -> Stride:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
-        ends, lengths = np.empty((2, most))
-        derivatives, sampled, switches, gap_checks = np.empty((4, most), np.int64)
-        states, slopes, losses = np.empty((3, most, ny))
-        terms, rows = np.empty((most if dense else 0, 7, ny)), np.empty((len(times), ny))
-        arrays = (ends, lengths, derivatives, sampled, states, slopes, losses, terms, times, rows)
-        kept = Records(*arrays, len(times), most)
+        each, whole = (most,), (most, ny)
         watch, pointed = checked.watch(self._checks, watched, sizes)
-        switched, values = np.empty(most), np.empty((most, watch.switching.count))
-        margins = made_margins(constrained, most)
+        (ends, lengths, states, slopes, losses, switched, values, terms), at_reals = placed(
+            [each, each, *[whole] * 3, each, (most, watch.switching.count), (dense * most, 7, ny)]
+        )
+        (derivatives, sampled, switches, gap_checks), at_wholes = placed([each] * 4, np.int64)
+        rows, margins = np.empty((len(times), ny)), made_margins(constrained, most)
         keeps = constraints(self._checks, constrained, self._inputs, ny)
+        start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
+        to_margins, to_times, to_rows, to_atol, *begun = map(
+            address, (margins[1:], times, rows, atol, *start)
+        )
+        system = equal_steps.System(*self._held)
+        run = structure(Bounds)(to_atol, rtol, longest, t_end, dense)
         at = filled(Progress(t, length=float(memory["h_abs"])))
-        system, run = equal_steps.System(*held), filled(Bounds(atol, rtol, longest, t_end, dense))
+        records = structure(Records)(
+            *(*at_reals[:2], *at_wholes[:2], *at_reals[2:5], at_reals[7], to_times, to_rows),
+            *(len(times), most),
+        )
         checks = _Checks(
             *(ctypes.addressof(each) for each in (system, run, watch)),
-            address(keeps),
-            *(0.0, margins[1:].ctypes.data, switched.ctypes.data, values.ctypes.data),
-            *(switches.ctypes.data, gap_checks.ctypes.data),
+            *(where(keeps), 0.0, to_margins, *at_reals[5:7], *at_wholes[2:]),
         )
-        start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
-        records = filled(kept)
         why = self._call(
             *(ctypes.addressof(each) for each in (system, checks, run, at)),
-            *(array.ctypes.data for array in start),
+            *begun,
             ctypes.addressof(records),
         )
         del pointed, keeps, records
@@ -166,12 +172,14 @@ class CompiledSteps:
             switches[:n],
             gap_checks[:n],
             usual=why != UNUSUAL,
-            within=partial(_within, t, y, kept) if dense else None,
+            within=partial(_within, (t, y), ends, states, terms) if dense else None,
             margins=margins[: n + 1] if constrained else None,
         )
 
 
-def _within(t: float, y: Array, kept: Records, i: int, time: float) -> Array:
-    """The state at a time in step number i of those that begin at t with the state y."""
-    start, first = (float(kept.ends[i - 1]), kept.states[i - 1]) if i else (t, y)
-    return interpolated(start, float(kept.ends[i]) - start, first, kept.terms[i], time)
+def _within(
+    begun: tuple[float, Array], ends: Array, states: Array, terms: Array, i: int, time: float
+) -> Array:
+    """The state at a time in step number i of those that begin at a time and a state."""
+    start, first = (float(ends[i - 1]), states[i - 1]) if i else begun
+    return interpolated(start, float(ends[i]) - start, first, terms[i], time)

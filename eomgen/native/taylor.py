@@ -9,6 +9,7 @@ import numpy as np
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
+from eomgen.native.memory import address
 from eomgen.native.taylor_source import Writer
 from eomgen.program.program import Program, live_steps
 from eomgen.program.series import coefficients
@@ -149,18 +150,18 @@ class CompiledTaylor:
         """
         most = 0 if dense or watched or constrained or sizes is not None else most
         ny = self._states
-        # Numbers and counts are parts of one array each: to ask for an address takes a microsecond.
+        # Numbers and counts are parts of one array each: so there are fewer to make.
         numbers, counts = np.empty((2 + 2 * ny) * most), np.empty(2 * most, np.int64)
-        at, of_counts, n = numbers.ctypes.data, counts.ctypes.data, 8 * most
+        at, of_counts, n = address(numbers), address(counts), 8 * most
         rows, made = np.empty((len(times), ny)), ctypes.c_int64()
         records = _Records(
             *(at, at + n, at + 2 * n, at + (2 + ny) * n, of_counts, of_counts + n),
-            *(times.ctypes.data, rows.ctypes.data, len(times)),
+            *(address(times), address(rows), len(times)),
         )
-        settings = _Settings(self._at, atol.ctypes.data, rtol, longest, t_end, order_of(rtol))
-        start = [np.ascontiguousarray(array).ctypes for array in (y, memory["lost"])]
+        settings = _Settings(self._at, address(atol), rtol, longest, t_end, order_of(rtol))
+        start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
         why = self._library.taylor_steps(
-            *(ctypes.byref(settings), most, t, start[0].data, start[1].data),
+            *(ctypes.byref(settings), most, t, *map(address, start)),
             *(ctypes.byref(records), ctypes.byref(made)),
         )
         ends, lengths = numbers[:most], numbers[most : 2 * most]

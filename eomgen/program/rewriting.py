@@ -2,21 +2,34 @@
 
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import combinations
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from eomgen.program.program import Output, Program, finish, live_steps
 from eomgen.program.tape import ExactTape, Stage, Step, Tape
 
+Found = TypeVar("Found")
 MOST_FACTORS = 8
 """Products of this many factors are not taken apart."""
 MOST_TRIED = 1000
 """Steps of a program up to which `take_apart_shared` tries what may help."""
-Rule = Callable[[Tape, str, list[int]], int]
-"""Records an operation on steps of a tape and returns the step of its result."""
+
+
+@dataclass(frozen=True)
+class Rule(Generic[Found]):
+    """Another way to compute an operation on steps.
+
+    find  what is to be done about an operation and its operands among steps, or None
+    make  records that on a tape and returns the step of the result
+    note  is told of each old step, its new operation and its new place
+    """
+
+    find: Callable[[Sequence[Step], str, Sequence[int]], Found | None]
+    make: Callable[[Tape, str, Found], int]
+    note: Callable[[int, str, int], None]
 
 
 class Steps:
@@ -90,35 +103,45 @@ def _gathered(program: Program, *, shared: bool) -> Program:
     """`gather_parameters`; `shared` takes k·x apart in l·(k·x) even if k·x is used elsewhere."""
     used_once = _UsedOnce(program, ("mul", "add"))
 
-    def is_inner(tape: Tape, operation: str, node: int) -> bool:
-        inner, operands, _, _ = tape.steps[node]
+    def is_inner(steps: Sequence[Step], operation: str, node: int) -> bool:
+        inner, operands, _, _ = steps[node]
         if inner != operation:
             return False
-        fixed = shared and any(tape.steps[o].stage <= Stage.PARAMETERS for o in operands)
+        fixed = shared and any(steps[o].stage <= Stage.PARAMETERS for o in operands)
         return node in used_once.results or fixed
 
-    def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
-        inner = partial(is_inner, tape, operation)
-        if operation in ("mul", "add") and any(map(inner, nodes)):
-            parts = _flattened(tape, nodes, inner)
-            fixed = [n for n in parts if tape.steps[n].stage <= Stage.PARAMETERS]
-            if len(fixed) > 1 and len(parts) > len(fixed):
-                rest = [n for n in parts if tape.steps[n].stage > Stage.PARAMETERS]
-                combine = partial(tape.applied, operation)
-                return combine(reduce(combine, fixed), reduce(combine, rest))
-        return tape.applied(operation, *nodes)
+    def find(
+        steps: Sequence[Step], operation: str, nodes: Sequence[int]
+    ) -> tuple[list[int], list[int]] | None:
+        """The factors, or terms, that are parameters, and the others."""
+        if operation not in ("mul", "add"):
+            return None
+        inner = partial(is_inner, steps, operation)
+        if not any(map(inner, nodes)):
+            return None
+        parts = _flattened(steps, nodes, inner)
+        fixed = [n for n in parts if steps[n].stage <= Stage.PARAMETERS]
+        if len(fixed) < 2 or len(parts) == len(fixed):
+            return None
+        return fixed, [n for n in parts if steps[n].stage > Stage.PARAMETERS]
 
-    return without_dead_steps(_rebuilt(program, rule, used_once.note))
+    def make(tape: Tape, operation: str, found: tuple[list[int], list[int]]) -> int:
+        combine = partial(tape.applied, operation)
+        return combine(*(reduce(combine, parts) for parts in found))
+
+    return _rebuilt(program, Rule(find, make, used_once.note))
 
 
-def _flattened(tape: Tape, nodes: list[int], is_inner: Callable[[int], bool]) -> list[int]:
+def _flattened(
+    steps: Sequence[Step], nodes: Sequence[int], is_inner: Callable[[int], bool]
+) -> list[int]:
     """The operands of nested products, or sums."""
     parts: list[int] = []
-    stack = nodes[::-1]
+    stack = list(nodes[::-1])
     while stack:
         node = stack.pop()
         if is_inner(node):
-            stack += reversed(tape.steps[node].operands)
+            stack += reversed(steps[node].operands)
         else:
             parts.append(node)
     return parts
@@ -137,32 +160,43 @@ def _factored(program: Program, *, shared: bool) -> Program:
     """`factor_sums`; with `shared`, one of the two products may be used elsewhere."""
     used_once = _UsedOnce(program, ("mul", "add", "sub"))
 
-    def product(tape: Tape, operation: str, left: int, right: int) -> int | None:
-        """a·(x ± y) for the products a·x and a·y; None if they are not, or have no common a."""
-        if not tape.steps[left].operation == tape.steps[right].operation == "mul":
+    def common(steps: Sequence[Step], left: int, right: int) -> tuple[int, int, int] | None:
+        """a, x, y of the products a·x and a·y; None if they are not, or have no common a."""
+        if not steps[left].operation == steps[right].operation == "mul":
             return None
         if sum(node in used_once.results for node in (left, right)) < 2 - shared:
             return None
-        a, b = tape.steps[left].operands, tape.steps[right].operands
+        a, b = steps[left].operands, steps[right].operands
         factor = next((i for i in a if i in b), None)
         if factor is None:
             return None
         x, y = (o[0] if o[1] == factor else o[1] for o in (a, b))
-        return tape.applied("mul", factor, tape.applied(operation, x, y))
+        return factor, x, y
 
-    def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
-        if operation in ("add", "sub"):
-            left, right = nodes
-            if found := product(tape, operation, left, right):
-                return found
-            inner, operands, _, _ = tape.steps[left]
-            if left in used_once.results and inner in ("add", "sub"):
-                alike = "add" if inner == operation else "sub"
-                if found := product(tape, alike, operands[1], right):
-                    return tape.applied(inner, operands[0], found)
-        return tape.applied(operation, *nodes)
+    def find(
+        steps: Sequence[Step], operation: str, nodes: Sequence[int]
+    ) -> tuple[tuple[int, int, int], Step | None] | None:
+        """a, x, y; and the sum s ± a·x if it is one."""
+        if operation not in ("add", "sub"):
+            return None
+        left, right = nodes
+        if products := common(steps, left, right):
+            return products, None
+        inner = steps[left]
+        if left not in used_once.results or inner.operation not in ("add", "sub"):
+            return None
+        products = common(steps, inner.operands[1], right)
+        return products and (products, inner)
 
-    return without_dead_steps(_rebuilt(program, rule, used_once.note))
+    def make(tape: Tape, operation: str, found: tuple[tuple[int, int, int], Step | None]) -> int:
+        (factor, x, y), inner = found
+        if inner is None:
+            return tape.applied("mul", factor, tape.applied(operation, x, y))
+        alike = "add" if inner.operation == operation else "sub"
+        product = tape.applied("mul", factor, tape.applied(alike, x, y))
+        return tape.applied(inner.operation, inner.operands[0], product)
+
+    return _rebuilt(program, Rule(find, make, used_once.note))
 
 
 def share_factors(program: Program) -> Program:
@@ -188,7 +222,7 @@ def share_factors(program: Program) -> Program:
         factors[i] = parts
     products = {i: parts for i, parts in factors.items() if i not in inner}
     often = Counter(pair for parts in products.values() for pair in _pairs(parts))
-    plans = {}
+    plans: dict[int, Sequence[int]] = {}
     for i, parts in products.items():
         if len(parts) < 3 or not _pairs(parts):
             continue
@@ -201,10 +235,7 @@ def share_factors(program: Program) -> Program:
     if not plans:
         return program
 
-    def rule(tape: Tape, operation: str, nodes: list[int]) -> int:
-        return tape.applied(operation, *nodes)
-
-    made = without_dead_steps(_rebuilt(program, rule, lambda *_: None, plans))
+    made = _rebuilt(program, Rule(lambda *_: None, lambda *_: 0, lambda *_: None), plans)
     # What two outputs shared they may now compute in different ways.
     pairs = program.operations.items()
     return made if all(made.operations[name] <= count for name, count in pairs) else program
@@ -217,9 +248,10 @@ def take_apart_shared(program: Program) -> Program:
     if len(program.steps) > MOST_TRIED:
         return program
     best = program
-    for gathered, factored in ((True, False), (False, True), (True, True)):
-        made = _gathered(program, shared=gathered)
-        made = share_factors(_factored(made, shared=factored))
+    plain, taken = (_gathered(program, shared=shared) for shared in (False, True))
+    ways = ((taken, False), (plain, True), *([] if taken is plain else [(taken, True)]))
+    for gathered, shared in ways:
+        made = share_factors(_factored(gathered, shared=shared))
         if _operations(made) < _operations(best):
             best = made
     return best
@@ -300,17 +332,24 @@ def _uses(program: Program) -> list[int]:
 
 
 def _rebuilt(
-    program: Program,
-    rule: Rule,
-    note: Callable[[int, str, int], None],
-    products: Mapping[int, Sequence[int]] = MappingProxyType({}),
+    program: Program, rule: Rule[Any], products: Mapping[int, Sequence[int]] = MappingProxyType({})
 ) -> Program:
-    """The program recorded on a new tape, each operation by `rule`; `note` gets each step. The
-    `products` are recorded as those of the given steps, from the left.
+    """The program recorded on a new tape, each operation by `rule` if that finds something; itself
+    if it finds nothing. The `products` are recorded as those of the given steps, from the left.
     """
-    tape = ExactTape()
-    new: list[int] = []
-    for i, (operation, operands, stage, value) in enumerate(program.steps):
+    old, start = program.steps, 0
+    while start < len(old) and start not in products:
+        operation, operands, _, _ = old[start]
+        if rule.find(old, operation, operands) is not None:
+            break
+        rule.note(start, operation, start)
+        start += 1
+    if start == len(old):
+        return program
+    tape = ExactTape.continued(old[:start])
+    tape.names |= {i: name for i, name in program.names.items() if i < start}
+    new = list(range(start))
+    for i, (operation, operands, stage, value) in enumerate(old[start:], start):
         if operation == "constant":
             node = tape.number(float(value or 0.0))
         elif operation == "input":
@@ -318,14 +357,19 @@ def _rebuilt(
         elif i in products:
             node = reduce(partial(tape.applied, "mul"), [new[o] for o in products[i]])
         else:
-            node = rule(tape, operation, [new[o] for o in operands])
+            nodes = [new[o] for o in operands]
+            found = rule.find(tape.steps, operation, nodes)
+            if found is None:
+                node = tape.applied(operation, *nodes)
+            else:
+                node = rule.make(tape, operation, found)
         if i in program.names:
             tape.names.setdefault(node, program.names[i])
-        note(i, tape.steps[node].operation, node)
+        rule.note(i, tape.steps[node].operation, node)
         new.append(node)
     outputs = {
         name: Output(output.shape, tuple([new[n] for n in output.nodes]))
         for name, output in program.outputs.items()
     }
     checks = (replace(check, node=new[check.node]) for check in program.checks)
-    return finish(tape, outputs, checks)
+    return without_dead_steps(finish(tape, outputs, checks))

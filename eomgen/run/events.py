@@ -11,32 +11,40 @@ so infinitely many bounces in a finite time come to an end. A contact whose gap 
 in grazing a curved surface, always bounces.
 """
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from copy import deepcopy
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from eomgen.run.contacts import (
-    STILL,
+from eomgen.engine.contact_times import NO_ZERO, UNHELD, closing, opening
+from eomgen.engine.contacts import (
+    ENDLESS,
+    NO_FORCES,
     TOLERANCE,
+    Held,
+    begin,
+    release,
+    settle,
+    strike,
+    weigh,
+)
+from eomgen.engine.roots import Search
+from eomgen.run.contacts import (
     Holding,
     Rate,
-    accelerations,
     check_depth,
     in_sizes,
-    recovery,
+    no_forces,
+    nothing_held,
     restrained,
-    slowest_bounces,
-    still,
-    strikes,
+    sizes_of,
 )
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Advance, Begin, Resume
 from eomgen.run.problem import Contacts, FloatArray, Problem
-from eomgen.run.roots import root
-from eomgen.run.trajectory import Event
+from eomgen.run.trajectory import Event, Kind
 
 GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Points of an adaptive step at which the gaps of contacts are checked; for equal steps, the ends.
@@ -45,8 +53,9 @@ GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 MOST_EVENTS = 10_000
 """Greatest number of events within 1e-9 of a run's length."""
 
-TOGETHER = 1e-9
-"""Contacts that open within this fraction of a step open together."""
+
+Flags = NDArray[np.int64]
+"""1 for some of the contacts, (nc,)."""
 
 
 @dataclass(frozen=True)
@@ -54,29 +63,22 @@ class Stepper:
     """How a run makes steps.
 
     begin    begins steps of a problem at any time
-    checked  the points of a step at which gaps are checked, as fractions from 0 to 1
+    share    gaps are checked at the ends of parts of a step, each this share of its length
     counted  wraps a function so that its calls count as derivatives
     """
 
     begin: Begin
-    checked: Sequence[float]
+    share: float
     counted: Callable[[Rate], Rate]
 
 
 @dataclass
 class _Status:
-    """The current status of a run: time, state, and contacts held.
-
-    slack    added to each gap, (nc,): positive for contacts that have just opened, whose gaps are 0
-             but for rounding, until they exceed `TOLERANCE`
-    fastest  the greatest rate of any gap at any strike so far, sizes/s
-    """
+    """The current status of a run: time, state, and what is known of contacts."""
 
     t: float
     y: FloatArray
-    held: tuple[int, ...]
-    slack: FloatArray
-    fastest: float
+    held: Held
 
 
 @dataclass
@@ -119,75 +121,76 @@ def advances(
     problem = replace(problem, contacts=in_sizes(problem.contacts))
     contacts = problem.contacts
     assert contacts is not None
-    count = len(contacts.names)
-    fastest = float(np.abs(contacts.rates(t_start, problem.initial)).max())
-    now = _Status(t_start, problem.initial, (), np.zeros(count), fastest)
-    closed: list[int] = []
+    now = _Status(
+        t_start, problem.initial, nothing_held(contacts, len(problem.initial), rest_speed)
+    )
+    closed = np.zeros(len(contacts.names), np.int64)
     begun = (now.t, now.y)
     if resume and "alpha" in resume:
-        alpha = float(resume["alpha"])
-        now.held = tuple(resume["held"].astype(int).tolist())
-        now.slack, now.fastest = resume["slack"].copy(), float(resume["fastest"])
-        begun = (float(resume["begun_t"]), resume["begun_y"])
+        begun = _resumed(contacts, now.held, resume)
     else:
-        alpha = recovery(contacts, t_start, now.y, t_end - t_start)
+        begin(contacts, now.held, now.t, now.y, t_end - t_start)
         check_depth(contacts, now.t, now.y)
-        closed = np.flatnonzero(contacts.gaps(now.t, now.y) <= TOLERANCE).tolist()
+        closed[contacts.gaps(now.t, now.y) <= TOLERANCE] = 1
     limit = _EventLimit(1e-9 * (t_end - t_start), t_start)
     made = 0
     while True:
-        if closed:
+        if closed.any():
             limit.count_event(now.t)
-            yield from _strike(problem, now, closed, rest_speed, alpha)
-        closed = []
+            yield from _strike(problem, now, closed)
+        closed[:] = 0
         if now.t >= t_end:
             return
         if resume is None:
             begun = (now.t, now.y)
-        holding = Holding(contacts, now.held, begun, alpha) if now.held else None
+        holding = Holding(contacts, deepcopy(now.held)) if now.held.holds.any() else None
         smooth = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
-        steps = stepper.begin(smooth, now.t, made, resume, lambda: not now.slack.any())
+        steps = stepper.begin(smooth, now.t, made, resume, lambda: not now.held.slack.any())
         resume = None
         for advance in steps:
             made += advance.steps
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             step = replace(advance, contact_powers=powers)
-            if advance.checked:
-                closing, closed = np.inf, list[int]()
-            else:
-                closing, closed = _closing(contacts, now, step, stepper.checked)
-            opening, opened = _opening(holding, now, step)
-            if closing <= opening and closed:
-                now.slack = np.zeros(len(contacts.names))
-                yield from _cut(now, step, closing, keep=True)
+            closes, opens = np.inf, np.inf
+            opened = np.zeros(len(closed), np.int64)
+            within, search = _Within(now.t, now.y, step), Search()
+            given = (contacts, within, now.held, search, now.t, step.t - now.t)
+            if not advance.checked:
+                closes = closing(*given, stepper.share, closed)
+            if holding:
+                opens = opening(*given, opened)
+            _check_times(contacts, now, step, closes, opens)
+            if closes <= opens and closed.any():
+                now.held.slack[:] = 0.0
+                yield from _cut(now, step, now.t + closes, keep=True)
                 break
-            closed = []
-            if opened:
-                limit.count_event(opening)
-                yield from _cut(now, step, opening, keep=False)
+            closed[:] = 0
+            if opened.any():
+                limit.count_event(now.t + opens)
+                yield from _cut(now, step, now.t + opens, keep=False)
                 yield _open(contacts, smooth, now, opened)
                 break
             now.t, now.y = step.t, step.y
-            if now.slack.any():
-                now.slack[contacts.gaps(now.t, now.y) > TOLERANCE] = 0.0
-            yield replace(step, resume=_resume(step, now, begun, alpha))
+            settle(contacts, now.held, now.t, now.y)
+            yield replace(step, resume=_resume(step, now.held, begun))
 
 
 def _resume(
-    step: Advance, now: _Status, begun: tuple[float, FloatArray], alpha: float
+    step: Advance, held: Held, begun: tuple[float, FloatArray]
 ) -> Callable[[], Resume] | None:
     """What a later run needs to continue after a step: that of the method, and the contacts."""
     if step.resume is None:
         return None
-    held, slack, fastest, own = now.held, now.slack.copy(), now.fastest, step.resume
+    own, alpha, fastest = step.resume, held.alpha, held.fastest
+    holds, slack = held.holds.copy(), held.slack.copy()
 
     def resume() -> Resume:
         return {
             **own(),
             "alpha": np.array(alpha),
-            "held": np.array(held, dtype=np.float64),
+            "held": np.flatnonzero(holds).astype(np.float64),
             "slack": slack,
             "fastest": np.array(fastest),
             "begun_t": np.array(begun[0]),
@@ -197,66 +200,92 @@ def _resume(
     return resume
 
 
-def _strike(
-    problem: Problem,
-    now: _Status,
-    closed: Sequence[int],
-    rest_speed: float | None,
-    alpha: float,
-) -> Iterator[Advance]:
-    """Yield the strikes at time `now.t`, and update `now` with the contacts that are then held."""
-    contacts, t = problem.contacts, now.t
-    assert contacts is not None
-    near = np.flatnonzero(contacts.gaps(t, now.y) <= TOLERANCE).tolist()
-    touching = sorted({*closed, *now.held, *near})
-    speeds: dict[int, float] = {}
+def _resumed(contacts: Contacts, held: Held, resume: Resume) -> tuple[float, FloatArray]:
+    """Take what an earlier run knew of contacts; when and where it began to hold them."""
+    held.alpha, held.fastest = float(resume["alpha"]), float(resume["fastest"])
+    held.holds[resume["held"].astype(int)] = 1
+    held.slack[:] = resume["slack"]
+    begun = (float(resume["begun_t"]), resume["begun_y"])
+    weigh(contacts, held, *begun)
+    return begun
 
-    def instant(struck: int | None = None) -> Advance:
-        y = now.y
+
+@dataclass(frozen=True)
+class _Within:
+    """The states of a step that begins at t with y."""
+
+    t: float
+    y: FloatArray
+    step: Advance
+
+    def state(self, s: float) -> FloatArray:
+        """The state s seconds after its start."""
+        step = self.step
+        return self.y if s <= 0 else step.y if s >= step.t - self.t else step.within(self.t + s)
+
+
+def _check_times(
+    contacts: Contacts, now: _Status, step: Advance, closes: float, opens: float
+) -> None:
+    """Raise `StepFailure` if times at which contacts close or open are not found."""
+    if opens == UNHELD:
+        raise no_forces(contacts, now.held, step.t)
+    if NO_ZERO in (closes, opens):
+        raise StepFailure(
+            f"the time of a contact is not found between {now.t:.6g} and {step.t:.6g}",
+            "take a smaller step",
+        )
+
+
+def _strike(problem: Problem, now: _Status, closed: Flags) -> Iterator[Advance]:
+    """Yield the strikes at time `now.t`, and update `now` with the contacts that are then held."""
+    contacts, held, t = problem.contacts, now.held, now.t
+    assert contacts is not None
+    count = len(contacts.names)
+    made: list[tuple[int, FloatArray]] = []
+
+    def impact(t: float, y: FloatArray, contact: int, bounce: float) -> FloatArray:
+        made.append((contact, contacts.impact(t, y, contact, bounce)))
+        return made[-1][1]
+
+    def instant(y: FloatArray, struck: int | None = None) -> Advance:
         return Advance(t, y, [], problem, lambda _: y, steps=0, struck=struck)
 
-    sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
-    free = accelerations(contacts, t, now.y)
-    now.fastest = max(now.fastest, float(np.abs(contacts.rates(t, now.y)).max()))
-    nothing = STILL * max(now.fastest, math.sqrt(np.abs(free).max()))
-    least = slowest_bounces(free, None if rest_speed is None else rest_speed / sizes)
-    for contact, speed, y in strikes(contacts, t, now.y, touching, least, nothing):
-        now.y = y
-        speeds[contact] = max(speeds.get(contact, 0.0), speed)
-        yield instant(contact)
-    before, now.held = now.held, tuple(still(contacts, t, now.y, touching, nothing, alpha))
-    slow = contacts.rates(t, now.y) <= nothing
-    for k in touching:
-        opens = slow[k] and k not in now.held
-        now.slack[k] = _slack(contacts, t, now.y, k) if opens else 0.0
-    events = [
-        Event(t, contacts.names[k], "impact", float(speed * sizes[k]))
-        for k, speed in sorted(speeds.items())
-        if speed >= least[k]
-    ]
-    rest = [k for k in now.held if k not in before]
-    lift = [k for k in before if k not in now.held]
-    events += [
-        Event(t, contacts.names[k], "rest", float(speeds.get(k, 0.0) * sizes[k])) for k in rest
-    ]
-    events += [Event(t, contacts.names[k], "lift", 0.0) for k in lift]
-    rows = [(t, now.y)] if speeds else []
-    yield replace(instant(), samples=rows, events=tuple(events))
+    before, y = held.holds.copy(), now.y.copy()
+    speeds, least = np.empty((2, count))
+    answer = strike(replace(contacts, impact=impact), held, t, y, closed, speeds, least)
+    for contact, after in made:
+        now.y = after
+        yield instant(after, contact)
+    if answer == ENDLESS:
+        names = ", ".join(contacts.names[k] for k in sorted({contact for contact, _ in made}))
+        raise StepFailure(
+            f"the impacts among {names} at t = {t:.6g} do not end", "take less restitution"
+        )
+    if answer == NO_FORCES:
+        raise no_forces(contacts, held, t)
+
+    found = (speeds * sizes_of(contacts)).tolist()
+    events: list[Event] = []
+    kinds: tuple[tuple[Kind, NDArray[np.bool_]], ...] = (
+        ("impact", (speeds > 0) & (speeds >= least)),
+        ("rest", held.holds > before),
+        ("lift", held.holds < before),
+    )
+    for kind, which in kinds:
+        for k in np.flatnonzero(which).tolist():
+            speed = 0.0 if kind == "lift" else found[k]
+            events.append(Event(t, contacts.names[k], kind, speed))
+    rows = [(t, now.y)] if made else []
+    yield replace(instant(now.y), samples=rows, events=tuple(events))
 
 
-def _open(contacts: Contacts, problem: Problem, now: _Status, opened: Sequence[int]) -> Advance:
+def _open(contacts: Contacts, problem: Problem, now: _Status, opened: Flags) -> Advance:
     """Release contacts that were held."""
-    now.held = tuple(k for k in now.held if k not in opened)
-    for k in opened:
-        now.slack[k] = _slack(contacts, now.t, now.y, k)
-    events = tuple(Event(now.t, contacts.names[k], "lift", 0.0) for k in opened)
+    release(contacts, now.held, now.t, now.y, opened)
+    events = tuple(Event(now.t, contacts.names[k], "lift", 0.0) for k in np.flatnonzero(opened))
     y = now.y
     return Advance(now.t, y, [], problem, lambda _: y, steps=0, events=events)
-
-
-def _slack(contacts: Contacts, t: float, y: FloatArray, contact: int) -> float:
-    """The `slack` of a contact that opens: `TOLERANCE`, or a little more than its penetration."""
-    return max(TOLERANCE, 0.01 * TOLERANCE - float(contacts.gaps(t, y)[contact]))
 
 
 def _cut(now: _Status, step: Advance, t: float, keep: bool) -> Iterator[Advance]:
@@ -270,101 +299,3 @@ def _cut(now: _Status, step: Advance, t: float, keep: bool) -> Iterator[Advance]
     now.t, now.y = t, y
     rows = [*samples, (t, y)] if keep else samples
     yield replace(step, t=t, y=y, samples=rows, resume=None)
-
-
-def _closing(
-    contacts: Contacts, now: _Status, step: Advance, checked: Sequence[float]
-) -> tuple[float, list[int]]:
-    """The time at which contacts first close in a step, and which; infinity and none if none do."""
-    apart = [k for k in range(len(contacts.names)) if k not in now.held]
-    if not apart:
-        return np.inf, []
-    length, slack = step.t - now.t, now.slack.copy()
-
-    def state(s: float) -> FloatArray:
-        return now.y if s <= 0 else step.y if s >= length else step.within(now.t + s)
-
-    def gap(k: int, s: float) -> float:
-        return float(contacts.gaps(now.t + s, state(s))[k] + slack[k])
-
-    def rate(k: int, s: float) -> float:
-        return float(contacts.rates(now.t + s, state(s))[k])
-
-    def at(s: float) -> tuple[float, FloatArray, FloatArray]:
-        y = state(s)
-        return s, contacts.gaps(now.t + s, y), contacts.rates(now.t + s, y)
-
-    a, gaps_a, rates_a = at(0.0)
-    for fraction in checked[1:]:
-        b, gaps_b, rates_b = at(fraction * length)
-        found = []
-        for k in apart:
-            low = gaps_b[k] + slack[k] < 0
-            dips = rates_a[k] < 0 < rates_b[k]
-            if low or dips:
-                ends = (gaps_a[k] + slack[k], gaps_b[k] + slack[k])
-                zero = _first_zero(partial(gap, k), partial(rate, k), a, b, ends)
-                if zero is not None:
-                    found.append((zero, k))
-        if found:
-            first = min(found)[0]
-            return now.t + first, [k for zero, k in found if zero <= first + 1e-12 * length]
-        slack[gaps_b > TOLERANCE] = 0.0
-        a, gaps_a, rates_a = b, gaps_b, rates_b
-    return np.inf, []
-
-
-def _first_zero(
-    gap: Callable[[float], float],
-    rate: Callable[[float], float],
-    a: float,
-    b: float,
-    ends: tuple[float, float],
-) -> float | None:
-    """The first point at which a gap falls to 0, if it does; its rate changes sign at most once
-    between `a` and `b`. `ends` are its values there.
-    """
-    at_a, at_b = ends
-    before, after = rate(a), rate(b)
-    # A gap that rises first reaches 0 only after its maximum: at `a` it may be 0 but for rounding.
-    if at_a > 0 and at_b < 0 and not before > 0 > after:
-        return _root(gap, a, b)
-    turns = before * after < 0
-    middle = _root(rate, a, b) if turns else b
-    if before < 0:  # it falls first
-        if at_a <= 0:
-            return a
-        return _root(gap, a, middle) if turns and gap(middle) < 0 else None
-    if at_b >= 0 or not turns:  # it rises still
-        return a if before == 0 and at_b < at_a <= 0 else None
-    return _root(gap, middle, b) if gap(middle) > 0 else middle
-
-
-def _root(function: Callable[[float], float], a: float, b: float) -> float:
-    xtol = max(1e-14 * (b - a), 1e-300)
-    return root(function, a, b, (function(a), function(b)), xtol=xtol, rtol=1e-15)
-
-
-def _opening(holding: Holding | None, now: _Status, step: Advance) -> tuple[float, list[int]]:
-    """The time at which held contacts first open in a step, and which; infinity and none if none
-    do. A contact opens when its force has fallen to 0 and its gap begins to grow.
-    """
-    if holding is None:
-        return np.inf, []
-    _, pushes, parts = holding.solve(step.t, step.y)
-    length = step.t - now.t
-
-    def force(i: int, s: float) -> float:
-        y = step.y if s >= length else step.within(now.t + s) if s > 0 else now.y
-        _, push, part = holding.solve(now.t + s, y)
-        return float(push[i] - part[i])
-
-    found = []
-    for i in np.flatnonzero((pushes == 0) & (parts > 0)).tolist():
-        pressed = partial(force, i)
-        at = _root(pressed, 0.0, length) if pressed(0.0) > 0 else 0.0
-        found.append((at, holding.held[i]))
-    if not found:
-        return np.inf, []
-    first = min(found)[0]
-    return now.t + first, [k for at, k in found if at <= first + TOGETHER * length]

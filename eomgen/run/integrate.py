@@ -1,10 +1,10 @@
 """Integration of a problem: checks of the arguments, the steps, and the trajectory."""
 
-import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from eomgen.run.passage import Passage
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.projection import Violations
+from eomgen.run.rows import Record, Rows, all_finite
 from eomgen.run.shaking import Shaken
 from eomgen.run.singular import watched
 from eomgen.run.stepping import (
@@ -113,23 +114,23 @@ def integrate(
     monitor = _monitor(guard, problem, method, asked) if guard else None
     repairs = monitor is not None and monitor.guard.repairs
     calls = Calls(Count(1), Count(2))
-    counted = replace(
-        problem,
-        derivative=calls.derivatives.of(monitor.derivative if monitor else problem.derivative),
-        jacobian=calls.jacobians.of(problem.jacobian),
-    )
+    functions: dict[str, Any] = {
+        "derivative": calls.derivatives.of(monitor.derivative if monitor else problem.derivative),
+        "jacobian": calls.jacobians.of(problem.jacobian),
+    }
     violations = None
     if problem.projection:
         violations = Violations(len(problem.projection.names))
         projection = replace(problem.projection, violations=violations, seen=Seen())
-        counted = replace(counted, projection=projection)
+        functions["projection"] = projection
     if problem.closed_form:
-        counted = replace(counted, closed_form=replace(problem.closed_form, seen=Seen()))
+        functions["closed_form"] = replace(problem.closed_form, seen=Seen())
+    counted = problem.having(**functions)
     if tally:
         counted = tally.counting(counted)
     seed = problem.scrutiny.seed if problem.scrutiny else None
     if seed is not None and isinstance(method, Adaptive) and "lost" not in method.memory:
-        counted = replace(counted, derivative=Shaken(counted.derivative, seed).derivative)
+        counted = counted.having(derivative=Shaken(counted.derivative, seed).derivative)
     remarks: list[str] = []
     if isinstance(method, FixedStep):
         # Evaluations to check stability do not count. They need a Jacobian with all digits, which
@@ -147,8 +148,8 @@ def integrate(
             asked, method, problem, remarks.append, compiled=compiled, each=each, dense=dense
         )
 
-    gap_checks = (0.0, 1.0) if isinstance(method, FixedStep) else events.GAP_CHECKS
-    stepper = events.Stepper(begin, gap_checks, calls.derivatives.of)
+    share = 1.0 if isinstance(method, FixedStep) else events.GAP_CHECKS[1]
+    stepper = events.Stepper(begin, share, calls.derivatives.of)
     passage = None
     if counted.projection and counted.contacts is None and not repairs:
         passage = Passage(
@@ -188,11 +189,12 @@ def _trajectory(
 ) -> Trajectory:
     """The trajectory of a run that has ended."""
     account = run.account
+    t, y = run.rows.arrays()
     return Trajectory(
         name=problem.name,
         states=problem.states,
-        t=np.array([t for t, _ in run.rows]),
-        y=np.array([y for _, y in run.rows]),
+        t=t,
+        y=y,
         integrator=integrator,
         finished=outcome.kind == "finished",
         message=message,
@@ -247,7 +249,7 @@ class _Run:
     t: float
     y: FloatArray
     account: Account | None
-    rows: list[tuple[float, FloatArray]] = field(default_factory=list)
+    rows: Record = field(default_factory=Record)
     works: list[FloatArray] = field(default_factory=list)
     steps: int = 0
     capped: int = 0
@@ -272,11 +274,11 @@ class _Run:
 
     def end(self) -> None:
         """Keep the last state if no row has its time."""
-        if self.t > self.rows[-1][0]:
+        if self.t > self.rows.last:
             self._keep()
 
     def _keep(self) -> None:
-        self.rows.append((self.t, self.y))
+        self.rows.add(self.t, self.y)
         if self.account:
             self.works.append(self.account.total)
 
@@ -387,17 +389,14 @@ def _check_start(problem: Problem, run: _Run) -> None:
     """
     slope = problem.derivative(run.t, run.y)
     assert slope.shape == run.y.shape, f"derivative has shape {slope.shape}"
-    if not np.isfinite(slope).all():
+    if not all_finite(slope):
         raise StepFailure("the derivative there is not finite", "change the initial state")
 
 
 def _is_finite(advance: Advance) -> bool:
-    return all(map(_has_numbers, (advance.y, *(y for _, y in advance.samples))))
-
-
-def _has_numbers(y: FloatArray) -> bool:
-    """Whether all numbers are finite; a finite sum, which is found sooner, says so, too."""
-    return math.isfinite(y.sum()) or bool(np.isfinite(y).all())
+    rows = advance.samples
+    states = [rows.y] if isinstance(rows, Rows) else [y for _, y in rows]
+    return all_finite(advance.y) and all(map(all_finite, states))
 
 
 def _place(problem: Problem, run: _Run) -> str:

@@ -17,6 +17,7 @@ from eomgen.run.intervals import Interval
 from eomgen.run.localised import Scrutiny
 from eomgen.run.origin import Origin
 from eomgen.run.projection import Projection
+from eomgen.run.rows import all_finite
 
 FloatArray = NDArray[np.float64]
 """An array of 64-bit floats, such as a state."""
@@ -158,9 +159,13 @@ class Problem:
                 f"initial: has shape {initial.shape}, but {self.name} has "
                 f"{len(self.states)} states; give one number for each"
             )
-        for state, value in zip(self.states, initial.tolist(), strict=True):
-            if not np.isfinite(value):
-                raise RunError(f"initial: {state} = {value} is not finite")
+        if not all_finite(initial):
+            state, value = next(
+                pair
+                for pair in zip(self.states, initial.tolist(), strict=True)
+                if not math.isfinite(pair[1])
+            )
+            raise RunError(f"initial: {state} = {value} is not finite")
         for indices in self.quaternions:
             if math.hypot(*(float(initial[i]) for i in indices)) < SHORTEST:
                 raise RunError(
@@ -172,6 +177,12 @@ class Problem:
         assert all(0 <= index < len(self.states) for index in self.positions)
         initial.flags.writeable = False
         object.__setattr__(self, "initial", initial)
+
+    def having(self, **functions: Any) -> "Problem":
+        """The same problem with other functions; its initial state is not checked again."""
+        made = object.__new__(Problem)
+        made.__dict__.update(self.__dict__, **functions)
+        return made
 
     @property
     def leading_positions(self) -> int:

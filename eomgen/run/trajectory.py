@@ -15,6 +15,7 @@ from eomgen.files import is_ours, read_plain, write_whole
 from eomgen.run.archive import Array, checked, packed, unpacked
 from eomgen.run.origin import Origin
 from eomgen.run.problem import FloatArray
+from eomgen.run.rows import all_finite
 from eomgen.run.setup import Setup
 
 FORMAT, READ = "trajectory 5", ("trajectory 5", "trajectory 4")
@@ -134,11 +135,11 @@ class Trajectory:
             raise ValueError(f"trajectory: t has shape {t.shape}, not (n,) with n >= 1")
         if y.shape != (t.size, len(self.states)):
             raise ValueError(f"trajectory: y has shape {y.shape}, not {(t.size, len(self.states))}")
-        if not (np.isfinite(t).all() and np.isfinite(y).all()):
+        if not (all_finite(t) and all_finite(y)):
             raise ValueError("trajectory: t or y is not finite")
-        if np.any(np.diff(t) < 0):
+        if (t[1:] < t[:-1]).any():
             raise ValueError("trajectory: t decreases")
-        if set(self.counts) != set(COUNTS):
+        if self.counts.keys() != set(COUNTS):
             raise ValueError(f"trajectory: counts are {sorted(self.counts)}, not {COUNTS}")
         arrays = [t, y]
         if self.works is not None:

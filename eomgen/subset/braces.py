@@ -34,7 +34,8 @@ STATEMENTS = (
 GATHERED = {"ordered": ("0.0", "+="), "all_within": ("1", "&=")}
 """What entries are gathered by, one after another: what is begun with, and what is done."""
 ONE, TWO = ("j_",), ("i_", "j_")
-"""The indices of entries in loops over arrays of one dimension and of two."""
+"""The indices of entries in loops over arrays of one dimension and of two; the text has no names
+that end so."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,8 @@ class _Function:
         if self.to.typed:
             read = {n for n, k in arguments if k.is_array} - self.changes[self.d.name]
             shown = [
-                f"{'const ' if name in read else ''}{_type(kind, self.to)}{name}"
+                f"{'const ' if name in read else ''}{_type(kind, self.to)}"
+                f"{'restrict ' if kind.is_array else ''}{name}"
                 for name, kind in arguments
             ]
         result = of_annotation(self.d.returns)
@@ -217,6 +219,10 @@ class _Function:
                 numbers.setdefault(word, []).append(name)
                 continue
             size = self._product(kind.room or kind.sizes)
+            parts = _names(ast.parse(size.replace("->", "."), mode="eval"))
+            if unknown := parts & (self.kinds.names.keys() - self.kinds.arguments.keys()):
+                why = f"the size of {name} is known only when {unknown.pop()} is"
+                raise NotInSubsetError(ast.copy_location(ast.Name(name), self.d), why)
             made = self.to.array.format(type=self.to.arrays[kind.of == "int"], name=name, size=size)
             lines.append(f"    {made}")
         return [*(f"    {word} {', '.join(many)};" for word, many in numbers.items()), *lines]
@@ -372,7 +378,7 @@ class _Function:
         for s in group:
             if called(s.value) in GATHERED:
                 self._line(f"{self._expr(s.targets[0])} = {GATHERED[called(s.value)][0]};")
-        self._line(self._for("j_", self._span(group[0])) + " {")
+        self._line(self._for(ONE[0], self._span(group[0])) + " {")
         self.depth += 1
         for s in group:
             (target,), value = s.targets, s.value
@@ -469,7 +475,7 @@ class _Function:
             return
         if len(kind.sizes) == 1:  # of whole numbers, or a vector of zeros
             fill = called(value) == "whole"
-            self._line(self._for("j_", kind.sizes[0]))
+            self._line(self._for(ONE[0], kind.sizes[0]))
             entry = "0" if fill else _bare(self._expr(value, ONE))
             self._line(f"    {self._expr(target, ONE)} = {entry};")
             return
@@ -619,6 +625,8 @@ class _Function:
             return self._expr(args[0], at)
         if name in ("zeros", "matrix", "whole"):
             return "0.0"
+        if name == "transposed":
+            return self._expr(args[0], at[::-1])
         if name == "outer":
             return f"({self._expr(args[0], at[:1])} * {self._expr(args[1], at[1:])})"
         if name in ("min", "max", "larger"):

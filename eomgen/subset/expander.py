@@ -36,27 +36,29 @@ class NotInSubsetError(SyntaxError):
 @dataclass
 class Text:
     """The engine's text: its functions, and the fields and functions of its records and protocols,
-    by name; the constants of its modules; and the functions themselves.
+    by name; the constants of each function's module; and the functions themselves.
     """
 
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     classes: dict[str, ast.ClassDef] = field(default_factory=dict)
-    constants: dict[str, Any] = field(default_factory=dict)
+    constants: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     python: dict[str, Callable[..., Any]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, *modules: ModuleType, **known: Any) -> "Text":
-        """The text of modules, with further constants."""
+    def of(cls, *modules: ModuleType) -> "Text":
+        """The text of modules. Raises `ValueError` if two functions have the same name."""
         text = cls()
         for module in modules:
-            text.constants |= {n: x for n, x in vars(module).items() if n.isupper()}
+            constants = {n: x for n, x in vars(module).items() if n.isupper()}
             for d in ast.parse(inspect.getsource(module)).body:
                 if isinstance(d, ast.FunctionDef):
+                    if d.name in text.functions:
+                        raise ValueError(f"{module.__name__}: a second function {d.name}")
                     text.functions[d.name] = d
+                    text.constants[d.name] = constants
                     text.python[d.name] = getattr(module, d.name)
                 elif isinstance(d, ast.ClassDef):
                     text.classes[d.name] = d
-        text.constants |= known
         return text
 
     def expanded(self, roots: Iterable[tuple[str, Mapping[str, Any]]]) -> list[ast.FunctionDef]:
@@ -74,7 +76,9 @@ class Text:
                 open_.append(own)
                 d = _copied(self.functions[name])
                 d.name, d.args.args = own, [a for a in d.args.args if a.arg not in known]
-                d.body = _Expander({**self.constants, **known}, self, make).block(d.body)
+                d.body = _Expander({**self.constants.get(name, {}), **known}, self, make).block(
+                    d.body
+                )
                 made[own] = d
                 open_.remove(own)
             return own

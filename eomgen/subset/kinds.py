@@ -192,6 +192,9 @@ class Kinds:
         if name == "product":
             rows = self.of(args[0])
             return Kind("float", rows.sizes[:1], rows.room[:1])
+        if name == "transposed":
+            x = self.of(args[0])
+            return Kind(x.of, x.sizes[::-1], x.room[::-1])
         if name in ("abs", "copy", "min", "max", "larger"):
             kinds = [self.of(a) for a in args]
             of = "float" if any(k.of == "float" for k in kinds) else "int"

@@ -88,7 +88,7 @@ def _results(
     """The chunks as they come."""
     if scheduler:
         yield from by_dask(task, jobs, scheduler)
-    elif task.together:
+    elif task.together or (task.threads and workers > 1):
         yield from _by_threads(task, jobs, max(1, min(workers, len(jobs))), running)
     elif workers > 1 and len(jobs) > 1:
         yield from by_processes(task, jobs, min(workers, len(jobs)), running)

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.codegen.interface import Interface
 from eomgen.errors import EomgenError
 from eomgen.model.model import Model
 from eomgen.native.accelerator import Accelerator
-from eomgen.program.program import Program
+from eomgen.native.needed import needed_by
 from eomgen.run.inputs import InputsOfTime, ModuleWithInputs, with_corners
 from eomgen.run.integrate import integrate
+from eomgen.run.integrators import find_integrator
 from eomgen.run.module import as_problem, given_values, load_module
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Trajectory
@@ -40,10 +40,10 @@ class Task:
 
     model       the scene's model
     source      the text of its module
-    program     its program and interface, from which compiled code is made where the members run;
-                None if they run in Python
+    compiled    whether members run in compiled code, which is made where they run; else in Python
     at_once     whether that is compiled before the first run, or once it pays
     together    whether members run together, see `sweep.together`, or one by one
+    threads     whether members that run one by one do so in threads: if Python does little in them
     names       what is varied; `kinds` says of each whether it is a "parameter", "state" or "input"
     parameters, inputs  fixed values by name
     varying     all inputs, if some of them are tables
@@ -58,9 +58,10 @@ class Task:
 
     model: Model
     source: str
-    program: tuple[Program, Interface] | None
+    compiled: bool
     at_once: bool
     together: bool
+    threads: bool
     names: tuple[str, ...]
     kinds: tuple[str, ...]
     parameters: Mapping[str, float]
@@ -88,7 +89,7 @@ class Task:
 
     @property
     def _key(self) -> tuple[object, ...]:
-        return self.digest, self.program is None, self.at_once
+        return self.digest, self.compiled, self.at_once
 
     def __hash__(self) -> int:
         return hash(self._key)
@@ -146,15 +147,16 @@ class _Prepared:
         self.kept = task.times if len(task.times) > 2 else task.times[-1:]
         self.shapes = [output_shape(task.source, name) for name in task.outputs]
         self.accelerator: Accelerator | None = None
-        if task.program is not None:
-            self.accelerator = Accelerator(
-                task.model, self.module, None, None, program=task.program
-            )
+        if task.compiled:
+            self.accelerator = Accelerator(task.model, self.module, None, None)
 
     def compile(self) -> None:
-        """Compile the steps now. Raises `RunError` if there is no compiler, or if it fails."""
+        """Compile now what all members need. Raises `RunError` if there is no compiler, or if it
+        fails.
+        """
         if self.accelerator is not None:
-            self.accelerator.compile()
+            method = find_integrator(self.task.settings["integrator"])
+            self.accelerator.compile(needed_by(method, self.module))
 
     def member(self, row: Sequence[float]) -> _Member:
         """Run a member. One that is refused or stops says so."""

@@ -7,12 +7,14 @@ from functools import lru_cache
 import numpy as np
 
 from eomgen.native import adaptive_lanes, lanes
+from eomgen.native.accelerator import library_key
 from eomgen.native.adaptive_lanes import AdaptiveLanes
 from eomgen.native.lanes import Lanes
 from eomgen.run.checks import errors_of_sizes
 from eomgen.run.module import as_problem, given_values
 from eomgen.run.problem import USUAL_LENGTH, FloatArray, Problem
 from eomgen.run.sizes import mechanism_size, state_sizes
+from eomgen.store import interfaced_program_of
 from eomgen.sweep.counter import Counter
 from eomgen.sweep.members import FINISHED, Arrays, Task, compile_steps, module_of, run_members
 
@@ -98,10 +100,10 @@ def build(task: Task) -> None:
 
 @lru_cache(4)
 def _library(task: Task) -> Lanes:
-    assert task.program is not None
-    if task.settings["integrator"] == "rk4":
-        return Lanes(lanes.sources(*task.program, task.outputs))
-    return AdaptiveLanes(adaptive_lanes.sources(*task.program, task.outputs))
+    name = task.settings["integrator"]
+    make, of = (Lanes, lanes) if name == "rk4" else (AdaptiveLanes, adaptive_lanes)
+    about = library_key(task.model, f"{name} {task.outputs}")
+    return make(lambda: of.sources(*interfaced_program_of(task.model), task.outputs), about=about)
 
 
 class _Starts:

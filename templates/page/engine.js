@@ -37,7 +37,7 @@ const makeEngine = (mechanism, data) => {
   let lost = new Float64Array(ny); // rounding errors of the last sums
   let [start, goal, cost] = [0, 0, NaN];
   let [regular, closed, repeated] = [true, [], 0];
-  let [law, held, change] = [null, null, null];
+  let [law, change] = [null, null];
 
   // ---- The problem ----
 
@@ -73,15 +73,15 @@ const makeEngine = (mechanism, data) => {
     if (!table.length) return null;
     const sizes = table.map((c) => (c.unit === "m" ? data.size ?? 1 : 1));
     const switches = table.map((c) => data.effects.find((e) => e.name === c.effect)?.switch ?? null);
-    const relative = (values) => Array.from(values, (x, k) => x / sizes[k]);
     const given = (t, y) => [t, y, engine.p, engine.u];
     return contacts.make({
       names: table.map((c) => c.name),
       sizes,
       ny,
       active: (k) => switches[k] === null || engine.p[switches[k]] !== 0,
-      gaps: (t, y) => relative(mechanism.gaps(...given(t, y))),
-      rates: (t, y) => relative(mechanism.gapRates(...given(t, y))),
+      many: mechanism.held(...given(engine.t, engine.y), table.map(() => 0)).length,
+      gaps: (t, y) => mechanism.gaps(...given(t, y)),
+      rates: (t, y) => mechanism.gapRates(...given(t, y)),
       impact: (t, y, k, bounce) =>
         mechanism.impact(...given(t, y), [...table.map((_, i) => (i === k ? 1 : 0)), bounce]),
       held: (t, y, forces) => {
@@ -118,8 +118,7 @@ const makeEngine = (mechanism, data) => {
   function renew() {
     lost.fill(0);
     regular = engine.t === start;
-    held = law?.now.held.length ? law.holding(law.now.held, engine.t, engine.y.slice()) : null;
-    problem = held ? { ...free, f: (t, y) => held.solve(t, y).result.subarray(0, ny) } : free;
+    problem = law?.held().length ? { ...free, f: law.derivative } : free;
   }
 
   function restart() {
@@ -153,8 +152,9 @@ const makeEngine = (mechanism, data) => {
   // One step to the next mark, or to the contact that comes first.
   function makeStep() {
     const { t, y } = engine;
-    if (law && law.now.held.some((k) => !law.active(k))) {
-      note(law.release(t, y, law.now.held.filter((k) => !law.active(k))));
+    const off = law ? law.held().filter((k) => !law.active(k)) : [];
+    if (off.length) {
+      note(law.release(t, y, off));
       renew();
     }
     if (closed.length) {
@@ -194,7 +194,7 @@ const makeEngine = (mechanism, data) => {
       return projected(t + s, y.map((x, k) => x + within[k]));
     };
     const closing = law.closing(t, length, state);
-    const opening = held ? law.opening(held, t, length, state) : null;
+    const opening = law.opening(t, length, state);
     if (!closing && !opening) return false;
     const first = closing && !(opening && opening.s < closing.s) ? closing : opening;
     if (first.s > 0) {

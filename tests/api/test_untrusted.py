@@ -164,6 +164,7 @@ def places(text: str) -> Iterator[tuple[int, int]]:
         yield found.span()
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("hostile", [HOSTILE, LONG], ids=["hostile", "long"])
 def test_text_of_a_scene_is_never_shown_as_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], hostile: str

@@ -1,13 +1,14 @@
 """Does the main job run with the oldest versions that pyproject.toml allows, and on the newest
 Python there is?
 
-    python tests/campaigns/versions.py [oldest] [newest] [3.N ...]
+    python tests/campaigns/versions.py [oldest] [newest] [newer] [3.N ...]
 
 The first two unless some are named. Each makes a virtual environment of its own, installs this
 folder, and there generates, simulates and verifies a few scenes and runs a small part of the tests.
 `oldest`: the lowest version of each dependency as pyproject.toml has it, on the lowest Python.
-`newest`: what the package index has, on the highest Python found here, which it names. `3.14`: the
-same on that Python. Where Python or the index is missing it says NOT CHECKED and why, and counts as
+`newest`: what the package index has, on the highest Python found here, which it names. `newer`: the
+same if that is higher than the Python that runs this, for after its own tests. `3.14`: the same on
+that Python. Where Python or the index is missing it says NOT CHECKED and why, and counts as
 no failure; all else that goes wrong does. docs/compatibility.md has what was found.
 """
 
@@ -61,7 +62,7 @@ def chosen(which: str) -> tuple[Path | None, str, list[str]]:
     ]
     there = pythons()
     if which != "oldest":
-        version = max(there) if which == "newest" else (3, int(which.removeprefix("3.")))
+        version = max(there) if which.startswith("newe") else (3, int(which.removeprefix("3.")))
         return there.get(version), f"3.{version[1]}", [t.split(">=")[0] for t in tests]
     match = re.fullmatch(r">=3\.(\d+)", project["requires-python"])
     assert match is not None, project["requires-python"]
@@ -72,6 +73,9 @@ def chosen(which: str) -> tuple[Path | None, str, list[str]]:
 def check(which: str, work: Path) -> bool:
     """Whether the main job and the tests ran; true also where that could not be checked."""
     python, version, packages = chosen(which)
+    if which == "newer" and version == f"3.{sys.version_info.minor}":
+        print(f"== newer: Python {version}, which runs this, is the newest here")
+        return True
     print(f"== {which}: Python {version} with {', '.join(packages)}", flush=True)
     if python is None:
         print(f"NOT CHECKED: there is no Python {version} here")
@@ -133,7 +137,7 @@ def run(command: Sequence[str | Path], work: Path) -> bool:
 def main() -> int:
     """All that is asked for; 1 if any failed."""
     wanted = sys.argv[1:] or ["oldest", "newest"]
-    if not all(re.fullmatch(r"oldest|newest|3\.\d+", which) for which in wanted):
+    if not all(re.fullmatch(r"oldest|newest|newer|3\.\d+", which) for which in wanted):
         print(__doc__)
         return 2
     good = True

@@ -35,6 +35,7 @@ def awk(text: str, states: np.ndarray, folder: Path) -> np.ndarray:
     return np.array([[float(x) for x in line.split()] for line in done.stdout.splitlines()])
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", ["double_pendulum", "tumbling_body", "chain"])
 def test_a_language_is_one_file_and_one_folder(
     scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -91,6 +92,7 @@ def javascript(text: str, made: Engine, name: str, y: np.ndarray, extra: Any = (
     return [value(row.strip().rstrip(",")) for row in rows.splitlines()]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 def test_javascript_is_the_module(scene: str, tmp_path: Path) -> None:
     """The same bits as Python's, of the derivative and of all that is computed beside it."""

@@ -44,6 +44,7 @@ def module(request: pytest.FixtureRequest) -> Any:
     return eomgen.load(eomgen.generate(SCENE, backend=backend))
 
 
+@pytest.mark.every(2)
 def test_columns_of_parameters_and_inputs_are_one_by_one(module: Any) -> None:
     """Arrays (n, k), and mappings to arrays (k,): each column as if it were alone."""
     random = np.random.default_rng(5)

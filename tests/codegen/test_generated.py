@@ -65,6 +65,7 @@ def pin_wrenches(
     return np.column_stack((motion.pin_forces, moments))[c.scene.pin_rows(c.module)]
 
 
+@pytest.mark.every(2)
 def test_random_states(built_in: Compiled) -> None:
     """At many states, with forces and torques if there are any, one by one and as columns.
 
@@ -113,7 +114,7 @@ def test_quarter_poses(built_in: Compiled) -> None:
 
 
 @pytest.mark.parametrize("tree", TREES, ids=lambda tree: tree.name)
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_random_trees(tree: Scene) -> None:
     """Chains, branches, several trees, point masses, pins anywhere: 20 states of each."""
     c = compiled(tree)
@@ -132,6 +133,7 @@ def c(request: pytest.FixtureRequest) -> Compiled:
     return compiled(request.param)
 
 
+@pytest.mark.every(3)
 def test_bodies_and_the_whole(c: Compiled) -> None:
     """Velocities of bodies, centre of mass, momentum and energies, from the other solver's motion.
 
@@ -307,6 +309,7 @@ def in_momentum_form(
     return np.array([state[name] for name in wanted]), np.array([rate[name] for name in wanted])
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("form", ["momentum", "redundant"])
 @pytest.mark.parametrize(
     "scene",

@@ -74,6 +74,7 @@ def error(found: Any, wanted: np.ndarray) -> float:
     return float((difference.max(0) / np.abs(wanted).max(0)).max())
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", some(SCENES, SCENES + LARGE))
 def test_numbers_are_those_of_the_python_module(scene: str) -> None:
     """Of columns, of states mapped by vmap, and with other parameters and inputs."""
@@ -156,6 +157,7 @@ def test_rows_and_lines_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.allclose(found(y), lines, rtol=1e-11, atol=1e-11 * np.abs(lines).max())
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("longest", [0, 1000], ids=["rows", "lines"])
 def test_no_branch_makes_a_derivative_nan(longest: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that is not taken counts nothing, even if it is infinite or has an infinite slope."""

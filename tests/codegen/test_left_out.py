@@ -128,7 +128,7 @@ PAIRS = [  # dimensions, the joint, what is locked, the weld in its place
     ("dimensions", "joint", "locked", "weld", "route"),
     [(*pair, r) for i, pair in enumerate(PAIRS) for r in some(ROUTES[i % 2 :][:1], ROUTES)],
 )
-@pytest.mark.every(2)
+@pytest.mark.every(6)
 def test_locked_is_welded(dimensions: int, joint: str, locked: str, weld: str, route: str) -> None:
     """The same numbers at the same cost: a locked joint is gone from the equations."""
     held = engine(leg(dimensions, joint, f"[locked]\n{locked}"), route)
@@ -267,7 +267,7 @@ def test_double_pendulum_without_velocity_forces(route: str) -> None:
 @pytest.mark.parametrize(
     ("dimensions", "seed"), [(PLANE, 3), (PLANE, 38), (SPACE, 11), (SPACE, 14)]
 )
-@pytest.mark.every(2)
+@pytest.mark.every(6)
 def test_without_velocity_forces(dimensions: int, seed: int, route: str) -> None:
     """V is 0 and h is G; accelerations, inverse dynamics and joint forces are those of the whole
     scene at rest in the same place; what moves still moves; the Jacobian is exact.

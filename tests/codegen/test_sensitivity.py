@@ -190,7 +190,7 @@ def state(e: Engine, seed: int) -> tuple[np.ndarray, dict, dict]:
     return y, u, p
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @every_case
 def test_derivatives_are_exact(name: str, route: str) -> None:
     """Written out, and along directions as for large models, by the program and by the module."""
@@ -222,6 +222,7 @@ def test_entries_are_exact_one_by_one(name: str, route: str) -> None:
                 assert np.max(np.abs(row - wanted), initial=0) <= 1e-12 * size + 1e-30, output
 
 
+@pytest.mark.every(4)
 @every_case
 def test_both_forms_for_columns_of_states(name: str, route: str) -> None:
     """Many states at once give each one's own matrix, written out or not; so does no input."""
@@ -244,6 +245,7 @@ def test_both_forms_for_columns_of_states(name: str, route: str) -> None:
                 assert apart(function(0.0, y, p, u), wanted) < ROUNDING
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "route"), [("machine", "aba"), ("chain", "ldl"), ("space_3", "")])
 def test_routes_have_one_derivative(name: str, route: str) -> None:
     """Both routes write down the same matrices."""
@@ -348,6 +350,7 @@ g = 9.81
         assert apart(J[:, i], column) < ROUNDING
 
 
+@pytest.mark.full
 def test_weights_that_vanish_refuse_nothing() -> None:
     """`orthogonal` weighs some rows by 1e-200: their products may vanish, and no derivative is
     refused for that.

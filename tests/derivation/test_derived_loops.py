@@ -200,6 +200,7 @@ def eliminated(
     return rates, known["lambda"]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SMALL)
 def test_matrices_with_multipliers_against_the_module(scene: str) -> None:
     """M v̇ + V + G = F, where F contains the forces of the constraints, and v̇ by the closed form."""

@@ -237,6 +237,7 @@ BY = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("by", BY)
 def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
     """M v̇ + V + G = F and its solution, F written out."""
@@ -363,6 +364,7 @@ def test_dots_are_over_whole_names() -> None:
             assert not words, words
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SHOWN)
 def test_three_formats(scene: str) -> None:
     """No refusal. In prose no markup, in formulas no hyphen for a minus, in LaTeX plain ASCII."""

@@ -134,7 +134,7 @@ def at_digits(model: Model, q: Any) -> Dynamics:
     return Dynamics(model, Values(values, {}, list(q), still, {}, mpfr(0)), Bits())
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", POLYGONS)
 def test_polygons_close_to_50_digits(name: str) -> None:
     """All round, on the branch of the start and without a jump of an angle."""
@@ -158,6 +158,7 @@ def test_polygons_close_to_50_digits(name: str) -> None:
 MODULES = ("two bars", "a guide that turns, then a bar")
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", some(MODULES, tuple(POLYGONS)))
 def test_modules_move_as_by_projection(name: str) -> None:
     """All coordinates, velocities and accelerations, and the Jacobian by that of deviations."""
@@ -188,6 +189,7 @@ FORMULAS = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", FORMULAS)
 def test_closed_formulas(name: str) -> None:
     """Positions, velocities and accelerations around the circle are those of the closed formulas,

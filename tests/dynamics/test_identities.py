@@ -186,6 +186,7 @@ CASES += [  # the other forms need an inertia of every body
 ]
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("scene", "form"), CASES)
 def test_jacobian(scene: str | int, form: str) -> None:
     """The exact Jacobian is the derivative's, differentiated in 60 digits, in every state form."""
@@ -205,6 +206,7 @@ def test_jacobian(scene: str | int, form: str) -> None:
     assert_close(c.module.jacobian(0.0, both, u=inputs)[:, :, 1], expected)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("scene", "form"), CASES)
 def test_jacobians_by_inputs_and_parameters(scene: str | int, form: str) -> None:
     """∂f/∂u and ∂f/∂p are the derivative's, differentiated in 60 digits, in every state form."""

@@ -96,6 +96,7 @@ def about(inertia: np.ndarray, mass: float, r: np.ndarray) -> np.ndarray:
 # One joint at a time.
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("axis", [X, -Y, Z, np.array([2, -1, 2]) / 3, np.array([1, 2, -2]) / 3])
 def test_revolute(route: str, axis: np.ndarray) -> None:
     """(a·I a + n² J) q̈ = τ + a · (arm × m g), with I about the pin; a = E axis."""
@@ -464,6 +465,7 @@ PARTS = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", PARTS)
 def test_a_joint_is_its_parts(route: str, kind: str) -> None:
     """Joints of several coordinates move as their parts on massless bodies do."""
@@ -517,6 +519,7 @@ NAMES = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("dimensions", "kind"), NAMES)
 def test_names(dimensions: int, kind: str) -> None:
     """Of coordinates and velocities, as they are by themselves and as a scene gives them."""
@@ -658,7 +661,7 @@ def upright(tree: SpatialTree) -> str:
 
 
 @pytest.mark.parametrize("seed", [*range(9), 60, 379])
-@pytest.mark.every(2)
+@pytest.mark.every(8)
 def test_the_plane_is_a_part_of_space(route: str, seed: int) -> None:
     """A planar scene stood upright in space: the same motion, forces, energies."""
     tree, text = random_spatial_tree(seed, PLANE, 5)
@@ -688,6 +691,7 @@ OUT_OF_PLANE = re.compile(
 )
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", ["acrobot", "cart_pole", "chain", "two_body_forced"])
 def test_the_plane_does_not_pay_for_space(route: str, name: str) -> None:
     """No step of a planar program is about what the plane makes zero."""
@@ -697,6 +701,7 @@ def test_the_plane_does_not_pay_for_space(route: str, name: str) -> None:
     assert any(OUT_OF_PLANE.fullmatch(word) for word in top)
 
 
+@pytest.mark.every(2)
 def test_the_plane_is_cheaper_than_space(route: str) -> None:
     """Pins and free bodies take fewer operations in the plane than upright in space."""
     paid = []

@@ -30,6 +30,7 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.max(np.abs(a - b), initial=0.0) / (1 + np.max(np.abs(b), initial=0.0)))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("judge", JUDGES)
 @pytest.mark.parametrize("tree", trees(), ids=lambda tree: tree.name)
 def test_accelerations_and_joint_forces_agree(tree: SpatialTree, judge: str) -> None:
@@ -45,6 +46,7 @@ def test_accelerations_and_joint_forces_agree(tree: SpatialTree, judge: str) -> 
             assert apart(wrenches, motion.joint_forces) < CLOSE
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("tree", trees(), ids=lambda tree: tree.name)
 def test_energy_and_momentum_change_as_power_and_wrench_say(tree: SpatialTree) -> None:
     """Central differences along the motion; poses change as the velocities say."""
@@ -110,6 +112,7 @@ def faults(tree: SpatialTree) -> Iterator[tuple[str, SpatialTree]]:
     yield "gravity", replace(tree, gravity=tree.gravity + 1e-5)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("judge", ["newton_euler", *JUDGES])
 def test_each_judge_notices_a_small_mistake(judge: str) -> None:
     """A mistake is in the tree that one judge reads; `solve` reads the right one."""

@@ -67,6 +67,7 @@ def test_every_route_is_mujoco(dimensions: int, seed: int) -> None:
     assert max(accelerations for accelerations, _ in found.values()) < CLOSE
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("seed", [2, 5, 9])
 def test_masses_over_12_decades(seed: int) -> None:
     """The route of last resort keeps every digit that the data have; the others do not."""
@@ -146,6 +147,7 @@ def left_out(*kept: str) -> tuple[str, ...]:
     return ("jacobian", *(name for name in OUTPUTS if name not in kept))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("dimensions", "route"), [(PLANE, "independent"), (SPACE, "aba")])
 def test_a_module_is_the_solver(dimensions: int, route: str) -> None:
     """As code: accelerations, wrenches, residuals, and projections that change nothing."""

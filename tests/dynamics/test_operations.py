@@ -144,6 +144,7 @@ def test_an_effect_costs_its_own_terms_and_no_route(what: str) -> None:
     assert (found.system.route, found.operations) == ("closed", 28 + more)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("name", "names"),
     [
@@ -170,7 +171,7 @@ def test_closed_takes_every_effect(name: str, names: tuple[str, ...]) -> None:
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-11, err_msg=output)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(9)
 @pytest.mark.parametrize("load", LOADS)
 def test_closed_takes_loads_at_joints(load: str) -> None:
     """The derivative, the power of the load, and what else depends on it, as by articulated bodies;

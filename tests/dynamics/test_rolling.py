@@ -179,15 +179,9 @@ def test_the_rate_of_a_residual_is_the_power_of_its_loads(name: str, other: str)
     at = anywhere(model, 5)
     d, along = MechanismState(model, at, FloatScalars()), moving(model, at)
     rates = constraints.rates(d)
-    alone = [
-        n
-        for (n, _), r in zip(model.rows, constraints.rows_of(d), strict=True)
-        if r.residual is None
-    ]
+    alone = [n for (n, _), r in zip(model.rows, d.rows, strict=True) if r.residual is None]
     assert list(model.velocity_rows) == alone
-    for row, changing, rate in zip(
-        constraints.rows_of(d), constraints.rows_of(along), rates, strict=True
-    ):
+    for row, changing, rate in zip(d.rows, along.rows, rates, strict=True):
         if row.residual is not None and "equations" not in HOLDING[name][2]:
             assert changing.residual.value == row.residual
             assert rate == pytest.approx(changing.residual.rate, abs=1e-13)
@@ -558,6 +552,7 @@ def test_a_tippe_top_that_rolls() -> None:
     assert energy == pytest.approx(energy[0], rel=1e-10)
 
 
+@pytest.mark.full
 def test_the_rattleback_turns_round() -> None:
     """With the parameters of Kane and Levinson 1982, energy kept. Spun the other way it goes on."""
     made = module("rattleback")
@@ -579,6 +574,7 @@ def test_the_rattleback_turns_round() -> None:
 # The bicycle: see whipple.py.
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("speed", SPEEDS)
 def test_the_linearised_bicycle(speed: int) -> None:
     """The Jacobian of the generated module on the manifold of the constraints, at every speed of

@@ -62,6 +62,7 @@ def in_floats(
     return Dynamics(model, values, FloatScalars(), axes)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("dimensions", "seed"), [*product((PLANE, SPACE), SEEDS)])
 def test_accelerations(dimensions: int, seed: int) -> None:
     """By both routes, in either kind of axes by turns, or in both, as three others have them."""
@@ -118,6 +119,7 @@ def test_regrouped_inertias(dimensions: int, seed: int) -> None:
                 assert body.first_moment[k] == 0.0 == min(across) <= max(across)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("seed", range(12))
 def test_accelerations_from_rest(dimensions: int, seed: int) -> None:
@@ -251,7 +253,7 @@ def assert_as_solved(
 
 
 @by_module
-@pytest.mark.every(2)
+@pytest.mark.every(7)
 def test_module_at_its_own_parameters(dimensions: int, seed: int, route: str) -> None:
     """Every output of a module against the solver; joint space against the accelerations."""
     tree, e = made(dimensions, seed, route)
@@ -298,7 +300,7 @@ FORCE = "applied_force"
 
 
 @by_module
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_module_at_other_parameters(dimensions: int, seed: int, route: str) -> None:
     """Parameters by name and in order: as the solver has a tree of other numbers."""
     tree, e = made(dimensions, seed, route)
@@ -355,7 +357,7 @@ def test_columns_are_one_by_one(dimensions: int, seed: int, route: str) -> None:
 # In 60 digits.
 
 FEW = range(20, some(23, 25))
-CLOSED = [(seed, 4) for seed in some((4, 15, 37), (4, 9, 15, 22, 27, 36, 37))]
+CLOSED = [(seed, 4) for seed in some((4, 37), (4, 9, 15, 22, 27, 36, 37))]
 CLOSED += some([], [(13, 5), (20, 5)])
 OUTPUTS = (
     "derivative mass_matrix velocity_force gravity_force bias_force applied_force kinetic_energy "
@@ -377,6 +379,7 @@ def assert_equal_programs(a: Engine, b: Engine, seed: int, digits: int) -> None:
             assert apart(found, other) < 10.0**-digits, output
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("seed", "most"), CLOSED)
 def test_closed_is_aba(seed: int, most: int) -> None:
     """SymPy's own solution and the recursion, to 50 digits, on planar trees of up to 5 bodies."""
@@ -392,7 +395,7 @@ def test_closed_is_aba(seed: int, most: int) -> None:
 
 @pytest.mark.parametrize("dimensions", (PLANE, SPACE))
 @pytest.mark.parametrize("seed", FEW)
-@pytest.mark.every(2)
+@pytest.mark.every(6)
 def test_ldl_is_aba(dimensions: int, seed: int) -> None:
     """Over all joint types: to 50 digits but for rotations that the scene gives in degrees.
 

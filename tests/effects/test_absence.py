@@ -32,7 +32,7 @@ def without(base: str) -> Engine:
     return compiled_light(parse_scene(BASES[base].format(outputs="")))
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("case", TRIED, ids=lambda case: case.name)
 def test_absence_is_free(case: Case) -> None:
     """With the effect the module is another, full of what it brings; without it, all that a module
@@ -52,6 +52,7 @@ def test_absence_is_free(case: Case) -> None:
     check_added(made.module, bare.module)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("base", ["plane", "space"])
 def test_absence_of_many(base: str) -> None:
     """The same, byte for byte, of whole modules, Jacobian and all, and of many effects at once."""

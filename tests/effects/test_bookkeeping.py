@@ -37,6 +37,7 @@ def moments(made: Engine, count: int) -> list[tuple[np.ndarray, float, dict[str,
     ]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("case", TRIED, ids=lambda case: case.name)
 def test_kinetic_energy_grows_by_the_power_of_effects(case: Case) -> None:
     """dT/dt = Σ power, with the powers that the module itself gives in doubles."""

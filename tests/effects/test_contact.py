@@ -297,7 +297,7 @@ def loads_by_hand(tree: SpatialTree, motion: SpatialMotion, law: tuple[str, ...]
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("law", [DAMPED, HUNT])
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 def test_random_trees_move_as_under_loads_put_in_by_hand(
     law: tuple[str, ...], dimensions: int, route: str
 ) -> None:
@@ -412,7 +412,7 @@ def wrench(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> np.ndarra
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("geometry", GEOMETRY)
 @pytest.mark.parametrize("law", [SPRING, HERTZ, (*HUNT, *RUB)])
-@pytest.mark.every(3)
+@pytest.mark.every(7)
 def test_the_change_of_energy_is_the_power_of_the_contacts(
     law: tuple[str, ...], geometry: str, dimensions: int
 ) -> None:
@@ -439,6 +439,7 @@ def test_the_change_of_energy_is_the_power_of_the_contacts(
     assert worked > 0.1
 
 
+@pytest.mark.every(6)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("geometry", GEOMETRY)
 def test_jacobians_are_those_of_central_differences(geometry: str, dimensions: int) -> None:
@@ -470,6 +471,7 @@ def test_just_touching_is_smooth(law: tuple[str, ...]) -> None:
             assert abs(jacobian[row, column]) < 1e-4
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("law", [SPRING, (*DAMPED, *RUB), HERTZ, (*HUNT, *RUB)])
 def test_centres_may_meet(law: tuple[str, ...], dimensions: int) -> None:
@@ -503,7 +505,7 @@ def rigid(found: Engine, y: np.ndarray) -> tuple[tuple[Contact, ...], Dynamics]:
 
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("geometry", GEOMETRY)
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 def test_rigid_contacts_say_how_their_gaps_change(geometry: str, dimensions: int) -> None:
     """The power of `normal` is the gap's rate; tangents are unit vectors across; in pairs the loads
     cancel; no load acts.

@@ -266,6 +266,7 @@ def test_numbers_are_parameters() -> None:
     assert all(f"hold_{name}" in module.PARAMETERS for name in names)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("tangents", [False, True])
 @pytest.mark.parametrize("name", SCENES)
 def test_jacobian(name: str, tangents: bool) -> None:
@@ -289,6 +290,7 @@ def test_jacobian(name: str, tangents: bool) -> None:
         assert np.allclose(module.input_jacobian(t, y), slopes(given, np.zeros(1)), **near)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", SCENES)
 def test_dynamics_with_states(name: str) -> None:
     """Forward and inverse dynamics take the states as `x`, and answer each other."""
@@ -315,6 +317,7 @@ def test_columns(name: str) -> None:
     assert np.allclose(module.derivative(0.2, states), one, rtol=1e-13, atol=1e-14)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     "integrator",
     [name for name in INTEGRATORS if not name.startswith(("leapfrog", "taylor", "heyoka"))],

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bookkeeping import differences, gained, powers
+from campaign import some
 from engine import Engine, apart, quick
 from scipy.integrate import solve_ivp
 from spatial_newton_euler import solve
@@ -41,6 +42,7 @@ def drop(effects: str, dimensions: int = PLANE) -> Engine:
     return quick(DROP.format(dimensions, inertia) + effects)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("law", ["linear", "quadratic", "made"])
 def test_a_fall_from_rest_is_the_exact_one(dimensions: int, law: str) -> None:
@@ -67,6 +69,7 @@ def test_a_fall_from_rest_is_the_exact_one(dimensions: int, law: str) -> None:
     assert abs(made.module.derivative(0.0, ending)[down]) < 1e-14 * G
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 def test_named_points_are_places_like_others(dimensions: int) -> None:
     """Drag at two named points is drag at those two places."""
@@ -135,7 +138,7 @@ def test_drag_on_any_tree(dimensions: int) -> None:
     rng = np.random.default_rng(5)
     tried, seed = 0, 0
     wind = ["3*sin(t) - 0.5*y", "0.4*x**2", "0"][:dimensions]
-    while tried < 4:
+    while tried < some(2, 4):
         tree, text = random_spatial_tree(seed := seed + 1, dimensions)
         if tree.push is not None or len(tree.bodies) < 2:
             continue
@@ -210,6 +213,7 @@ def test_energy_changes_by_the_power_of_the_effects() -> None:
     assert powers(still, still.random_state(rng))[1] < 0
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("tangents", [False, True])
 def test_jacobians_are_right_at_rest_and_elsewhere(tangents: bool) -> None:
     """Against differences of the module; at rest quadratic drag has no slope at all, exactly."""

@@ -32,6 +32,7 @@ FEW = [(PLANE, 3), (PLANE, 38), (SPACE, 11), (SPACE, 14), (SPACE, 47)]
 ROUTES = ("aba", "ldl")
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("dimensions", "seed"), TREES)
 def test_as_the_judge_has_it(dimensions: int, seed: int) -> None:
     """Accelerations by both routes and in both kinds of axes, driving forces, joint forces."""
@@ -92,7 +93,7 @@ def at_random(e: Engine, seed: int) -> tuple[np.ndarray, dict[str, float], Any]:
 
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize(("dimensions", "seed"), FEW)
-@pytest.mark.every(2)
+@pytest.mark.every(8)
 def test_as_the_undriven_scene(dimensions: int, seed: int, route: str) -> None:
     """At the same motion: M, V, G, F are its free rows, and f'' takes its part of M into V; the
     same forces keep the same motion; what else there is is the same.
@@ -156,7 +157,7 @@ def turned(tree: SpatialTree) -> bool:
         (SPACE, 47, "aba", True),
     ],
 )
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_jacobians(dimensions: int, seed: int, route: str, tangents: bool) -> None:
     """By state and by parameters, those of the drives among them, against differences."""
     e = made(dimensions, seed, route, tangents=tangents)
@@ -179,6 +180,7 @@ def test_jacobians(dimensions: int, seed: int, route: str, tangents: bool) -> No
         assert apart(jacobian[:, i], along(rates, p, unit)) < digits, names[i]
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("dimensions", "seed"), FEW)
 def test_energy_is_accounted_for(dimensions: int, seed: int) -> None:
     """dE/dt is the sum of the effects' powers, driving force times rate among them."""

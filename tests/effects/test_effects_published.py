@@ -296,7 +296,7 @@ def couple(
     return [(k, axes.T @ arm, force), (k, np.zeros(3), -force)]
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @both_dimensions
 def test_random_trees_under_fields_forces_and_torques(dimensions: int, route: str) -> None:

@@ -71,7 +71,7 @@ def test_a_formula_is_the_force(dimensions: int) -> None:
 
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("power", [0, 1, 2, 3, 6])
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 def test_central_fields(dimensions: int, power: int) -> None:
     """Attract, repel and vortex by hand, with softening and a centre away from the origin."""
     centre, place = np.array([0.2, -0.1, 0.3])[:dimensions], [1.2, 0.7, -0.6][:dimensions]

@@ -120,6 +120,7 @@ def test_any_direction_in_space() -> None:
     assert np.allclose(same.joint_forces(0.0, y), down.joint_forces(0.0, y), rtol=1e-11, atol=1e-12)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", [PLANE, SPACE])
 def test_except_bodies(scene: str) -> None:
     """Weights of all but some: as forces from outside on the others, and none excepted is all."""
@@ -239,6 +240,7 @@ def test_torque_in_the_plane() -> None:
     assert list(module.INPUTS) == ["twist"]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", [SHIP, SPINNER])
 def test_force_in_body_axes(scene: str) -> None:
     """At every instant the force of the world that the body's turn makes of it."""
@@ -274,7 +276,7 @@ VARIANTS = [
 
 
 @pytest.mark.parametrize(("scene", "more"), VARIANTS)
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_jacobian_and_energy(scene: str, more: str) -> None:
     """Jacobians as central differences have them; dE/dt is the power of what has no potential."""
     for route in ("aba", "ldl"):

@@ -104,6 +104,7 @@ def test_a_ball_bounces_on_a_shaken_floor(name: str) -> None:
     assert abs(run.works[-1].sum() - change[-1]) < 1e-11
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["DOP853", "rk4"])
 def test_a_drive_bears_what_rests_on_its_floor(name: str) -> None:
     """Its work is what both bodies' energy grows by; the contact does none."""
@@ -184,6 +185,7 @@ coordinate = "0.4*t*t"
 """
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 def test_powers_under_contact_forces_add_up(route: str) -> None:
     """Of contacts, drives, in the order of the effects, and weight: dE/dt, in 60 digits."""

@@ -263,6 +263,7 @@ def test_a_damped_stop_never_pulls(limits: str) -> None:
 # Equal and opposite.
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("more", [(), ("tension_only = true",), ('law = "9*stretch + 2*rate"',)])
 def test_a_spring_between_free_bodies_keeps_momentum(
@@ -353,6 +354,7 @@ def by_hand(
     return total
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 def test_random_trees_move_as_under_loads_put_in_by_hand(dimensions: int, route: str) -> None:
@@ -428,6 +430,7 @@ def linked(table: str) -> str:
     return bodies + second + table
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_change_of_energy_is_the_power_of_the_effects(kind: str) -> None:
     """dT/dt is the power of all; of what has potential energy, power is minus its change."""
@@ -497,6 +500,7 @@ ZERO_CASES = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("case", "dimensions"),
     [

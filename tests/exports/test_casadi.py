@@ -68,6 +68,7 @@ def check_at(functions: Any, module: Any, y: Any, t: float = 0.3) -> None:
     assert close(slope(t, y, p, u).full(), module.jacobian(t, y, p, u))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "source",
     [

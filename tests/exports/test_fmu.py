@@ -58,6 +58,7 @@ def unit(folder: Path, scene: str) -> Path:
     return eomgen.export(scene, "fmu", path)[0]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("scene", "t_end"), RUNS)
 def test_a_unit_moves_as_our_own_run(scene: str, t_end: float, folder: Path) -> None:
     """Plane, space, a loop, and impacts until a contact is held: both kinds, to 1e-8."""

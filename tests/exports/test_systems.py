@@ -27,6 +27,7 @@ def test_the_state_space_of_a_cart_and_pole() -> None:
     assert np.array_equal(whole.C, np.eye(4)) and not whole.D.any() and whole.name == "cart_pole"
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("scene", "outputs"),
     [

@@ -122,7 +122,7 @@ def test_an_orientation_of_parameters_follows_them(n: int) -> None:
     """
     y, p = np.random.default_rng(1).normal(size=4), {"tilt": 0.7}
     fixed = eomgen.load(eomgen.generate(tilted(n, 0.7)))
-    for route in some(("closed", "aba"), ("closed", "ldl", "aba", "orthogonal")):
+    for route in some(("aba",), ("closed", "ldl", "aba", "orthogonal")):
         own = eomgen.load(eomgen.generate(tilted(n), route=route))
         for name in ("derivative", "jacobian", "joint_forces", "body_poses"):
             pair = getattr(own, name)(0.0, y, p), getattr(fixed, name)(0.0, y)

@@ -340,6 +340,7 @@ LONGEST = [
 ]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("formula", LONGEST)
 def test_the_longest_formulas_stay_small(formula: str) -> None:
     """500 characters make some hundred operations, which Python's parser takes, in no time."""

@@ -52,6 +52,7 @@ def run(
     return ours.dop853(y, k, u, atol, times=times, **options)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 def test_runs_are_those_of_the_method_in_python(scene: str) -> None:
     """The same steps, with some rejected, rows within steps and at their ends."""
@@ -71,6 +72,7 @@ def test_runs_are_those_of_the_method_in_python(scene: str) -> None:
             assert np.allclose(rows[:, :, j], single.y[1:], rtol=0, atol=1e-9 * size)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_member_has_the_same_bits_at_every_width_and_beside_any_others(scene: str) -> None:
     """One neighbour overflows, one is not finite; others need many more steps; the order is

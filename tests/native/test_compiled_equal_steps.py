@@ -16,6 +16,7 @@ SCENES = some(("two_body_forced", "spinning_top"), built_in_names())
 pytestmark = compiler
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("method", METHODS)
 def test_the_bits_are_those_of_python(scene: str, method: str) -> None:
@@ -37,6 +38,7 @@ def test_parameters_and_inputs_count(method: str) -> None:
     assert not np.array_equal(other.y, compiled.y)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_run_goes_on_in_either(method: str) -> None:
     """What one has begun the other continues, also from the middle of a step of the whole run."""

@@ -14,6 +14,7 @@ import eomgen
 from eomgen.native import checked
 from eomgen.results import Run
 from eomgen.run.integrators import strides
+from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.roots import root
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import read_scene
@@ -145,6 +146,26 @@ def test_stops_and_pulses_are_seen(scene: str, share: float, made: list[int]) ->
     assert sum(made) > share * steps
 
 
+def test_python_makes_only_what_was_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step that passed over a pulse is repeated in C, shorter."""
+    made, step = list[float](), DormandPrince8.step
+
+    def noted(self: DormandPrince8) -> str | None:
+        made.append(self.t)
+        return step(self)
+
+    monkeypatch.setattr(DormandPrince8, "step", noted)
+    random, cut = np.random.default_rng(3), 0
+    for _ in range(5):
+        exponents = {"w": random.uniform(-5, -1), "k": random.uniform(0, 5)}
+        given = {name: 10**x for name, x in exponents.items()} | {"a": random.uniform(0.0, 3.0)}
+        run = eomgen.simulate(
+            TURNING, backend="c", integrator="DOP853", parameters=given, rtol=1e-7, samples=11
+        )
+        cut += run.trajectory.counts["cut"]
+    assert 0 < cut <= len(made) <= 2 * cut
+
+
 def test_a_function_with_the_period_of_a_step_is_seen() -> None:
     """At the ends of all steps it has the same value, far from 0."""
     begun = alike(STILL, parameters={"a": 9.0}, max_step=0.1, t_end=2.05)
@@ -157,6 +178,7 @@ def test_a_contact_that_closes_and_opens_in_a_step_is_seen() -> None:
     alike(HELD, integrator="DOP853", parameters={"push": 13.0}, rtol=1e-2)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", [WHEEL, TURNING, "bouncing_two_body"])
 def test_a_run_goes_on_in_either(scene: str) -> None:
     """What one has begun the other continues, also where a step is to end before a pulse."""

@@ -176,6 +176,7 @@ def test_equal_steps_have_the_bits_of_python(scene: str, method: str) -> None:
     assert compiled.trajectory.counts["steps"] == 51 or not compiled.finished
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", [*GAUSS, "leapfrog"])
 def test_equal_steps_go_on_in_either(method: str) -> None:
     """Also from the middle of a step of the whole run."""
@@ -188,6 +189,7 @@ def test_equal_steps_go_on_in_either(method: str) -> None:
         assert run.compiled == (second == "c")
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", [*GAUSS, "leapfrog"])
 def test_equal_steps_fail_alike(method: str) -> None:
     """In the fall into a centre, and where Newton's iteration does not converge."""
@@ -196,6 +198,7 @@ def test_equal_steps_fail_alike(method: str) -> None:
         assert_same(compiled, python)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("scene", [PLANE, FALL, "pendulum"])
 @pytest.mark.parametrize("unstable", [False, True])
 @pytest.mark.parametrize("method", ["leapfrog", "leapfrog_4", "leapfrog_6"])

@@ -109,6 +109,7 @@ def test_the_bits_are_those_of_python(
     assert sum(compiled_steps) >= 0.8 * steps - 4 or (scene, options) == ("car_suspension", RODAS)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("options", [RK4, DOP853])
 def test_change_points_are_passed_alike(options: dict[str, Any], compiled_steps: list[int]) -> None:
     """At the change point of a parallelogram."""
@@ -151,6 +152,7 @@ def test_contacts_close_alike(compiled_steps: list[int]) -> None:
     assert python.trajectory.counts["impacts"] > 1 and sum(compiled_steps) > 5
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["leapfrog", "leapfrog_4", "leapfrog_6"])
 def test_rattle_in_c(method: str, compiled_steps: list[int]) -> None:
     """All steps but the first and the last, with the bits of Python's."""

@@ -12,6 +12,7 @@ import eomgen
 from eomgen.errors import RunError
 from eomgen.native import accelerator
 from eomgen.results import Run
+from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.scene.built_in import built_in_names
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -71,6 +72,17 @@ def test_the_bits_are_those_of_python(scene: str, rtol: float) -> None:
     end = 1.0 if scene in ("ragdoll", "walker_motors", "stiff_beam") else 3.0
     compiled, python = both(scene, t_end=end, rtol=rtol, samples=237)
     assert_same(compiled, python)
+
+
+@compiler
+def test_python_makes_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even the one that reaches the end, which is rejected if it is too long."""
+    ends = (1.0, 2.013, 2.5)
+    runs = [eomgen.simulate("two_body", t_end=end, backend="numpy", rtol=1e-4) for end in ends]
+    monkeypatch.setattr(DormandPrince8, "step", pytest.fail)
+    for end, python in zip(ends, runs, strict=True):
+        compiled = eomgen.simulate("two_body", t_end=end, backend="c", rtol=1e-4)
+        assert_same(compiled, python)
 
 
 @compiler
@@ -173,6 +185,21 @@ def test_without_a_compiler_long_runs_say_so(
     assert [line for line in run.warnings if "no C compiler was found" in line]
     with pytest.raises(RunError, match="no C compiler was found"):
         eomgen.simulate("two_body", t_end=0.1, backend="c")
+
+
+def test_a_library_is_compiled_once_that_pays_for_all_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What Python has taken for a function counts, in whichever run."""
+    made, library = list[str](), object()
+
+    def compiled(about: str, *given: Any) -> Any:
+        made.append(about)
+        return library
+
+    monkeypatch.setattr(accelerator, "kept_library", lambda about: None)
+    monkeypatch.setattr(accelerator, "compiled_library", compiled)
+    of = accelerator._Library("jacobian", dict, "main.c", 1.0, pytest.fail)
+    assert of.beyond(0.4) is None and of.beyond(0.4) is None and not made
+    assert of.beyond(0.4) is library and of.after(0.0) is library and made == ["jacobian"]
 
 
 def test_an_unknown_backend_is_refused() -> None:

@@ -486,6 +486,7 @@ BEAM_RATES = np.array(
 )
 
 
+@pytest.mark.full
 def test_stiff_beam() -> None:
     """Forty angles within 1e-9 and their rates within 1e-6: sums of the relative ones here."""
     module = loaded("stiff_beam")

@@ -94,6 +94,7 @@ def chosen(scene: str, accuracy: float, **given: Any) -> eomgen.Run:
     return run
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("width", [5e-4, 1e-6])
 def test_a_pulse_in_time_is_not_overlooked(width: float) -> None:
     """All tolerances step over it, by some seconds; so their runs agreed."""
@@ -115,6 +116,7 @@ def test_a_pulse_in_time_is_not_overlooked(width: float) -> None:
     assert run.trajectory.y[-1] == pytest.approx(y, abs=1e-4)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     "shape", ["exp(-((x - 3)/w)**2)", "(1 - tanh((x - 3)/w)**2)", "1/(1 + ((x - 3)/w)**4)"]
 )
@@ -143,6 +145,7 @@ def test_a_bullet_meets_a_ball_for_a_moment() -> None:
     assert run.trajectory.y[-1] == pytest.approx([99.993 - 1000 * back, 0, -1000, 0], abs=1e-4)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("given", [{"integrator": "DOP853"}, {"integrator": "Rodas5P"}, {}])
 def test_what_rounding_decides_is_not_met(given: dict[str, str]) -> None:
     """Whether the pendulum falls over again is decided by its last bits, not by its constants. An

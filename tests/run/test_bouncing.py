@@ -98,6 +98,7 @@ coordinate = "q{i}"
 )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("moving", [1, 2])
 def test_newtons_cradle(moving: int) -> None:
     """As many swing out as swung in, as far, half a period later; the others hang still."""
@@ -243,6 +244,7 @@ def test_two_bodies_bounce_until_they_lie_still() -> None:
 SHORT = some(["DOP853", "LSODA"], ["DOP853", "RK45", "Radau", "BDF", "LSODA"])
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("integrator", SHORT)
 def test_no_step_leaps_over_what_is_short(integrator: str) -> None:
     """A stiff ball between two far walls, and then a pulse of a force: steps would like to be long.

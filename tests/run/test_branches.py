@@ -64,6 +64,7 @@ def module(scene: str):
     return load_module(compile_scene(parse_scene(scene)))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("shape", PULSES)
 def test_pulses_are_found(shape: str, method: str) -> None:
@@ -82,6 +83,7 @@ def test_pulses_are_found(shape: str, method: str) -> None:
         assert run.counts["steps"] < 300
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_every_pulse_of_many_is_found(method: str) -> None:
     """A pulse in each period of 0.1 s, one hundredth of it long."""
@@ -153,7 +155,7 @@ v = { ball_y_dot = 3.0 }
 
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("scene", [QUADROTOR, ROPE], ids=["quadrotor", "rope"])
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 def test_steps_are_as_long_as_their_error_allows(scene: str, method: str) -> None:
     """A saturated controller and a taut rope take as many steps as without the check."""
     problem = as_problem(module(scene))
@@ -209,6 +211,7 @@ def tree(seed: int) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(60 if FULL else 1))
 def test_brief_contacts_of_random_trees(seed: int) -> None:
     """As close to a run with very short steps as a run with 1000 steps, except where the motion

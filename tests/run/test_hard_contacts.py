@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bookkeeping import light
 
-from eomgen.run.contacts import RISE
+from eomgen.engine.contacts import RISE
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
 from eomgen.run.trajectory import Trajectory

@@ -135,6 +135,7 @@ def test_quaternions_stay_unit() -> None:
 # --- long runs ----------------------------------------------------------------------------------
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("method", "dt"), [("leapfrog", 0.05), ("gauss_4", 0.2)])
 def test_symplectic_methods_keep_the_energy(method: str, dt: float) -> None:
     """The error stays in a band without drift: the last tenth of a run is like the first."""
@@ -187,6 +188,7 @@ GOING_ON = {
 }
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", GOING_ON)
 def test_a_run_goes_on_to_the_same_bytes(method: str) -> None:
     """A run that ended twice on the way, not at ends of steps, agrees with one that did not."""
@@ -220,6 +222,7 @@ def test_legs_of_no_whole_step_keep_what_the_next_goes_on_from(method: str) -> N
     assert run.y[-1].tobytes() == whole.y[-1].tobytes()
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("method", "rtol"), [("DOP853", 1e-8), ("gragg_bulirsch_stoer", 1e-6)])
 def test_a_step_that_the_end_cut_short_is_not_gone_on_from(method: str, rtol: float) -> None:
     """Even if it was rejected and retried with another length, which depends on the end, too."""

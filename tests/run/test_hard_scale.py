@@ -95,6 +95,7 @@ POWERS = some(
 )
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", ["rk4", "DOP853"])
 @pytest.mark.parametrize("units", POWERS)
 def test_powers_of_two_change_no_bit(units: Units, method: str) -> None:

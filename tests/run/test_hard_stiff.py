@@ -156,6 +156,7 @@ def test_what_holds_is_left_alone() -> None:
     assert abs(energy - 0.5 * 9.81) < 0.02 * energy
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "rk4"])
 def test_what_could_grow_but_does_not_is_left_alone(method: str) -> None:
     """Steps that are too long for the friction of a bounce, which saturates; much longer ones

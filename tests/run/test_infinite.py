@@ -73,6 +73,7 @@ def run(text: str, integrator: str, t_end: float = 3.0) -> Trajectory:
     return found
 
 
+@pytest.mark.every(6)
 @pytest.mark.parametrize(
     ("effect", "integrator"),
     [
@@ -99,6 +100,7 @@ def test_a_fall_into_the_centre(effect: str, integrator: str) -> None:
     assert found.t[-1] == pytest.approx(time, rel=1e-5)
 
 
+@pytest.mark.every(6)
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.parametrize(
     "effect",
@@ -131,7 +133,7 @@ def test_infinite_at_the_start(
         ("1/max(0.9 - x, 0)", 0.5, 2.0, 0.84, 0.95),
     ],
 )
-@pytest.mark.every(2)
+@pytest.mark.every(6)
 def test_undefined_on_the_way(
     formula: str, x: float, v: float, low: float, high: float, integrator: str
 ) -> None:

@@ -214,7 +214,7 @@ def test_symmetric_methods_run_backwards(name):
     assert y == pytest.approx(PENDULUM.initial, abs=1e-13)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(5)
 @pytest.mark.parametrize("name", ["semi_implicit_euler", *LEAPFROGS, *GAUSS])
 def test_symplectic_energy_is_bounded_without_trend(name):
     trajectory = run(PENDULUM, name, 200.0, dt=0.05)
@@ -249,6 +249,7 @@ def test_euler_gains_energy():
     assert energy[-1] - energy[0] > 0.05
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", GAUSS)
 @pytest.mark.parametrize("dt", [0.05, 0.2])
 def test_gauss_conserves_quadratic_invariants(name, dt):
@@ -284,6 +285,7 @@ PLANET = Problem(
 )
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", [*GAUSS, *LEAPFROGS])
 def test_angular_momentum_of_a_planet_is_kept(name):
     """Eccentricity 0.6, 5 revolutions; the momentum is 0.8, and bilinear."""
@@ -473,6 +475,7 @@ def raising(error):
     return replace(BLOW_UP, derivative=derivative)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", GENERAL)
 def test_blow_up_keeps_the_finite_rows(name):
     # LSODA stops one rounding before t = 1; the others stop at it or pass it.
@@ -489,6 +492,7 @@ def test_blow_up_keeps_the_finite_rows(name):
     assert trajectory.counts["steps"] > 50
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", GENERAL)
 @pytest.mark.parametrize(
     "error",
@@ -972,6 +976,7 @@ def test_canonical_momenta_tell_the_same_motion(tumbling):
     assert problem.jacobian(0.0, y) == pytest.approx(np.array(columns).T, abs=1e-8)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("form", "name"), energy.RUNS)
 def test_energy_over_many_periods(tumbling, form, name):
     """A short version of `campaigns/energy.py`, which runs 1e5 of them."""

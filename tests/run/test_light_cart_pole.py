@@ -93,6 +93,7 @@ def test_published_ladder(rtol: str) -> None:
         assert abs(median(calls) - count) < 0.01 * count
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("method", cart.DEFAULT)
 def test_default_tolerances_are_wrong_and_report_success(method: str) -> None:
     """Every method of SciPy; what is published, within a factor that rounding leaves open."""

@@ -66,6 +66,7 @@ def test_matrix_of_large_mechanisms() -> None:
     )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("route", ["independent", "aba"])
 def test_symmetric_projection_keeps_energy(route: str) -> None:
     """The implicit midpoint rule keeps the energy of a swinging four-bar in a band, and a run back
@@ -86,6 +87,7 @@ def test_symmetric_projection_keeps_energy(route: str) -> None:
     np.testing.assert_allclose(back.y[-1] * [1, 1, 1, -1, -1, -1], there.y[0], atol=1e-11)
 
 
+@pytest.mark.full
 def test_rattle_keeps_energy_where_symmetry_does_not() -> None:
     """A crank that goes round in one direction: the energy of RATTLE has no trend, and its error is
     of order 2. Forces that depend on velocities are refused.
@@ -106,6 +108,7 @@ def test_rattle_keeps_energy_where_symmetry_does_not() -> None:
         eomgen.simulate(four_bar(effects=rubs), t_end=0.1, **settings)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("method", "order"), [("leapfrog_4", 4), ("leapfrog_6", 6)])
 def test_composed_rattle_has_its_order(method: str, order: int) -> None:
     """Against DOP853 at its tightest, and back to where it came from."""
@@ -123,6 +126,7 @@ def test_composed_rattle_has_its_order(method: str, order: int) -> None:
     assert back.y[-1][0] == pytest.approx(1.0, abs=1e-11)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["leapfrog", "leapfrog_4", "leapfrog_6"])
 def test_rattle_takes_all_coordinates(method: str) -> None:
     """Where other methods have the independent ones as their state."""
@@ -243,7 +247,7 @@ PARALLELOGRAM = (0.5, 0.7, 0.5, 0.7)
 SETTINGS: tuple[dict[str, Any], ...] = ({"integrator": "DOP853"}, {"integrator": "rk4", "dt": 0.01})
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(2)
 @pytest.mark.parametrize("route", ["independent", "aba", "orthogonal"])
 @pytest.mark.parametrize("settings", [*SETTINGS, {"integrator": "leapfrog", "dt": 0.005}])
 def test_change_points_are_passed(route: str, settings: dict[str, Any]) -> None:
@@ -261,6 +265,7 @@ def test_change_points_are_passed(route: str, settings: dict[str, Any]) -> None:
     assert np.ptp(run.energy) < loose[settings["integrator"]]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("longer", [1e-3, -1e-5, 1e-7])
 def test_near_change_points_nothing_jumps(longer: float) -> None:
     """Where the bars of a four-bar come nearly into line, no change point is passed: the motion is
@@ -348,6 +353,7 @@ def test_sweeps_close_each_member() -> None:
         eomgen.simulate(four_bar(), integrator="BDF", t_end=0.1)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("loops", ["projected", "closed"])
 @pytest.mark.parametrize("rate", ["", "_dot"])
 def test_given_starts_are_kept_or_refused(loops: str, rate: str) -> None:

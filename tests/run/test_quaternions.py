@@ -79,6 +79,7 @@ def test_a_stopped_run_keeps_a_unit_row() -> None:
         assert off_unit(asked, run.y) < 1e-15
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("method", "order", "steps"),
     [
@@ -99,6 +100,7 @@ def test_order_of_fixed_step_methods(method: str, order: int, steps: tuple[int, 
     assert abs(slope - order) < 0.1, (slope, errors)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("method", ["RK45", "DOP853", "Radau"])
 def test_one_step_methods_are_as_accurate_and_as_cheap(scene: str, method: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from eomgen.engine import few
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import elimination, rodas_5p
 from eomgen.run.integrators import rodas_5p_coefficients as own
@@ -195,7 +196,7 @@ def test_systems_are_solved(positions: int, monkeypatch: pytest.MonkeyPatch) -> 
         jacobian[:positions, :positions] = 0.0
         values, found = random.normal(size=7), []
         for small in (0, 20):
-            monkeypatch.setattr(elimination, "SMALL", small)
+            monkeypatch.setattr(few, "FEW", small)
             factors = elimination.factored(jacobian, 0.01, positions)
             assert factors is not None
             found.append(factors.solve(values))

@@ -6,6 +6,7 @@ from campaign import some
 from campaigns.stiff_scenes import STIFF, run
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("rtol", some([1e-3], [1e-3, 1e-6]))
 @pytest.mark.parametrize("scene", some(["stiff_beam", "light_cart_pole"], list(STIFF)))
 def test_generated_jacobian_takes_fewer_evaluations(scene: str, rtol: float) -> None:

@@ -142,6 +142,7 @@ def test_each_wrong_rule_shows() -> None:
     assert min(residual(program, wrong) for wrong in faults(system)) > 1e-20
 
 
+@pytest.mark.every(2)
 @compiler
 @pytest.mark.parametrize("small", [0, 64])
 def test_compiled_coefficients(small: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,6 +177,7 @@ def test_functions_with_corners_are_refused() -> None:
         recurrences(finish(tape, {"derivative": Output((1,), nodes)}, ()), ["x"])
 
 
+@pytest.mark.every(2)
 @compiler
 @pytest.mark.parametrize(("scene", "end"), [("double_pendulum", 1.0), ("tumbling_body", 0.3)])
 def test_runs_end_where_they_should(scene: str, end: float) -> None:

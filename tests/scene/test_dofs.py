@@ -53,6 +53,7 @@ AXIS = np.array([2.0, -1.0, 2.0]) / 3
 OMEGA = np.array([0.3, -0.7, 1.1])
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 0.4, 2.9])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_ball_is_pulled_back_about_the_axis_of_its_turn(angle: float, sign: float) -> None:

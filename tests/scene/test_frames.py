@@ -69,6 +69,7 @@ def scene(dimensions: int, framed: bool) -> dict[str, Any]:
     }  # fmt: skip
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_a_frame_changes_what_is_written_and_not_the_motion(dimensions: int) -> None:
     """Every kind of point, shifted into frames of their own: the same derivative and outputs."""

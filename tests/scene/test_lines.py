@@ -61,6 +61,7 @@ def leaves(value: Any, location: str = "") -> list[str]:
 SCENES = [TRICKY, *(path.read_text("utf-8") for path in sorted(BUILT_IN.glob("*.toml")))]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("text", SCENES, ids=range(len(SCENES)))
 def test_each_location_is_where_the_parser_meets_it(text: str) -> None:
     """Judged by `tomllib`: a location is in no valid beginning of the text that ends before its

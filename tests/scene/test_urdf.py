@@ -73,6 +73,7 @@ def rates(tables: Any, **state: float) -> dict[str, float]:
     return dict(zip(module.STATES, found, strict=True))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("floating", [False, True])
 def test_accelerations_are_those_of_pinocchio(tmp_path: Path, floating: bool) -> None:
     """Places, velocities and accelerations in its order and frames: a branched robot of all joints,

@@ -247,6 +247,7 @@ def test_rounding_is_drawn_as_nothing(cart: tuple[eomgen.Run, eomgen.Run]) -> No
     assert axes.get_ylim()[1] > 1e-3
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("count", [14, 40])
 def test_names_of_many_coordinates(count: int) -> None:
     """Every row of a map is named, and no name covers another; the panels fill the figure."""

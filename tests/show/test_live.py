@@ -108,6 +108,7 @@ def in_page(code: LiveCode, name: str, t: Any, y: Any, table: dict[str, Any]) ->
     return np.array(run_in_node(code.source, script, given))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", SCENES)
 def test_functions_equal_those_of_the_module(name: str) -> None:
     """Errors of the rates of positions, and of those of the other states, are relative to the
@@ -136,7 +137,7 @@ def test_functions_equal_those_of_the_module(name: str) -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize(("name", "method", "dt"), RUNS)
 def test_a_live_run_ends_where_simulate_does(name: str, method: str, dt: float) -> None:
     """Same method, same step; scenes that are not chaotic within the time."""
@@ -464,6 +465,7 @@ def test_loads_have_the_power_of_their_effects() -> None:
         np.testing.assert_allclose(total, powers[:, k], rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("form", ["momentum", "redundant"])
 def test_rows_of_momenta_are_converted(form: Any) -> None:
     """A run in momenta, converted, has the poses and the energy of that run, but for the error of

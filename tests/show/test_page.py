@@ -277,6 +277,7 @@ return { rows: Array.from(replay.t, poses), between: given.more.map(poses) };
 """
 
 
+@pytest.mark.every(3)
 @needs_node
 @pytest.mark.parametrize("live", [True, False])
 @pytest.mark.parametrize("scene", ["plane", "driven", "space"])

@@ -66,6 +66,7 @@ def ends(picture: Picture, body: int) -> Iterator[np.ndarray]:
             yield from (np.array(numbers(end)) for end in (shape.start, shape.end))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["triple_pendulum", "finger", "robot_arm", "car", "puppet"])
 def test_links_reach_their_joints_at_any_parameters(name: str) -> None:
     """The generated module says where bodies are; their rods meet there, whatever the lengths."""
@@ -100,6 +101,7 @@ def gaps(picture: Picture, dimensions: int) -> dict[tuple[str, str], float]:
     return found
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", [name for name in built_in_names() if name != "puma560"])
 def test_shapes_of_built_in_scenes_stay_at_their_joints(name: str) -> None:
     """Whatever the lengths. The PUMA's shapes are beside some of its joints from the beginning."""
@@ -218,6 +220,7 @@ def resolved(data: Any, values: list[float]) -> Any:
     return [resolved(part, values) for part in data] if isinstance(data, list) else data
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", [*built_in_names(), *UNTUNED], ids=str)
 def test_data_with_its_geometry_is_the_picture(name: str | Path) -> None:
     """At other values of the parameters than those of the scene, and it is plain JSON."""

@@ -408,7 +408,7 @@ def test_a_hundred_bodies_make_a_figure(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.usefixtures("coarse")
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_odd_motions_in_space_are_drawn(tmp_path: Path, changes: dict[str, Any]) -> None:
     motion = sliding(**changes)
     figure = draw_motion(motion)

@@ -130,6 +130,7 @@ def counted(scene: object) -> int:
     return total
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("each", [False, True])
 def test_counts_are_those_of_the_modules(each: bool) -> None:
     """Of the whole, of the mechanism, without each effect and without each type of them; nothing is

@@ -144,6 +144,7 @@ def test_the_default_atol() -> None:
     assert np.all(allowed <= 1e-12 * sizes)
 
 
+@pytest.mark.full
 def test_rows_a_period_apart() -> None:
     """Those of an orbit do not move at all: that is no scale, and no reason to refuse."""
     case = case_of("orbit_99", samples=31)
@@ -244,7 +245,7 @@ FORCED = [
 
 @pytest.mark.parametrize(
     ("scene", "cheapest", "targets"),
-    thinned(FORCED, 2),
+    thinned(FORCED, 4),
 )
 def test_the_accuracy_holds_whichever_method_is_the_cheapest(
     monkeypatch: pytest.MonkeyPatch, scene: str, cheapest: str, targets: tuple[float, ...]

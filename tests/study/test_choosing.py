@@ -136,6 +136,7 @@ def test_a_difference_is_no_accident_of_its_moment() -> None:
     assert difference(struck, motion(np.array([0.0, 1.0]), np.array([0.0, -1.0])), np.ones(1)) == 0
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("scene", "targets"),
     [("pendulum", (1e-3, 1e-6, 1e-9)), ("two_body", (1e-3, 1e-8)), ("double_pendulum", (1e-4,))],
@@ -220,6 +221,7 @@ def test_beyond_the_floor_of_adaptive_methods(target: float) -> None:
     assert error(floor, true.y[-1], true.scale) > target
 
 
+@pytest.mark.full
 def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lorenz's over 50 s grows an error by 1e19: no run in doubles is right, and once DOP853 as
     tight as it goes is wrong, no other method is asked; gauss_6 only for so long that its error
@@ -365,6 +367,7 @@ def test_out_of_reach(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert (tmp_path / "pendulum.npz").exists()
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     "integrator", some(["DOP853", "BDF"], ["RK45", "DOP853", "LSODA", "BDF", "Radau"])
 )

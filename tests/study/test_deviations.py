@@ -147,7 +147,7 @@ def slopes_of(function: Callable[[np.ndarray], np.ndarray], count: int, h: float
 FOURTH = (2 / 3, -1 / 12)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", ROLLING)
 def test_what_rolls_against_states_that_meet_the_constraints(name: str, tmp_path: Path) -> None:
     """A and C, about a moving state: by differences of rates and outputs at states beside it, which

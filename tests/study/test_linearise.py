@@ -335,6 +335,7 @@ def test_the_command_on_quaternions_and_states(capsys: pytest.CaptureFixture[str
     assert "inputs      tau = -5.0277" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_a_figure_is_reported_in_short(capsys: pytest.CaptureFixture[str]) -> None:
     """76 states: no matrix is printed, lines have at most 100 columns, modes are counted."""
     assert main(["linearise", "hanging_figure", "--at", "rest"]) == 0

@@ -114,6 +114,7 @@ def to_mp(values: np.ndarray) -> np.ndarray:
 SCENES = some(("babyboot", "chain_in_wind", "two_body_forced", FORCED), (*built_in_names(), FORCED))
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.split()[0])
 def test_the_derivative_is_the_program_in_long_numbers(scene: str) -> None:
     """It agrees with 60 digits to 30 digits, for any state, time, parameters and inputs."""

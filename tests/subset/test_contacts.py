@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from campaign import some
 from complementarity import drawn, solution
-from languages import results
+from languages import Given, results
 
 from eomgen.engine import complementarity, least_squares
-from eomgen.engine.printed import text
+from eomgen.engine.contacts import ALPHA, Held
+from eomgen.engine.printed import CONTACTS, text
+from eomgen.engine.roots import Search
 from eomgen.run.problem import FloatArray
 
 SEEDED = np.random.default_rng(1)
@@ -19,7 +21,7 @@ def test_forces_have_the_same_bits_in_three_languages() -> None:
     """Of unsymmetric problems, of which one in four needs Lemke's method.
     `tests/campaigns/contact_forces.py` has more of them.
     """
-    problems = drawn(some(200, 2000), 1)
+    problems = drawn(some(100, 2000), 1)
     cases = [[len(b), a, b, np.zeros(len(b))] for a, b in problems]
     python, c, javascript = results(text(), "complementary", cases)
     assert python == c
@@ -88,3 +90,128 @@ def test_there_may_be_no_forces() -> None:
     assert solution(np.zeros((2, 2)), np.array([1.0, -1.0])) is None
     assert solution(np.array([[np.nan]]), np.array([-1.0])) is None
     assert solution(np.eye(2), np.array([-1.0, np.nan])) is None
+
+
+class Stack:
+    """Two unit masses above each other and the ground, from which forces push; gravity is 2. In a
+    step the lower one is shaken.
+    """
+
+    def gaps(self, _: float, y: FloatArray) -> FloatArray:
+        """Below each."""
+        return np.array([y[0], y[1] - y[0]])
+
+    def rates(self, _: float, y: FloatArray) -> FloatArray:
+        """Their rates."""
+        return np.array([y[2], y[3] - y[2]])
+
+    def held(self, t: float, y: FloatArray, f: FloatArray) -> FloatArray:
+        """Rates of positions and velocities, of the gaps' rates, and powers."""
+        a, b = f[0] - f[1] - 2.0 + 5.0 * t, f[1] - 2.0
+        return np.array([y[2], y[3], a, b, a, b - a, f[0] * y[2], f[1] * (y[3] - y[2])])
+
+    def impact(self, _: float, y: FloatArray, contact: int, bounce: float) -> FloatArray:
+        """With the restitution 0.5."""
+        e = 1.0 + 0.5 * bounce
+        if contact == 0:
+            return np.array([y[0], y[1], y[2] - e * y[2], y[3]])
+        push = 0.5 * e * (y[3] - y[2])
+        return np.array([y[0], y[1], y[2] + push, y[3] - push])
+
+    def state(self, s: float) -> FloatArray:
+        """Some seconds after the start of a step."""
+        x = 0.3 - s + s * s * (3.0 - s)
+        return np.array([x, x + 0.2 - s * s, 6.0 * s - 3.0 * s * s - 1.0, 4.0 * s - 3.0 * s * s])
+
+
+STACK = Given(
+    Stack(),
+    c="""
+enum { STATES = 4, CONTACTS = 2, PRESSED = 8 };
+typedef struct { int none; } ContactLaw;
+typedef ContactLaw Within;
+static void gaps(ContactLaw *law, double t, const double *y, double *to) {
+    (void)law, (void)t;
+    to[0] = y[0], to[1] = y[1] - y[0];
+}
+static void rates(ContactLaw *law, double t, const double *y, double *to) {
+    (void)law, (void)t;
+    to[0] = y[2], to[1] = y[3] - y[2];
+}
+static void held(ContactLaw *law, double t, const double *y, const double *f, double *to) {
+    (void)law;
+    const double a = f[0] - f[1] - 2.0 + 5.0 * t, b = f[1] - 2.0;
+    to[0] = y[2], to[1] = y[3], to[2] = a, to[3] = b, to[4] = a, to[5] = b - a;
+    to[6] = f[0] * y[2], to[7] = f[1] * (y[3] - y[2]);
+}
+static void impact(ContactLaw *law, double t, const double *y, int64_t k, double much, double *to) {
+    (void)law, (void)t;
+    const double e = 1.0 + 0.5 * much, push = 0.5 * e * (y[3] - y[2]);
+    for (int i = 0; i < 4; i++) to[i] = y[i];
+    if (k == 0) to[2] = y[2] - e * y[2];
+    else to[2] = y[2] + push, to[3] = y[3] - push;
+}
+static void state(Within *within, double s, double *to) {
+    (void)within;
+    to[0] = 0.3 - s + s * s * (3.0 - s), to[1] = to[0] + 0.2 - s * s;
+    to[2] = 6.0 * s - 3.0 * s * s - 1.0, to[3] = 4.0 * s - 3.0 * s * s;
+}
+""",
+    javascript="""
+const [STATES, CONTACTS, PRESSED] = [4, 2, 8];
+const system = {
+  gaps: (t, y, to) => to.set([y[0], y[1] - y[0]]),
+  rates: (t, y, to) => to.set([y[2], y[3] - y[2]]),
+  held: (t, y, f, to) => {
+    const [a, b] = [f[0] - f[1] - 2.0 + 5.0 * t, f[1] - 2.0];
+    to.set([y[2], y[3], a, b, a, b - a, f[0] * y[2], f[1] * (y[3] - y[2])]);
+  },
+  impact: (t, y, k, bounce, to) => {
+    const e = 1.0 + 0.5 * bounce;
+    const push = 0.5 * e * (y[3] - y[2]);
+    to.set(k === 0 ? [y[0], y[1], y[2] - e * y[2], y[3]] : [y[0], y[1], y[2] + push, y[3] - push]);
+  },
+  state: (s, to) => {
+    const x = 0.3 - s + s * s * (3.0 - s);
+    to.set([x, x + 0.2 - s * s, 6.0 * s - 3.0 * s * s - 1.0, 4.0 * s - 3.0 * s * s]);
+  },
+};
+""",
+)
+
+
+def known(holds: list[int]) -> Held:
+    """Contacts of the stack, of which some are held."""
+    return Held(
+        ALPHA, 1.0, np.array(holds), np.ones(2), 1e-9 * SEEDED.random(2), -np.ones(2), np.zeros(8)
+    )
+
+
+def random_case(name: str) -> list[object]:
+    """Arguments of a function, for the stack."""
+    holds = SEEDED.integers(0, 2, 2).tolist()
+    y = np.concatenate([1e-9 * SEEDED.random(2), SEEDED.normal(size=2)])
+    y[1] += y[0]
+    t = float(SEEDED.uniform(0, 1))
+    within = [STACK, STACK, known(holds), Search(), t, float(SEEDED.uniform(0.5, 2))]
+    return {
+        "begin": [STACK, known(holds), t, y, 10.0],
+        "press": [STACK, known(holds), t, y, np.zeros(2), np.zeros(2)],
+        "strike": [STACK, known(holds), t, y, np.array(holds), *np.zeros((2, 2))],
+        "release": [STACK, known(holds), t, y, np.array([*holds[:1], 0])],
+        "settle": [STACK, known(holds), t, y],
+        "deepest": [STACK, t, y - 1e-9],
+        "closing": [*within, float(SEEDED.choice([0.25, 1.0])), np.zeros(2, np.int64)],
+        "opening": [*within, np.zeros(2, np.int64)],
+    }[name]
+
+
+@pytest.mark.parametrize("name", CONTACTS)
+@pytest.mark.every(3)
+def test_contacts_have_the_same_bits_in_three_languages(name: str) -> None:
+    """Of two masses that fall on the ground and on each other."""
+    cases = [random_case(name) for _ in range(50)]
+    python, c, javascript = results(text(), name, cases, given=STACK)
+    assert python == c
+    assert python == javascript
+    assert len({tuple(found) for found in python}) > 3

@@ -20,8 +20,9 @@ from eomgen.api import saving
 from eomgen.api.saving import save_statistics, save_sweep
 from eomgen.cli import main
 from eomgen.errors import RunError
+from eomgen.native import accelerator
 from eomgen.show.sweep import draw_sweep
-from eomgen.sweep import ensemble, execute, storage, together
+from eomgen.sweep import ensemble, execute, members, storage, together
 from eomgen.sweep.design import Law
 from eomgen.sweep.ensemble import Ensemble
 
@@ -90,6 +91,7 @@ TOGETHER: dict[str, Any] = {"integrator": "rk4", "dt": 0.01, "t_end": 0.5, "back
 COMPILED = pytest.mark.skipif(CC is None, reason="there is no C compiler")
 
 
+@pytest.mark.every(2)
 @COMPILED
 @pytest.mark.parametrize("asked", [TOGETHER, {**QUICK, "backend": "c", "samples": 7}])
 def test_members_that_run_together(asked: Any, tmp_path: Path) -> None:
@@ -102,6 +104,28 @@ def test_members_that_run_together(asked: Any, tmp_path: Path) -> None:
     assert all(same(runs[0], run) for run in runs[1:])
     alone = eomgen.ensemble("two_body", {"m_A": [design.values[7, 0]]}, **asked)
     assert alone.finished.all()
+
+
+@COMPILED
+@pytest.mark.parametrize(
+    ("scene", "name", "asked"),
+    [
+        ("pendulum", "theta", {"integrator": "Rodas5P", "rtol": 1e-6}),
+        ("four_bar", "theta_dot", {"integrator": "gauss_4", "dt": 0.01}),
+    ],
+)
+def test_compiled_members_run_in_threads(
+    scene: str, name: str, asked: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By stiff methods and with loops; once compiled, the program is not read again."""
+    asked = {"t_end": 0.2, "backend": "c", **asked}
+    vary = {name: np.linspace(0.5, 1.5, 6)}
+    one = eomgen.ensemble(scene, vary, **asked)
+    assert one.finished.all()
+    members._prepared.cache_clear()
+    monkeypatch.setattr(execute, "by_processes", pytest.fail)
+    monkeypatch.setattr(accelerator, "interfaced_program_of", pytest.fail)
+    assert same(one, eomgen.ensemble(scene, vary, workers=2, **asked))
 
 
 @pytest.mark.parametrize("asked", [QUICK, pytest.param(TOGETHER, marks=COMPILED)])

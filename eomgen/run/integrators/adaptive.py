@@ -26,7 +26,7 @@ from eomgen.run.integrators.interface import (
     always,
 )
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
-from eomgen.run.integrators.strides import Strides, continuation
+from eomgen.run.integrators.strides import Before, Strides, continuation
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.shaking import Shaken
 
@@ -103,16 +103,17 @@ def advances(
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
         until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
-        # A step that was cut is repeated in Python, which counts that.
-        use = compiled if compiled and not cut and compiles() else None
+        use = compiled if compiled and compiles() else None
         most = min(until - here, stepper.shaken.left) if stepper.shaken else until - here
         stride = use.made(stepper, sampled, most) if use else None
         if use and stride:
-            yield from use.advances(stride, sampled, stepper.is_whole, each)
+            before = Before(cut, stepper.factorisations - factored, stepper.is_limited)
+            yield from use.advances(stride, sampled, stepper.is_whole, each, before)
             here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
+            cut, factored = 0, stepper.factorisations
             if stepper.ended:
                 return
-            if stride.ended:
+            if stepper.solver.status == "finished":
                 stepper.prepare_next(float(stride.ends[-1]), stride.states[-1])
             stepper.shake(len(stride.ends))
             continue
@@ -227,10 +228,11 @@ class _Stepper:
         """Make a step. Raises `StepFailure` if the method fails."""
         solver = self.solver
         self._before = (float(solver.t), solver.y.copy(), self._memory())
-        if self.method.memory and self.until == self.t_end:
+        if self.method.memory:
             # A step shortened to the end would be retried with another length if rejected.
             length = min(getattr(solver, self.method.memory[0]), self.longest)
-            self._whole = self._whole and solver.t + length < self.t_end
+            if not solver.t + length < self.t_end:
+                self.shorten()
         factored = int(solver.nlu)
         message = solver.step()
         self.factorisations += int(solver.nlu) - factored
@@ -244,6 +246,10 @@ class _Stepper:
         end = self._problem.projected(float(solver.t), solver.y.copy())
         slopes = np.array([memory["f"], solver.f]) if "f" in memory else None
         return Step(t, float(solver.t), y, end, lambda times: dense()(times).T, slopes)
+
+    def shorten(self) -> None:
+        """Take account of a step that its end shortens: that of a run with a later end is longer."""
+        self._whole = self._whole and self.until != self.t_end
 
     def retry(self, step: Step) -> Retry | None:
         """Check a step for branches. If it must be repeated, restart the solver for that and say
@@ -290,8 +296,12 @@ class _Stepper:
 
     def is_capped(self, step: Step) -> bool:
         """Whether a step has the greatest length allowed there."""
-        limited = self._unseen and self.solver.status == "finished" and not self.ended
-        return limited or step.length >= self.longest * (1 - 1e-9)
+        return self.is_limited or step.length >= self.longest * (1 - 1e-9)
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether the last step ends where longer ones cannot be checked."""
+        return self._unseen and self.solver.status == "finished" and not self.ended
 
     def continuation(self) -> Callable[[], Resume] | None:
         """A function that gives what a later run needs to continue from here; None if it cannot.

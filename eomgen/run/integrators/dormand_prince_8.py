@@ -23,7 +23,6 @@ from eomgen.engine.adaptive import (
     within,
 )
 from eomgen.engine.embedded import DOP853
-from eomgen.engine.printed import steps_of_few
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.problem import FloatArray
 
@@ -101,7 +100,12 @@ class DormandPrince8:
         ny = len(self.y)
         self._is_new = 0 < ny <= FEW and _made[ny] < MANY
         _made[ny] += self._is_new
-        return steps_of_few(ny) if 0 < ny <= FEW and not self._is_new else partial(made, DOP853)
+        if self._is_new or not 0 < ny <= FEW:
+            return partial(made, DOP853)
+        # Imported here because short runs do without the printer.
+        from eomgen.engine.printed import steps_of_few
+
+        return steps_of_few(ny)
 
     def dense_output(self) -> Callable[[FloatArray | float], FloatArray]:
         """The states within the last step, as a function of times: (m,) -> (ny, m), or one."""

@@ -11,6 +11,7 @@ from eomgen.run.integrators.interface import Advance, Resume
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import constrained_by
+from eomgen.run.rows import Rows
 
 
 class EqualStrides:
@@ -91,7 +92,7 @@ def advances_of(
     count = len(ends)
     for first in range(count) if each else (0,):
         last = first if each else count - 1
-        kept = range(first + -(made + 1 + first) % every, last + 1, every)
+        kept = slice(first + -(made + 1 + first) % every, last + 1, every)
         derivatives = (last + 1 - first) * stride.calls
         if stride.iterations is not None:
             derivatives = int(stride.iterations[first : last + 1].sum()) * stride.calls
@@ -102,7 +103,7 @@ def advances_of(
         yield Advance(
             ends[last],
             states[last],
-            [(ends[j], states[j].copy()) for j in kept],  # not a view that keeps all in memory
+            Rows(stride.ends[kept].copy(), states[kept].copy()),  # no views, which keep all of it
             problem,
             partial(shorter, begin, from_),
             steps=last + 1 - first,

@@ -1,7 +1,7 @@
 """Steps of an adaptive method that compiled code makes, many at once."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -13,11 +13,13 @@ from eomgen.run.integrators.closed_strides import FEWER, MORE, MOST, kept_closed
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import PROJECTS, constrained_by
+from eomgen.run.rows import Rows
 
 OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates")
 """Functions of a module that steps are checked with."""
 
 _COUNTED = ("derivatives", "jacobians", "factorisations", "switches", "gap_checks")
+_FACTORISATIONS = 3 + _COUNTED.index("factorisations")
 
 
 class Tolerances(Protocol):
@@ -37,6 +39,10 @@ class Stepper(Protocol):
     until: float
     t_end: float
     branches: BranchMonitor | None
+
+    def shorten(self) -> None:
+        """Take account of a step that its end shortens."""
+        ...
 
 
 class Strides:
@@ -81,8 +87,11 @@ class Strides:
         if self._unusual:  # the last stride ended before a step that Python must make
             self._unusual = False
             return None
-        solver, branches, most = stepper.solver, stepper.branches, min(most, self._most)
-        until = stepper.until
+        lengths = self._lengths(stepper, min(most, self._most))
+        if lengths is None:
+            return None
+        solver, branches, until = stepper.solver, stepper.branches, stepper.until
+        longest, t_end, most = lengths
         watched = branches.watched(solver.t, solver.h_abs, most, until) if branches else None
         if branches and not watched:
             return None
@@ -90,10 +99,10 @@ class Strides:
             solver.t,
             solver.y,
             _Memory(solver, self._method.memory),
-            t_end=until,
+            t_end=t_end,
             rtol=self._bounds.rtol,
             atol=self._atol,
-            longest=stepper.longest,
+            longest=longest,
             times=self._times[sampled:],
             most=most,
             watched=watched,
@@ -109,10 +118,14 @@ class Strides:
         kept, self._most = kept_closed(self._problem, solver.t, solver.y, stride, self._most)
         if kept is None:
             return None
-        stride = kept
+        if t_end == np.inf:
+            stepper.shorten()
+        reached = not float(kept.ends[-1]) < until
+        ended = reached and until == stepper.t_end
+        stride = kept if kept.ended == ended else replace(kept, ended=ended)
         self._unusual = not stride.usual
         self._start, self._longest, self._watched = solver.t, stepper.longest, watched
-        self._until = until if until < stepper.t_end else np.inf
+        self._until = np.inf if reached or until == stepper.t_end else until
         solver.t_old = float(stride.ends[-2]) if count > 1 else solver.t
         solver.t, solver.y = float(stride.ends[-1]), stride.states[-1].copy()
         for name, values in stride.memory.items():
@@ -122,9 +135,23 @@ class Strides:
             if self._problem.switching and self._problem.switching.of_state:
                 branches.passed(stride.ends, stride.values, stride.switched)
             branches.restore(_checks(watched, stride, count - 1))
-        if stride.ended:
+        if reached:
             solver.status = "finished"
         return stride
+
+    def _lengths(self, stepper: Stepper, most: int) -> tuple[float, float, int] | None:
+        """The longest step, s, the end, and the number of steps that are asked for; None if Python
+        must make the next one.
+
+        Compiled steps end before one that would reach the end, unless they are series. So that one
+        is asked for alone, by its length; but where steps are looked at within, Python counts what
+        that takes only if it is done.
+        """
+        t, until, longest = stepper.solver.t, stepper.until, stepper.longest
+        if self._method.series or t + min(stepper.solver.h_abs, longest) < until:
+            return longest, until, most
+        left, looked = until - t, self._problem.closed_form is not None
+        return (left, np.inf, 1) if t + left == until and not looked else None
 
     def _passes_nothing(self, branches: BranchMonitor, solver: Any, stride: Stride) -> bool:
         """Whether steps pass over nothing; else Python makes the next one, and then fewer are made
@@ -138,29 +165,34 @@ class Strides:
         return passes
 
     def advances(
-        self, stride: Stride, sampled: int, resumes: bool, each: bool
+        self, stride: Stride, sampled: int, resumes: bool, each: bool, before: "Before"
     ) -> Iterator[Advance]:
         """The steps as one `Advance`, or as one for each; with `resumes` a run can continue from
         their ends.
         """
-        ends = stride.ends.tolist()
+        ends, last = stride.ends, len(stride.ends) - 1
         capped = none = np.zeros_like(stride.derivatives)
-        if self._longest < np.inf:
-            lengths = np.diff(stride.ends, prepend=self._start)
-            capped = np.cumsum(lengths >= self._longest * (1 - 1e-9))
+        if before.limited or self._longest < np.inf:
+            longest = np.diff(ends, prepend=self._start) >= self._longest * (1 - 1e-9)
+            longest[last] |= before.limited
+            capped = np.cumsum(longest)
         solved = (none if x is None else x for x in (stride.jacobians, stride.factorisations))
-        called = (stride.derivatives, *solved, stride.switches, stride.gap_checks)
-        sums = np.column_stack((np.arange(1, len(ends) + 1), stride.sampled, capped, *called))
-        kept = slice(None) if each else slice(-1, None)
-        made = np.diff(sums[kept], axis=0, prepend=0).tolist()
+        counted = (stride.derivatives, *solved, stride.switches, stride.gap_checks)
+        sums = (stride.sampled, capped, *counted)
+        if each:
+            made = np.diff(np.column_stack((np.arange(1, last + 2), *sums)), axis=0, prepend=0)
+            numbers, parts = range(last + 1), made.tolist()
+        else:
+            numbers, parts = range(last, last + 1), [[last + 1, *(int(x[-1]) for x in sums)]]
         whole = len(ends) - stride.ended  # the end shortens the last step
-        times, rows = self._times[sampled : sampled + sums[-1, 1]].tolist(), 0
-        for i, (steps, passed, shortened, *calls) in zip(range(len(ends))[kept], made, strict=True):
+        times, rows = self._times[sampled:], 0
+        parts[0][_FACTORISATIONS] += before.factorisations
+        for i, (steps, passed, shortened, *calls) in zip(numbers, parts, strict=True):
             at = slice(rows, rows + passed)
             yield Advance(
-                ends[i],
+                float(ends[i]),
                 stride.states[i],
-                list(zip(times[at], stride.rows[at], strict=True)) if passed else [],
+                Rows(times[at], stride.rows[at]) if passed else (),
                 self._problem,
                 partial(_within, self._problem, stride.within, i) if stride.within else _unknown,
                 steps=steps,
@@ -168,6 +200,7 @@ class Strides:
                 checked=True,
                 resume=self._resume(stride, min(i, whole - 1)) if resumes and whole else None,
                 capped=shortened,
+                cut=before.cut if i == numbers[0] else 0,
                 margins=self._margins(stride, i),
             )
             rows += passed
@@ -182,6 +215,18 @@ class Strides:
     def _resume(self, stride: Stride, i: int) -> Callable[[], Resume]:
         """A function that gives what a later run needs to continue after step i."""
         return partial(_after, stride, self._watched, self._until, i)
+
+
+@dataclass(frozen=True)
+class Before:
+    """What came before compiled steps: attempts that were too long, which Python made: how many,
+    and their factorisations; and whether the steps are limited because longer ones cannot be
+    checked.
+    """
+
+    cut: int
+    factorisations: int
+    limited: bool
 
 
 @dataclass(frozen=True)

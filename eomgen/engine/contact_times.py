@@ -1,0 +1,215 @@
+"""When rigid contacts close or open within a step.
+
+Times within a step are in seconds from its start.
+"""
+
+from typing import Annotated, Protocol
+
+from eomgen.engine.contacts import TOLERANCE, ContactLaw, Held, counted, press
+from eomgen.engine.roots import FOUND, WANTED, Search, begun, gone_on
+from eomgen.subset.words import Vector, Whole, copy, inf, nan, zeros
+
+TOGETHER_CLOSED, TOGETHER_OPENED = 1e-12, 1e-9
+"""Contacts that close, or open, within these fractions of a step do so together."""
+GAP, RATE, PUSH = 0, 1, 2
+"""What is searched for its zero: the gap of a contact with its slack, its rate, how it is pressed.
+"""
+NO_ZERO, UNHELD = -1.0, -2.0
+"""What is answered instead of a time: a zero is not found; no forces keep contacts from closing."""
+
+
+class Within(Protocol):
+    """A step whose states are known."""
+
+    def state(self, s: float, /) -> Annotated[Vector, "STATES"]:
+        """The state s seconds after the start of the step."""
+        ...
+
+
+def closing(
+    law: ContactLaw,
+    within: Within,
+    now: Held,
+    search: Search,
+    t: float,
+    length: float,
+    share: float,
+    closed: Annotated[Whole, "CONTACTS"],
+) -> float:
+    """The time at which contacts first close in a step from t, and which; infinity if none do.
+
+    Gaps are checked at the ends of parts of the step, a `share` of its length each.
+    """
+    n = len(closed)
+    for c in range(n):
+        closed[c] = 0
+    if counted(n, now.holds) == n:
+        return inf
+    at = zeros(len(closed))
+    slack = copy(now.slack)
+    y = within.state(0.0)
+    gap_a = law.gaps(t, y)
+    rate_a = law.rates(t, y)
+    a = 0.0
+    part = 1
+    while a < length:
+        b = share * part * length
+        y = within.state(b)
+        gap_b = law.gaps(t + b, y)
+        rate_b = law.rates(t + b, y)
+        first = inf
+        for c in range(n):
+            at[c] = inf
+            low = gap_b[c] + slack[c] < 0.0
+            dips = rate_a[c] < 0.0 and rate_b[c] > 0.0
+            if now.holds[c] == 0 and (low or dips):
+                before = gap_a[c] + slack[c]
+                after = gap_b[c] + slack[c]
+                at[c] = first_zero(law, within, now, search, t, c, slack[c], a, b, before, after)
+                if at[c] < 0.0:
+                    return at[c]
+                first = min(first, at[c])
+        if first < inf:
+            for c in range(n):
+                if at[c] <= first + TOGETHER_CLOSED * length:
+                    closed[c] = 1
+            return first
+        for c in range(n):
+            if gap_b[c] > TOLERANCE:
+                slack[c] = 0.0
+        gap_a[:] = gap_b
+        rate_a[:] = rate_b
+        a = b
+        part += 1
+    return inf
+
+
+def first_zero(
+    law: ContactLaw,
+    within: Within,
+    now: Held,
+    search: Search,
+    t: float,
+    c: int,
+    slack: float,
+    a: float,
+    b: float,
+    at_a: float,
+    at_b: float,
+) -> float:
+    """The first time at which a gap falls to 0, infinity if it does not; its rate changes sign at
+    most once between a and b, where the gap has these values.
+    """
+    before = value(law, within, now, t, RATE, c, slack, a)
+    after = value(law, within, now, t, RATE, c, slack, b)
+    # A gap that rises first reaches 0 only after its maximum: at a it may be 0 but for rounding.
+    if at_a > 0.0 and at_b < 0.0 and not (before > 0.0 and after < 0.0):
+        return zero(law, within, now, search, t, GAP, c, slack, a, b)
+    turns = before * after < 0.0
+    middle = b
+    if turns:
+        middle = zero(law, within, now, search, t, RATE, c, slack, a, b)
+        if middle < 0.0:
+            return middle
+    if before < 0.0:  # it falls first
+        if at_a <= 0.0:
+            return a
+        if turns and value(law, within, now, t, GAP, c, slack, middle) < 0.0:
+            return zero(law, within, now, search, t, GAP, c, slack, a, middle)
+        return inf
+    if at_b >= 0.0 or not turns:  # it rises still
+        return a if before == 0.0 and at_b < at_a and at_a <= 0.0 else inf
+    if value(law, within, now, t, GAP, c, slack, middle) > 0.0:
+        return zero(law, within, now, search, t, GAP, c, slack, middle, b)
+    return middle
+
+
+def opening(
+    law: ContactLaw,
+    within: Within,
+    now: Held,
+    search: Search,
+    t: float,
+    length: float,
+    opened: Annotated[Whole, "CONTACTS"],
+) -> float:
+    """The time at which held contacts first open in a step from t, and which; infinity if none do.
+    A contact opens when its force has fallen to 0 and its gap begins to grow.
+    """
+    n = len(opened)
+    for c in range(n):
+        opened[c] = 0
+    if counted(n, now.holds) == 0:
+        return inf
+    at = zeros(len(opened))
+    pushes = zeros(len(opened))
+    parts = zeros(len(opened))
+    y = within.state(length)
+    if not press(law, now, t + length, y, pushes, parts):
+        return UNHELD
+    first = inf
+    for c in range(n):
+        at[c] = inf
+        if now.holds[c] == 1 and pushes[c] == 0.0 and parts[c] > 0.0:
+            at[c] = 0.0
+            if value(law, within, now, t, PUSH, c, 0.0, 0.0) > 0.0:
+                at[c] = zero(law, within, now, search, t, PUSH, c, 0.0, 0.0, length)
+                if at[c] < 0.0:
+                    return at[c]
+            first = min(first, at[c])
+    for c in range(n):
+        if at[c] < inf and at[c] <= first + TOGETHER_OPENED * length:
+            opened[c] = 1
+    return first
+
+
+def zero(
+    law: ContactLaw,
+    within: Within,
+    now: Held,
+    search: Search,
+    t: float,
+    what: int,
+    c: int,
+    slack: float,
+    a: float,
+    b: float,
+) -> float:
+    """The time between a and b at which something of a contact crosses 0; `NO_ZERO` or `UNHELD` if
+    it is not found.
+    """
+    search.xtol = max(1e-14 * (b - a), 1e-300)
+    search.rtol = 1e-15
+    at_a = value(law, within, now, t, what, c, slack, a)
+    at_b = value(law, within, now, t, what, c, slack, b)
+    answer = begun(search, a, b, at_a, at_b)
+    while answer == WANTED:
+        answer = gone_on(search, value(law, within, now, t, what, c, slack, search.here))
+    if answer == FOUND:
+        return search.here
+    return UNHELD if what == PUSH else NO_ZERO
+
+
+def value(
+    law: ContactLaw,
+    within: Within,
+    now: Held,
+    t: float,
+    what: int,
+    c: int,
+    slack: float,
+    s: float,
+) -> float:
+    """What is searched for its zero, at a time; not a number if there are no forces."""
+    y = within.state(s)
+    if what == GAP:
+        gap = law.gaps(t + s, y)
+        return gap[c] + slack
+    if what == RATE:
+        rate = law.rates(t + s, y)
+        return rate[c]
+    pushes = zeros(len(now.slack))
+    parts = zeros(len(now.slack))
+    if not press(law, now, t + s, y, pushes, parts):
+        return nan
+    return pushes[c] - parts[c]

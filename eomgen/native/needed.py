@@ -1,0 +1,24 @@
+"""The functions of a module that runs by a method call, beside those that are called rarely."""
+
+from typing import Any
+
+from eomgen.run.integrators.interface import Adaptive, FixedStep
+from eomgen.run.integrators.strides import OF_CONTACTS, OF_STATE
+from eomgen.run.projection import PROJECTS
+
+OF_EVENTS = (*OF_CONTACTS, "impact", "held")
+
+
+def needed_by(method: FixedStep | Adaptive, module: Any) -> tuple[str, ...]:
+    """The names of the functions of a module that runs by a method call at each step or event."""
+    adaptive = isinstance(method, Adaptive)
+    names = ["derivative"]
+    if method.uses_jacobian if adaptive else not method.explicit:
+        names.append("jacobian")
+    if adaptive:
+        names += OF_STATE
+    if getattr(module, "CONTACTS", ()):
+        names += OF_EVENTS
+    if getattr(module, "CONSTRAINTS", ()):
+        names += PROJECTS
+    return tuple(name for name in names if hasattr(module, name))
