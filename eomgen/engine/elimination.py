@@ -19,7 +19,7 @@ def _largest(n: int, x: Vector) -> int:
 
 
 @with_arrays(_largest)
-def largest(n: int, x: Annotated[Vector, "n"]) -> int:
+def place_of_largest(n: int, x: Annotated[Vector, "n"]) -> int:
     """The number of the first of the entries of greatest size."""
     found = 0
     for i in range(1, n):
@@ -149,7 +149,7 @@ def eliminated(factors: Factors) -> bool:
     for i in range(m, n):
         factors.order[i] = i
     for p in range(m, n):
-        pivot = p + largest(n - p, factors.columns[p, p:])
+        pivot = p + place_of_largest(n - p, factors.columns[p, p:])
         if pivot != p:
             row = copy(factors.columns[m:, p])
             factors.columns[m:, p] = factors.columns[m:, pivot]

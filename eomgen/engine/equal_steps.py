@@ -46,7 +46,7 @@ class Kept:
     margins: Annotated[Vector, "most"]
 
 
-class Held(Protocol):
+class Constrained(Protocol):
     """What is held along the way: flags of the processor, and constraints if there are any."""
 
     def clear(self) -> None:
@@ -69,7 +69,7 @@ class Held(Protocol):
 
 
 def equal_steps(
-    held: Held, method: Method, t: float, at: Sum, course: Course, step: Step, kept: Kept
+    held: Constrained, method: Method, t: float, at: Sum, course: Course, step: Step, kept: Kept
 ) -> int:
     """Steps from t on. Ends before a step whose rate jumps, or one with anything unusual: these are
     made elsewhere.

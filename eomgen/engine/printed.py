@@ -44,7 +44,12 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     *((name, {}) for name in CONTACTS),
 )
 """What a page that goes on live calls."""
-CODES = ("TOLERANCE", "ENDLESS", "NO_FORCES", "UNHELD")
+CODES = {
+    "TOLERANCE": contacts.TOLERANCE,
+    "ENDLESS": contacts.ENDLESS,
+    "NO_FORCES": contacts.NO_FORCES,
+    "UNHELD": contact_times.UNHELD,
+}
 """The constants that it needs."""
 
 
@@ -69,7 +74,7 @@ def steps_of_pages() -> str:
     call, by name. Of these numbers those are given that are needed.
     """
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
-    codes = "".join(f", {name}: {getattr(contacts, name)!r}" for name in CODES)
+    codes = "".join(f", {name}: {value!r}" for name, value in CODES.items())
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
     head = "const makeSteps = (STATES, POSITIONS, OTHERS, CONTACTS, PRESSED) =>"
     return f"{head} {{\n{source}return {{ {names}{codes} }};\n}};\n"

@@ -46,14 +46,15 @@ class Text:
 
     @classmethod
     def of(cls, *modules: ModuleType) -> "Text":
-        """The text of modules. Raises `ValueError` if two functions have the same name."""
+        """The text of modules. Raises `ValueError` if two things have the same name."""
         text = cls()
         for module in modules:
             constants = {n: x for n, x in vars(module).items() if n.isupper()}
             for d in ast.parse(inspect.getsource(module)).body:
+                named = isinstance(d, ast.FunctionDef | ast.ClassDef)
+                if named and (d.name in text.functions or d.name in text.classes):
+                    raise ValueError(f"{module.__name__}: a second {d.name}")
                 if isinstance(d, ast.FunctionDef):
-                    if d.name in text.functions:
-                        raise ValueError(f"{module.__name__}: a second function {d.name}")
                     text.functions[d.name] = d
                     text.constants[d.name] = constants
                     text.python[d.name] = getattr(module, d.name)

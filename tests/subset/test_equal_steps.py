@@ -17,7 +17,7 @@ N, POSITIONS, OTHERS = 5, np.array([1, 3]), np.array([0, 2, 4])
 
 
 class Python:
-    """Functions of `System`, `Method` and `Held`."""
+    """Functions of `System`, `Method` and `Constrained`."""
 
     def derivative(self, t: float, y: Any) -> Any:
         return y * y[::-1] - t * y
@@ -49,20 +49,20 @@ GIVEN = Given(
 struct Step;
 typedef struct { int none; } System;
 typedef System Method;
-typedef System Held;
+typedef System Constrained;
 static void derivative(System *s, double t, const double *y, double *out) {
     (void)s;
     for (int j = 0; j < 5; j++) out[j] = y[j] * y[4 - j] - t * y[j];
 }
 static int64_t changed(Method *m, double t, const double *y, double h, struct Step *step);
-static void clear(Held *h) { (void)h; }
-static int64_t is_raised(Held *h) { (void)h; return 0; }
-static int64_t projected(Held *h, double t, double *y) {
+static void clear(Constrained *h) { (void)h; }
+static int64_t is_raised(Constrained *h) { (void)h; return 0; }
+static int64_t projected(Constrained *h, double t, double *y) {
     (void)h;
     y[1] *= 1.0 + 1e-3 * t;
     return y[1] < 2.0;
 }
-static int64_t keep_step(Held *h, double t, const double *y, double *margin) {
+static int64_t keep_step(Constrained *h, double t, const double *y, double *margin) {
     (void)h, (void)t;
     *margin = y[0];
     return 1;
