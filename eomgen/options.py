@@ -57,6 +57,9 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         )
     parser.add_argument("--float", action="store_true", help="numbers in C are float, not double")
     parser.add_argument(
+        "--integrator", metavar="NAME", default="", help="an explicit method with equal steps"
+    )
+    parser.add_argument(
         "-o",
         "--output",
         metavar="PATH",

@@ -23,9 +23,9 @@ real seen(real x, int quarter) { return quarter ? cos_(x) : sin_(x); }
 class Firmware:
     """The functions of a scene's firmware, over arrays of its own type of numbers."""
 
-    def __init__(self, scene: str, number: Number) -> None:
+    def __init__(self, scene: str, number: Number, integrator: str = "") -> None:
         with tempfile.TemporaryDirectory() as folder:
-            paths = eomgen.export(scene, "firmware", folder, number=number)
+            paths = eomgen.export(scene, "firmware", folder, number=number, integrator=integrator)
             sources = {path.name: path.read_text("utf-8") for path in paths}
         self.name, self.type = Path(paths[0]).stem, TYPES[number]
         self.sources = sources

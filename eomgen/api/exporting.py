@@ -24,6 +24,7 @@ def export(
     route: Route | None = None,
     outputs: Outputs | None = None,
     number: Number = "double",
+    integrator: str = "",
     force: bool = False,
 ) -> tuple[Path, ...]:
     """Write a scene's equations in the format of another tool; return the paths of the files.
@@ -35,6 +36,7 @@ def export(
     route    to the equations; None: the scene's own
     outputs  functions beside those that the format needs; None: the scene's own
     number   type of numbers in C, "double" or "float", where the format has a choice
+    integrator  explicit method with equal steps, where the format makes steps; "" for its own
     force    also overwrite files that this program did not write
 
     Raises `SceneError` or `RunError` if the scene has something that the format cannot hold, or a
@@ -43,7 +45,7 @@ def export(
     scene = read(source)
     model = modelled(scene, form=form, route=route, outputs=outputs)
     target = None if path is None else Path(path)
-    options = Options(number=number, simulation=scene.simulation)
+    options = Options(number=number, integrator=integrator, simulation=scene.simulation)
     return exported(model, format, target, options, force=force)
 
 

@@ -13,7 +13,7 @@ def export(given: Arguments) -> int:
         model,
         given.format,
         given.output,
-        Options(number=number, simulation=scene.simulation),
+        Options(number=number, integrator=given.integrator, simulation=scene.simulation),
         name=name,
         force=given.force,
         reporter=reporter_of(given, given.scene),

@@ -23,10 +23,12 @@ class Options:
     """What a user chooses beside the scene; a format takes those that its entry names.
 
     number      type of numbers in C
+    integrator  the method of steps, "" for the format's own
     simulation  the scene's settings of a run, which every format may use
     """
 
     number: Number = "double"
+    integrator: str = ""
     simulation: "Simulation | None" = None
 
 
@@ -68,12 +70,12 @@ class Format:
     options: tuple[str, ...] = ()
 
 
-CHOICES = ("number",)
+CHOICES = ("number", "integrator")
 """The options that only some formats take."""
 FORMATS: dict[str, Format] = {
     "casadi": Format("a function for CasADi, which its `Function.load` reads", ".casadi"),
     "fmu": Format("an FMI 3.0 unit for model exchange and co-simulation", ".fmu"),
-    "firmware": Format("a folder with C99 for firmware", options=("number",)),
+    "firmware": Format("a folder with C99 for firmware", options=("number", "integrator")),
     "matlab": Format("a folder with functions for MATLAB and Octave"),
 }
 

@@ -7,12 +7,16 @@ library; numbers are `double` or `float`.
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.errors import SceneError
-from eomgen.exports import Options, Written
+from eomgen.exports import Options, Written, explicit_steps
+from eomgen.integrators import INTEGRATORS
 from eomgen.model.model import Model
 from eomgen.program.ordering import ordered
 from eomgen.store import interfaced_program_of
+from eomgen.subset.braces import REALS
 from eomgen.templating import render
 
+METHOD = "rk4"
+"""The method of steps, if no other one is wanted."""
 CIRCULAR = ("sin", "cos", "tan")
 SINES = {
     "double": (
@@ -47,7 +51,7 @@ def files(model: Model, options: Options) -> Written:
     if not interface.states:
         raise SceneError("firmware: the scene has no states, so there is nothing to step")
     values = c.context(ordered(program), interface)
-    name, number = interface.name, options.number
+    name, number, method = interface.name, options.number, options.integrator or METHOD
     called = [(f, name) for f, name in values["functions"] if f not in (*CIRCULAR, "abs")]
     circular = [f for f in CIRCULAR if f in {f for f, _ in values["functions"]}]
     source = {
@@ -65,11 +69,13 @@ def files(model: Model, options: Options) -> Written:
         "constrained": interface.projected,
         "coordinates": interface.coordinates,
         "velocities": interface.velocities,
+        **explicit_steps.context(method, model, interface, REALS),
     }
     header = {
         **c.header(values, interface),
         "real": number,
         "functions": circular,
+        "method": INTEGRATORS[method].about,
     }
     example = {
         "scene": name,

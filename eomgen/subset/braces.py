@@ -52,6 +52,8 @@ class Language:
     part          how a part of an array is passed on, by its name and the place where it begins
     field         how a record's field is read
     prelude       what the printed functions need
+    literal       how a number is written
+    typed         whether arguments and results have types, and records structures
     """
 
     function: str
@@ -65,11 +67,7 @@ class Language:
     field: str
     prelude: str
     literal: str = "{}"
-
-    @property
-    def is_c(self) -> bool:
-        """Whether it is C, or C with vectors in place of numbers."""
-        return self.field == "->"
+    typed: bool = False
 
 
 C = Language(
@@ -92,7 +90,10 @@ static inline double next_after(double t) {
     return nextafter(t, INFINITY);
 }
 """,
+    typed=True,
 )
+REALS = replace(C, number="real", arrays=("real", "int64_t"), literal="R({})")
+"""C with numbers of a type `real`, for which R(x) writes constants."""
 VECTORS = replace(C, number="V", arrays=("V", "int64_t"), literal="N({})")
 """C with a type V of vectors in place of numbers: text without decisions makes several at once."""
 JAVASCRIPT = Language(
@@ -133,16 +134,16 @@ def printed(
     """
     functions = text.expanded(roots)
     made = {d.name: d for d in functions}
-    lines = []
-    if language.is_c:
-        lines += _structures(text, made.values(), language.number)
+    lines = list(_structures(text, made.values(), language)) if language.typed else []
     changes: dict[str, set[str]] = {}
     for d in functions:
         lines += ["", *_Function(text, made, d, language, changes).lines()]
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _structures(text: Text, functions: Iterable[ast.FunctionDef], number: str) -> Iterable[str]:
+def _structures(
+    text: Text, functions: Iterable[ast.FunctionDef], language: Language
+) -> Iterable[str]:
     """C's structures of the records that are arguments."""
     kinds = (of_annotation(a.annotation).of for d in functions for a in d.args.args)
     for name in dict.fromkeys(kinds):
@@ -150,13 +151,16 @@ def _structures(text: Text, functions: Iterable[ast.FunctionDef], number: str) -
         if record and not is_protocol(record):
             yield f"typedef struct {name} {{"
             for each, kind in fields_of(record).items():
-                yield f"    {_c_type(kind, number)}{each};"
+                yield f"    {_type(kind, language)}{each};"
             yield f"}} {name};"
 
 
-def _c_type(kind: Kind, number: str) -> str:
-    of = {"float": number, "int": "int64_t"}.get(kind.of, kind.of)
-    return f"{of} {'*' if kind.is_array or kind.of not in ('float', 'int') else ''}"
+def _type(kind: Kind, language: Language) -> str:
+    if kind.of not in ("float", "int"):
+        return f"{kind.of} *"
+    if kind.is_array:
+        return f"{language.arrays[kind.of == 'int']} *"
+    return f"{language.whole if kind == INT else language.number} "
 
 
 Group = list[ast.Assign]
@@ -190,18 +194,18 @@ class _Function:
     def _head(self) -> str:
         arguments = self.kinds.arguments.items()
         shown = [name for name, _ in arguments]
-        if self.to.is_c:
-            kept = self.changes[self.d.name]
+        if self.to.typed:
+            read = {n for n, k in arguments if k.is_array} - self.changes[self.d.name]
             shown = [
-                f"{'' if name in kept or not kind.is_array else 'const '}{_c_type(kind, self.to.number)}"
+                f"{'const ' if name in read else ''}{_type(kind, self.to)}"
                 f"{'restrict ' if kind.is_array else ''}{name}"
                 for name, kind in arguments
             ]
         result = of_annotation(self.d.returns)
         return self.to.function.format(
-            result="void" if result == NOTHING else _c_type(result, self.to.number).strip(),
+            result="void" if result == NOTHING else _type(result, self.to).strip(),
             name=self.d.name,
-            arguments=", ".join(shown) or ("void" if self.to.is_c else ""),
+            arguments=", ".join(shown) or ("void" if self.to.typed else ""),
         )
 
     def _declared(self) -> list[str]:
@@ -385,7 +389,7 @@ class _Function:
             self._check_overlap(target, value)
             word = ""
             if isinstance(target, ast.Name) and target.id in self.scalars - declared:
-                word = f"{self.to.number} "
+                word = f"{self.to.arrays[0] if self.to.typed else self.to.number} "
                 declared.add(target.id)
             self._line(f"{word}{self._expr(target, ONE)} = {_bare(self._expr(value, ONE))};")
         self.depth -= 1
@@ -544,8 +548,8 @@ class _Function:
             return str(int(value))
         if math.isinf(value):
             return self.to.infinite if value > 0 else f"(-{self.to.infinite})"
-        shown = f"({value!r})" if value < 0 else repr(value)
-        return self.to.literal.format(shown) if isinstance(value, float) else shown
+        shown = repr(value) if isinstance(value, int) else self.to.literal.format(repr(value))
+        return f"({shown})" if value < 0 else shown
 
     def _entry(self, e: ast.expr, at: Sequence[str]) -> str:
         """A number, an entry of an array, or a whole array by its name."""
@@ -600,7 +604,7 @@ class _Function:
         if self._given(e):
             assert isinstance(e.func, ast.Attribute) and isinstance(e.func.value, ast.Name)
             of, name = e.func.value.id, e.func.attr
-            if self.to.is_c:
+            if self.to.typed:
                 return f"{name}({', '.join([of, *arguments])})"
             return f"{of}.{name}({', '.join(arguments)})"
         if called(e) not in self.made:

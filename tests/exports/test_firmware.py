@@ -8,6 +8,7 @@ import pytest
 from firmware import Firmware
 
 import eomgen
+from eomgen.errors import RunError
 from eomgen.exports import Number
 from eomgen.exports.firmware import ERRORS, FARTHEST
 
@@ -62,6 +63,16 @@ def test_steps_keep_quaternions_and_loops(scene: str) -> None:
     run = eomgen.simulate(scene, integrator="rk4", dt=1e-3, t_end=0.5, samples=2)
     inputs = [i.default for i in eomgen.check(scene).inputs]
     np.testing.assert_allclose(made.stepped(run.y[0], inputs, 1e-3, 500), run.y[-1], atol=1e-11)
+
+
+@pytest.mark.parametrize("method", ["euler", "leapfrog", "leapfrog_6", "semi_implicit_euler"])
+def test_each_explicit_method_steps(method: str) -> None:
+    """Beside our own run of it, in double; and one that is not explicit is refused."""
+    made = Firmware("pendulum", "double", method)
+    run = eomgen.simulate("pendulum", integrator=method, dt=1e-3, t_end=0.5, samples=2)
+    np.testing.assert_allclose(made.stepped(run.y[0], [], 1e-3, 500), run.y[-1], atol=1e-11)
+    with pytest.raises(RunError, match="rk4"):
+        Firmware("double_pendulum", "float", "leapfrog" if "leap" in method else "gauss_4")
 
 
 def test_the_example_estimates_what_is_not_measured(tmp_path: Path) -> None:

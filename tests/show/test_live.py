@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from inspect import getsource
 from typing import Any
 
 import numpy as np
@@ -186,9 +187,11 @@ def with_same_sines(name: str, **more: Any) -> tuple[str, dict[str, Any], Genera
     code, table = page_of(name, **more)
     source = SAME_SINES + re.sub(r"Math\.(sin|cos)\(", r"\1_(", code.source)
     system = live_system(model_of(read(name), name), ()).system
-    module = load_module(re.sub(r"\b(sin|cos)\(", r"\1_(", python_module(system)))
-    vars(module).update(sin_=lambda x: x * series(x, 1), cos_=lambda x: series(x, -1))
-    return source, table, module
+    text = re.sub(r"\b(sin|cos)\(", r"\1_(", python_module(system))
+    sines = (
+        f"{getsource(series)}\n\nsin_ = lambda x: x * series(x, 1)\ncos_ = lambda x: series(x, -1)"
+    )
+    return source, table, load_module(text.replace("import numpy", f"{sines}\nimport numpy", 1))
 
 
 TREES = some(
