@@ -1,13 +1,13 @@
 """Elimination and implicit steps over random inputs in three languages: the same bits."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 from languages import NONE, Given, results
 
-from eomgen.engine import elimination, few, implicit, system
+from eomgen.engine import elimination, few, implicit, rosenbrock, system
 from eomgen.engine.implicit import (
     GAUSS_4,
     GAUSS_6,
@@ -15,9 +15,11 @@ from eomgen.engine.implicit import (
     Collocation,
     Stages,
 )
+from eomgen.engine.rodas_5p_coefficients import GAMMA
+from eomgen.engine.rosenbrock import MANY_SUMS, Rodas
 from eomgen.subset.expander import Text
 
-TEXT = Text.of(elimination, implicit, system)
+TEXT = Text.of(elimination, implicit, rosenbrock, system)
 SEEDED = np.random.default_rng(1)
 
 
@@ -106,8 +108,28 @@ def test_implicit_steps(method: Collocation, positions: int) -> None:
     factors = few.factors_of(many * n, -few.FEW)
     starts = SEEDED.normal(size=(3, n))
     cases = [
-        [SYSTEM, 0.1, h, y, stages, factors, np.zeros(n)]
-        for y in starts
-        for h in (0.01, 0.5, 9.0)
+        [SYSTEM, 0.1, h, y, stages, factors, np.zeros(n)] for y in starts for h in (0.01, 0.5, 9.0)
     ]
     same("implicit_change", cases, SYSTEM, method=method)
+
+
+@pytest.mark.parametrize("timed", [False, True])
+def test_rosenbrock_steps(timed: bool) -> None:
+    """Attempts at steps, with their sums and errors; then whole steps, some of them shortened. In
+    JavaScript these have another `pow`.
+    """
+    n = 4
+    arrays = np.full(n, 1e-6), *np.zeros((3, n)), np.zeros((MANY_SUMS, n))
+    empty = Rodas(9.0, 3.0, 1e-4, 2, timed, 0.0, 0.02, 0.5, 0.0, 0, 0, *arrays)
+    starts = SEEDED.normal(size=(4, n))
+    attempts, steps = list[list[Any]](), list[list[Any]]()
+    for y in starts:
+        factors = few.factors_of(n, -few.FEW)
+        slope, matrix = (f(0.1, y) for f in (SYSTEM.python.derivative, SYSTEM.python.jacobian))
+        assert elimination.factored(factors, 1.0 / (0.05 * GAMMA), 2, matrix)
+        attempts.append([SYSTEM, empty, factors, 0.1, 0.05, y, slope, SEEDED.normal(size=n)])
+        lengths = (replace(empty, h_abs=length) for length in (0.01, 2.0))
+        steps += [[SYSTEM, run, factors, 0.1, y] for run in lengths]
+    same("attempted", attempts, SYSTEM)
+    python, c, _ = results(TEXT, "rodas_step", steps, given=SYSTEM)
+    assert python == c
