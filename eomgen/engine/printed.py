@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from eomgen.engine import elimination, implicit, linear, roots, rosenbrock, system
+from eomgen.engine import elimination, implicit, linear, projection, roots, rosenbrock, system
 from eomgen.subset.braces import JAVASCRIPT, C, printed
 from eomgen.subset.expander import Text
 
@@ -17,7 +17,7 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (("begun", {}), ("gone_on"
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    return Text.of(elimination, implicit, linear, roots, rosenbrock, system)
+    return Text.of(elimination, implicit, linear, projection, roots, rosenbrock, system)
 
 
 def c_source(functions: Roots) -> str:

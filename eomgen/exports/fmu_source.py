@@ -4,9 +4,11 @@ import hashlib
 from collections.abc import Mapping, Sequence
 
 from eomgen.codegen.backends import c
+from eomgen.engine import projection
+from eomgen.engine.printed import c_source
 from eomgen.exports.fmu_unit import Observed, Unit
 from eomgen.native.dop853 import constants, written_out
-from eomgen.run import complementarity, contacts, events, projection
+from eomgen.run import complementarity, contacts, events
 from eomgen.templating import render, templates_folder
 
 HEADERS = ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h")
@@ -75,9 +77,9 @@ def _closure(unit: Unit) -> dict[str, object]:
         "row_sizes": [repr(unit.size if force == "N" else 1.0) for _, force in rows],
         "coordinates": interface.coordinates,
         "velocities": interface.velocities,
-        "most_newton": projection.MOST,
-        "met": repr(projection.MET),
-        "close": repr(projection.CLOSE),
+        "projection": c_source([("moved_onto", {})]),
+        "on_constraints": projection.PROJECTED,
+        "far": projection.FAR,
         "drift": repr(DRIFT),
     }
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from languages import NONE, Given, results
 
-from eomgen.engine import elimination, few, implicit, rosenbrock, system
+from eomgen.engine import elimination, few, implicit, projection, rosenbrock, system
 from eomgen.engine.implicit import (
     GAUSS_4,
     GAUSS_6,
@@ -19,7 +19,7 @@ from eomgen.engine.rodas_5p_coefficients import GAMMA
 from eomgen.engine.rosenbrock import MANY_SUMS, Rodas
 from eomgen.subset.expander import Text
 
-TEXT = Text.of(elimination, implicit, rosenbrock, system)
+TEXT = Text.of(elimination, implicit, projection, rosenbrock, system)
 SEEDED = np.random.default_rng(1)
 
 
@@ -133,3 +133,68 @@ def test_rosenbrock_steps(timed: bool) -> None:
     same("attempted", attempts, SYSTEM)
     python, c, _ = results(TEXT, "rodas_step", steps, given=SYSTEM)
     assert python == c
+
+
+class Circle:
+    """States x, y, v, w on a circle."""
+
+    def residuals_at(self, t: float, y: Any, out: Any) -> bool:
+        out[:] = y[0] * y[0] + y[1] * y[1] - 1.0, y[0] - y[0]
+        return bool(y[0] < 9.0)
+
+    def move_closer(self, t: float, y: Any, there: Any) -> bool:
+        far = (y[0] * y[0] + y[1] * y[1] - 1.0) / (2.0 * (y[0] * y[0] + y[1] * y[1]))
+        there[:2] = y[0] - far * y[0], y[1] - far * y[1]
+        return True
+
+    def hold_velocities(self, t: float, y: Any) -> bool:
+        out = (y[0] * y[2] + y[1] * y[3]) / (y[0] * y[0] + y[1] * y[1])
+        y[2:] = y[2] - out * y[0], y[3] - out * y[1]
+        return True
+
+
+CIRCLE = Given(
+    Circle(),
+    """
+typedef struct { int none; } Constraints;
+static int64_t residuals_at(Constraints *c, double t, const double *y, double *out) {
+    out[0] = y[0] * y[0] + y[1] * y[1] - 1.0, out[1] = y[0] - y[0];
+    return y[0] < 9.0;
+}
+static int64_t move_closer(Constraints *c, double t, const double *y, double *there) {
+    const double far = (y[0] * y[0] + y[1] * y[1] - 1.0) / (2.0 * (y[0] * y[0] + y[1] * y[1]));
+    there[0] = y[0] - far * y[0], there[1] = y[1] - far * y[1];
+    return 1;
+}
+static int64_t hold_velocities(Constraints *c, double t, double *y) {
+    const double out = (y[0] * y[2] + y[1] * y[3]) / (y[0] * y[0] + y[1] * y[1]);
+    y[2] = y[2] - out * y[0], y[3] = y[3] - out * y[1];
+    return 1;
+}
+""",
+    """
+const system = {
+  residuals_at(t, y, out) {
+    out.set([y[0] * y[0] + y[1] * y[1] - 1.0, y[0] - y[0]]);
+    return y[0] < 9.0;
+  },
+  move_closer(t, y, there) {
+    const far = (y[0] * y[0] + y[1] * y[1] - 1.0) / (2.0 * (y[0] * y[0] + y[1] * y[1]));
+    there.set([y[0] - far * y[0], y[1] - far * y[1]]);
+    return true;
+  },
+  hold_velocities(t, y) {
+    const out = (y[0] * y[2] + y[1] * y[3]) / (y[0] * y[0] + y[1] * y[1]);
+    y.set([y[2] - out * y[0], y[3] - out * y[1]], 2);
+    return true;
+  },
+};
+""",
+)
+
+
+def test_projection() -> None:
+    """Near and far states; one where a function has no valid result."""
+    starts = [*SEEDED.normal(size=(20, 4)), np.array([1e-9, 0, 1, 1]), np.array([9.0, 0, 1, 1])]
+    room = np.array([1.0, 2.0]), *np.zeros((3, 2)), np.zeros(4)
+    same("moved_onto", [[CIRCLE, 4, 2, 0.0, y, *room] for y in starts], CIRCLE)
