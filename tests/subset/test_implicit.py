@@ -130,7 +130,7 @@ def test_rosenbrock_steps(timed: bool) -> None:
         attempts.append([SYSTEM, empty, factors, 0.1, 0.05, y, slope, SEEDED.normal(size=n)])
         lengths = (replace(empty, h_abs=length) for length in (0.01, 2.0))
         steps += [[SYSTEM, run, factors, 0.1, y] for run in lengths]
-    same("attempted", attempts, SYSTEM)
+    same("rodas_attempted", attempts, SYSTEM)
     python, c, _ = results(TEXT, "rodas_step", steps, given=SYSTEM)
     assert python == c
 
