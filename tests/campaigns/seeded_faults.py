@@ -10,7 +10,7 @@ as many as they have lines. Each is made in a copy of the project. There run the
 more than LONGEST processor time counts as caught, too. What is not caught is shown with its line:
 the tests have a hole there, or the change means nothing.
 
-`--near`: only the tests of the changed package run; what they do not catch is left for another call.
+`--near`: only the tests of the changed package run; what they miss is left for another call.
 `--before`: where the tests as they stand catch nothing, the cases run that this revision's tests
 have and they have not. A log has a line of JSON for each fault; faults that have theirs are not
 tried again, so a campaign can be stopped and continued.
