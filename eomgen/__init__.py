@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from eomgen.api.linearising import linearise
     from eomgen.api.reopening import load_run
     from eomgen.api.simulating import simulate
+    from eomgen.api.stepping import Stepper, stepper
     from eomgen.api.sweeping import Ensemble, ensemble, grid, sampled
     from eomgen.api.symbolic import casadi_functions
     from eomgen.api.systems import nonlinear_system, state_space
@@ -41,6 +42,7 @@ __all__ = [
     "RunError",
     "Scene",
     "SceneError",
+    "Stepper",
     "accuracy",
     "arithmetic",
     "built_in_names",
@@ -64,6 +66,7 @@ __all__ = [
     "sampled",
     "simulate",
     "state_space",
+    "stepper",
     "verify",
 ]
 
@@ -79,6 +82,7 @@ _PLACES = {
     "linearise": "api.linearising",
     "load_run": "api.reopening",
     "simulate": "api.simulating",
+    **dict.fromkeys(("Stepper", "stepper"), "api.stepping"),
     **dict.fromkeys(("nonlinear_system", "state_space"), "api.systems"),
     **dict.fromkeys(("Ensemble", "ensemble", "grid", "sampled"), "api.sweeping"),
     "casadi_functions": "api.symbolic",

@@ -74,7 +74,7 @@ def functions_page() -> str:
         if inspect.isclass(each) and each.__module__ != "eomgen.scene.schema":
             lines += _entry("class", f"eomgen.{name}", None, each.__doc__)
             for part, value in vars(each).items():
-                if part.startswith("_"):
+                if part.startswith("_") and part != "__call__":
                     continue
                 if isinstance(value, property):
                     lines += _entry("attribute", f"eomgen.{name}.{part}", None, value.__doc__)

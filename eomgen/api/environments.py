@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.api.generating import compiled
-from eomgen.api.given import Source, check, check_name
+from eomgen.api.given import Source, check_name
+from eomgen.api.stepping import stepper
 from eomgen.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.language.formula import FormulaError, evaluate, names_in, parse
-from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.scalars.floats import ArrayScalars
@@ -43,20 +42,21 @@ def environment(
     ended    formula that is not 0 where an episode has failed, for example "abs(theta) > 0.2"
     start    distributions of states at the beginning, as those of `sampled`; others have the values
              of the scene
-    dt       length of a step, s; it is made by `parts` steps of the classical Runge-Kutta method
+    dt       length of a step, s; it is made by `parts` steps of the classical Runge-Kutta method,
+             in compiled code if there is a compiler, see `stepper`
     t_end    time after which an episode is cut off, s
     lanes    number of environments that step together
 
     A seed determines an episode. A state that is not finite ends an episode, and
     `info["diverged"]` says so. Raises `SceneError`; `RunError` for an unknown name, a formula that
-    cannot be read, for rigid contacts and for loops that are not closed in closed form, which steps
-    of this kind do not have, or if Gymnasium is not installed.
+    cannot be read, for rigid contacts, whose impacts such steps do not have, or if Gymnasium is not
+    installed.
     """
     if find_spec("gymnasium") is None:
         raise RunError(NEEDED)
-    model = check(source)
-    _check_steps(model, dt, parts, t_end, lanes)
-    _, module = compiled(model)
+    _check_steps(dt, parts, t_end, lanes)
+    step = stepper(source, dt=dt / parts, lanes=lanes or 1)
+    module = step.module
     from eomgen.exports.gymnasium_envs import SceneEnv, SceneVectorEnv, Task
 
     bounds = {identifier(name): each for name, each in actions.items()}
@@ -70,34 +70,26 @@ def environment(
         raise RunError("actions: name at least one input with its bounds")
     task = Task(
         module,
+        step.initial()[:, 0],
+        lambda y, u, t: step(y, u, t=t, steps=parts),
+        step.projected,
         bounds,
         _stacked([_function(text, "observe", module) for text in observe or module.STATES]),
         _function(reward, "reward", module),
         _function(ended, "ended", module),
         _laws(start or {}, module),
         dt,
-        parts,
         max(1, round(t_end / dt)),
     )
     return SceneEnv(task) if lanes is None else SceneVectorEnv(task, lanes)
 
 
-def _check_steps(model: Model, dt: float, parts: int, t_end: float, lanes: int | None) -> None:
-    """Raise `RunError` for numbers out of range, and for scenes whose steps need more."""
+def _check_steps(dt: float, parts: int, t_end: float, lanes: int | None) -> None:
+    """Raise `RunError` for numbers out of range."""
     if not (np.isfinite([dt, t_end]).all() and 0 < dt <= t_end):
         raise RunError(f"dt: {dt:g} s is not between 0 and t_end = {t_end:g} s")
     if parts < 1 or (lanes is not None and lanes < 1):
         raise RunError("parts, lanes: give positive numbers")
-    if any(effect.contact_names([b.name for b in model.bodies]) for effect in model.effects):
-        raise RunError(
-            "environment: steps of equal length have no impacts; give the contacts a stiffness "
-            "instead of a restitution"
-        )
-    if model.constraints and not model.groups:
-        raise RunError(
-            "environment: the constraints of this scene are kept by projection, which these steps "
-            "do not have"
-        )
 
 
 def _function(text: str, argument: str, module: GeneratedModule) -> Columns:

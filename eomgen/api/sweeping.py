@@ -349,7 +349,8 @@ def _mostly_in_c(integrator: str, functions: Any) -> bool:
     methods that pass over a corner are repeated there.
     """
     method = find_integrator(integrator)
-    if not method.compiled or getattr(functions, "CONTACTS", ()):
+    contacts: tuple[str, ...] = getattr(functions, "CONTACTS", ())
+    if not method.compiled or contacts:
         return False
     return isinstance(method, FixedStep) or not hasattr(functions, "switching_functions")
 

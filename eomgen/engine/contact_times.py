@@ -5,7 +5,7 @@ Times within a step are in seconds from its start.
 
 from typing import Annotated, Protocol
 
-from eomgen.engine.contacts import TOLERANCE, ContactLaw, Held, counted, press
+from eomgen.engine.contacts import TOLERANCE, ContactLaw, Touching, counted, press
 from eomgen.engine.roots import FOUND, WANTED, Search, begun, gone_on
 from eomgen.subset.words import Vector, Whole, copy, inf, nan, zeros
 
@@ -29,7 +29,7 @@ class Within(Protocol):
 def closing(
     law: ContactLaw,
     within: Within,
-    now: Held,
+    now: Touching,
     search: Search,
     t: float,
     length: float,
@@ -87,7 +87,7 @@ def closing(
 def first_zero(
     law: ContactLaw,
     within: Within,
-    now: Held,
+    now: Touching,
     search: Search,
     t: float,
     c: int,
@@ -127,7 +127,7 @@ def first_zero(
 def opening(
     law: ContactLaw,
     within: Within,
-    now: Held,
+    now: Touching,
     search: Search,
     t: float,
     length: float,
@@ -166,7 +166,7 @@ def opening(
 def zero(
     law: ContactLaw,
     within: Within,
-    now: Held,
+    now: Touching,
     search: Search,
     t: float,
     what: int,
@@ -193,7 +193,7 @@ def zero(
 def value(
     law: ContactLaw,
     within: Within,
-    now: Held,
+    now: Touching,
     t: float,
     what: int,
     c: int,

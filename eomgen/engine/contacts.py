@@ -60,7 +60,7 @@ class ContactLaw(Protocol):
 
 
 @dataclass(slots=True)
-class Held:
+class Touching:
     """What is known of contacts beside time and state.
 
     alpha    the rate at which drift decays, 1/s
@@ -112,7 +112,7 @@ def accelerations(
 
 
 def begin(
-    law: ContactLaw, now: Held, t: float, y: Annotated[Vector, "STATES"], span: float
+    law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES"], span: float
 ) -> None:
     """Begin a run of `span` s: nothing is held.
 
@@ -142,13 +142,13 @@ def deepest(law: ContactLaw, t: float, y: Annotated[Vector, "STATES"]) -> int:
     return found
 
 
-def acceleration_of_motion(now: Held) -> float:
+def acceleration_of_motion(now: Touching) -> float:
     """The acceleration of the motion at the start of the run, sizes/s²: see `begin`."""
     rate = now.alpha / ALPHA
     return rate * rate
 
 
-def weigh(law: ContactLaw, now: Held, t: float, y: Annotated[Vector, "STATES"]) -> None:
+def weigh(law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES"]) -> None:
     """Compute `units` of the contacts that are held: forces that accelerate their gaps as much as
     any gap is without contact forces, but at least by the acceleration of the motion, since bodies
     that move together do not accelerate their gaps.
@@ -169,7 +169,7 @@ def weigh(law: ContactLaw, now: Held, t: float, y: Annotated[Vector, "STATES"]) 
 
 def press(
     law: ContactLaw,
-    now: Held,
+    now: Touching,
     t: float,
     y: Annotated[Vector, "STATES"],
     pushes: Annotated[Vector, "CONTACTS"],
@@ -189,7 +189,7 @@ def press(
 
 def press_many(
     law: ContactLaw,
-    now: Held,
+    now: Touching,
     many: int,
     t: float,
     y: Annotated[Vector, "STATES"],
@@ -240,7 +240,7 @@ def press_many(
 
 def strike(
     law: ContactLaw,
-    now: Held,
+    now: Touching,
     t: float,
     y: Annotated[Vector, "STATES"],
     closed: Annotated[Whole, "CONTACTS"],
@@ -283,7 +283,7 @@ def strike(
 
 def slowest(
     law: ContactLaw,
-    now: Held,
+    now: Touching,
     t: float,
     y: Annotated[Vector, "STATES"],
     least: Annotated[Vector, "CONTACTS"],
@@ -321,7 +321,7 @@ def fastest(n: int, touching: Annotated[Whole, "n"], rate: Annotated[Vector, "n"
 
 def hold(
     law: ContactLaw,
-    now: Held,
+    now: Touching,
     t: float,
     y: Annotated[Vector, "STATES"],
     touching: Annotated[Whole, "CONTACTS"],
@@ -352,7 +352,7 @@ def hold(
     return STRUCK
 
 
-def let_go(now: Held, c: int, gap: float) -> None:
+def let_go(now: Touching, c: int, gap: float) -> None:
     """Let a contact open; its `slack` is `TOLERANCE`, or a little more than its penetration."""
     now.holds[c] = 0
     now.slack[c] = max(TOLERANCE, 0.01 * TOLERANCE - gap)
@@ -360,7 +360,7 @@ def let_go(now: Held, c: int, gap: float) -> None:
 
 def release(
     law: ContactLaw,
-    now: Held,
+    now: Touching,
     t: float,
     y: Annotated[Vector, "STATES"],
     opened: Annotated[Whole, "CONTACTS"],
@@ -373,7 +373,7 @@ def release(
     weigh(law, now, t, y)
 
 
-def settle(law: ContactLaw, now: Held, t: float, y: Annotated[Vector, "STATES"]) -> None:
+def settle(law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES"]) -> None:
     """Take the slack off contacts that have left."""
     n = len(now.slack)
     if largest(n, now.slack) > 0.0:

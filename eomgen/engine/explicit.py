@@ -141,7 +141,7 @@ def leapfrog(
     kick = h * slope[split.others]
     middle = velocities + kick / 2.0
     drift = product(split.rates, middle)
-    change = zeros(len(y))
+    change = copy(y)
     change[split.others] = kick
     change[split.positions] = h * drift
     step.change = change
@@ -160,7 +160,7 @@ def composed(
     """A step made of steps of parts of h, of which some lead back: Hairer, Lubich, Wanner,
     (II.4.2). Returns the number of iterations, or 0 if there is no step.
     """
-    total = zeros(len(y))
+    total = 0.0 * y
     start = t
     iterations = 0
     for part in unrolled(of.parts):

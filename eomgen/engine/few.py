@@ -3,6 +3,7 @@
 The operations are those of `eomgen.engine.elimination`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -32,8 +33,17 @@ class _Few(Factors):
     rest: list[list[float]] = field(default_factory=list)
     places: list[int] = field(default_factory=list)
 
-    def eliminated(self) -> bool:
-        """As `elimination.eliminated`."""
+    @property
+    def eliminated(self) -> Callable[[], bool] | None:
+        """As `elimination.eliminated`; None if there are many unknowns."""
+        return self._eliminated if self.n - self.first <= FEW else None
+
+    @property
+    def solve_by(self) -> Callable[[Vector], None] | None:
+        """As `elimination.solve_by`; None if there are many unknowns."""
+        return self._solve_by if self.n - self.first <= FEW else None
+
+    def _eliminated(self) -> bool:
         m = self.first
         diagonal = self.diagonal
         right: list[list[float]] = self.right[:m, m:].tolist()
@@ -62,8 +72,7 @@ class _Few(Factors):
                     ]
         return True
 
-    def solve_by(self, values: Vector) -> None:
-        """As `elimination.solve_by`."""
+    def _solve_by(self, values: Vector) -> None:
         given: list[float] = values.tolist()
         m, rest = self.first, self.rest
         first, others = given[:m], given[m:]

@@ -12,6 +12,7 @@ from eomgen.engine import (
     elimination,
     equal_steps,
     explicit,
+    implicit,
     least_squares,
     linear,
     quaternions,
@@ -20,13 +21,15 @@ from eomgen.engine import (
     system,
 )
 from eomgen.engine.embedded import DOP853
-from eomgen.subset.braces import JAVASCRIPT, C, printed
+from eomgen.subset.braces import JAVASCRIPT, C, Language, printed
 from eomgen.subset.expander import Text
 from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 """Functions of the engine, each with the values of its `Known` parameters."""
-CONTACTS = ("begin", "deepest", "press", "strike", "release", "settle", "closing", "opening")
+CONTACTS: Roots = [
+    (name, {}) for name in "begin deepest press strike release settle closing opening".split()
+]
 """What is called for rigid contacts."""
 ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("runge_kutta", {"method": explicit.EULER}),
@@ -41,7 +44,7 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
-    *((name, {}) for name in CONTACTS),
+    *CONTACTS,
 )
 """What a page that goes on live calls."""
 CODES = {
@@ -56,16 +59,16 @@ CODES = {
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    steps = (adaptive, equal_steps, explicit, quaternions, sums)
+    steps = (adaptive, equal_steps, explicit, implicit, quaternions, sums)
     solved = (linear, elimination, least_squares, complementarity, roots)
     return Text.of(*steps, *solved, contacts, contact_times, system)
 
 
-def c_source(functions: Roots) -> str:
-    """C of functions and of all that they call. What includes it defines STATES, `System` and its
-    functions, such as `void derivative(const System *, double t, const double *y, double *rates)`.
+def c_source(functions: Roots, language: Language = C) -> str:
+    """C, or another language like it, of functions and of all that they call. What includes it
+    defines STATES, `System` and its functions, such as `void derivative(const System *, double t, const double *y, double *rates)`.
     """
-    return printed(text(), functions, C)
+    return printed(text(), functions, language)
 
 
 @cache

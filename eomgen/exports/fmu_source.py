@@ -117,6 +117,6 @@ def _contacts(unit: Unit) -> dict[str, object]:
         "endless": contacts.ENDLESS,
         "no_forces": contacts.NO_FORCES,
         "share": repr(events.GAP_CHECKS[1]),
-        "engine": c_source((name, {}) for name in CONTACTS),
+        "engine": c_source(CONTACTS),
         "most_events": events.MOST_EVENTS,
     }

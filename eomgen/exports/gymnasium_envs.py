@@ -20,23 +20,28 @@ class Task:
     """What an environment does; functions take columns: states (ny, k), inputs (nu, k).
 
     module     generated code of the scene
+    initial    its initial state, (ny,)
+    advanced   (y, u, t) -> (ny, k), the states a step after t (k,)
+    projected  (y) -> (ny, k), states with unit quaternions, on the constraints
     inputs     the inputs that are actions, with their bounds; others keep their defaults
     observed   (t, y, u) -> (no, k)
     reward     (t, y, u) -> (k,), after a step
     failed     (t, y, u) -> (k,), whether an episode ends there
     start      what of the first state is drawn, by the index of the state
-    dt, parts  length of a step, s, and how many steps of Runge-Kutta it has
+    dt         length of a step, s
     length     steps after which an episode is cut off
     """
 
     module: GeneratedModule
+    initial: FloatArray
+    advanced: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    projected: Callable[[FloatArray], FloatArray]
     inputs: Mapping[str, tuple[float, float]]
     observed: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     reward: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     failed: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     start: Mapping[int, Law]
     dt: float
-    parts: int
     length: int
 
     def action_space(self) -> Any:
@@ -46,7 +51,7 @@ class Task:
 
     def observation_space(self) -> Any:
         """Any numbers."""
-        y = np.array(self.module.initial_state())[:, None]
+        y = self.initial[:, None]
         count = len(self.observed(np.zeros(1), y, self.applied(np.zeros((1, len(self.inputs))))))
         return gymnasium.spaces.Box(-np.inf, np.inf, (count,), dtype=np.float64)
 
@@ -60,29 +65,10 @@ class Task:
 
     def begun(self, count: int, random: Generator) -> FloatArray:
         """First states (ny, count), drawn."""
-        first = np.array(self.module.initial_state(), dtype=float)
-        y = np.repeat(first[:, None], count, axis=1)
+        y = np.repeat(self.initial[:, None], count, axis=1)
         for i, law in self.start.items():
             y[i] = law.at(random.random(count))
-        return self._of_unit_length(y)
-
-    def stepped(self, t: FloatArray, y: FloatArray, u: FloatArray) -> FloatArray:
-        """States (ny, k) a step after t (k,), by the classical Runge-Kutta method."""
-        h, f = self.dt / self.parts, self.module.derivative
-        with np.errstate(all="ignore"):  # a state that is not finite ends its episode
-            for i in range(self.parts):
-                s = t + i * h
-                k1 = f(s, y, None, u)
-                k2 = f(s + h / 2, y + h / 2 * k1, None, u)
-                k3 = f(s + h / 2, y + h / 2 * k2, None, u)
-                k4 = f(s + h, y + h * k3, None, u)
-                y = self._of_unit_length(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
-        return y
-
-    def _of_unit_length(self, y: FloatArray) -> FloatArray:
-        for indices in map(list, self.module.QUATERNIONS):
-            y[indices] /= np.sqrt(np.sum(y[indices] ** 2, axis=0))
-        return y
+        return self.projected(y) if self.start else y
 
 
 class Lanes:
@@ -113,7 +99,7 @@ class Lanes:
         diverges fails, and keeps its last finite state.
         """
         self.u = self.task.applied(actions)
-        y = self.task.stepped(self.t, self.y, self.u)
+        y = self.task.advanced(self.y, self.u, self.t)
         diverged = ~np.isfinite(y).all(axis=0)
         self.y = np.where(diverged, self.y, y)
         self.steps += 1

@@ -33,9 +33,20 @@ STEPS: Roots = [
     *(("runge_kutta", {"method": each}) for each in _TABLEAUS),
     *(("semi_implicit_euler", {}), ("leapfrog", {}), *COMPOSED, ("equal_steps", {})),
 ]
+
+
+def roots_of(name: str) -> Roots:
+    """What of the engine's text a method is."""
+    composed = [root for root in COMPOSED if root[1]["of"].name == name]
+    tableau = [
+        root for root in STEPS if root[0] == "runge_kutta" and root[1]["method"].name == name
+    ]
+    return [*composed, ("leapfrog", {})] if composed else tableau or [(name, {})]
+
+
 _POINTER, _REAL = ctypes.c_void_p, ctypes.c_double
 _AT, _SPLIT = "t, y, h, step", "(int64_t *)positions, (int64_t *)others, m->system->rates"
-_CALLS = {
+CALLS = {
     **{each.name: f"runge_kutta_{each.name}(m->system, {_AT})" for each in _TABLEAUS},
     "semi_implicit_euler": f"semi_implicit_euler(m->system, positions, {_AT})",
     "leapfrog": f"leapfrog(m->system, &(Split){{ {_SPLIT} }}, {_AT})",
@@ -52,7 +63,7 @@ def context(interface: Interface) -> dict[str, Any]:
     """The values of the template."""
     states = list(enumerate(interface.states))
     return {
-        "methods": [(name, _CALLS.get(name)) for name in METHODS],
+        "methods": [(name, CALLS.get(name)) for name in METHODS],
         "positions": [i for i, state in states if state.position],
         "others": [i for i, state in states if not state.position],
     }

@@ -6,7 +6,7 @@ scene, which are libraries of their own.
 
 import ctypes
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
+from eomgen.engine.implicit import GAUSS_4, GAUSS_6, IMPLICIT_MIDPOINT
 from eomgen.engine.printed import Roots, c_source
 from eomgen.native import checked, equal_steps
 from eomgen.native.checked import Function, FunctionStructure
@@ -22,15 +23,7 @@ from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import constants_of
 from eomgen.native.module import Kernels
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
-from eomgen.run.integrators import (
-    gauss_4,
-    gauss_6,
-    implicit_midpoint,
-    implicit_stages,
-    rattle,
-    rodas_5p,
-)
-from eomgen.run.integrators.implicit_stages import ImplicitMethod
+from eomgen.run.integrators import implicit_stages, rattle, rodas_5p
 from eomgen.run.integrators.rodas_5p_coefficients import GAMMA, IN_TIME, NODES, Row
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
@@ -40,16 +33,15 @@ from eomgen.templating import render
 MAIN = "implicit.c"
 NEEDED = ("derivative", "jacobian")
 """The functions that the methods call."""
-ELIMINATION: Roots = (("factored", {}), ("solve_by", {}))
 EQUAL_STEPS: Roots = (*equal_steps.COMPOSED, ("equal_steps", {}))
 """What of the engine's text this library has."""
 SYMMETRIC = ("constraint_jacobian", "constraint_rates")
 """Further functions for symmetric projection."""
 METHODS = ("rodas_5p",)
-GAUSS: Mapping[str, ImplicitMethod] = {
-    method.METHOD.compiled: method.METHOD for method in (implicit_midpoint, gauss_4, gauss_6)
-}
+GAUSS = {method.name: method for method in (IMPLICIT_MIDPOINT, GAUSS_4, GAUSS_6)}
 """The methods of adaptive and of equal steps, by the names of their compiled steps."""
+ROOTS = [("implicit_change", {"method": method}) for method in GAUSS.values()]
+"""The functions of the engine that are printed."""
 METHODS_LIBRARY = "methods"
 """The name of the library of the methods among the others."""
 OPERATIONS = 5500
@@ -80,27 +72,15 @@ def sources() -> Mapping[str, str]:
         "negligible": repr(rodas_5p.NEGLIGIBLE),
         "least_error": repr(rodas_5p.LEAST_ERROR),
         "engine": C.prelude + c_source(EQUAL_STEPS),
-        "elimination": c_source(ELIMINATION),
+        "newton": c_source([("implicit_change", {"method": of}) for of in GAUSS.values()]),
         "compositions": [each.name for each in equal_steps.COMPOSITIONS],
         "most_of_rattle": rattle.MOST,
         "rattle_roundoff": repr(rattle.ROUNDOFF),
         "rattle_noise": repr(rattle.NOISE),
-        "max_iterations": implicit_stages.MAX_ITERATIONS,
         "max_projected": implicit_stages.MAX_PROJECTED,
-        "roundoff": repr(implicit_stages.ROUNDOFF),
-        "noise": repr(implicit_stages.NOISE),
-        "nothing": repr(implicit_stages.NOTHING),
-        "small": repr(implicit_stages.SMALL),
-        "gauss": [
-            (name, len(of.b), *(_listed(x) for x in (sum(of.shares, ()), of.b, of.c)))
-            for name, of in GAUSS.items()
-        ],
+        "gauss": [(name, len(of.b)) for name, of in GAUSS.items()],
     }
     return {MAIN: render(c.TEMPLATES, "implicit.c.jinja", context)}
-
-
-def _listed(values: Iterable[float]) -> str:
-    return ", ".join(repr(float(value)) for value in values)
 
 
 def _sum(row: Row) -> str:

@@ -61,6 +61,8 @@ class Kernels:
         self.module, self.library = module, library
         self.states, self.inputs, _, self.constants = (_LONG * 4).in_dll(library, "sizes")
         self.own = tuple(map(float, module.PARAMETERS.values()))
+        self.none = np.array([*module.INPUTS.values()], dtype=np.float64)
+        self.none.flags.writeable = False
         self._known: dict[bytes, Any] = {}
 
     def held(self, p: Any) -> Any:
@@ -86,7 +88,7 @@ class Kernels:
     def given(self, u: Any, *columns: int) -> FloatArray | None:
         """Inputs as an array; None if the Python module must be used."""
         if u is None:
-            return np.array([*self.module.INPUTS.values()], dtype=np.float64)
+            return self.none
         values = _ordered(u, self.module.INPUTS)
         if values is None or values.shape not in ((self.inputs,), (self.inputs, *columns)):
             return None
@@ -95,7 +97,7 @@ class Kernels:
     def output(self, name: str, shape: tuple[int, ...]) -> Callable[..., Any]:
         """The function of an output: (t, y, p=None, u=None), where y may have columns."""
         python, states = getattr(self.module, name), self.states
-        own, none = self.held(None), np.array([*self.module.INPUTS.values()], np.float64).tobytes()
+        own, none = self.held(None), self.none.tobytes()
         buffer = _REAL * math.prod(shape)
         one = self.library[f"checked_{name}"]
         one.argtypes = [_REAL, *[_POINTER] * 5]
@@ -144,21 +146,23 @@ class Kernels:
         python, size = getattr(self.module, name), math.prod(shape)
         many = self.library[f"columns_{name}"]
         many.argtypes = [_LONG, _REAL, *[_POINTER] * 3, ctypes.c_int, *[_POINTER] * 2]
+        own, none = self.held(None), self.none.ctypes.data
 
         def columns(t: float, y: FloatArray, p: Any, u: Any) -> FloatArray:
             count = y.shape[1]
-            k, given = self.held(p), self.given(u, count)
+            k, given = own if p is None else self.held(p), self.given(u, count)
             if k is None or given is None:
                 return np.asarray(python(t, y, p, u))
             y, given = np.ascontiguousarray(y), np.ascontiguousarray(given)
+            pushes = none if u is None else given.ctypes.data
             result, sound = np.empty((size, count)), np.empty(count, dtype=np.int8)
             into = (result.ctypes.data, sound.ctypes.data)
             each = given.ndim == 2
-            many(count, t, y.ctypes.data, k, given.ctypes.data, each, *into)
+            many(count, t, y.ctypes.data, k, pushes, each, *into)
             if not sound.all():
                 left = np.flatnonzero(sound == 0)
-                pushes = given[:, left] if each else u
-                result[:, left] = python(t, y[:, left], p, pushes).reshape(size, len(left))
+                u = given[:, left] if each else u
+                result[:, left] = python(t, y[:, left], p, u).reshape(size, len(left))
             return result.reshape(*shape, count)
 
         return columns

@@ -11,12 +11,11 @@ OF_EVENTS = (*OF_CONTACTS, "impact", "held")
 
 def needed_by(method: FixedStep | Adaptive, module: Any) -> tuple[str, ...]:
     """The names of the functions of a module that runs by a method call at each step or event."""
-    adaptive = isinstance(method, Adaptive)
     names = ["derivative"]
-    if method.uses_jacobian if adaptive else not method.explicit:
+    if isinstance(method, Adaptive):
+        names += [*(["jacobian"] if method.uses_jacobian else []), *OF_STATE]
+    elif not method.explicit:
         names.append("jacobian")
-    if adaptive:
-        names += OF_STATE
     if getattr(module, "CONTACTS", ()):
         names += OF_EVENTS
     if getattr(module, "CONSTRAINTS", ()):

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.engine.contacts import Held, deepest, press
+from eomgen.engine.contacts import Touching, deepest, press
 from eomgen.run.failure import StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
 
@@ -46,10 +46,10 @@ def in_sizes(contacts: Contacts) -> Contacts:
     )
 
 
-def nothing_held(contacts: Contacts, states: int, rest_speed: float | None) -> Held:
+def nothing_held(contacts: Contacts, states: int, rest_speed: float | None) -> Touching:
     """What is known of contacts before a run. `rest_speed`, m/s or rad/s: see `integrate`."""
     n = len(contacts.names)
-    return Held(
+    return Touching(
         alpha=0.0,
         fastest=0.0,
         holds=np.zeros(n, np.int64),
@@ -70,7 +70,7 @@ class Holding:
     """The forces of contacts that are held: they may open, but not close."""
 
     contacts: Contacts
-    held: Held
+    held: Touching
 
     def solve(self, t: float, y: FloatArray) -> FloatArray:
         """What `Contacts.held` gives under the forces, (ny + 2 nc + nd,); overwritten by the next
@@ -92,7 +92,7 @@ class Holding:
         return self.solve(t, y)[len(y) + len(self.contacts.names) :].copy()
 
 
-def no_forces(contacts: Contacts, held: Held, t: float) -> StepFailure:
+def no_forces(contacts: Contacts, held: Touching, t: float) -> StepFailure:
     """The failure of a step for which contacts have no forces."""
     return StepFailure(
         f"no contact forces at t = {t:.6g} keep {names_of(contacts, held.holds)} from closing "

@@ -23,7 +23,7 @@ from eomgen.engine.contacts import (
     ENDLESS,
     NO_FORCES,
     TOLERANCE,
-    Held,
+    Touching,
     begin,
     release,
     settle,
@@ -78,7 +78,7 @@ class _Status:
 
     t: float
     y: FloatArray
-    held: Held
+    held: Touching
 
 
 @dataclass
@@ -178,7 +178,7 @@ def advances(
 
 
 def _resume(
-    step: Advance, held: Held, begun: tuple[float, FloatArray]
+    step: Advance, held: Touching, begun: tuple[float, FloatArray]
 ) -> Callable[[], Resume] | None:
     """What a later run needs to continue after a step: that of the method, and the contacts."""
     if step.resume is None:
@@ -200,7 +200,7 @@ def _resume(
     return resume
 
 
-def _resumed(contacts: Contacts, held: Held, resume: Resume) -> tuple[float, FloatArray]:
+def _resumed(contacts: Contacts, held: Touching, resume: Resume) -> tuple[float, FloatArray]:
     """Take what an earlier run knew of contacts; when and where it began to hold them."""
     held.alpha, held.fastest = float(resume["alpha"]), float(resume["fastest"])
     held.holds[resume["held"].astype(int)] = 1

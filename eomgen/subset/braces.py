@@ -45,6 +45,7 @@ class Language:
     function      how a function begins, by its result, name and arguments
     number, whole types of numbers
     infinite      how infinity is written
+    literal       how a number is, where it is not its digits alone
     names         how functions of numbers are called
     array         how a local array is declared, by type, name and size
     arrays        the types of arrays of numbers, and of whole ones
@@ -93,6 +94,8 @@ static inline double next_after(double t) {
 )
 REALS = replace(C, number="real", arrays=("real", "int64_t"), literal="R({})")
 """C with numbers of a type `real`, for which R(x) writes constants."""
+VECTORS = replace(C, number="V", arrays=("V", "int64_t"), literal="N({})")
+"""C with a type V of vectors in place of numbers: text without decisions makes several at once."""
 JAVASCRIPT = Language(
     function="function {name}({arguments}) {{",
     number="let",
@@ -123,19 +126,15 @@ def printed(
     text: Text,
     roots: Iterable[tuple[str, Mapping[str, Any]]],
     language: Language,
-    *,
-    records: bool = True,
 ) -> str:
     """The source of functions of the engine and of all that they call, those called first. Each is
     given with values of its `Known` parameters.
-
-    records  whether C's structures of the records are declared
 
     Raises `NotInSubsetError` for text outside the subset.
     """
     functions = text.expanded(roots)
     made = {d.name: d for d in functions}
-    lines = list(_structures(text, made.values(), language)) if records and language.typed else []
+    lines = list(_structures(text, made.values(), language)) if language.typed else []
     changes: dict[str, set[str]] = {}
     for d in functions:
         lines += ["", *_Function(text, made, d, language, changes).lines()]
@@ -487,7 +486,7 @@ class _Function:
             raise NotInSubsetError(x, "an array would change while it is read")
         self._line(f"{self._for('i_', self.kinds.of(a).sizes[0])} {{")
         entry = self._expr(target, ("i_",))
-        self._line(f"    {entry} = 0.0;")
+        self._line(f"    {entry} = {self._number(0.0)};")
         self._line(f"    {self._for('j_', self.kinds.of(x).sizes[0])}")
         self._line(f"        {entry} += {self._expr(a, TWO)} * {self._expr(x, ONE)};")
         self._line("}")
@@ -624,7 +623,7 @@ class _Function:
         if name == "copy":
             return self._expr(args[0], at)
         if name in ("zeros", "matrix", "whole"):
-            return "0.0"
+            return self._number(0.0)
         if name == "transposed":
             return self._expr(args[0], at[::-1])
         if name == "outer":

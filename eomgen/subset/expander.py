@@ -51,9 +51,9 @@ class Text:
         for module in modules:
             constants = {n: x for n, x in vars(module).items() if n.isupper()}
             for d in ast.parse(inspect.getsource(module)).body:
-                named = isinstance(d, ast.FunctionDef | ast.ClassDef)
-                if named and (d.name in text.functions or d.name in text.classes):
-                    raise ValueError(f"{module.__name__}: a second {d.name}")
+                name = d.name if isinstance(d, ast.FunctionDef | ast.ClassDef) else ""
+                if name in text.functions or name in text.classes:
+                    raise ValueError(f"{module.__name__}: a second {name}")
                 if isinstance(d, ast.FunctionDef):
                     text.functions[d.name] = d
                     text.constants[d.name] = constants

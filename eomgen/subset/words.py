@@ -102,8 +102,9 @@ def copy(x: Vector) -> Vector:
 
 def added(terms: Iterable[Any]) -> Any:
     """The sum of terms, in order."""
-    total, *others = terms
-    for term in others:
+    rest = iter(terms)
+    total = next(rest)
+    for term in rest:
         total = total + term
     return total
 
@@ -129,9 +130,10 @@ def all_within(x: Vector, limits: Vector) -> bool:
 
 
 def product(a: Matrix, x: Vector) -> Vector:
-    """The matrix by the vector, each row's sum in order, from 0 on."""
+    """The matrix by the vector, each row's sum in order, from 0 on; or by columns."""
     n = len(x)
-    return 0.0 + np.add.accumulate(a * x, axis=1)[:, -1] if n else np.zeros(len(a))
+    factors = a[:, :, None] if x.ndim == 2 else a
+    return 0.0 + np.add.accumulate(factors * x, axis=1)[:, -1] if n else np.zeros(len(a))
 
 
 def larger(a: Vector, b: Vector | float) -> Vector:

@@ -305,6 +305,28 @@ def runs(rounds: int) -> None:
         row(f"compilation: taylor {own:.2g} s, heyoka {other:.2g} s", *[""] * 8)
 
 
+def calls(rounds: int) -> None:
+    """Print the table of whole calls of `integrate` beside heyoka's, each at its loosest tolerance
+    with this error.
+    """
+    row("motion", "true error", "taylor", "DOP853 in C", "heyoka", "taylor / heyoka", "DOP853 / it")
+    row(*["---"] * 7)
+    for case in (
+        Case("double_pendulum, 10 s", elaborate(read_scene("double_pendulum")), 10.0),
+        Case("chain of 10, 1 s", chain(10), 1.0),
+    ):
+        for most in ERRORS[:2]:
+            found = (case.loosest(by, most) for by in (case.by_taylor, case.by_c, case.by_heyoka))
+            times = paired(rounds, *(call for call in found if call), warm=True)
+            ours, other = times[:, :-1], times[:, -1]
+            row(
+                case.name,
+                f"{most:g}",
+                *(f"{1e3 * x:.3g} ms" for x in np.median(times, axis=0)),
+                *(spread(x / other) for x in ours.T),
+            )
+
+
 def engines(rounds: int) -> None:
     """Print the table of runs beside MuJoCo, and Pinocchio and lambdify in SciPy."""
     row("motion", "true error", "peer", "its time", "peer / C, DOP853")
@@ -319,7 +341,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    tables = {"derivatives": derivatives, "vectors": vectors, "runs": runs, "engines": engines}
+    tables = {
+        "derivatives": derivatives,
+        "vectors": vectors,
+        "runs": runs,
+        "calls": calls,
+        "engines": engines,
+    }
     parser.add_argument("--rounds", type=int, default=30)
     parser.add_argument("--only", nargs="+", choices=tables, default=tables, metavar="TABLE")
     given = parser.parse_args()

@@ -16,10 +16,11 @@ import eomgen
 from eomgen.api.given import check, read
 from eomgen.codegen.backends import c
 from eomgen.model.elaborate import in_order
-from eomgen.native import lanes
+from eomgen.native import compiler, lanes
 from eomgen.native.lanes import Lanes
 from eomgen.native.library import compiled_library
 from eomgen.run.module import load_module
+from eomgen.run.sine import cosine, sine
 from eomgen.scene.built_in import built_in_names
 from eomgen.store import generated_code, interfaced_program_of
 from eomgen.study.verification.states import random_state
@@ -42,6 +43,15 @@ void both(const double *x, double *sine, double *cosine) {
     memcpy(cosine, &c, sizeof c);
 }
 """
+ALONE = """
+void alone(const double *x, double *sine, double *cosine) {
+    V v, s, c;
+    memcpy(&v, x, sizeof v);
+    s = sin_v(v), c = cos_v(v);
+    memcpy(sine, &s, sizeof s);
+    memcpy(cosine, &c, sizeof c);
+}
+"""
 
 
 def usable() -> list[int]:
@@ -50,17 +60,17 @@ def usable() -> list[int]:
 
 
 @cache
-def trigonometry(width: int) -> Any:
+def trigonometry(width: int, *more: str) -> Any:
     each = {"each": [(name, c.C_NAMES.get(name, name)) for name in c.EACH]}
     texts = {"vector.c": render(c.TEMPLATES, "sine.c.jinja", each), "both.c": WRAPPER}
-    flags = (f"-DWIDTH={width}", *lanes.FLAGS[width])
-    return compiled_library(f"trigonometry {width} {texts}", lambda: texts, "both.c", *flags)
+    flags = (f"-DWIDTH={width}", *lanes.FLAGS[width], *more)
+    return compiled_library(f"trigonometry {width} {more} {texts}", lambda: texts, "both.c", *flags)
 
 
-def sine_and_cosine(x: np.ndarray, width: int) -> np.ndarray:
+def sine_and_cosine(x: np.ndarray, width: int, *more: str) -> np.ndarray:
     """Sines and cosines (2, n) of n angles, a multiple of the width."""
     found = np.empty((2, len(x)))
-    call = trigonometry(width).both
+    call = trigonometry(width, *more).both
     call.argtypes = [ctypes.c_void_p] * 3
     for i in range(0, len(x), width):
         call(*(row[i:].ctypes.data for row in (x, *found)))
@@ -103,10 +113,42 @@ def nearest_to_quarters() -> list[float]:
     return found
 
 
-def test_sine_and_cosine_are_within_an_ulp() -> None:
+def test_plain_sine_and_cosine_have_the_bits_of_numpys() -> None:
+    """Without fused sums, over the whole range of doubles, signs of zero too."""
+    x = angles()
+    found = sine_and_cosine(x, usable()[-1], "-DPLAIN")
+    assert found.tobytes() == np.array([sine(x), cosine(x)]).tobytes()
+    assert np.isnan([sine(math.inf), cosine(-math.inf), sine([[math.nan]])[0, 0]]).all()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_sines_of_columns_have_the_bits_of_the_library(width: int) -> None:
+    """Of both of an angle, and of one alone, over the whole range of doubles."""
+    if width > lanes.width():
+        pytest.skip("this processor has no such registers")
+    each = {"each": [(name, c.C_NAMES.get(name, name)) for name in c.EACH]}
+    texts = {
+        "vector.c": render(c.TEMPLATES, "vector.c.jinja", each)
+        + render(c.TEMPLATES, "rounded_sine.c.jinja", {}),
+        "both.c": "#include <math.h>\n" + WRAPPER + ALONE,
+    }
+    flags = (f"-DWIDTH={width}", *lanes.FLAGS[width], compiler.NOT_JOINED, "-lm")
+    library = compiled_library(f"rounded {texts} {flags}", lambda: texts, "both.c", *flags)
+    x = np.concatenate([angles(), np.random.default_rng(2).uniform(-7.0, 7.0, some(2**16, 2**22))])
+    true = np.array([np.fromiter(map(f, x.tolist()), float) for f in (math.sin, math.cos)])
+    for name in ("both", "alone"):
+        call, found = library[name], np.empty_like(true)
+        call.argtypes = [ctypes.c_void_p] * 3
+        for i in range(0, len(x), width):
+            call(*(row[i:].ctypes.data for row in (x, *found)))
+        assert found.tobytes() == true.tobytes()
+
+
+@pytest.mark.parametrize("more", [(), ("-DPLAIN",)], ids=["fused", "plain"])
+def test_sine_and_cosine_are_within_an_ulp(more: tuple[str, ...]) -> None:
     """Against 1,200 bits, over the whole range of doubles."""
     x = angles()
-    found = sine_and_cosine(x, usable()[-1])
+    found = sine_and_cosine(x, usable()[-1], *more)
     worst = 0.0
     with mpmath.workprec(1200):
         for angle, *pair in zip(x.tolist(), *found.tolist(), strict=True):

@@ -152,3 +152,9 @@ def test_what_is_refused(statement: str) -> None:
     with pytest.raises(NotInSubsetError, match=f"(?s)line [12].*{REFUSED[statement]}"):
         for language in (C, JAVASCRIPT):
             printed(Text({"f": function}), [("f", {})], language)
+
+
+def test_names_are_those_of_one_function() -> None:
+    """Functions of two modules with one name, of which one would be lost."""
+    with pytest.raises(NotInSubsetError, match=r"(?s)line .*another module"):
+        Text.of(constructs, constructs)

@@ -1,21 +1,29 @@
 """Elimination and implicit steps over random inputs in three languages: the same bits."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
-from languages import results
+from languages import NONE, Given, results
 
-from eomgen.engine import elimination, few
+from eomgen.engine import elimination, few, implicit, system
+from eomgen.engine.implicit import (
+    GAUSS_4,
+    GAUSS_6,
+    IMPLICIT_MIDPOINT,
+    Collocation,
+    Stages,
+)
 from eomgen.subset.expander import Text
 
-TEXT = Text.of(elimination)
+TEXT = Text.of(elimination, implicit, system)
 SEEDED = np.random.default_rng(1)
 
 
-def same(name: str, cases: list[list[Any]], **known: Any) -> None:
+def same(name: str, cases: list[list[Any]], given: Given = NONE, **known: Any) -> None:
     """Assert that a function leaves and returns the same bits in all languages."""
-    python, c, javascript = results(TEXT, name, cases, known)
+    python, c, javascript = results(TEXT, name, cases, known, given)
     assert python == c
     assert python == javascript
 
@@ -42,3 +50,62 @@ def test_elimination(n: int, positions: int) -> None:
         assert type(factors) is not type(lists) and (x == y).all()
         assert np.allclose(0.25 * x - jacobian @ x, b, rtol=1e-9, atol=1e-9)
         same("solve_by", [[factors, b]])
+
+
+@dataclass
+class Pendulums:
+    """Two coupled pendulums with friction, as positions, then velocities; products in a stated
+    order, without functions that languages compute with other bits.
+    """
+
+    def derivative(self, t: float, y: Any) -> Any:
+        a, b, v, w = y.tolist()
+        return np.array([v, w, t - a * a * a - 0.1 * v + b, a - 2.0 * b - 0.3 * w])
+
+    def jacobian(self, t: float, y: Any) -> Any:
+        row = [-(3.0 * y[0] * y[0]), 1.0, -0.1, 0.0]
+        return np.array([[0, 0, 1, 0], [0, 0, 0, 1], row, [1, -2.0, 0, -0.3]])
+
+
+SYSTEM = Given(
+    Pendulums(),
+    """
+typedef struct { int none; } System, StiffSystem;
+#define STATES 4
+static void derivative(const System *of, double t, const double *y, double *r) {
+    r[0] = y[2], r[1] = y[3], r[2] = t - y[0] * y[0] * y[0] - 0.1 * y[2] + y[1];
+    r[3] = y[0] - 2.0 * y[1] - 0.3 * y[3];
+}
+static void jacobian(const System *of, double t, const double *y, double *j) {
+    for (int i = 0; i < 16; i++) j[i] = 0.0;
+    j[2] = j[7] = j[9] = j[12] = 1.0, j[8] = -(3.0 * y[0] * y[0]);
+    j[10] = -0.1, j[13] = -2.0, j[15] = -0.3;
+}
+""",
+    """
+const STATES = 4;
+const system = {
+  derivative(t, y, r) {
+    r.set([y[2], y[3], t - y[0] * y[0] * y[0] - 0.1 * y[2] + y[1], y[0] - 2.0 * y[1] - 0.3 * y[3]]);
+  },
+  jacobian(t, y, j) {
+    j.set([0, 0, 1, 0, 0, 0, 0, 1, -(3.0 * y[0] * y[0]), 1, -0.1, 0, 1, -2, 0, -0.3]);
+  },
+};
+""",
+)
+
+
+@pytest.mark.parametrize("method", [IMPLICIT_MIDPOINT, GAUSS_4, GAUSS_6], ids=lambda m: m.name)
+@pytest.mark.parametrize("positions", [0, 2])
+def test_implicit_steps(method: Collocation, positions: int) -> None:
+    """Steps of methods of Gauss: short ones, and some that hardly converge."""
+    many, n = len(method.b), 4
+    shapes = (many, n), (many, n), (many * n, n), (many, many), (many * n, many * n)
+    stages = Stages(many, positions, *map(np.zeros, shapes))
+    factors = few.factors_of(many * n, -few.FEW)
+    starts = SEEDED.normal(size=(3, n))
+    cases = [
+        [SYSTEM, 0.1, h, y, stages, factors, np.zeros(n)] for y in starts for h in (0.01, 0.5, 9.0)
+    ]
+    same("implicit_change", cases, SYSTEM, method=method)

@@ -102,6 +102,16 @@ def of_others(robot: Path) -> None:
     print(eomgen.environment("cart_pole", "cos(theta)", actions={"push": (-1.0, 1.0)}))
 
 
+def of_steps() -> None:
+    """Steps with a policy between them."""
+    step: eomgen.Stepper = eomgen.stepper("cart_pole", dt=0.01, method="rk4", lanes=8)
+    y: Floats = step.initial()
+    fallen: npt.NDArray[np.bool_] = np.abs(y[1] - np.pi) > 0.5
+    y = step(y, {"push": 1.0}, {"l": np.full(8, 0.4)}, steps=2, reset=fallen, first=y[:, 0])
+    step(y, np.zeros((1, 8)), t=0.1, out=y, lost=np.zeros_like(y))
+    print(step.projected(y).shape, step.compiled, step.notice, step.module.NAME)
+
+
 def of_errors() -> None:
     """What a mistake is."""
     try:
@@ -125,6 +135,7 @@ def main(robot: Path) -> None:
         of_many(folder)
         of_studies()
         of_others(robot)
+        of_steps()
         of_errors()
 
 

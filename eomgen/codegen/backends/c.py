@@ -66,7 +66,7 @@ OURS_IN_VECTORS = (
     "V I N EACH LANES INLINE STATES INPUTS CONSTANTS WIDTH RAISED either size_of any root columns "
     "times reduced bits_from sine_and_cosine put taken lanes_of beside begin unit suspicious l i "
     "fused plus_product product_minus minus_product from_row to_row finite_lanes FUSED SUM VECTORS "
-    "AGAIN APART"
+    "AGAIN APART PLAIN CLEAR TOGETHER SIZE bits_of pair by_library unclear rounded slopes"
 )
 VECTORS = replace(
     DIALECT,
@@ -135,7 +135,7 @@ def library(program: Program, interface: Interface, *, vectors: bool = False) ->
         "parameters": len(interface.parameters),
         "held": len(values["held"]),
         "kernels": values["kernels"],
-        "each": [(name, C_NAMES.get(name, name)) for name in ("sin", "cos", *EACH)],
+        "each": [(name, C_NAMES.get(name, name)) for name in EACH],
         "vectors": {k["name"]: k for k in in_vectors(program, interface, VECTORS, wanted)},
     }
     return {**files_of(values, interface), MAIN: render(TEMPLATES, "checked.c.jinja", checked)}

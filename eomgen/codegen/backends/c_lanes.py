@@ -6,13 +6,14 @@ the C backend, and of the Python module, by the roundings of sine and cosine, wh
 polynomials here, and by those of sums with a product, which are rounded once.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.program.ordering import ordered
+from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.templating import render
 
@@ -41,18 +42,32 @@ def files(
     context = c.context(program, interface)
     wanted = [f.name for f in interface.functions if f.name != "initial_state"]
     values: dict[str, Any] = {
-        "prefix": interface.name,
-        "states": len(interface.states),
-        "inputs": len(interface.inputs),
-        "parameters": len(interface.parameters),
-        "held": len(context["held"]),
-        "vectors": c.in_vectors(program, interface, DIALECT, wanted),
-        "each": [(name, c.C_NAMES.get(name, name)) for name in c.EACH],
-        "quaternions": interface.quaternions,
-        "shortest": repr(usual_length[0]),
-        "longest": repr(usual_length[1]),
+        **columns(program, interface, context, DIALECT, wanted, usual_length),
         "positions": [int(state.position) for state in interface.states],
         "limit": LIMIT,
         "noise": NOISE,
     }
     return {**c.files_of(context, interface), MAIN: render(c.TEMPLATES, "lanes.c.jinja", values)}
+
+
+def columns(
+    program: Program,
+    interface: Interface,
+    context: Mapping[str, Any],
+    dialect: Dialect,
+    wanted: Collection[str],
+    usual_length: tuple[float, float],
+) -> dict[str, Any]:
+    """Values for templates with kernels of these outputs for columns; `context` is that of `c`."""
+    return {
+        "prefix": interface.name,
+        "states": len(interface.states),
+        "inputs": len(interface.inputs),
+        "parameters": len(interface.parameters),
+        "held": len(context["held"]),
+        "vectors": c.in_vectors(program, interface, dialect, wanted),
+        "each": [(name, c.C_NAMES.get(name, name)) for name in c.EACH],
+        "quaternions": interface.quaternions,
+        "shortest": repr(usual_length[0]),
+        "longest": repr(usual_length[1]),
+    }

@@ -248,7 +248,7 @@ class _Stepper:
         return Step(t, float(solver.t), y, end, lambda times: dense()(times).T, slopes)
 
     def shorten(self) -> None:
-        """Take account of a step that its end shortens: that of a run with a later end is longer."""
+        """Take account of a step that the end of the run shortens, unless another end does."""
         self._whole = self._whole and self.until != self.t_end
 
     def retry(self, step: Step) -> Retry | None:

@@ -15,14 +15,14 @@ def first_length(
     slope: FloatArray,
     *,
     scale: FloatArray,
-    root: Callable[[float], float],
+    power: float,
     longest: float,
 ) -> float:
     """The length in s of the first step from y (ny,) at t, at most `longest`.
 
     slope  the derivative there, (ny,)
     scale  the error allowed in each state, (ny,)
-    root   gives x^(1/k) if the error of a step is proportional to its length to the power k
+    power  1/k if the error of a step is proportional to its length to the power k
 
     Hairer, Norsett, Wanner, Solving ODEs I, section II.4.
     """
@@ -35,7 +35,7 @@ def first_length(
     if speed <= 1e-15 and bend <= 1e-15:
         length = max(1e-6, trial * 1e-3)
     else:
-        length = root(0.01 / max(speed, bend))
+        length = (0.01 / max(speed, bend)) ** power
     return min(100 * trial, length, longest)
 
 

@@ -4,9 +4,8 @@ It conserves every quadratic invariant: Hairer, Lubich, Wanner, Geometric Numeri
 theorem IV.2.1. It is Gauss collocation with one stage.
 """
 
+from eomgen.engine.implicit import IMPLICIT_MIDPOINT
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
 
-METHOD = ImplicitMethod(
-    shares=((1 / 2,),), b=(1.0,), c=(1 / 2,), order=2, compiled="implicit_midpoint"
-)
+METHOD = ImplicitMethod(IMPLICIT_MIDPOINT, order=2)
 INTEGRATOR = METHOD.integrator

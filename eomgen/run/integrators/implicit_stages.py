@@ -1,142 +1,108 @@
-"""Implicit Runge-Kutta methods, whose stages are solved by Newton's method with the exact Jacobian.
-
-The stages are solved to roundoff, because the methods conserve invariants only as well as their
-equations are solved. Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit
-Runge-Kutta methods (BIT 48, 2008) give two more causes of drift by rounding: rounded coefficients,
-which `ImplicitMethod.shares` avoids, and sums of small changes to large states, which `fixed_step`
-compensates.
+"""Implicit Runge-Kutta methods as integrators: see `eomgen.engine.implicit`, and with constraints,
+symmetric projection.
 
 Sums are taken term by term in a fixed order, so that compiled code has the same bits: see
-`eomgen.native.implicit` and `templates/c/implicit.c.jinja`, which repeats this arithmetic.
+`eomgen.native.implicit` and `templates/c/symmetric.c.jinja`, which repeats this arithmetic.
 """
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import partial
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eomgen.engine import few
+from eomgen.engine.elimination import Factors
+from eomgen.engine.implicit import (
+    DIVERGES,
+    MAX_ITERATIONS,
+    SINGULAR,
+    UNSOLVED,
+    Collocation,
+    Stages,
+    begin_stages,
+    implicit_change,
+    improved,
+    is_solved,
+    largest_update,
+)
 from eomgen.engine.tableau import ButcherTableau
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.elimination import factored, product
-from eomgen.run.integrators.interface import FixedStep
+from eomgen.run.integrators.interface import Change, FixedStep
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import Projection
 from eomgen.run.tangents import tangents
 
-MAX_ITERATIONS, MAX_PROJECTED = 20, 60
-"""Most iterations, and those of a step with symmetric projection, which converge linearly."""
+MAX_PROJECTED = 60
+"""Most iterations of a step with symmetric projection, which converge linearly."""
 REMEDY = "take a smaller --dt or an adaptive method (--integrator Radau)"
-
-ROUNDOFF = 4 * float(np.finfo(np.float64).eps)
-# If updates stop shrinking below this fraction of the state, they are rounding errors of the
-# derivative, and the iteration ends. Above it, the iteration has not converged.
-NOISE = 1e-10
-# The same bound, absolute, for a state that is almost zero, as of a body at rest on the ground.
-NOTHING = 1e-13
-# A component below this fraction of the largest one is solved to roundoff of that fraction, not of
-# itself: it may be 0 in exact arithmetic.
-SMALL = 1e-9
+WHY = {
+    SINGULAR: "Newton's matrix is singular",
+    DIVERGES: "Newton's iteration diverges",
+    UNSOLVED: f"Newton did not converge in {MAX_ITERATIONS} iterations",
+}
 
 
 @dataclass(frozen=True)
 class ImplicitMethod:
-    """An implicit Runge-Kutta method of s stages with positive weights b (s,) and nodes c (s,).
+    """An implicit Runge-Kutta method. Raises `ValueError` if it does not have the given order."""
 
-    `shares` (s, s) are the a_ij / b_j. A method conserves quadratic invariants, and is symplectic,
-    if share_ij + share_ji = 1 (Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem
-    IV.2.2). In this form the condition holds exactly in floating point: Antonana, Makazaga, Murua,
-    Reducing and monitoring round-off error propagation for symplectic implicit Runge-Kutta schemes
-    (Numerical Algorithms 76, 2017).
-
-    `compiled` is the name of its compiled steps. Raises `ValueError` if the method does not have
-    the given order.
-    """
-
-    shares: tuple[tuple[float, ...], ...]
-    b: tuple[float, ...]
-    c: tuple[float, ...]
+    of: Collocation
     order: int
-    compiled: str = ""
 
     def __post_init__(self) -> None:
-        shares, b = self._arrays
-        a = tuple(map(tuple, (shares * b).tolist()))
-        ButcherTableau(a=a, b=self.b, c=self.c, order=self.order)
+        a = np.array(self.of.shares) * self.of.b
+        ButcherTableau(a=tuple(map(tuple, a.tolist())), b=self.of.b, c=self.of.c, order=self.order)
 
     @property
     def integrator(self) -> FixedStep:
         """The method as an integrator with equal steps."""
-        return FixedStep(
-            lambda _: self.change, self.order, REMEDY, explicit=False, compiled=self.compiled
-        )
+        compiled = self.of.name
+        return FixedStep(self.prepared, self.order, REMEDY, explicit=False, compiled=compiled)
 
-    @cached_property
-    def _arrays(self) -> tuple[FloatArray, FloatArray]:
-        return np.array(self.shares, dtype=np.float64), np.array(self.b, dtype=np.float64)
+    def prepared(self, problem: Problem) -> Change:
+        """Its steps, with room to work in."""
+        return partial(self._change, *self._room(problem))
 
     def change(self, problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
-        """Return y(t + h) - y(t), (ny,): the sum of d_i = h b_i f(t + c_i h, Y_i) with
-        Y_i = y + Σ share_ij d_j.
+        """Return y(t + h) - y(t), (ny,). Raises `StepFailure` if it is not found."""
+        return self.prepared(problem)(problem, t, y, h)
 
-        Newton's method starts at d = 0; an explicit predictor would be far off on stiff problems.
-        Raises `StepFailure` if the iteration does not converge.
-        """
-        newton = _Newton(self, problem, t, h, len(y))
+    def _room(self, problem: Problem) -> tuple[Stages, Factors]:
+        many, n, positions = len(self.of.b), len(problem.states), problem.leading_positions
+        changes, update = np.zeros((2, many, n))
+        shapes = (many * n, n), (many, many), (many * n, many * n)
+        stages = Stages(many, positions, changes, update, *map(np.zeros, shapes))
+        return stages, few.factors_of(many * n, many * positions)
+
+    def _change(
+        self,
+        stages: Stages,
+        factors: Factors,
+        problem: Problem,
+        t: float,
+        y: FloatArray,
+        h: float,
+    ) -> FloatArray:
         if problem.projection:
-            return newton.projected(y, problem.projection)
-        changes = np.zeros(newton.shape)
-        previous = 0.0
-        for _ in range(MAX_ITERATIONS):
-            update = newton.update(y, changes)
-            changes += update
-            size = _finite(update)
-            if size == 0 or (previous and _is_solved(y, changes, update, size, previous)):
-                return _last(changes, axis=0)
-            previous = size
-        raise _unsolved()
+            return self._projected(stages, factors, problem, problem.projection, t, y, h)
+        change = np.empty(len(y))
+        made = implicit_change(problem, self.of, t, h, y, stages, factors, change)
+        if made in WHY:
+            raise StepFailure(WHY[made], REMEDY)
+        return change
 
-
-class _Newton:
-    """Newton's method for the stages of a step."""
-
-    def __init__(
-        self, method: ImplicitMethod, problem: Problem, t: float, h: float, states: int
-    ) -> None:
-        shares, b = method._arrays
-        self._problem, self._shares, self._end, self._step = problem, shares, t + h, h
-        self._times = [t + node * h for node in method.c]
-        self._lengths = h * b
-        self._coupling = self._lengths[:, None] * shares
-        self.shape = stages, states = len(b), states
-        self._positions = stages * problem.leading_positions
-        self._order = _positions_first(stages, states, problem.leading_positions)
-        self._slopes = np.empty(self.shape)
-        self._matrix = np.empty((stages, states, stages, states))
-        self._update = np.empty(self.shape)
-
-    def update(self, start: FloatArray, changes: FloatArray) -> FloatArray:
-        """The update of the stages' changes d in a step from `start`; valid until the next one.
-
-        Raises `StepFailure` if its matrix is singular.
-        """
-        problem, order, slopes = self._problem, self._order, self._slopes
-        unknowns = len(order)
-        square = self._matrix.reshape(unknowns, unknowns)
-        at_stages = start + _last(self._shares[:, :, None] * changes, axis=1)
-        for i, time in enumerate(self._times):
-            slopes[i] = problem.derivative(time, at_stages[i])
-            jacobian = self._last = problem.jacobian(time, at_stages[i])
-            np.multiply(self._coupling[i][:, None], jacobian[:, None, :], out=self._matrix[i])
-        missing = self._lengths[:, None] * slopes - changes
-        factors = factored(square[order[:, None], order], 1.0, self._positions)
-        if factors is None:
-            raise StepFailure("Newton's matrix is singular", REMEDY)
-        self._update.ravel()[order] = factors.solve(missing.ravel()[order])
-        return self._update
-
-    def projected(self, y: FloatArray, projection: Projection) -> FloatArray:
+    def _projected(
+        self,
+        stages: Stages,
+        factors: Factors,
+        problem: Problem,
+        projection: Projection,
+        t: float,
+        y: FloatArray,
+        h: float,
+    ) -> FloatArray:
         """The change of the state by a step with symmetric projection.
 
         The step starts from y + N(y) μ and ends at z + N(y') μ = y', z the end of the method's own
@@ -146,36 +112,43 @@ class _Newton:
 
         Raises `StepFailure` if the iteration does not converge.
         """
-        normals = normals_at(projection, self._end, y)
-        beyond, changes = normals, np.zeros(self.shape)
+        normals = normals_at(projection, t + h, y)
+        beyond, changes = normals, stages.changes
+        begin_stages(problem, self.of, h, stages)
         multipliers, previous = np.zeros(normals.shape[1]), 0.0
+        sizes = stages.many + 1, len(y)
         for _ in range(MAX_PROJECTED):
             aside = product(normals, multipliers)
-            update = self.update(y + aside, changes)
-            changes += update
+            if not improved(problem, self.of, t, h, y + aside, stages, factors):
+                raise StepFailure(WHY[SINGULAR], REMEDY)
             step = aside + _last(changes, axis=0)
             end = y + step + product(beyond, multipliers)
-            beyond = normals_at(projection, self._end, end)
-            ways = self._carried(normals) + beyond
-            more = -multipliers_at(projection, self._end, end, ways)
+            beyond = normals_at(projection, t + h, end)
+            ways = (
+                _carried(0.5 * h * stages.jacobians[-len(y) :], normals, stages.positions) + beyond
+            )
+            more = -multipliers_at(projection, t + h, end, ways)
             before, multipliers = multipliers, multipliers + more
-            updates = np.vstack((update, product(beyond, more)))
-            size = _finite(updates)
-            if size == 0 or (previous and _is_solved(y, changes, updates, size, previous)):
+            updates = np.vstack((stages.update, product(beyond, more)))
+            size = largest_update(*sizes, updates)
+            if not isfinite(size):
+                raise StepFailure(WHY[DIVERGES], REMEDY)
+            scale = np.abs(y) + _last(np.abs(changes), axis=0)
+            if size == 0 or (previous and is_solved(*sizes, scale, updates, size, previous)):
                 return np.asarray(step + product(normals + beyond, more) + product(beyond, before))
             previous = size
-        raise _unsolved(MAX_PROJECTED)
+        raise StepFailure(f"Newton did not converge in {MAX_PROJECTED} iterations", REMEDY)
 
-    def _carried(self, normals: FloatArray) -> FloatArray:
-        """Changes (ny, k) of the start at the end of the step, about: by the implicit midpoint rule
-        with the Jacobian of the last stage.
-        """
-        half = 0.5 * self._step * self._last
-        factors = factored(half, 1.0, self._positions // self.shape[0])
-        if factors is None:
-            raise StepFailure("the matrix of a step is singular", REMEDY)
-        begun = product(np.eye(len(normals)) + half, normals)
-        return np.array([factors.solve(column) for column in begun.T]).T
+
+def _carried(half: FloatArray, normals: FloatArray, positions: int) -> FloatArray:
+    """Changes (ny, k) of the start at the end of the step, about: by the implicit midpoint rule
+    with `half` the step times the Jacobian of the last stage.
+    """
+    factors = factored(half, 1.0, positions)
+    if factors is None:
+        raise StepFailure("the matrix of a step is singular", REMEDY)
+    begun = product(np.eye(len(normals)) + half, normals)
+    return np.array([factors.solve(column) for column in begun.T]).T
 
 
 def normals_at(projection: Projection, t: float, y: FloatArray) -> FloatArray:
@@ -206,39 +179,6 @@ def multipliers_at(projection: Projection, t: float, y: FloatArray, ways: FloatA
     return factors.solve(off)
 
 
-def _finite(update: FloatArray) -> float:
-    """The size of an update. Raises `StepFailure` if it is not finite."""
-    size = float(np.abs(update).max(initial=0.0))
-    if not isfinite(size):
-        raise StepFailure("Newton's iteration diverges", REMEDY)
-    return size
-
-
-def _unsolved(most: int = MAX_ITERATIONS) -> StepFailure:
-    return StepFailure(f"Newton did not converge in {most} iterations", REMEDY)
-
-
-def _is_solved(
-    y: FloatArray, changes: FloatArray, update: FloatArray, size: float, previous: float
-) -> bool:
-    """Whether the iteration has converged to roundoff, by the sizes of the last two updates."""
-    scale = np.abs(y) + _last(np.abs(changes), axis=0)
-    largest = float(scale.max(initial=0.0))
-    # The remaining error is about the next update: this one times the last contraction factor.
-    # Hairer, Wanner, Solving ODEs II, section IV.8.
-    missing = np.abs(update) * (size / previous)
-    if (missing <= ROUNDOFF * np.maximum(scale, SMALL * largest)).all():
-        return True
-    return previous <= 2 * size and size <= max(NOISE * largest, NOTHING)
-
-
 def _last(terms: FloatArray, axis: int) -> FloatArray:
     """The sum of terms along an axis, one after the other."""
     return np.asarray(np.take(np.add.accumulate(terms, axis=axis), -1, axis=axis))
-
-
-@cache
-def _positions_first(stages: int, states: int, positions: int) -> NDArray[np.intp]:
-    """The order of the unknowns in which the positions of all stages come before all else."""
-    numbers = np.arange(stages * states).reshape(stages, states)
-    return np.concatenate((numbers[:, :positions].ravel(), numbers[:, positions:].ravel()))

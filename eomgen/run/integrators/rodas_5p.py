@@ -97,7 +97,7 @@ class Rodas5P:
             y0,
             fun(self.t, y0),
             scale=atol + np.abs(y0) * rtol,
-            root=lambda x: x**-POWER,
+            power=-POWER,
             longest=min(t_bound - self.t, max_step),
         )
         self.h_last, self.error = 0.0, 1.0

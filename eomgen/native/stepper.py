@@ -1,0 +1,186 @@
+"""Compiled steps of equal length for columns of states, one in each lane of vector registers.
+
+They have the bits of `eomgen.run.columns`, whatever the number of lanes and their neighbours. What
+raises a flag of the floating-point unit is left to that.
+"""
+
+import ctypes
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eomgen.codegen.backends import c, c_lanes
+from eomgen.codegen.interface import Interface
+from eomgen.engine.printed import c_source
+from eomgen.model.model import Model
+from eomgen.native import checked, constrained, equal_steps, functions
+from eomgen.native.accelerator import library_key
+from eomgen.native.compiler import NOT_JOINED, find_compiler
+from eomgen.native.lanes import FLAGS, Columns, Lanes, columns_of, width
+from eomgen.native.library import compiled_library
+from eomgen.program.ordering import ordered
+from eomgen.program.program import Program
+from eomgen.program.tape import TIME
+from eomgen.run.compiled import Constrained
+from eomgen.run.problem import USUAL_LENGTH, FloatArray
+from eomgen.run.projection import PROJECTS, Projection
+from eomgen.store import interfaced_program_of
+from eomgen.subset.braces import VECTORS, C
+from eomgen.templating import render
+
+MAIN = "stepper.c"
+METHODS = ("rk4", *(name for name in equal_steps.METHODS if name != "rk4"))
+_POINTER, _LONG, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_int64
+
+
+FEW, SMALL = 16, 100
+"""Below this number of states, two vectors of each are stepped together; below this number of
+operations, the derivative is a part of each stage."""
+
+
+def sources(program: Program, interface: Interface, method: str) -> Mapping[str, str]:
+    """The C sources of the derivative and of a method of `METHODS` for columns, name to text."""
+    kept = ("derivative", "initial_state")
+    program, interface = functions.restricted(program, interface, kept)
+    program = ordered(program)
+    context = c.context(program, interface)
+    states = len(interface.states)
+    own = equal_steps.context(interface)
+    timed = any(step.value == TIME for step in program.steps if step.operation == "input")
+    together = 2 if states < FEW and method not in equal_steps.LEAPFROGS and not timed else 1
+    (derivative,) = (f["operations"] for f in context["kernels"] if f["name"] == "derivative")
+    parts = method in ("leapfrog_4", "leapfrog_6")
+    call = f"composed_{method}(m, t, y, h, step)" if parts else equal_steps.CALLS[method]
+    values: dict[str, Any] = {
+        **c_lanes.columns(program, interface, context, c.VECTORS, ("derivative",), USUAL_LENGTH),
+        **constrained.context(),
+        "of_numbers": C.prelude + c_source([("normalised", {})]),
+        "engine": c_source(equal_steps.roots_of(method), VECTORS),
+        "positions": [i + n * states for n in range(together) for i in own["positions"]],
+        "others": [i + n * states for n in range(together) for i in own["others"]],
+        "together": together,
+        "how": "INLINE " if derivative < SMALL else "static ",
+        "call": call,
+        "part": equal_steps.CALLS["leapfrog"] if parts else "",
+    }
+    return {**c.files_of(context, interface), MAIN: render(c.TEMPLATES, "stepper.c.jinja", values)}
+
+
+class _Call(ctypes.Structure):
+    """`call` of `templates/c/stepper.c.jinja`."""
+
+    _fields_ = (
+        ("dt", _REAL),
+        ("steps", _WHOLE),
+        ("more", _POINTER),
+        ("held", _POINTER),
+        *((name, Columns) for name in ("t", "y", "k", "u", "first")),
+        *((name, _POINTER) for name in ("again", "out", "lost", "sound")),
+    )
+
+
+class CompiledSteps(Lanes):
+    """The compiled steps of a model's module by a method of `METHODS`.
+
+    rates  the matrix by which velocities give the rates of positions, which leapfrog needs
+    projection  of the module, or None
+
+    It has no state beside the library, so that threads may share it. Raises `RunError` if there is
+    no compiler, or if it fails.
+    """
+
+    main = MAIN
+
+    def __init__(
+        self,
+        model: Model,
+        module: Any,
+        method: str,
+        dt: float,
+        rates: FloatArray | None,
+        projection: Projection | None,
+    ) -> None:
+        compiler, lanes = find_compiler(), width()
+        joined = tuple(flag for flag in compiler.tuning if flag == NOT_JOINED)
+        flags = (f"-DWIDTH={lanes}", *FLAGS[lanes], *compiler.ordering, *joined)
+        about = f"{library_key(model, 'stepper')} {method} {flags}"
+
+        def texts() -> Mapping[str, str]:
+            return sources(*interfaced_program_of(model), method)
+
+        self.library = compiled_library(about, texts, MAIN, *flags)
+        sizes = (_LONG * 5).in_dll(self.library, "sizes")
+        self.states, self.inputs, self.parameters, self.constants, self.lanes = sizes
+        self._call = self.library.steps
+        self._call.argtypes, self._call.restype = [_POINTER, _LONG], None
+        self._module, self._dt, self._rates, self._projection = module, dt, rates, projection
+        self._beside = {
+            name: compiled_library(
+                library_key(model, name), partial(_function, model, name), c.MAIN
+            )
+            for name in (PROJECTS if projection else ())
+        }
+        self._own = checked.functions(module, self._beside, None)
+
+    def __call__(
+        self,
+        y: FloatArray,
+        out: FloatArray,
+        *,
+        t: Columns,
+        k: Columns,
+        u: Columns,
+        p: FloatArray | None,
+        steps: int,
+        lost: FloatArray | None = None,
+        again: NDArray[np.bool_] | None = None,
+        first: Columns | None = None,
+    ) -> NDArray[np.int8]:
+        """Make steps from states y (ny, n) into `out`, and update `lost`. Returns which columns are
+        made, (n,); others are not written.
+
+        t, k, u  times (1, n), constants of parameters (nk, n) and inputs (nu, n), or one column
+        p        parameters of which these are the constants, (np,); None for the scene's own
+        again, first
+                 columns that become a column of `first` (ny, n), or (ny, 1), instead
+        """
+        n = y.shape[1]
+        sound = np.zeros(n, dtype=np.int8)
+        keeps = self._constraints(p)
+        if self._projection and keeps is None:
+            return sound
+        (states,) = columns_of(y)
+        call = _Call(
+            self._dt,
+            steps,
+            None if self._rates is None else self._rates.ctypes.data,
+            constrained.address(keeps),
+            *(t, states, k, u, first or states),
+            None if again is None else again.ctypes.data,
+            out.ctypes.data,
+            None if lost is None else lost.ctypes.data,
+            sound.ctypes.data,
+        )
+        self._call(ctypes.byref(call), n)
+        return sound
+
+    def _constraints(self, p: FloatArray | None) -> constrained.Constraints | None:
+        """What C is given of the constraints, without inputs; None if there are none, or no kernels
+        for them.
+        """
+        if self._projection is None or (p is not None and p.ndim == 2):
+            return None
+        found = self._own if p is None else checked.functions(self._module, self._beside, p)
+        if len(found) < len(PROJECTS):
+            return None
+        of, rows = self._projection, len(self._projection.names)
+        none = (np.zeros(rows), np.zeros(rows), ((0.0, 0.0), (0.0, 0.0)))
+        given = Constrained(of.sizes, of.quaternions, *none)
+        return constrained.constraints(found, given, np.empty(0), self.states)
+
+
+def _function(model: Model, name: str) -> Mapping[str, str]:
+    return functions.sources(*interfaced_program_of(model), name)
