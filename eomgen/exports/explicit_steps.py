@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine.explicit import EULER, LEAPFROG_4, LEAPFROG_6, RUNGE_KUTTA_4
 from eomgen.engine.printed import text
@@ -11,6 +12,7 @@ from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.module import as_problem, load_module
 from eomgen.store import generated_code
 from eomgen.subset.braces import Language, printed
+from eomgen.templating import render
 
 _AT = "system, t, y, h, step"
 _SPLIT = "&(Split){ (int64_t *)positions, (int64_t *)others, (%s *)rates }"
@@ -30,8 +32,11 @@ EXPLICIT = tuple(_STEPS)
 """The methods."""
 
 
-def context(name: str, model: Model, interface: Interface, language: Language) -> dict[str, Any]:
-    """The values of `templates/c/explicit_step.c.jinja` for a method.
+def context(
+    name: str, model: Model, interface: Interface, language: Language, *more: str
+) -> dict[str, Any]:
+    """C of steps by a method, `explicit_step`, with `more` functions of the engine; the number of
+    positions.
 
     Raises `RunError` if there is no such method, or if it cannot make steps of the model.
     """
@@ -44,16 +49,19 @@ def context(name: str, model: Model, interface: Interface, language: Language) -
     number, splits = language.number, name.startswith("leapfrog")
     composed = root[0] == "composed"
     states = list(enumerate(interface.states))
-    roots = [root, ("leapfrog", {})] if composed else [root]
-    return {
+    roots = [root, *((other, {}) for other in (*more, *["leapfrog"] * composed))]
+    positions = [i for i, state in states if state.position]
+    values = {
         "steps": printed(text(), roots, language),
         "number": number,
         "call": call.replace("%s", number),
         "parts": _LEAPFROG.replace("%s", number) if composed else "",
-        "positions": [i for i, state in states if state.position],
+        "positions": positions,
         "others": [i for i, state in states if not state.position] if splits else [],
         "rates": _rates(model, interface, language) if splits else [],
     }
+    step = render(c.TEMPLATES, "explicit_step.c.jinja", values)
+    return {"explicit_step": step, "positions": len(positions)}
 
 
 def _rates(model: Model, interface: Interface, language: Language) -> list[str]:

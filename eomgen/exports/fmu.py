@@ -13,12 +13,14 @@ from collections.abc import Mapping
 
 from eomgen.errors import RunError
 from eomgen.exports import Options, Written
+from eomgen.exports.explicit_steps import context
 from eomgen.exports.fmu_description import description_files
 from eomgen.exports.fmu_source import MAIN, sources_of
 from eomgen.exports.fmu_unit import unit_of
 from eomgen.model.model import Model
 from eomgen.native.compiler import find_compiler, suffix
 from eomgen.scene.schema import Simulation
+from eomgen.subset.braces import C
 
 SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows"}
 PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
@@ -34,7 +36,10 @@ def files(model: Model, options: Options) -> Written:
     the initial state.
     """
     unit = unit_of(model, options.simulation or Simulation())
-    sources, token = sources_of(unit)
+    method = None
+    if options.integrator not in ("", "DOP853"):
+        method = context(options.integrator, model, unit.interface, C, "add_compensated")
+    sources, token = sources_of(unit, method)
     binary, remark = _binary(model.name, sources)
     content: dict[str, str | bytes] = {
         **description_files(unit, token, MAIN),

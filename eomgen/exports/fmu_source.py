@@ -21,19 +21,23 @@ RTOL = 1e-10
 """Relative tolerance of steps of co-simulation, if the importer gives none."""
 
 
-def sources_of(unit: Unit) -> tuple[Mapping[str, str], str]:
-    """The sources of a unit by name, and its instantiation token, which is a digest of them."""
+def sources_of(
+    unit: Unit, method: Mapping[str, object] | None = None
+) -> tuple[Mapping[str, str], str]:
+    """The sources of a unit by name, and its instantiation token, which is a digest of them. A
+    `method` of `explicit_steps.context` makes steps of equal length.
+    """
     folder = templates_folder() / "fmu" / "vendor" / "fmi3"
     others = {
         **c.files(unit.program, unit.interface),
         **{name: (folder / name).read_text("utf-8") for name in HEADERS},
     }
-    digest = hashlib.sha256("".join((_main(unit, ""), *others.values())).encode())
+    digest = hashlib.sha256("".join((_main(unit, "", method or {}), *others.values())).encode())
     token = f"{{{digest.hexdigest()[:32]}}}"
-    return {MAIN: _main(unit, token), **others}, token
+    return {MAIN: _main(unit, token, method or {}), **others}, token
 
 
-def _main(unit: Unit, token: str) -> str:
+def _main(unit: Unit, token: str, method: Mapping[str, object]) -> str:
     interface = unit.interface
     held = c.context(unit.program, interface)["held"]
     context = {
@@ -57,7 +61,11 @@ def _main(unit: Unit, token: str) -> str:
         "switching": [(n, s) for n, s, _, _ in _observed(unit.switches, len(interface.contacts))],
         **_closure(unit),
         **_contacts(unit),
+        "dt": repr(unit.simulation.dt),
         "steps": c_source(_steps(unit)),
+        "explicit_step": "",
+        "positions": 0,
+        **method,
         "slopes": len(DOP853.nodes),
     }
     return render("fmu", "unit.c.jinja", context)

@@ -80,6 +80,29 @@ def test_a_unit_moves_as_our_own_run(scene: str, t_end: float, folder: Path) -> 
     np.testing.assert_allclose(exchanged(path, t_end), run.y[-1], rtol=1e-8, atol=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("scene", "method", "t_end"),
+    [("spinning_top", "rk4", 1.0), ("pendulum", "leapfrog_4", 1.0), (BALL, "euler", 1.6)],
+)
+def test_steps_of_equal_length(scene: str, method: str, t_end: float, tmp_path: Path) -> None:
+    """They are those of our own run: to the bit, or with contacts to 1e-8."""
+    options = {"integrator": method, "dt": 1e-3}
+    path = eomgen.export(scene, "fmu", tmp_path / "unit.fmu", integrator=method)[0]
+    run = eomgen.simulate(scene, t_end=t_end, samples=2, unstable=True, **options)
+    found = simulate_fmu(
+        str(path),
+        fmi_type="CoSimulation",
+        stop_time=t_end,
+        output_interval=t_end / 4,
+        output=list(run.states),
+    )
+    stepped = [found[name][-1] for name in run.states]
+    if scene == BALL:
+        np.testing.assert_allclose(stepped, run.y[-1], rtol=1e-8, atol=1e-8)
+    else:
+        assert stepped == run.y[-1].tolist()
+
+
 def test_the_units_own_solver_of_an_importer_agrees(folder: Path) -> None:
     """FMPy's solver, of order 5 at most, finds the events of the ball."""
     path = unit(folder, BALL)
