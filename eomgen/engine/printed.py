@@ -14,7 +14,6 @@ from eomgen.engine import (
     explicit,
     implicit,
     least_squares,
-    linear,
     projection,
     quaternions,
     roots,
@@ -62,7 +61,7 @@ CODES = {
 def text() -> Text:
     """The text of the whole engine."""
     steps = (adaptive, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
-    solved = (linear, elimination, least_squares, complementarity, roots)
+    solved = (elimination, least_squares, complementarity, roots)
     return Text.of(*steps, *solved, contacts, contact_times, projection, system)
 
 
