@@ -15,8 +15,10 @@ from eomgen.engine import (
     implicit,
     least_squares,
     linear,
+    projection,
     quaternions,
     roots,
+    rosenbrock,
     sums,
     system,
 )
@@ -59,14 +61,15 @@ CODES = {
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    steps = (adaptive, equal_steps, explicit, implicit, quaternions, sums)
+    steps = (adaptive, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
     solved = (linear, elimination, least_squares, complementarity, roots)
-    return Text.of(*steps, *solved, contacts, contact_times, system)
+    return Text.of(*steps, *solved, contacts, contact_times, projection, system)
 
 
 def c_source(functions: Roots, language: Language = C) -> str:
     """C, or another language like it, of functions and of all that they call. What includes it
-    defines STATES, `System` and its functions, such as `void derivative(const System *, double t, const double *y, double *rates)`.
+    defines STATES, `System` and its functions, such as
+    `void derivative(const System *, double t, const double *y, double *rates)`.
     """
     return printed(text(), functions, language)
 

@@ -4,11 +4,11 @@ import hashlib
 from collections.abc import Mapping, Sequence
 
 from eomgen.codegen.backends import c
-from eomgen.engine import contacts
+from eomgen.engine import contacts, projection
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import CONTACTS, Roots, c_source
 from eomgen.exports.fmu_unit import Observed, Unit
-from eomgen.run import events, projection
+from eomgen.run import events
 from eomgen.subset.braces import C
 from eomgen.templating import render, templates_folder
 
@@ -97,9 +97,9 @@ def _closure(unit: Unit) -> dict[str, object]:
         "row_sizes": [repr(unit.size if force == "N" else 1.0) for _, force in rows],
         "coordinates": interface.coordinates,
         "velocities": interface.velocities,
-        "most_newton": projection.MOST,
-        "met": repr(projection.MET),
-        "close": repr(projection.CLOSE),
+        "projection": c_source([("moved_onto", {})]),
+        "on_constraints": projection.PROJECTED,
+        "far": projection.FAR,
         "drift": repr(DRIFT),
     }
 

@@ -1,7 +1,6 @@
 """What compiled steps are given of the constraints of a mechanism.
 
-`templates/c/projection.c.jinja` repeats `eomgen.run.projection`. The functions lie in libraries of
-their own.
+The functions lie in libraries of their own.
 """
 
 import ctypes
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.engine.projection import PROJECTED
 from eomgen.native.checked import Function, FunctionStructure
 from eomgen.run import margins, projection
 from eomgen.run.compiled import Array, Constrained
@@ -33,10 +33,12 @@ class Constraints(ctypes.Structure):
 
 def context() -> dict[str, Any]:
     """The values of the template."""
+    # Imported here because runs whose library is in the store do without the printer.
+    from eomgen.engine.printed import c_source
+
     return {
-        "most_projections": projection.MOST,
-        "met": repr(projection.MET),
-        "close": repr(projection.CLOSE),
+        "projection": c_source([("moved_onto", {})]),
+        "on_constraints": PROJECTED,
         "near": repr(margins.NEAR),
         "singular": repr(margins.SINGULAR),
     }

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
 from eomgen.engine.implicit import GAUSS_4, GAUSS_6, IMPLICIT_MIDPOINT
-from eomgen.engine.printed import Roots, c_source
+from eomgen.engine.rosenbrock import MANY_SUMS
 from eomgen.native import checked, equal_steps
 from eomgen.native.checked import Function, FunctionStructure
 from eomgen.native.constrained import address, constraints, made_margins
@@ -23,24 +23,26 @@ from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import constants_of
 from eomgen.native.module import Kernels
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
-from eomgen.run.integrators import implicit_stages, rattle, rodas_5p
-from eomgen.run.integrators.rodas_5p_coefficients import GAMMA, IN_TIME, NODES, Row
+from eomgen.run.integrators import implicit_stages, rattle
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
-from eomgen.subset.braces import C
 from eomgen.templating import render
 
 MAIN = "implicit.c"
 NEEDED = ("derivative", "jacobian")
 """The functions that the methods call."""
-EQUAL_STEPS: Roots = (*equal_steps.COMPOSED, ("equal_steps", {}))
+EQUAL_STEPS = (*equal_steps.COMPOSED, ("equal_steps", {}))
 """What of the engine's text this library has."""
 SYMMETRIC = ("constraint_jacobian", "constraint_rates")
 """Further functions for symmetric projection."""
 METHODS = ("rodas_5p",)
 GAUSS = {method.name: method for method in (IMPLICIT_MIDPOINT, GAUSS_4, GAUSS_6)}
 """The methods of adaptive and of equal steps, by the names of their compiled steps."""
-ROOTS = [("implicit_change", {"method": method}) for method in GAUSS.values()]
+ROOTS = [
+    *(("implicit_change", {"method": method}) for method in GAUSS.values()),
+    ("rodas_step", {}),
+    ("rodas_within", {}),
+]
 """The functions of the engine that are printed."""
 METHODS_LIBRARY = "methods"
 """The name of the library of the methods among the others."""
@@ -53,27 +55,16 @@ _UNUSUAL = 2
 
 def sources() -> Mapping[str, str]:
     """The C source of the methods."""
-    sums = [_sum(row) for row in rodas_5p.SUMS]
+    # Imported here because runs whose library is in the store do without the printer.
+    from eomgen.engine.printed import c_source
+    from eomgen.subset.braces import C
+
     context = {
         **of_constraints(),
-        "stages": rodas_5p.STAGES,
-        "aside": repr(rodas_5p.ASIDE),
-        "gamma": repr(GAMMA),
-        "in_time": [repr(factor) for factor in IN_TIME],
-        "stage_sums": [
-            (i, repr(NODES[i]), sums[2 * i - 2], sums[2 * i - 1]) for i in range(1, rodas_5p.STAGES)
-        ],
-        "end_sum": sums[rodas_5p.AT_END],
-        "dense": sums[rodas_5p.IN_DENSE :],
-        "safety": repr(rodas_5p.SAFETY),
-        "power": repr(rodas_5p.POWER),
-        "smallest": repr(rodas_5p.SMALLEST),
-        "greatest": repr(rodas_5p.GREATEST),
-        "negligible": repr(rodas_5p.NEGLIGIBLE),
-        "least_error": repr(rodas_5p.LEAST_ERROR),
         "engine": C.prelude + c_source(EQUAL_STEPS),
-        "newton": c_source([("implicit_change", {"method": of}) for of in GAUSS.values()]),
+        "newton": c_source(ROOTS),
         "compositions": [each.name for each in equal_steps.COMPOSITIONS],
+        "many_sums": MANY_SUMS,
         "most_of_rattle": rattle.MOST,
         "rattle_roundoff": repr(rattle.ROUNDOFF),
         "rattle_noise": repr(rattle.NOISE),
@@ -81,11 +72,6 @@ def sources() -> Mapping[str, str]:
         "gauss": [(name, len(of.b)) for name, of in GAUSS.items()],
     }
     return {MAIN: render(c.TEMPLATES, "implicit.c.jinja", context)}
-
-
-def _sum(row: Row) -> str:
-    """A sum over solutions. It begins with 0 and so is never -0, as where all factors are added."""
-    return " + ".join(["0.0", *(f"{factor!r} * u{j}[j]" for j, factor in enumerate(row))])
 
 
 class System(ctypes.Structure):

@@ -1,9 +1,5 @@
-"""Projection of a state onto the constraints of a mechanism, after each step.
-
-The step of an integrator leaves the constraints by its error. Newton's method returns the
-coordinates to them, and a linear solution the velocities, both to the nearest state in the metric
-of the mass matrix (Hairer and Wanner II, VII.2; Eich 1993). The order of the method is kept, and no
-error of the constraints adds up.
+"""The constraints of a mechanism, and projection of a state onto them: see
+`eomgen.engine.projection`.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,18 +9,13 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.engine.projection import PROJECTED, moved_onto
 from eomgen.run.compiled import Constrained
 from eomgen.run.failure import StepFailure
 from eomgen.run.margins import Seen
 
 FloatArray = NDArray[np.float64]
 
-MOST = 12
-"""Most steps of Newton's method after a step; two suffice where steps are accurate."""
-MET = 1e-15
-"""A residual relative to the mechanism's size that is rounding, beside the last one."""
-CLOSE = 1e-9
-"""The largest residual that is left where Newton's method ends, in sizes."""
 PROJECTS = ("constraint_residuals", "project_position", "project_velocity", "constraint_margins")
 """The functions of a module that a step onto the constraints needs."""
 
@@ -95,27 +86,14 @@ class Projection:
 
         Raises `StepFailure` if the constraints cannot be met near the state.
         """
-        y, nq = y.copy(), self.coordinates
-        first = left = self.residuals(t, y)
-        off = self._relative(left)
-        for _ in range(MOST):
-            if off <= MET:
-                break
-            there = y.copy()
-            there[:nq] = self.position(t, y)
-            there = unit(there)
-            after = self.residuals(t, there)
-            if not self._relative(after) < off:  # rounding, or no way towards the constraints
-                break
-            y, left, off = there, after, self._relative(after)
-        if not off <= CLOSE:
+        y, (first, left, after) = y.copy(), np.empty((3, len(self.names)))
+        room = self.sizes, first, left, after, np.empty_like(y)
+        if moved_onto(_Held(self, unit), len(y), len(self.names), t, y, *room) != PROJECTED:
             worst = int(np.argmax(np.abs(left) / self.sizes))
             raise StepFailure(
                 f"constraint {self.names[worst]} cannot be met near t = {t:.6g} s",
                 "take shorter steps, or a start farther from a singular position",
             )
-        v = self.velocity(t, y)
-        y[nq : nq + len(v)] = v
         if self.violations:
             self.violations.add(first, left)
         return y
@@ -124,9 +102,27 @@ class Projection:
         """The derivatives (nc, nv) of the rates, in sizes, by the velocities."""
         return self.jacobian(t, y) / self.sizes[:, None]
 
-    def _relative(self, residuals: FloatArray) -> float:
-        """The largest residual, in sizes."""
-        return float(np.abs(residuals / self.sizes).max())
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """The constraints as the engine is given them."""
+
+    of: Projection
+    unit: Callable[[FloatArray], FloatArray]
+
+    def residuals_at(self, t: float, y: FloatArray, out: FloatArray) -> bool:
+        out[:] = self.of.residuals(t, y)
+        return True
+
+    def move_closer(self, t: float, y: FloatArray, there: FloatArray) -> bool:
+        there[: self.of.coordinates] = self.of.position(t, y)
+        there[:] = self.unit(there)
+        return True
+
+    def hold_velocities(self, t: float, y: FloatArray) -> bool:
+        v, nq = self.of.velocity(t, y), self.of.coordinates
+        y[nq : nq + len(v)] = v
+        return True
 
 
 def constrained_by(projection: Projection | None) -> Constrained | None:

@@ -46,14 +46,14 @@ class Text:
 
     @classmethod
     def of(cls, *modules: ModuleType) -> "Text":
-        """The text of modules. Raises `ValueError` if two things have the same name."""
+        """The text of modules. Raises `NotInSubsetError` if two things have one name."""
         text = cls()
         for module in modules:
             constants = {n: x for n, x in vars(module).items() if n.isupper()}
             for d in ast.parse(inspect.getsource(module)).body:
                 name = d.name if isinstance(d, ast.FunctionDef | ast.ClassDef) else ""
                 if name in text.functions or name in text.classes:
-                    raise ValueError(f"{module.__name__}: a second {name}")
+                    raise NotInSubsetError(d, "another module of the text has this name")
                 if isinstance(d, ast.FunctionDef):
                     text.functions[d.name] = d
                     text.constants[d.name] = constants

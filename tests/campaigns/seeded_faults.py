@@ -1,7 +1,7 @@
 """A hundred faults all over the program, and which test catches each.
 
     python tests/campaigns/seeded_faults.py [--list] [--first N] [--last N] [--log FILE]
-        [--before REV] [--count N] [--seed N]
+        [--near | --before REV] [--count N] [--seed N]
 
 A fault is one change in one place: a sign, a dropped term, < for <=, a condition turned round, a
 constant or an index that is off by one, sin for cos. The packages and the folders of templates get
@@ -10,6 +10,7 @@ as many as they have lines. Each is made in a copy of the project. There run the
 more than LONGEST processor time counts as caught, too. What is not caught is shown with its line:
 the tests have a hole there, or the change means nothing.
 
+`--near`: only the tests of the changed package run; what they miss is left for another call.
 `--before`: where the tests as they stand catch nothing, the cases run that this revision's tests
 have and they have not. A log has a line of JSON for each fault; faults that have theirs are not
 tried again, so a campaign can be stopped and continued.
@@ -356,7 +357,7 @@ def _environment(root: Path) -> dict[str, str]:
     return {**env, "PYTHONPATH": str(root), "EOMGEN_CACHE": str(root.parent / "store")}
 
 
-def judged(fault: Fault, made: Copy, gone: list[str]) -> dict[str, object]:
+def judged(fault: Fault, made: Copy, gone: list[str], near_only: bool) -> dict[str, object]:
     """What catches a fault: of the tests that are named for it, of all others, of those of before
     that are left out now.
     """
@@ -368,11 +369,13 @@ def judged(fault: Fault, made: Copy, gone: list[str]) -> dict[str, object]:
     made.put(fault, fault.made())
     try:
         # The smaller folder comes first: that of a package is seldom larger than all others.
-        for stage, root, tests in (
-            *(("touched", made.root, [name]) for name in sorted(near, key=_project_last)),
-            *(("others", made.root, [name]) for name in far),
-            *([("before", made.old, gone)] if gone else []),
-        ):
+        stages = [("touched", made.root, [name]) for name in sorted(near, key=_project_last)]
+        if near_only:
+            stages = stages[: len(near) - 1]
+        else:
+            stages += [("others", made.root, [name]) for name in far]
+            stages += [("before", made.old, gone)] if gone else []
+        for stage, root, tests in stages:
             by, seconds = made.caught(root, tests)
             said["seconds"] = round(float(str(said["seconds"])) + seconds, 1)
             if by:
@@ -397,6 +400,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--last", type=int, default=10**9)
     parser.add_argument("--log", type=Path, default=Path("seeded_faults.jsonl"))
+    parser.add_argument("--near", action="store_true")
     parser.add_argument("--before", default="", metavar="REV")
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
@@ -417,11 +421,15 @@ def main() -> int:
         for k, fault in list(enumerate(faults))[given.first : given.last + 1]:
             if k in done:
                 continue
-            done[k] = {"fault": k, "what": fault.told(), **judged(fault, made, gone)}
+            done[k] = {"fault": k, "what": fault.told(), **judged(fault, made, gone, given.near)}
             if str(done[k]["by"]).startswith(("FAILED", "ERROR")):
                 root = made.old if done[k]["stage"] == "before" else made.root
                 if made.caught(root, [str(done[k]["by"]).split(" ", 1)[1]])[0]:
                     raise SystemExit(f"without a fault as well: {done[k]['by']}")
+            if given.near and done[k]["stage"] == "no":
+                print(f"{k}: {fault.told()}\n    not near", flush=True)
+                del done[k]
+                continue
             with given.log.open("a") as log:
                 print(json.dumps(done[k]), file=log)
             print(f"{k}: {fault.told()}\n    {done[k]['stage']}: {done[k]['by']}", flush=True)

@@ -142,13 +142,14 @@ SQUARED = [case for case in (*SMALL, *FIVE) if is_regular(squared(tree(*case)))]
 assert len(SQUARED) >= some(10, 16)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("seed", "dimensions", "most"), SQUARED)
 def test_closed_is_aba_in_60_digits(seed: int, dimensions: int, most: int) -> None:
     """Every joint type, rotations that are exact: to all digits but a few."""
     agree(squared(tree(seed, dimensions, most)), seed, EXACT)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("seed", "dimensions", "most"), FEW)
 def test_closed_is_aba_about_any_axis(seed: int, dimensions: int, most: int) -> None:
     """Axes and orientations that no double is exactly: to what they are rounded to."""

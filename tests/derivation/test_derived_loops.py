@@ -143,6 +143,7 @@ def assert_close(ours: Any, theirs: Any) -> None:
     assert float(np.abs(ours - theirs).max(initial=0.0)) < ROUNDING * size
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", [*SCENES, *some(("prismatic",), LOOPS)])
 def test_equations_of_constraints_and_their_solution(scene: str) -> None:
     """g, ġ, J, β and the elimination; then v̇ by the steps of the tree with these multipliers."""

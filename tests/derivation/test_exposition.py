@@ -59,7 +59,7 @@ def assert_close(ours: Any, theirs: Any, within: float = ROUNDING) -> None:
     assert float(np.max(np.abs(ours - theirs), initial=0.0)) < within * size
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize("scene", built_in_names())
 def test_the_algorithm_followed_by_hand(scene: str) -> None:
     """Every equation in its order, from parameters to v̇ and F: what the numeric solver has."""
@@ -256,6 +256,7 @@ def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
     assert_close(M @ np.array(want) + (V + G - F).ravel(), np.zeros(len(want)))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("form", ["redundant", "momentum", "velocity"])
 @pytest.mark.parametrize("scene", ["two_body", "two_body_forced"])
 def test_the_derivative_of_a_state_form(scene: str, form: Any) -> None:
@@ -364,7 +365,7 @@ def test_dots_are_over_whole_names() -> None:
             assert not words, words
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.parametrize("scene", SHOWN)
 def test_three_formats(scene: str) -> None:
     """No refusal. In prose no markup, in formulas no hyphen for a minus, in LaTeX plain ASCII."""

@@ -193,6 +193,7 @@ def test_joint_force(scene: str) -> None:
     assert_same(found.values(), handout)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 def test_symmetric_form_is_lagranges(scene: str) -> None:
     """Lagrange's equations, from the energies and the virtual work alone, are the symmetric form.
@@ -263,6 +264,7 @@ def place_bodies(eq: Equations, values: dict[sp.Expr, sp.Expr]) -> None:
         values[body[1]] = values[body[0]] + values.get(coordinate[3], coordinate[3])
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 def test_closed_form_solves_the_system_symbolically(scene: str) -> None:
     """The closed form put into (24) is an identity: cos² + sin² = 1 alone makes it vanish.

@@ -89,6 +89,7 @@ def denominators(expression: sp.Expr) -> list[sp.Expr]:
     return [1 / power for power in expression.atoms(sp.Pow) if not power.exp.is_nonnegative]
 
 
+@pytest.mark.every(3)
 @every_scene
 def test_denominators_are_sums_of_positive_terms(scene: Scene) -> None:
     """Whatever the closed form divides by is built of positive terms: no pose makes it vanish."""

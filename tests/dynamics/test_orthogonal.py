@@ -403,7 +403,7 @@ def operations(text: str, route: str) -> int:
     return cost(finish(record.tape, outputs, ()), "v")["total"]
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("n", some([7], [8, 20]))
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])

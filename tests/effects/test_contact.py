@@ -505,7 +505,7 @@ def rigid(found: Engine, y: np.ndarray) -> tuple[tuple[Contact, ...], Dynamics]:
 
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("geometry", GEOMETRY)
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 def test_rigid_contacts_say_how_their_gaps_change(geometry: str, dimensions: int) -> None:
     """The power of `normal` is the gap's rate; tangents are unit vectors across; in pairs the loads
     cancel; no load acts.

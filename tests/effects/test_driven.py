@@ -205,6 +205,7 @@ def test_energy_is_accounted_for(dimensions: int, seed: int) -> None:
         assert apart(powers[f"way{i}"], forces[i] * at[velocity]) < 1e-50
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("dimensions", "seed"), FEW)
 def test_many_states_at_many_times(dimensions: int, seed: int) -> None:
     """Columns are single states, each at its own time."""

@@ -620,7 +620,7 @@ def test_length_of_quaternions(name: str, route: str) -> None:
         assert apart(m.at(output, longer), m[output]) < 1e-50, output
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", some(LARGE[::4], LARGE))
 def test_jacobian_of_large_scenes(name: str) -> None:
     """Some columns, as central differences in 60 digits have them."""

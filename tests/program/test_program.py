@@ -197,7 +197,7 @@ def some_inputs(program: Program, rng: np.random.Generator) -> dict[str, Any]:
     return {name: MP.mpf(float(rng.uniform(0.3, 2.0))) for name in names}
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("case", [*BUILT_IN, *TREES])
 def test_passes_keep_values_and_save_work(case: str | int) -> None:
     """After each pass every output has its value to 45 digits, and no more to do than before."""

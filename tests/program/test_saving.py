@@ -23,7 +23,7 @@ from eomgen.store import program_of
 SCENES = some(("acrobot", "bouncing_two_body", "chain_in_wind", "tumbling_body"), built_in_names())
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_program_comes_back_to_the_last_bit(scene: str) -> None:
     """Steps, outputs, names, checks; and the text again is the same text."""

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eomgen.engine import few
+from eomgen.engine import few, rosenbrock
+from eomgen.engine import rodas_5p_coefficients as own
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import elimination, rodas_5p
-from eomgen.run.integrators import rodas_5p_coefficients as own
 from eomgen.run.problem import Problem
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def standard() -> tuple[Array, Array, Array]:
     """The coefficients α, β = α + γ and b of the form with products of the Jacobian with vectors,
     by which order conditions are written. Hairer, Wanner, Solving ODEs II, section IV.7.
     """
-    stages = rodas_5p.STAGES
+    stages = rosenbrock.STAGES
     a, c = np.zeros((2, stages, stages))
     for i in range(stages):
         a[i, :i], c[i, :i] = own.PLACES[i], own.COUPLINGS[i]

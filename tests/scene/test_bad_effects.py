@@ -163,7 +163,6 @@ def test_all_effects_are_here() -> None:
             elaborate(parse_scene(crane(kind, dimensions)))
 
 
-@pytest.mark.every(2)
 @pytest.mark.parametrize("kind", TABLES)
 def test_quantities(kind: str) -> None:
     """Values of the wrong kind or sign, formulas with names that nothing has."""

@@ -408,6 +408,7 @@ def test_float32_loses_29_bits() -> None:
 # What is found.
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", ["double_pendulum", "two_body", "tumbling_body"])
 def test_every_route_is_exact_where_masses_are_even(scene: str) -> None:
     """A few ulps at most states, some hundred at the worst; every route is compared."""

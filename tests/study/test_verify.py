@@ -614,6 +614,7 @@ def test_an_interrupt_keeps_the_states_judged_so_far(
 # Small faults in components and terms that others hide.
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("output", "entry", "size", "lines"),
     [

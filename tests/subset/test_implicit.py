@@ -1,13 +1,13 @@
 """Elimination and implicit steps over random inputs in three languages: the same bits."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 from languages import NONE, Given, results
 
-from eomgen.engine import elimination, few, implicit, system
+from eomgen.engine import elimination, few, implicit, projection, rosenbrock, system
 from eomgen.engine.implicit import (
     GAUSS_4,
     GAUSS_6,
@@ -15,9 +15,11 @@ from eomgen.engine.implicit import (
     Collocation,
     Stages,
 )
+from eomgen.engine.rodas_5p_coefficients import GAMMA
+from eomgen.engine.rosenbrock import MANY_SUMS, Rodas
 from eomgen.subset.expander import Text
 
-TEXT = Text.of(elimination, implicit, system)
+TEXT = Text.of(elimination, implicit, projection, rosenbrock, system)
 SEEDED = np.random.default_rng(1)
 
 
@@ -109,3 +111,90 @@ def test_implicit_steps(method: Collocation, positions: int) -> None:
         [SYSTEM, 0.1, h, y, stages, factors, np.zeros(n)] for y in starts for h in (0.01, 0.5, 9.0)
     ]
     same("implicit_change", cases, SYSTEM, method=method)
+
+
+@pytest.mark.parametrize("timed", [False, True])
+def test_rosenbrock_steps(timed: bool) -> None:
+    """Attempts at steps, with their sums and errors; then whole steps, some of them shortened. In
+    JavaScript these have another `pow`.
+    """
+    n = 4
+    arrays = np.full(n, 1e-6), *np.zeros((3, n)), np.zeros((MANY_SUMS, n))
+    empty = Rodas(9.0, 3.0, 1e-4, 2, timed, 0.0, 0.02, 0.5, 0.0, 0, 0, *arrays)
+    starts = SEEDED.normal(size=(4, n))
+    attempts, steps = list[list[Any]](), list[list[Any]]()
+    for y in starts:
+        factors = few.factors_of(n, -few.FEW)
+        slope, matrix = (f(0.1, y) for f in (SYSTEM.python.derivative, SYSTEM.python.jacobian))
+        assert elimination.factored(factors, 1.0 / (0.05 * GAMMA), 2, matrix)
+        attempts.append([SYSTEM, empty, factors, 0.1, 0.05, y, slope, SEEDED.normal(size=n)])
+        lengths = (replace(empty, h_abs=length) for length in (0.01, 2.0))
+        steps += [[SYSTEM, run, factors, 0.1, y] for run in lengths]
+    same("rodas_attempted", attempts, SYSTEM)
+    python, c, _ = results(TEXT, "rodas_step", steps, given=SYSTEM)
+    assert python == c
+
+
+class Circle:
+    """States x, y, v, w on a circle."""
+
+    def residuals_at(self, t: float, y: Any, out: Any) -> bool:
+        out[:] = y[0] * y[0] + y[1] * y[1] - 1.0, y[0] - y[0]
+        return bool(y[0] < 9.0)
+
+    def move_closer(self, t: float, y: Any, there: Any) -> bool:
+        far = (y[0] * y[0] + y[1] * y[1] - 1.0) / (2.0 * (y[0] * y[0] + y[1] * y[1]))
+        there[:2] = y[0] - far * y[0], y[1] - far * y[1]
+        return True
+
+    def hold_velocities(self, t: float, y: Any) -> bool:
+        out = (y[0] * y[2] + y[1] * y[3]) / (y[0] * y[0] + y[1] * y[1])
+        y[2:] = y[2] - out * y[0], y[3] - out * y[1]
+        return True
+
+
+CIRCLE = Given(
+    Circle(),
+    """
+typedef struct { int none; } Constraints;
+static int64_t residuals_at(Constraints *c, double t, const double *y, double *out) {
+    out[0] = y[0] * y[0] + y[1] * y[1] - 1.0, out[1] = y[0] - y[0];
+    return y[0] < 9.0;
+}
+static int64_t move_closer(Constraints *c, double t, const double *y, double *there) {
+    const double far = (y[0] * y[0] + y[1] * y[1] - 1.0) / (2.0 * (y[0] * y[0] + y[1] * y[1]));
+    there[0] = y[0] - far * y[0], there[1] = y[1] - far * y[1];
+    return 1;
+}
+static int64_t hold_velocities(Constraints *c, double t, double *y) {
+    const double out = (y[0] * y[2] + y[1] * y[3]) / (y[0] * y[0] + y[1] * y[1]);
+    y[2] = y[2] - out * y[0], y[3] = y[3] - out * y[1];
+    return 1;
+}
+""",
+    """
+const system = {
+  residuals_at(t, y, out) {
+    out.set([y[0] * y[0] + y[1] * y[1] - 1.0, y[0] - y[0]]);
+    return y[0] < 9.0;
+  },
+  move_closer(t, y, there) {
+    const far = (y[0] * y[0] + y[1] * y[1] - 1.0) / (2.0 * (y[0] * y[0] + y[1] * y[1]));
+    there.set([y[0] - far * y[0], y[1] - far * y[1]]);
+    return true;
+  },
+  hold_velocities(t, y) {
+    const out = (y[0] * y[2] + y[1] * y[3]) / (y[0] * y[0] + y[1] * y[1]);
+    y.set([y[2] - out * y[0], y[3] - out * y[1]], 2);
+    return true;
+  },
+};
+""",
+)
+
+
+def test_projection() -> None:
+    """Near and far states; one where a function has no valid result."""
+    starts = [*SEEDED.normal(size=(20, 4)), np.array([1e-9, 0, 1, 1]), np.array([9.0, 0, 1, 1])]
+    room = np.array([1.0, 2.0]), *np.zeros((3, 2)), np.zeros(4)
+    same("moved_onto", [[CIRCLE, 4, 2, 0.0, y, *room] for y in starts], CIRCLE)

@@ -1,0 +1,102 @@
+"""Projection of a state onto the constraints of a mechanism, after each step.
+
+The step of an integrator leaves the constraints by its error. Newton's method returns the
+coordinates to them, and a linear solution the velocities, both to the nearest state in the metric
+of the mass matrix (Hairer and Wanner II, VII.2; Eich 1993). The order of the method is kept, and no
+error of the constraints adds up.
+"""
+
+from typing import Annotated, Protocol
+
+import numpy as np
+
+from eomgen.subset.words import Vector, with_arrays
+
+MOST = 12
+"""Most steps of Newton's method after a step; two suffice where steps are accurate."""
+MET = 1e-15
+"""A residual relative to the mechanism's size that is rounding, beside the last one."""
+CLOSE = 1e-9
+"""The largest residual that is left where Newton's method ends, in sizes."""
+PROJECTED, FAR, INVALID = 1, 0, -1
+"""What a projection returns: the state is on the constraints; they cannot be met near it; a
+function has no valid result."""
+
+
+class Constraints(Protocol):
+    """The constraints of a mechanism with n states, and with residuals in rows. Each function
+    returns whether its result is valid.
+    """
+
+    def residuals_at(
+        self, t: float, y: Annotated[Vector, "n"], out: Annotated[Vector, "rows"]
+    ) -> bool:
+        """The residuals, m or rad."""
+        ...
+
+    def move_closer(
+        self, t: float, y: Annotated[Vector, "n"], there: Annotated[Vector, "n"]
+    ) -> bool:
+        """Give `there`, a copy of y, the coordinates after a step of Newton's method, with unit
+        quaternions.
+        """
+        ...
+
+    def hold_velocities(self, t: float, y: Annotated[Vector, "n"]) -> bool:
+        """Give y the velocities that meet the constraints."""
+        ...
+
+
+def _worst_off(rows: int, residuals: Vector, sizes: Vector) -> float:
+    return float(np.abs(residuals / sizes).max())
+
+
+@with_arrays(_worst_off)
+def worst_off(
+    rows: int, residuals: Annotated[Vector, "rows"], sizes: Annotated[Vector, "rows"]
+) -> float:
+    """The largest residual, in sizes; not a number if one is not."""
+    largest = 0.0
+    nothing = 0.0
+    for i in range(rows):
+        size = abs(residuals[i] / sizes[i])
+        nothing += 0.0 * size
+        if size > largest:
+            largest = size
+    return largest + nothing
+
+
+def moved_onto(
+    held: Constraints,
+    n: int,
+    rows: int,
+    t: float,
+    y: Annotated[Vector, "n"],
+    sizes: Annotated[Vector, "rows"],
+    first: Annotated[Vector, "rows"],
+    left: Annotated[Vector, "rows"],
+    after: Annotated[Vector, "rows"],
+    there: Annotated[Vector, "n"],
+) -> int:
+    """Move a state with unit quaternions onto the constraints; `first` are the residuals before,
+    `left` those of the coordinates found.
+    """
+    if not held.residuals_at(t, y, left):
+        return INVALID
+    first[:] = left
+    far = worst_off(rows, left, sizes)
+    for _ in range(MOST):
+        if far <= MET:
+            break
+        there[:] = y
+        if not held.move_closer(t, y, there) or not held.residuals_at(t, there, after):
+            return INVALID
+        nearer = worst_off(rows, after, sizes)
+        if not nearer < far:  # rounding, or no way towards the constraints
+            break
+        y[:] = there
+        left[:] = after
+        far = nearer
+    if not far <= CLOSE:
+        return FAR
+    return PROJECTED if held.hold_velocities(t, y) else INVALID
