@@ -45,6 +45,7 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
+    ("moved_onto", {}),
     *CONTACTS,
 )
 """What a page that goes on live calls."""
@@ -53,6 +54,7 @@ CODES = {
     "ENDLESS": contacts.ENDLESS,
     "NO_FORCES": contacts.NO_FORCES,
     "UNHELD": contact_times.UNHELD,
+    "PROJECTED": projection.PROJECTED,
 }
 """The constants that it needs."""
 

@@ -66,7 +66,8 @@ const makeEngine = (mechanism, data) => {
     return y;
   }
 
-  const projected = (t, y) => closure.onto(mechanism, { positions, others, unit }, t, y, engine.p, engine.u);
+  const given = () => [engine.p, engine.u];
+  const projected = makeClosure(mechanism, steps, data.size ?? 1, { ny, positions, others, unit, given });
 
   function makeLaw() {
     const table = mechanism.contacts ?? [];

@@ -106,7 +106,8 @@ def mechanism(
     Each returns a Float64Array of the entries of an output in C order, or a number, and may use the
     same array for its next result. State y, parameters p and inputs u are arrays in the order of
     the interface. `held` and `impact` take an array of their further inputs last. `contacts` are
-    described by tables, one for each, which the object has as `contacts`.
+    described by tables, one for each, which the object has as `contacts`. Its `constraints` are the
+    units of their forces, "N" or "N m".
     """
     program, interface = _numbered(*_of_page(program, interface))
     kernels, constants = kernels_of(program, interface, IN_PAGE, sharing=True)
@@ -130,6 +131,7 @@ def mechanism(
         "kernels": written,
         "missing": [in_page(name) for name in OF_PAGE if name not in program.outputs],
         "contacts": json.dumps(list(contacts)),
+        "constraints": json.dumps([force for _, force in interface.constraints]),
     }
     return render(TEMPLATES, "mechanism.js.jinja", context)
 
