@@ -22,8 +22,9 @@ from eomgen.engine import (
     system,
 )
 from eomgen.engine.embedded import DOP853
-from eomgen.subset.braces import JAVASCRIPT, C, Language, printed
+from eomgen.subset.braces import printed
 from eomgen.subset.expander import Text
+from eomgen.subset.languages import JAVASCRIPT, C, Language
 from eomgen.subset.unrolled import unrolled_functions
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]

@@ -11,7 +11,8 @@ from eomgen.model.model import Model
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.module import as_problem, load_module
 from eomgen.store import generated_code
-from eomgen.subset.braces import Language, printed
+from eomgen.subset.braces import printed
+from eomgen.subset.languages import Language
 from eomgen.templating import render
 
 _AT = "system, t, y, h, step"

@@ -12,7 +12,7 @@ from eomgen.integrators import INTEGRATORS
 from eomgen.model.model import Model
 from eomgen.program.ordering import ordered
 from eomgen.store import interfaced_program_of
-from eomgen.subset.braces import REALS
+from eomgen.subset.languages import REALS
 from eomgen.templating import render
 
 METHOD = "rk4"

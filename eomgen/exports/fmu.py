@@ -20,7 +20,7 @@ from eomgen.exports.fmu_unit import unit_of
 from eomgen.model.model import Model
 from eomgen.native.compiler import find_compiler, suffix
 from eomgen.scene.schema import Simulation
-from eomgen.subset.braces import C
+from eomgen.subset.languages import C
 
 SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows"}
 PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}

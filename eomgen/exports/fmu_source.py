@@ -9,7 +9,7 @@ from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import CONTACTS, Roots, c_source
 from eomgen.exports.fmu_unit import Observed, Unit
 from eomgen.run import events
-from eomgen.subset.braces import C
+from eomgen.subset.languages import C
 from eomgen.templating import render, templates_folder
 
 HEADERS = ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h")

@@ -57,7 +57,7 @@ def sources() -> Mapping[str, str]:
     """The C source of the methods."""
     # Imported here because runs whose library is in the store do without the printer.
     from eomgen.engine.printed import c_source
-    from eomgen.subset.braces import C
+    from eomgen.subset.languages import C
 
     context = {
         **of_constraints(),

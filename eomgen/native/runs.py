@@ -36,7 +36,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C sources of the derivative and of the methods that step with it."""
     # Imported here because runs whose library is in the store do without the printer.
     from eomgen.engine.printed import c_source
-    from eomgen.subset.braces import C
+    from eomgen.subset.languages import C
 
     program, interface = restricted(program, interface, ("derivative",))
     context = {

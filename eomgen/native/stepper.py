@@ -28,7 +28,7 @@ from eomgen.run.compiled import Constrained
 from eomgen.run.problem import USUAL_LENGTH, FloatArray
 from eomgen.run.projection import PROJECTS, Projection
 from eomgen.store import interfaced_program_of
-from eomgen.subset.braces import VECTORS, C
+from eomgen.subset.languages import VECTORS, C
 from eomgen.templating import render
 
 MAIN = "stepper.c"

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from languages import NONE, Given, results
 
-from eomgen.subset.braces import JAVASCRIPT, C, printed
+from eomgen.subset.braces import printed
 from eomgen.subset.expander import NotInSubsetError, Text
+from eomgen.subset.languages import JAVASCRIPT, C
 
 TEXT = Text.of(constructs)
 SEEDED = np.random.default_rng(2)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from languages import results
 
-from eomgen.subset.braces import C, printed
+from eomgen.subset.braces import printed
 from eomgen.subset.expander import NotInSubsetError, Text
+from eomgen.subset.languages import C
 from eomgen.subset.words import Matrix, Vector, transposed, zeros
 
 

@@ -1,0 +1,99 @@
+"""The languages in which the engine's text is printed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from eomgen.subset.kinds import INT, Kind
+
+
+@dataclass(frozen=True)
+class Language:
+    """What differs between languages with braces.
+
+    function      how a function begins, by its result, name and arguments
+    number, whole types of numbers
+    infinite      how infinity is written
+    literal       how a number is, where it is not its digits alone
+    names         how functions of numbers are called
+    array         how a local array is declared, by type, name and size
+    arrays        the types of arrays of numbers, and of whole ones
+    part          how a part of an array is passed on, by its name and the place where it begins
+    field         how a record's field is read
+    prelude       what the printed functions need
+    literal       how a number is written
+    typed         whether arguments and results have types, and records structures
+    """
+
+    function: str
+    number: str
+    whole: str
+    infinite: str
+    names: Mapping[str, str]
+    array: str
+    arrays: tuple[str, str]
+    part: str
+    field: str
+    prelude: str
+    literal: str = "{}"
+    typed: bool = False
+
+
+C = Language(
+    function="static inline {result} {name}({arguments}) {{",
+    number="double",
+    whole="int64_t",
+    infinite="INFINITY",
+    names={"abs": "fabs", "next_after": "next_after", "pow": "pow", "nan": "NAN"},
+    array="{type} {name}[ROOM({size})];",
+    arrays=("double", "int64_t"),
+    part="{array} + {place}",
+    field="->",
+    prelude="""#include <math.h>
+#include <stdint.h>
+
+/* Room for n numbers; an array of none is not allowed. */
+#define ROOM(n) ((n) > 0 ? (n) : 1)
+
+static inline double next_after(double t) {
+    return nextafter(t, INFINITY);
+}
+""",
+    typed=True,
+)
+REALS = replace(C, number="real", arrays=("real", "int64_t"), literal="R({})")
+"""C with numbers of a type `real`, for which R(x) writes constants."""
+VECTORS = replace(C, number="V", arrays=("V", "int64_t"), literal="N({})")
+"""C with a type V of vectors in place of numbers: text without decisions makes several at once."""
+JAVASCRIPT = Language(
+    function="function {name}({arguments}) {{",
+    number="let",
+    whole="let",
+    infinite="Infinity",
+    names={
+        "abs": "Math.abs", "sqrt": "Math.sqrt", "pow": "Math.pow", "nan": "NaN",
+        "isfinite": "Number.isFinite", "next_after": "nextAfter",
+    },
+    array="const {name} = new {type}Array({size});",
+    arrays=("Float64", "Int32"),
+    part="{array}.subarray({place})",
+    field=".",
+    prelude="""const nextAfter = (() => {
+    const number = new Float64Array(1), bits = new BigInt64Array(number.buffer);
+    return (t) => {
+        if (t === 0) return Number.MIN_VALUE;
+        number[0] = t;
+        bits[0] += t > 0 ? 1n : -1n;
+        return number[0];
+    };
+})();
+""",
+)  # fmt: skip
+
+
+def type_of(kind: Kind, language: Language) -> str:
+    """How the type of a kind is written before a name."""
+    if kind.of not in ("float", "int"):
+        return f"{kind.of} *"
+    if kind.is_array:
+        return f"{language.arrays[kind.of == 'int']} *"
+    return f"{language.whole if kind == INT else language.number} "
