@@ -180,7 +180,7 @@ class Problem:
 
     def having(self, **functions: Any) -> "Problem":
         """The same problem with other functions; its initial state is not checked again."""
-        made = object.__new__(Problem)
+        made = object.__new__(type(self))
         made.__dict__.update(self.__dict__, **functions)
         return made
 

@@ -35,6 +35,7 @@ const adaptive = (() => {
       to.states.set(y);
       system.derivative(t, y, to.slopes);
       next = first_length(system, run, t, to.states, to.slopes, run.longest);
+      if (next === Infinity) next = 1; // without states
       path = [{ at: { t, end: t, h: 0 }, y: to.states, to }];
     };
     const go = () => {
