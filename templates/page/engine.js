@@ -191,7 +191,7 @@ const makeEngine = (mechanism, data) => {
       if (s <= 0) return y;
       if (s >= length) return next;
       if (change.free) return change(problem, t, y, t + s).slice();
-      const within = change(problem, t, y, s);
+      const within = change(problem, t, y, t + s - t); // to the time that is said, as in Python
       return projected(t + s, y.map((x, k) => x + within[k]));
     };
     const closing = law.closing(t, length, state);

@@ -36,7 +36,7 @@ return { t: engine.t, y: Array.from(engine.y), error: engine.error };
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", some(["pendulum", "spinning_top"], built_in_names()))
+@pytest.mark.parametrize("name", some(["bouncing_two_body", "four_bar"], built_in_names()))
 def test_the_same_bits(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Time and state at the end, or that both fail."""
     # Whether it may take the steps it checks by a Jacobian, which this module does not have.
