@@ -15,7 +15,6 @@ from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import MADE
 from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.explicit import EULER, LEAPFROG_4, LEAPFROG_6, RUNGE_KUTTA_4
-from eomgen.engine.printed import Roots
 from eomgen.native.checked import Function
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.run.compiled import Array, Constrained, EqualSteps, EqualStride
@@ -28,14 +27,16 @@ LEAPFROGS = {"leapfrog": 1, **{each.name: len(each.parts) for each in COMPOSITIO
 _TABLEAUS = (EULER, RUNGE_KUTTA_4)
 METHODS = {**{each.name: each.stages for each in _TABLEAUS}, "semi_implicit_euler": 2, **LEAPFROGS}
 """The derivatives in a step, by the name of the method."""
-COMPOSED: Roots = [("composed", {"of": each}) for each in COMPOSITIONS]
-STEPS: Roots = [
+Root = tuple[str, Mapping[str, Any]]
+"""A function of the engine, with the values of its `Known` parameters."""
+COMPOSED: list[Root] = [("composed", {"of": each}) for each in COMPOSITIONS]
+STEPS: list[Root] = [
     *(("runge_kutta", {"method": each}) for each in _TABLEAUS),
     *(("semi_implicit_euler", {}), ("leapfrog", {}), *COMPOSED, ("equal_steps", {})),
 ]
 
 
-def roots_of(name: str) -> Roots:
+def roots_of(name: str) -> list[Root]:
     """What of the engine's text a method is."""
     composed = [root for root in COMPOSED if root[1]["of"].name == name]
     tableau = [
