@@ -73,7 +73,7 @@ JAVASCRIPT = Language(
         "abs": "Math.abs", "sqrt": "Math.sqrt", "pow": "Math.pow", "nan": "NaN",
         "isfinite": "Number.isFinite", "next_after": "nextAfter",
     },
-    array="const {name} = new {type}Array({size});",
+    array="const {name} = {function}.{name}_ = roomFor({function}.{name}_, {type}Array, {size});",
     arrays=("Float64", "Int32"),
     part="{array}.subarray({place})",
     field=".",
@@ -86,6 +86,8 @@ JAVASCRIPT = Language(
         return number[0];
     };
 })();
+// The room of a function's last call, if that had as many numbers.
+const roomFor = (room, Numbers, n) => (room?.length === n ? room : new Numbers(n));
 """,
 )  # fmt: skip
 
