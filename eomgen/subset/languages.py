@@ -15,7 +15,7 @@ class Language:
     infinite      how infinity is written
     literal       how a number is, where it is not its digits alone
     names         how functions of numbers are called
-    array         how a local array is declared, by type, name and size
+    array         how a local array is declared, by type, name and size, and the function
     arrays        the types of arrays of numbers, and of whole ones
     part          how a part of an array is passed on, by its name and the place where it begins
     field         how a record's field is read
