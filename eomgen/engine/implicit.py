@@ -1,4 +1,5 @@
-"""Implicit Runge-Kutta methods, whose stages are solved by Newton's method with the exact Jacobian.
+"""Implicit Runge-Kutta methods, whose stages are solved by Newton's method with the exact Jacobian,
+or by its simplified iteration, which keeps the factors of one matrix.
 
 The stages are solved to roundoff, because the methods conserve invariants only as well as their
 equations are solved. Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit
@@ -78,6 +79,10 @@ class Stages:
     """The stages of a step: the changes d of the state in them, their last update, and the
     Jacobians J_i there, one below the other; the h b_i a_ij / b_j, and their products with J_i, in
     rows and columns of which the positions of all stages come first.
+
+    simplified   whether iterations go on with the factors of an earlier one, if there are such:
+                 more of them, but without a Jacobian. Hairer, Wanner, Solving ODEs II, section IV.8
+    has_factors  whether there are such, of a step of the same length
     """
 
     many: int
@@ -87,6 +92,8 @@ class Stages:
     jacobians: Annotated[Matrix, "many * STATES", "STATES"]
     couplings: Annotated[Matrix, "many", "many"]
     matrix: Annotated[Matrix, "many * STATES", "many * STATES"]
+    simplified: bool = False
+    has_factors: bool = False
 
 
 @cache
@@ -241,14 +248,17 @@ def improved(
     for i in unrolled(range(len(method.b))):
         now = t + method.c[i] * h
         place = start + added(a * stages.changes[j] for j, a in method.rows[i])
-        stages.jacobians[i * n : i * n + n] = system.jacobian(now, place)
+        if not stages.has_factors:
+            stages.jacobians[i * n : i * n + n] = system.jacobian(now, place)
         slope = system.derivative(now, place)
         stages.update[i, :] = h * method.b[i] * slope - stages.changes[i]
-    couple(many, n, stages.positions, stages.couplings, stages.jacobians, stages.matrix)
+    if not stages.has_factors:
+        couple(many, n, stages.positions, stages.couplings, stages.jacobians, stages.matrix)
+        if not factored(factors, 1.0, many * stages.positions, stages.matrix):
+            return False
+        stages.has_factors = stages.simplified
     missing = zeros(factors.n)
     arrange(many, n, stages.positions, stages.update, missing)
-    if not factored(factors, 1.0, many * stages.positions, stages.matrix):
-        return False
     solve_by(factors, missing)
     spread(many, n, stages.positions, missing, stages.update)
     stages.changes[:, :] += stages.update
@@ -291,6 +301,9 @@ def implicit_change(
             scale = abs(y) + added(abs(stages.changes[i]) for i in range(len(method.b)))
             solved = is_solved(stages.many, len(y), scale, stages.update, size, previous)
         if solved:
+            # Linear convergence ends not far below roundoff.
+            if stages.simplified and not improved(system, method, t, h, y, stages, factors):
+                return SINGULAR
             change[:] = added(stages.changes[i] for i in range(len(method.b)))
             return count
         previous = size

@@ -46,6 +46,9 @@ ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
+    ("implicit_change", {"method": implicit.IMPLICIT_MIDPOINT}),
+    ("implicit_change", {"method": implicit.GAUSS_4}),
+    ("implicit_change", {"method": implicit.GAUSS_6}),
     ("moved_onto", {}),
     *CONTACTS,
 )

@@ -127,7 +127,9 @@ class _Function(Expressions):
             if unknown := parts & (self.kinds.names.keys() - self.kinds.arguments.keys()):
                 why = f"the size of {name} is known only when {unknown.pop()} is"
                 raise NotInSubsetError(ast.copy_location(ast.Name(name), self.d), why)
-            made = self.to.array.format(type=self.to.arrays[kind.of == "int"], name=name, size=size)
+            made = self.to.array.format(
+                type=self.to.arrays[kind.of == "int"], function=self.d.name, name=name, size=size
+            )
             lines.append(f"    {made}")
         return [*(f"    {word} {', '.join(many)};" for word, many in numbers.items()), *lines]
 

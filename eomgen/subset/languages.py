@@ -15,7 +15,7 @@ class Language:
     infinite      how infinity is written
     literal       how a number is, where it is not its digits alone
     names         how functions of numbers are called
-    array         how a local array is declared, by type, name and size
+    array         how a local array is declared, by type, name and size, and the function
     arrays        the types of arrays of numbers, and of whole ones
     part          how a part of an array is passed on, by its name and the place where it begins
     field         how a record's field is read
@@ -73,7 +73,7 @@ JAVASCRIPT = Language(
         "abs": "Math.abs", "sqrt": "Math.sqrt", "pow": "Math.pow", "nan": "NaN",
         "isfinite": "Number.isFinite", "next_after": "nextAfter",
     },
-    array="const {name} = new {type}Array({size});",
+    array="const {name} = {function}.{name}_ = roomFor({function}.{name}_, {type}Array, {size});",
     arrays=("Float64", "Int32"),
     part="{array}.subarray({place})",
     field=".",
@@ -86,6 +86,8 @@ JAVASCRIPT = Language(
         return number[0];
     };
 })();
+// The room of a function's last call, if that had as many numbers.
+const roomFor = (room, Numbers, n) => (room?.length === n ? room : new Numbers(n));
 """,
 )  # fmt: skip
 

@@ -99,12 +99,12 @@ const system = {
 
 
 @pytest.mark.parametrize("method", [IMPLICIT_MIDPOINT, GAUSS_4, GAUSS_6], ids=lambda m: m.name)
-@pytest.mark.parametrize("positions", [0, 2])
-def test_implicit_steps(method: Collocation, positions: int) -> None:
+@pytest.mark.parametrize(("positions", "simplified"), [(0, False), (2, False), (2, True)])
+def test_implicit_steps(method: Collocation, positions: int, simplified: bool) -> None:
     """Steps of methods of Gauss: short ones, and some that hardly converge."""
     many, n = len(method.b), 4
     shapes = (many, n), (many, n), (many * n, n), (many, many), (many * n, many * n)
-    stages = Stages(many, positions, *map(np.zeros, shapes))
+    stages = Stages(many, positions, *map(np.zeros, shapes), simplified)
     factors = few.factors_of(many * n, -few.FEW)
     starts = SEEDED.normal(size=(3, n))
     cases = [

@@ -73,7 +73,8 @@ class ImplicitMethod:
         many, n, positions = len(self.of.b), len(problem.states), problem.leading_positions
         changes, update = np.zeros((2, many, n))
         shapes = (many * n, n), (many, many), (many * n, many * n)
-        stages = Stages(many, positions, changes, update, *map(np.zeros, shapes))
+        jacobians, couplings, matrix = map(np.zeros, shapes)
+        stages = Stages(many, positions, changes, update, jacobians, couplings, matrix)
         return stages, few.factors_of(many * n, many * positions)
 
     def _change(
