@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaign import FULL
 from engine import MP, Engine, along, exact
 from striking import (
     MATERIAL,
@@ -616,7 +617,7 @@ def test_kernels_grow_with_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
     """A link with its contact costs no more where there are many."""
     monkeypatch.setattr(jacobians, "LARGEST_JACOBIAN", -1)
     counts = []
-    for n in (4, 6, 8):
+    for n in (4, 8, 12) if FULL else (4, 6, 8):
         scene = 'name = "row"\ndimensions = 3\n' + MATERIAL
         parent, balls = "world", []
         for i in range(n):
