@@ -200,6 +200,7 @@ def is_whole(e: ast.expr) -> bool:
 
 
 def names_in(*nodes: ast.AST) -> set[str]:
+    """The names in trees, and the fields of records, as text."""
     found = (n for node in nodes for n in ast.walk(node))
     return {ast.unparse(n) for n in found if isinstance(n, ast.Name | ast.Attribute)}
 

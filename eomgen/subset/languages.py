@@ -13,7 +13,6 @@ class Language:
     function      how a function begins, by its result, name and arguments
     number, whole types of numbers
     infinite      how infinity is written
-    literal       how a number is, where it is not its digits alone
     names         how functions of numbers are called
     array         how a local array is declared, by type, name and size, and the function
     arrays        the types of arrays of numbers, and of whole ones
