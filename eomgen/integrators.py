@@ -63,11 +63,6 @@ _OWN: Mapping[str, IntegratorSpec] = {
     "DOP853": IntegratorSpec("Dormand-Prince 8(5,3)", "explicit", "dormand_prince_8:INTEGRATOR"),
     "taylor": IntegratorSpec("Taylor series, order 8 to 24", "explicit", "taylor:INTEGRATOR"),
     "heyoka": IntegratorSpec("Taylor series, by heyoka", "explicit", "taylor:HEYOKA", True),
-    "gragg_bulirsch_stoer": IntegratorSpec(
-        "extrapolated modified midpoint rule, variable order",
-        "explicit",
-        "gragg_bulirsch_stoer:INTEGRATOR",
-    ),
     "Rodas5P": IntegratorSpec("Rosenbrock method, order 5", "implicit", "rodas_5p:INTEGRATOR"),
     "Radau": IntegratorSpec("Radau IIA, order 5, by SciPy", "implicit", "from_scipy:RADAU"),
     "Radau_differences": IntegratorSpec(

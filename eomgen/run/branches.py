@@ -50,7 +50,6 @@ class BranchMonitor:
 
     allowed    y (ny,) -> (ny,), the error allowed in a step that ends at y
     unseen     the longest step, s, if the functions cannot be followed
-    sees_end   whether the method's error estimate depends on the derivative at the end of a step
     switched   the time of the last switch, s
     features   what else it may pass over, if the run is under scrutiny
     """
@@ -59,7 +58,6 @@ class BranchMonitor:
     switching: Switching
     allowed: Callable[[FloatArray], FloatArray]
     unseen: float
-    sees_end: bool = True
     switched: float = -math.inf
     features: Features | None = None
     _cut_at: float = math.nan
@@ -116,11 +114,8 @@ class BranchMonitor:
             search = Crossings(self.switching, step, self._ends, marks)
         times, whole = self._times(search, step)
         switched = self.switched
-        for i, after in enumerate(times):
-            if self.sees_end:
-                until = self._cut(step, switched, after)
-            else:
-                until = self._end(step, switched, after, [*times, step.end][i + 1])
+        for after in times:
+            until = self._cut(step, switched, after)
             if until is not None:
                 return Retry(until, seen=True)
             switched = max(switched, after)
@@ -165,7 +160,7 @@ class BranchMonitor:
             if step.length > self.unseen * (1 + TOGETHER):
                 return Retry(step.start + self.unseen, seen=False), ()
             return None, ()
-        cut = (step.start == self._cut_at, step.end == self._cut_at and self.sees_end)
+        cut = (step.start == self._cut_at, step.end == self._cut_at)
         for at, size in features.places(parts, cut):
             t = step.start + at * step.length
             if step.start < t < step.end and self._jumps(smooth, at, size):
@@ -222,16 +217,6 @@ class BranchMonitor:
         aside = gap / 8
         times = (max(step.start, before - aside), middle, min(step.end, after + aside))
         return middle if self._matters(step, times, gap) else None
-
-    def _end(self, step: Step, before: float, change: float, after: float) -> float | None:
-        """The time of a switch between two others, if a step must end there; else None."""
-        whole = min(change - step.start, step.end - change)
-        # The others may be so near that they count as one with it, or bound a short pulse.
-        for reach in (whole / 2, min(change - before, after - change, whole) / 2):
-            times = (change - reach, change, change + reach)
-            if reach > TOGETHER * step.length and self._matters(step, times, reach):
-                return change
-        return None
 
     def _matters(self, step: Step, times: tuple[float, float, float], length: float) -> bool:
         """Whether the derivative at the second of three times differs from the mean of those at the

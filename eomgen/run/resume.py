@@ -9,7 +9,6 @@ import numpy as np
 
 from eomgen.errors import RunError
 from eomgen.run.integrators import FixedStep, find_integrator
-from eomgen.run.integrators.extrapolation import MOST_ROWS
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.origin import START, UNITS
 from eomgen.run.problem import Problem
@@ -71,9 +70,8 @@ def going_on(
 
     With the same scene, parameters, inputs, method and step or tolerances it continues from the
     last whole step, to the same bytes as if that run had not ended. All methods with equal steps
-    can do that, and without rigid contacts RK45, DOP853 and gragg_bulirsch_stoer. With other
-    methods, or if something differs, the run starts anew from the last state, and the message says
-    why.
+    can do that, and without rigid contacts RK45 and DOP853. With other methods, or if something
+    differs, the run starts anew from the last state, and the message says why.
 
     Raises `RunError` if the run is one of another scene, or if its file does not fit its method.
     """
@@ -238,12 +236,11 @@ def _is_sane(kept: Mapping[str, Any], problem: Problem) -> bool:
             sane = np.isfinite(value).all()
         if not sane:
             return False
-    lengths = [kept[name] for name in ("h_abs", "length", "longest", "unseen") if name in kept]
+    lengths = [kept[name] for name in ("h_abs", "longest", "unseen") if name in kept]
     count = len(problem.contacts.names) if problem.contacts else 0
     held = kept.get("held", np.empty(0))
     return (
         all(length > 0 for length in lengths)
-        and 0 <= kept.get("target", 0) < MOST_ROWS - 1
         and held.ndim == 1
         and bool(np.isin(held, np.arange(count)).all())
         and kept.get("checked", np.empty((0, 0))).ndim == 2

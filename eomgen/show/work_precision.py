@@ -29,7 +29,6 @@ COLOURS = {
     "gauss_6": "#7a1f4e",
     "RK45": "#55bbe8",
     "DOP853": "#0055bb",
-    "gragg_bulirsch_stoer": "#332288",
     "Rodas5P": "#66a61e",
     "Radau": "#228833",
     "Radau_differences": "#228833",

@@ -42,7 +42,7 @@ from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
 from eomgen.study.diagnosis import problem_of
 
 TARGETS = (1e-3, 1e-6, 1e-9)
-METHODS = "DOP853,LSODA,Radau,gragg_bulirsch_stoer,RK45,rk4,gauss_6"
+METHODS = "DOP853,LSODA,Radau,RK45,rk4,gauss_6"
 """Among which the quickest is looked for afterwards."""
 FACTOR = 3.0
 """What is reported: how many times lie within this many times the quickest."""

@@ -23,7 +23,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent.parent
 SCENES = ("pendulum", "two_body", "tumbling_body", "bouncing_two_body")
-METHODS = ("LSODA", "Radau", "DOP853", "gragg_bulirsch_stoer", "gauss_6")
+METHODS = ("LSODA", "Radau", "DOP853", "gauss_6")
 SHOWN = ("numpy", "scipy", "sympy", "mpmath", "gmpy2", "pydantic", "matplotlib")
 TESTS = ("formula", "trajectory", "small_faults")
 RUNNERS = ("pytest", "pytest-xdist")

@@ -282,18 +282,6 @@ def test_babyboot_to_the_last_digit() -> None:
     np.testing.assert_allclose(babyboot_end(module, y), BABYBOOT, rtol=1e-8)
 
 
-def test_babyboot_by_extrapolation() -> None:
-    """At tight tolerances a smaller error than DOP853's, for fewer derivatives."""
-    module = loaded("babyboot")
-    errors, counts = {}, {}
-    for method in ("DOP853", "gragg_bulirsch_stoer"):
-        found = integrate(as_problem(module), method, 10.0, rtol=1e-13, atol=1e-15, samples=2)
-        errors[method] = np.max(np.abs(babyboot_end(module, found.y[-1]) / BABYBOOT - 1))
-        counts[method] = found.counts["derivatives"]
-    assert errors["gragg_bulirsch_stoer"] < errors["DOP853"] < 1e-6, errors
-    assert counts["gragg_bulirsch_stoer"] < 0.8 * counts["DOP853"], counts
-
-
 # The rigid body of Hairer, Norsett and Wanner: y1' = -2 y2 y3, y2' = 1.25 y1 y3, y3' = -0.5 y1 y2,
 # which are Euler's equations for moments 1, 4, 6. From (1, 0, 0.9) it is (cn, sqrt(0.625) sn,
 # 0.9 dn)(1.42302494707577 t | 0.308641975308642), evaluated in 40 digits.

@@ -184,7 +184,6 @@ GOING_ON = {
     "gauss_4": {"dt": 7e-3},
     "RK45": {"rtol": 1e-7},
     "DOP853": {"rtol": 1e-7},
-    "gragg_bulirsch_stoer": {"rtol": 1e-7},
 }
 
 
@@ -202,7 +201,6 @@ def test_a_run_goes_on_to_the_same_bytes(method: str) -> None:
 
 
 LEGS = {
-    "gragg_bulirsch_stoer": ("tumbling_body", (0.607, 1.0, 1.7), {"rtol": 1e-9}),
     "DOP853": ("two_body", (1.0, 1.001, 1.701), {"rtol": 1e-9}),
     "RK45": (PENDULUM, (1e-6, 0.3, 0.31, 0.3101, 1.0), {"rtol": 1e-6}),
     "rk4": ("two_body", (0.001, 0.02, 0.025, 1.0), {"dt": 0.01}),
@@ -222,11 +220,9 @@ def test_legs_of_no_whole_step_keep_what_the_next_goes_on_from(method: str) -> N
     assert run.y[-1].tobytes() == whole.y[-1].tobytes()
 
 
-@pytest.mark.every(2)
-@pytest.mark.parametrize(("method", "rtol"), [("DOP853", 1e-8), ("gragg_bulirsch_stoer", 1e-6)])
-def test_a_step_that_the_end_cut_short_is_not_gone_on_from(method: str, rtol: float) -> None:
+def test_a_step_that_the_end_cut_short_is_not_gone_on_from() -> None:
     """Even if it was rejected and retried with another length, which depends on the end, too."""
-    asked = problem(PENDULUM)
+    asked, method, rtol = problem(PENDULUM), "DOP853", 1e-8
     whole = ran(asked, method, 1.5, rtol=rtol)
     for t_end in np.linspace(0.2, 1.4, 40):
         first = ran(asked, method, float(t_end), rtol=rtol)

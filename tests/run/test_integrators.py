@@ -31,7 +31,6 @@ from eomgen.run.integrators import (
 )
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.integrators.explicit import runge_kutta
-from eomgen.run.integrators.gragg_bulirsch_stoer import GraggBulirschStoer
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.problem import Problem
 from eomgen.run.progress import terminal_progress
@@ -624,7 +623,7 @@ def test_adaptive_run_stops_after_max_steps():
             "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
             "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
             "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, taylor, heyoka, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
+            "DOP853, taylor, heyoka, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
         (
@@ -633,7 +632,7 @@ def test_adaptive_run_stops_after_max_steps():
             "integrator: unknown name 'radau' (did you mean 'Radau'?); known: euler, "
             "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
             "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, taylor, heyoka, gragg_bulirsch_stoer, Rodas5P, Radau, Radau_differences, BDF, "
+            "DOP853, taylor, heyoka, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
         ("euler", {}, "dt: euler needs a step; give e.g. --dt 0.001"),
@@ -894,59 +893,6 @@ def test_leapfrog_refuses_what_does_not_separate(problem, why):
         f"integrator: leapfrog needs forces that depend on positions alone, and {why}; "
         "take --integrator implicit_midpoint or gauss_4"
     )
-
-
-# --- Gragg, Bulirsch, Stoer ---------------------------------------------------------------------
-
-TIGHT = {"rtol": 1e-13, "atol": 1e-13}
-
-
-def test_extrapolation_takes_long_steps():
-    """Of high order: few steps where DOP853 needs many. `test_published` counts derivatives."""
-    found = {
-        name: integrate(PENDULUM, name, 20.0, **TIGHT, samples=2)
-        for name in ("DOP853", "gragg_bulirsch_stoer")
-    }
-    for each in found.values():
-        assert np.abs(each.y[-1] - exact_pendulum(20.0)).max() < 3e-12
-    ours, theirs = (found[name].counts for name in ("gragg_bulirsch_stoer", "DOP853"))
-    assert ours["steps"] < theirs["steps"] / 3
-    assert ours["derivatives"] < theirs["derivatives"]
-
-
-@pytest.mark.parametrize("rtol", [1e-5, 1e-9, 1e-13])
-def test_dense_output_is_as_accurate_as_the_steps(rtol):
-    solver = GraggBulirschStoer(
-        PENDULUM.derivative, 0.0, PENDULUM.initial, 20.0, rtol=rtol, atol=rtol
-    )
-    while solver.status == "running":
-        solver.step()
-        assert solver.status != "failed"
-        times = np.linspace(solver.t_old, solver.t, 41)
-        within = solver.dense_output()(times).T
-        ends = [np.abs(y - exact_pendulum(t)).max() for t, y in zip(times, within, strict=True)]
-        at_ends = max(ends[0], ends[-1])
-        assert max(ends) < 3 * at_ends + 30 * rtol
-        assert within[-1] == pytest.approx(solver.y, abs=1e-15 + rtol)
-
-
-def test_extrapolation_backs_off_from_where_there_is_no_derivative():
-    """Its long steps evaluate far ahead; the motion turns back well before."""
-
-    def derivative(t, y):
-        return np.array([y[1], -y[0] / math.sqrt(1.01 - y[0] ** 2)])
-
-    bowl = replace(PENDULUM, derivative=derivative, initial=np.array([1.0, 0.0]))
-    found = integrate(bowl, "gragg_bulirsch_stoer", 20.0, **TIGHT)
-    assert found.finished, found.message
-    energy = found.y[:, 1] ** 2 / 2 - np.sqrt(1.01 - found.y[:, 0] ** 2)
-    assert energy == pytest.approx(energy[0], abs=1e-10)
-
-
-def test_extrapolation_keeps_to_the_longest_step():
-    found = integrate(PENDULUM, "gragg_bulirsch_stoer", 10.0, max_step=0.05, samples=2)
-    assert found.counts["steps"] >= 200
-    assert found.y[-1] == pytest.approx(exact_pendulum(10.0)[0], abs=1e-11)
 
 
 # --- many periods -------------------------------------------------------------------------------

@@ -173,9 +173,7 @@ class _Stepper:
         scrutiny = problem.scrutiny
         if problem.switching or (scrutiny and scrutiny.localised):
             switching = problem.switching or Switching()
-            self.branches = BranchMonitor(
-                problem, switching, bounds.allowed, bounds.unseen, method.sees_end
-            )
+            self.branches = BranchMonitor(problem, switching, bounds.allowed, bounds.unseen)
         if problem.corners and not problem.switching:
             self.longest = min(bounds.longest, bounds.unseen)
         self._whole, self._unseen, self.factorisations = True, False, 0
@@ -239,8 +237,6 @@ class _Stepper:
         if solver.status == "failed":
             reason = (message or "the method failed").rstrip(".")
             raise StepFailure(reason, self.method.remedy)
-        if not self.method.sees_end and solver.status == "finished" and not self.ended:
-            solver.turn()
         dense = cache(solver.dense_output)
         t, y, memory = self._before
         end = self._problem.projected(float(solver.t), solver.y.copy())

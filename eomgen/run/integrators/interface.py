@@ -82,7 +82,6 @@ class Adaptive:
                    determine the next step; the first is its length. Empty if these do not suffice
     vectors        those of `memory` that have a number for each state
     series         name of the Taylor series that it is given; "" if it needs none
-    sees_end       whether its error estimate depends on the derivative at the end of a step
     """
 
     solver: Callable[..., Any]
@@ -91,8 +90,7 @@ class Adaptive:
     one_step: bool = True
     remedy: str = LOOSER
     memory: tuple[str, ...] = ()
-    vectors: tuple[str, ...] = ("f", "slope", "lost")
-    sees_end: bool = True
+    vectors: tuple[str, ...] = ("f", "lost")
     compiled: str = ""
     series: str = ""
     smallest_rtol: float = SMALLEST_RTOL

@@ -32,12 +32,11 @@ ORDERS = {
     "Rodas5P": 5,
     "Radau": 5,
     "BDF": 4,
-    "gragg_bulirsch_stoer": 12,
     "taylor": 20,
     "heyoka": 20,
 }
 """Orders of adaptive methods: the time for an error e grows like e^(-1/order). LSODA has orders up
-to 12; extrapolation chooses its own, and so do Taylor series."""
+to 12; Taylor series choose their own."""
 LEAST = 1e-9
 """Shortest time that is measured, s."""
 OVER = "no time for more"
