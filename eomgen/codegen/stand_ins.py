@@ -5,16 +5,16 @@ it sees where its loads act; their components are symbols to it, which stand for
 An effect without loads, such as a rigid contact, leaves nothing.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from eomgen.codegen.recording import Recording
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.vectors import add, cross, in_space, torque_in_space, zeros
-from eomgen.language.base import Table
-from eomgen.language.formula import ZERO, Formula, Name, names_in
+from eomgen.language.formula import ZERO, Name
 from eomgen.language.quantity import Parameter
+from eomgen.model.dependence import is_plain
 from eomgen.model.model import Model
 from eomgen.program.tape import Node, Stage
 from eomgen.scalars.protocol import Scalars
@@ -30,16 +30,10 @@ force at the centre of mass and one torque.
 AnyLoad = Load | JointLoad
 
 
-class _OfSymbols(EffectTable):
-    """The base of stand-ins. A symbol is given by its name, 0 by ""."""
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True: all that moves is in the symbols."""
-        return True
-
-
-class StandIn(_OfSymbols):
-    """The loads of another effect, whose components are inputs and whose points are parameters."""
+class StandIn(EffectTable):
+    """The loads of another effect, whose components are inputs and whose points are parameters. A
+    symbol is given by its name, 0 by "".
+    """
 
     type: Literal["stand-in"] = "stand-in"
     components: Any
@@ -58,7 +52,7 @@ class StandIn(_OfSymbols):
                 yield replace(load, force=force, torque=torque, at=_fixed(load.at, mechanism))
 
 
-class Fall(_OfSymbols):
+class Fall(EffectTable):
     """Uniform gravity in any direction, by the components of its acceleration. In a free tree its
     terms cancel, so they are written out.
     """
@@ -116,13 +110,13 @@ def with_stand_ins(
     that it does not write out; and the nodes that the stand-ins' symbols stand for, on the tape of
     `dynamics`, by default one of their own. The model itself if it needs none.
     """
-    if all(_is_written_out(effect, model) for effect in model.effects):
+    if all(is_plain(effect, model) for effect in model.effects):
         return model, {}
     d = dynamics or Recording(model, "aba").dynamics
     names = _Names(d.scalars)
     effects = list[Any]()
     for effect in model.effects:
-        if _is_written_out(effect, model):
+        if is_plain(effect, model):
             effects.append(effect)
         elif isinstance(effect, Gravity) and not effect.except_bodies:
             effects.append(Fall(name=effect.name, acceleration=names.fixed(effect.acceleration(d))))
@@ -132,24 +126,6 @@ def with_stand_ins(
     parameters = (*model.parameters, *(Parameter(name, 1.0, "", "") for name in names.parameters))
     derived = replace(model, effects=tuple(effects), inputs=inputs, parameters=parameters, extra=())
     return derived, names.inputs | names.parameters
-
-
-def _is_written_out(effect: Effect, model: Model) -> bool:
-    """Whether a derivation takes an effect as it is: it is plain, and no formula of it has an extra
-    state, which a motor's may.
-    """
-    states = {state.name for state in model.extra}
-    return effect.is_plain(model.defaults) and not (states and states & set(_names_of(effect)))
-
-
-def _names_of(value: Any) -> Iterator[str]:
-    """The names in all formulas of a table."""
-    if isinstance(value, Formula):
-        yield from names_in(value)
-    elif isinstance(value, Table | Mapping | tuple):
-        parts = vars(value) if isinstance(value, Table) else value
-        for part in parts.values() if isinstance(parts, Mapping) else parts:
-            yield from _names_of(part)
 
 
 def _loads(effect: Effect, d: Dynamics) -> list[AnyLoad]:

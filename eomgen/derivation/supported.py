@@ -4,6 +4,7 @@ from collections import Counter
 from typing import TypeGuard
 
 from eomgen.language.formula import ZERO, is_zero
+from eomgen.model.dependence import is_plain
 from eomgen.model.model import Model
 from eomgen.scene.joints import Free, Joint, Revolute
 
@@ -61,9 +62,9 @@ def why_not_momenta(model: Model) -> str:
     if words := why_not_plain(model):
         return words
     for effect in model.effects:
-        if not effect.is_plain(model.defaults):
-            what = f"'{effect.type}' {effect.why_not_plain()}"
-            return f"in momenta it takes no {what} ('{effect.name}')"
+        if not is_plain(effect, model):
+            what = f"'{effect.type}' that it does not write out ('{effect.name}')"
+            return f"in momenta it takes no {what}"
     return why_not_pins(model)
 
 

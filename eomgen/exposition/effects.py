@@ -2,7 +2,7 @@
 
 import inspect
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr
 from eomgen.exposition.mechanism import AXES, NamingMechanism, Notes
 from eomgen.language.formula import Name
+from eomgen.model.dependence import is_plain
 from eomgen.model.model import Model
 from eomgen.scene.effects import Driven, Effect
 from eomgen.scene.effects.base import (
@@ -70,7 +71,7 @@ def _derived(model: Model, effect: Effect) -> DerivedEffect:
     notes = Notes(effect.name, totals=notes.counts)
     loads, states, contacts = _run(model, effect, notes)
     moving = notes.bodies or notes.definitions or any(map(_moves(model), _forces(loads)))
-    kept = effect.is_plain(model.defaults) and not moving and not contacts
+    kept = is_plain(effect, model) and not moving and not contacts
     definitions = list(notes.definitions)
     if not kept:
         loads = named_loads(model, effect.name, loads, definitions)
@@ -199,10 +200,6 @@ class StandIn(EffectTable):
                 continue
             force, torque = (tuple(map(given, x)) for x in (load.force, load.torque))
             yield replace(load, force=force, torque=torque, at=tuple(map(fixed, load.at)))
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True: all that moves is in the symbols."""
-        return True
 
 
 def with_symbols(model: Model, derived: Sequence[DerivedEffect]) -> Model:

@@ -38,6 +38,10 @@ run = eomgen.simulate(boat, t_end=1.0)
 assert np.abs(run.energy - run.energy[0]).max() < 1e-6
 assert 0.1 < -run["sea_up"].min() < 0.5
 assert "water" in eomgen.derive(boat).text()
+gate = boat.replace("telescope", "revolute")
+assert "water" in eomgen.derive(gate).text()
+ends = [eomgen.simulate(gate, t_end=0.3, route=route).y[-1] for route in ("closed", "aba")]
+assert np.abs(ends[0] - ends[1]).max() < 1e-8
 finest = eomgen.simulate(boat, t_end=0.2, integrator="DOP853", rtol=1e-12, atol=1e-14)["sea_up"][-1]
 rough = [
     eomgen.simulate(boat, t_end=0.2, integrator="heun", dt=0.2 / steps)["sea_up"][-1] - finest

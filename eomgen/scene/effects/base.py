@@ -1,6 +1,6 @@
 """The interface of effects: the `Mechanism` that they read and the loads that they return."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, Self
 
@@ -312,15 +312,3 @@ class EffectTable(Table):
         """Whether it has inputs and all of them are 0."""
         own = self.inputs(dimensions)
         return bool(own) and not any(inputs.get(i.name) for i in own)
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """Whether its loads depend only on parameters, inputs and poses of bodies, or are at
-        joints and depend on no extra state. It has no rigid contacts.
-
-        Route `closed` writes it out then; else its loads are symbols there.
-        """
-        return False
-
-    def why_not_plain(self) -> str:
-        """Why `is_plain` is false, as words that follow the type of the effect."""
-        return "that depends on the motion"

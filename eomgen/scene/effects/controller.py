@@ -1,6 +1,6 @@
 """A controller whose states and torques are formulas of the scene."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -59,14 +59,6 @@ torques = { elbow = "-5*elbow_angle - 2*z" }
     def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
         """Values of the states' formulas."""
         return tuple(mechanism.value(state.rate) for state in self.own_states.values())
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True without states."""
-        return not self.own_states
-
-    def why_not_plain(self) -> str:
-        """Only one with states is not plain."""
-        return "that has states"
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Values of the torques' formulas."""

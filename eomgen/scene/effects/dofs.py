@@ -1,6 +1,6 @@
 """The bases of effects on degrees of freedom of one joint, of several, or of all."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -121,10 +121,6 @@ class OnJoints(EffectTable):
             assert self.joint is not None
             known = _scalar_coordinates(joints, names, self.joint)
             _check_coordinate(self.coordinate, self.joint, known, location)
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True: its loads are at joints."""
-        return True
 
     def dofs(self, mechanism: Mechanism) -> Iterator[Dof]:
         """The degrees of freedom that it acts on."""

@@ -1,12 +1,11 @@
 """An external force at a point of a body."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field
 
 from eomgen.language.base import Identifier
-from eomgen.language.formula import names_in
 from eomgen.language.quantity import Vector, quantity
 from eomgen.scene.effects.base import EffectTable, Input, Load, Mechanism
 
@@ -66,11 +65,3 @@ force = ["2*sin(t)", 0]
     ) -> bool:
         """True if its inputs are 0."""
         return self.idle(inputs, dimensions)
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True in world axes, unless its formula depends on the motion or on time."""
-        if self.axes == "body":
-            return False
-        if not isinstance(self.force, tuple):
-            return True
-        return all(n in parameters for part in self.force for n in names_in(part))

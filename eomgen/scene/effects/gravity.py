@@ -1,6 +1,6 @@
 """Uniform gravity, downwards or in a given direction."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field, field_validator
@@ -74,9 +74,9 @@ g = 9.81
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """Σ m g times height, J; zero at the world's origin."""
         total = mechanism.value(ZERO)
-        if self.direction is None:
+        if self.direction is None and not self.except_bodies:
             g = mechanism.value(self.g)
-            for body in self._falling(mechanism):
+            for body in mechanism.bodies:
                 total = total + mechanism.mass(body) * g * mechanism.height(body)
             return total
         fall, zeros = self.acceleration(mechanism), (total,) * mechanism.dimensions
@@ -93,11 +93,3 @@ g = 9.81
 
     def _falling(self, mechanism: Mechanism) -> list[str]:
         return [body for body in mechanism.bodies if body not in self.except_bodies]
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True if it acts downwards on all bodies."""
-        return self.direction is None and not self.except_bodies
-
-    def why_not_plain(self) -> str:
-        """It has its own direction, or does not act on all bodies."""
-        return "with except_bodies" if self.except_bodies else "with its own direction"

@@ -1,6 +1,6 @@
 """Soft or rigid stops at the limits of a joint's coordinate."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field
@@ -95,14 +95,6 @@ damping = 1.0
                     f"{location}.coordinate: missing; a rigid stop acts on one coordinate, and "
                     f"'{self.joint}' has {', '.join(names[acted_on[0]])}"
                 )
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True for a soft stop."""
-        return self.restitution is None
-
-    def why_not_plain(self) -> str:
-        """Only a rigid stop is not plain."""
-        return "with a restitution"
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Loads on the child, with reactions on the parent."""

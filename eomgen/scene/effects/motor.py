@@ -1,6 +1,6 @@
 """A motor at a joint."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal
 
 from eomgen.language.quantity import Quantity, quantity
@@ -48,7 +48,3 @@ torque = "input"
     ) -> bool:
         """True if its input is 0."""
         return self.idle(inputs, dimensions)
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True: its load is at a joint."""
-        return True

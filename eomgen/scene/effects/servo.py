@@ -1,6 +1,6 @@
 """The base of joint controllers: target, gains, saturation, and an actuator with lag."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 from pydantic import Field
 
@@ -71,14 +71,6 @@ class Servo(OnCoordinate):
             return ()
         difference = self.command(mechanism) - mechanism.state(f"{self.name}_torque")
         return (difference / mechanism.value(self.lag),)
-
-    def is_plain(self, parameters: Collection[str]) -> bool:
-        """True without states."""
-        return not self.states(2)
-
-    def why_not_plain(self) -> str:
-        """Only one with states is not plain."""
-        return "that has states"
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """The command, or the torque of an actuator with lag."""
