@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import eomgen
-from eomgen.cli import command_parsers
+from eomgen.cli import parsers
 from eomgen.scene.reference import reference_pages
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -34,7 +34,7 @@ The text that `help` prints, as in `help(eomgen.simulate)`. [api.md](api.md) has
 
 def commands_page() -> str:
     """The page of all commands with their options."""
-    return "\n".join([COMMANDS, *(line for p in command_parsers() for line in _command(*p))])
+    return "\n".join([COMMANDS, *(line for p in parsers()[1].items() for line in _command(*p))])
 
 
 def _command(name: str, parser: argparse.ArgumentParser) -> Iterator[str]:

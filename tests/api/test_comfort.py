@@ -13,10 +13,10 @@ import pytest
 import eomgen
 from eomgen.cli import main
 from eomgen.commands import durations, generating
+from eomgen.commands.table import COMMANDS
 from eomgen.run import progress
 from eomgen.scene.built_in import BUILT_IN
 from eomgen.scene.reader import read_scene
-from eomgen.usage import EXAMPLES
 
 
 def test_a_new_scene_runs_and_is_not_overwritten(
@@ -55,14 +55,14 @@ def commands(capsys: pytest.CaptureFixture[str]) -> list[str]:
 def test_help_states_defaults_and_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     """Every command has an example that its own parser takes; every option has a text."""
     names = commands(capsys)
-    assert sorted(names) == sorted(EXAMPLES)
+    assert sorted(names) == sorted(COMMANDS)
     for name in names:
         with pytest.raises(SystemExit):
             main([name, "--help"])
         text = capsys.readouterr().out
-        assert text.rstrip().endswith(f"example: {EXAMPLES[name]}")
+        assert text.rstrip().endswith(f"example: {COMMANDS[name].example}")
         with pytest.raises(SystemExit) as stop:
-            main([*EXAMPLES[name].partition(">")[0].split()[1:], "--help"])
+            main([*COMMANDS[name].example.partition(">")[0].split()[1:], "--help"])
         assert stop.value.code == 0
         for option in re.findall(r"^  (-.*(?:\n {8,}.*)*)", text, re.MULTILINE):
             assert re.search(r"(\s{2,}|\n\s+)\w", option), f"{name}: {option}"

@@ -1,4 +1,4 @@
-"""How the command line looks: its parser, help with defaults, an example of each command."""
+"""How the command line looks: its parser, and help with defaults."""
 
 import argparse
 from collections.abc import Sequence
@@ -8,37 +8,6 @@ from typing import Any, NoReturn
 from eomgen.errors import nearest
 from eomgen.text import breaks_lines, one_line
 from eomgen.version import __version__
-
-EXAMPLES = {
-    "list": "eomgen list",
-    "show": "eomgen show pendulum",
-    "new": "eomgen new swing",
-    "copy": "eomgen copy cart_pole my_cart",
-    "import": "eomgen import robot.urdf -o robot.toml",
-    "completion": "eomgen completion bash > ~/.local/share/bash-completion/completions/eomgen",
-    "schema": "eomgen schema > scene.schema.json",
-    "reference": "eomgen reference contact",
-    "check": "eomgen check two_body",
-    "derive": "eomgen derive two_body -o two_body.html",
-    "generate": "eomgen generate two_body pendulum -o modules",
-    "export": "eomgen export cart_pole --fmu -o cart_pole.fmu",
-    "simulate": "eomgen simulate cart_pole --set l=0.4 --state theta=0.3 --input push=3*sin(t)",
-    "view": "eomgen view double_pendulum",
-    "gallery": "eomgen gallery -o course --scene pendulum two_body",
-    "plot": "eomgen plot out/cart_pole.npz --of theta,theta_dot,energy,joint_forces.pin -o run.pdf",
-    "film": "eomgen film out/cart_pole.npz --speed 0.5 -o cart_pole.gif",
-    "sweep": "eomgen sweep cart_pole --vary m_pole=0.1:0.5:20 --of theta",
-    "verify": "eomgen verify two_body --states 20",
-    "accuracy": "eomgen accuracy pendulum --quick",
-    "effects": "eomgen effects ragdoll --each",
-    "linearise": "eomgen linearise cart_pole --state theta_deg=180 -o cart_pole.npz",
-}
-"""An example for the help of each command."""
-
-
-def example_of(command: str) -> str | None:
-    """The last line of a command's help; None if it has no example."""
-    return f"example: {EXAMPLES[command]}" if command in EXAMPLES else None
 
 
 def path(text: str) -> Path:
