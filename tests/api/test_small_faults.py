@@ -49,8 +49,8 @@ def test_all_outputs_in_a_list() -> None:
         ('child = "rod"', 'child = "world"', "joints[0].child: 'world' is the ground, which has "
          "no parent; name it as the parent, or give the joint loop = true if it closes a loop"),
         ("g = 9.81 }", 'g = 9.81, direction = [1, -1] }', "form: 'redundant' needs the closed "
-         "form, and in momenta it takes no 'gravity' that it does not write out ('gravity'); leave it "
-         "out"),
+         "form, and in momenta it takes no 'gravity' that it does not write out ('gravity'); leave "
+         "it out"),
     ],
 )  # fmt: skip
 def test_refusals_say_what_is_wrong(old: str, new: str, message: str) -> None:
