@@ -5,10 +5,12 @@ the docstrings. To add an output, add its entry here and its function in `codege
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 Size = str | int
 """The length of one axis of an array: a number, or its name."""
+ANGULAR = ("mx", "my", "mz", "wx", "wy", "wz", "lx", "ly", "lz", "angle")
+"""Names of angular parts."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,12 @@ class OutputSpec:
     forms     whether all state forms have it, or the form [q, v] alone
     contacts  whether forces of held rigid contacts, which it leaves out, would change it
     by        the variables by which it is the Jacobian of `derivative`; "" if it is not one
+    units     the unit of its numbers, or those of linear and of angular components; () if they
+              differ, or if it has none
+    titles    what it is called in a figure, and its angular components; () for its name
+    parts     the names along its last axis, by their number
+    pure      those of its parts in space that have no unit
+    group     the word for what is saved with it: energy, points or poses
     """
 
     shape: tuple[Size, ...]
@@ -31,12 +39,30 @@ class OutputSpec:
     forms: bool = True
     contacts: bool = False
     by: str = ""
+    units: tuple[str, ...] = ()
+    titles: tuple[str, ...] = ()
+    parts: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+    pure: tuple[str, ...] = ()
+    group: str = ""
 
     def of(self, dimensions: int) -> tuple[tuple[Size, ...], str]:
         """Shape and docstring in the plane or in space."""
         if dimensions == 3 and self.space is not None:
             return self.space
         return self.shape, self.about
+
+    def unit(self, part: str, dimensions: int) -> str:
+        """The unit of the numbers with this last name, "" if there is none or it is not known."""
+        return "" if dimensions == 3 and part in self.pure else _of_kind(self.units, part)
+
+    def title(self, part: str) -> str:
+        """What the numbers with this last name are in a figure; "" for the name of the output."""
+        return _of_kind(self.titles, part)
+
+
+def _of_kind(words: tuple[str, ...], part: str) -> str:
+    """The last word for an angular part, the first for another one; "" if there is none."""
+    return words[-1 if part in ANGULAR else 0] if words else ""
 
 
 def _force(about: str, *, contacts: bool = False) -> OutputSpec:
@@ -65,14 +91,19 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "applied_force": _force(
         "F of M v̇ + V + G = F, (nv,): applied forces and torques.", contacts=True
     ),
-    "kinetic_energy": OutputSpec((), "Kinetic energy, J."),
-    "potential_energy": OutputSpec((), "Potential energy, J."),
+    "kinetic_energy": OutputSpec((), "Kinetic energy, J.", units=("J",), group="energy"),
+    "potential_energy": OutputSpec((), "Potential energy, J.", units=("J",), group="energy"),
     "kinetic_slopes": OutputSpec(
         ("nq",),
         "Derivatives of the kinetic energy by the coordinates, at fixed velocities, (nq,).",
         needs="constraints",
     ),
-    "effect_powers": OutputSpec(("effects",), "Power of each of `EFFECT_NAMES` on the motion, W."),
+    "effect_powers": OutputSpec(
+        ("effects",),
+        "Power of each of `EFFECT_NAMES` on the motion, W.",
+        units=("W",),
+        titles=("power",),
+    ),
     "coordinates": OutputSpec(
         ("nq",),
         "Coordinates of all joints, (nq,): those too that follow from others and are no states.",
@@ -87,9 +118,12 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         (3,),
         "Linear momentum x, y (kg m/s), angular momentum about the world's origin (kg m^2/s).",
         ((6,), "Momentum x, y, z (kg m/s), angular momentum about the world's origin (kg m^2/s)."),
+        units=("kg m/s", "kg m²/s"),
+        titles=("momentum", "angular momentum"),
+        parts={3: ("px", "py", "lz"), 6: ("px", "py", "pz", "lx", "ly", "lz")},
     ),
     "centre_of_mass": OutputSpec(
-        ("dimensions",), "World position of the centre of mass of all bodies, m."
+        ("dimensions",), "World position of the centre of mass of all bodies, m.", units=("m",)
     ),
     "joint_forces": OutputSpec(
         ("joints", 3),
@@ -99,6 +133,9 @@ OUTPUTS: Mapping[str, OutputSpec] = {
             "Force (N) and moment (N m) of each of `JOINTS` on its parent, world axes.",
         ),
         contacts=True,
+        units=("N", "N m"),
+        titles=("joint force", "joint moment"),
+        parts={3: ("fx", "fy", "mz"), 6: ("fx", "fy", "fz", "mx", "my", "mz")},
     ),
     "constraint_forces": OutputSpec(
         ("constraints",),
@@ -111,11 +148,17 @@ OUTPUTS: Mapping[str, OutputSpec] = {
         "Driving force or torque of each of `DRIVEN` on the child, N or N m.",
         needs="driven joints",
         contacts=True,
+        titles=("driving force",),
     ),
     "body_poses": OutputSpec(
         ("bodies", 3),
         "World x, y (m) of each centre of mass and angle (rad), one row a body.",
         (("bodies", 3, 4), "[world_R_body | centre of mass (m)] of each body, 3 x 4."),
+        units=("m", "rad"),
+        titles=("position", "angle"),
+        parts={3: ("x", "y", "angle")},
+        pure=("1", "2", "3"),
+        group="poses",
     ),
     "body_velocities": OutputSpec(
         ("bodies", 3),
@@ -124,12 +167,25 @@ OUTPUTS: Mapping[str, OutputSpec] = {
             ("bodies", 6),
             "Velocity of each centre of mass (m/s) and angular velocity (rad/s), world.",
         ),
+        units=("m/s", "rad/s"),
+        titles=("velocity", "angular velocity"),
+        parts={3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")},
     ),
     "point_positions": OutputSpec(
-        ("points", "dimensions"), "World position of each of `POINTS`, m.", needs="points"
+        ("points", "dimensions"),
+        "World position of each of `POINTS`, m.",
+        needs="points",
+        units=("m",),
+        titles=("position",),
+        group="points",
     ),
     "point_velocities": OutputSpec(
-        ("points", "dimensions"), "World velocity of each of `POINTS`, m/s.", needs="points"
+        ("points", "dimensions"),
+        "World velocity of each of `POINTS`, m/s.",
+        needs="points",
+        units=("m/s",),
+        titles=("velocity",),
+        group="points",
     ),
     "point_jacobians": OutputSpec(
         ("points", "dimensions", "nv"),

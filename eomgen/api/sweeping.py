@@ -48,7 +48,7 @@ MANY = 20
 """Least number of members for which C steps are compiled that are not in the store."""
 DYNAMICS = ("forward_dynamics", "inverse_dynamics")
 """Outputs that take more than a time and a state."""
-UNITS = {"kinetic_energy": "J", "potential_energy": "J"}
+UNITS = {name: spec.units[0] for name, spec in OUTPUTS.items() if not spec.shape}
 """Units of the outputs with one number."""
 MOST_STEPS = 10_000_000
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from eomgen.errors import RunError
 from eomgen.model.model import Model
+from eomgen.outputs import OUTPUTS
 from eomgen.run.trajectory import Trajectory, table_of
-from eomgen.study.quantities import ANGULAR, UNITS
 
 if TYPE_CHECKING:
     import pandas
@@ -22,9 +22,9 @@ def units_of(trajectory: Trajectory, model: Model, states: Mapping[str, str]) ->
     found = {"t": "s"} | {f"work_{name}": "J" for name in trajectory.work_names}
     found |= {f"input_{each.name}": each.unit for each in model.inputs}
     for name, saved in trajectory.saved.items():
-        kinds = ("J",) if name == "energy" else UNITS.get(name, ())
-        for column in saved.columns if kinds else ():
-            found[column] = kinds[-1 if column.rpartition("_")[2] in ANGULAR else 0]
+        if spec := OUTPUTS.get("kinetic_energy" if name == "energy" else name):
+            for column in saved.columns:
+                found[column] = spec.unit(column.rpartition("_")[2], model.dimensions)
     found |= states
     return {name: found[name] for name in table_of(trajectory) if found.get(name)}
 

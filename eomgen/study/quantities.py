@@ -29,31 +29,6 @@ ENERGIES: Mapping[str, str] = {
     "total": "",
 }
 WORDS = ("t", "energy", "works", "inputs", "points", "poses")
-UNITS: Mapping[str, tuple[str, ...]] = {
-    "kinetic_energy": ("J",),
-    "potential_energy": ("J",),
-    "effect_powers": ("W",),
-    "momentum": ("kg m/s", "kg m²/s"),
-    "centre_of_mass": ("m",),
-    "joint_forces": ("N", "N m"),
-    "body_poses": ("m", "rad"),
-    "body_velocities": ("m/s", "rad/s"),
-    "point_positions": ("m",),
-    "point_velocities": ("m/s",),
-}
-"""Units of outputs; a second one is that of angular components."""
-TITLES: Mapping[str, tuple[str, str]] = {
-    "effect_powers": ("power",) * 2,
-    "momentum": ("momentum", "angular momentum"),
-    "joint_forces": ("joint force", "joint moment"),
-    "driving_forces": ("driving force",) * 2,
-    "body_poses": ("position", "angle"),
-    "body_velocities": ("velocity", "angular velocity"),
-    "point_positions": ("position",) * 2,
-    "point_velocities": ("velocity",) * 2,
-}
-"""What outputs are called in a figure, and their angular components."""
-ANGULAR = ("mx", "my", "mz", "wx", "wy", "wz", "lx", "ly", "lz", "angle")
 MOST = 200
 """Greatest number of quantities in one figure."""
 
@@ -199,7 +174,7 @@ def _of_output(
     labels = _labels(output, array.shape[1:], run.model, run.functions)
     columns = array.reshape(len(t), -1)
     flat = _all(labels)
-    units = [_unit(output, entry, run) for entry in flat]
+    units = [spec.unit(entry[-1] if entry else "", run.model.dimensions) for entry in flat]
     largest = np.nan_to_num(np.abs(columns)).max(axis=0, initial=0.0)
     sizes = {unit: float(max(largest[[u == unit for u in units]])) for unit in dict.fromkeys(units)}
     if output == "joint_forces":  # a moment is small beside a force on a lever of the mechanism
@@ -209,7 +184,7 @@ def _of_output(
         yield Quantity(
             ".".join((output, *entry)),
             ".".join(entry) or output,
-            _title(output, entry),
+            spec.title(entry[-1] if entry else "") or output.replace("_", " "),
             units[index],
             columns[:, index],
             sizes[units[index]],
@@ -271,17 +246,3 @@ def _match(part: str, names: Sequence[str]) -> str | None:
         return part
     short = (name for name in names if len(name) == 2 and len(part) == 1 and name[1] == part)
     return next(short, None)
-
-
-def _title(output: str, entry: Sequence[str]) -> str:
-    """What an entry of an output is, in words."""
-    linear, angular = TITLES.get(output, (output.replace("_", " "),) * 2)
-    return angular if entry and entry[-1] in ANGULAR else linear
-
-
-def _unit(output: str, entry: Sequence[str], run: Observed) -> str:
-    """The unit of an entry of an output; "" if it is not known."""
-    if output == "body_poses" and run.model.dimensions == 3:
-        return "m" if entry[-1] == "4" else ""
-    known = UNITS.get(output, ("",))
-    return known[-1] if len(known) > 1 and entry[-1] in ANGULAR else known[0]

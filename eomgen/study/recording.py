@@ -11,9 +11,10 @@ from eomgen.run.trajectory import Saved, Trajectory
 from eomgen.study.whole import following
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
-    "energy": ("kinetic_energy", "potential_energy"),
-    "points": ("point_positions", "point_velocities"),
-    "poses": ("body_poses",),
+    **{
+        word: tuple(name for name, spec in OUTPUTS.items() if spec.group == word)
+        for word in ("energy", "points", "poses")
+    },
     "works": (),
     "inputs": (),
 }
@@ -22,14 +23,6 @@ SAVED = tuple(name for name in OUTPUTS if not (name.endswith("_dynamics") or nam
 """The outputs that a state determines."""
 FOLLOWING = "following"
 """The name under which coordinates and velocities that follow from the states are kept."""
-FORCES = {3: ("fx", "fy", "mz"), 6: ("fx", "fy", "fz", "mx", "my", "mz")}
-PARTS: Mapping[str, Mapping[int, tuple[str, ...]]] = {
-    "joint_forces": FORCES,
-    "body_velocities": {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")},
-    "body_poses": {3: ("x", "y", "angle")},
-    "momentum": {3: ("px", "py", "lz"), 6: ("px", "py", "pz", "lx", "ly", "lz")},
-}
-"""Names of the components of an output, by their number."""
 
 
 def recorded(
@@ -115,7 +108,7 @@ def labels_of(
     """The names along an axis of an output, `count` of them; `last` if it is its last axis."""
     if isinstance(axis, int):
         numbers = tuple(str(i + 1) for i in range(count))
-        return PARTS.get(output, {}).get(count, numbers) if last else numbers
+        return OUTPUTS[output].parts.get(count, numbers) if last else numbers
     known: Mapping[str, Sequence[str]] = {
         "joints": module.JOINTS,
         "bodies": module.BODIES,

@@ -27,6 +27,15 @@ def test_a_run_as_table_and_dataset() -> None:
     assert next(units[name] for name in table.columns if name.startswith("work_")) == "J"
 
 
+def test_rotation_matrices_have_no_unit() -> None:
+    """Of a pose in space only the position is in metres."""
+    run = eomgen.simulate("spinning_top", t_end=0.1, samples=3, save=["poses"])
+    units = run.to_dataframe().attrs["units"]
+    poses = [name for name in run.to_dataframe().columns if name.startswith("body_poses")]
+    assert {name[-1] for name in poses if name in units} == {"4"}
+    assert {name[-1] for name in poses} == set("1234")
+
+
 def test_times_of_impacts_stand_twice() -> None:
     """As in the table: two rows, of which one is the impact's."""
     run = eomgen.simulate("bouncing_two_body", t_end=1.0)
