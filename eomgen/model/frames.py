@@ -47,7 +47,7 @@ def effect_from_centres(
     """
     fields: dict[str, Any] = {}
     for field, naming in effect.points_of.items():
-        names = _named(effect, naming, bodies)
+        names = effect.named(naming, bodies)
         own = [name for name in names if name in centres]
         if field not in given or not own:
             continue
@@ -60,15 +60,6 @@ def effect_from_centres(
     if isinstance(effect, BodyContact) and effect.against == "plane" and effect.other in centres:
         fields["offset"] = _offset(effect, centres[effect.other])
     return effect.replaced(**fields) if fields else effect
-
-
-def _named(effect: EffectTable, fields: Sequence[str], bodies: Sequence[str]) -> list[str]:
-    """The bodies that some fields name."""
-    names: list[str] = []
-    for field in fields:
-        value = getattr(effect, field)
-        names += bodies if value == "all" else [value] if isinstance(value, str) else value or ()
-    return names
 
 
 def _offset(contact: BodyContact, centre: Vector) -> Formula:

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.language.formula import ZERO, Formula, names_in
+from eomgen.language.rewriting import constant, with_names
 from eomgen.model.model import Model
-from eomgen.show.elements import Field, Vector, Wind
-from eomgen.show.formulas import constant, with_names
+from eomgen.scene.effects.elements import Field, Vector, Wind
 
 Array = NDArray[np.float64]
 ARROWS = {2: (9, 7), 3: (4, 4, 3)}

@@ -1,15 +1,17 @@
 """The points of bodies that shapes should reach, and the typical lengths of a mechanism."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import median
 
 from eomgen.language.formula import Formula
 from eomgen.model.model import Body, Model
-from eomgen.scene.constraints import Distance
-from eomgen.scene.effects import BodyContact, ExternalForce, Spring
+from eomgen.scene.effects.base import EffectTable
+from eomgen.scene.effects.elements import Link
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
+from eomgen.show.effect_elements import elements_of_constraints
 
 DRAWN = (1e-90, 1e90)
 """Only lengths between these, m, are drawn."""
@@ -56,40 +58,32 @@ def points_of(model: Model) -> list[BodyPoints]:
     for loop in model.loops:
         add(loop.joint.child, loop.joint.r_child, "joints")
         add(loop.joint.parent, loop.joint.r_parent, "joints")
-    for constraint in model.constraints:
-        if isinstance(constraint, Distance):
-            add(constraint.body_1, constraint.at_1, "others")
-            add(constraint.body_2, constraint.at_2, "others")
+    names = (*index, WORLD)  # -1 is the world
+    for element in elements_of_constraints(model, 1.0):
+        if isinstance(element, Link):
+            for end in (element.start, element.end):
+                add(names[end.body], end.at, "others")
     for point in model.points:
         add(model.bodies[point.body].name, point.at, "others")
     for effect in model.effects:
-        match effect:
-            case Spring():
-                add(effect.body_1, effect.at_1, "others")
-                add(effect.body_2, effect.at_2, "others")
-            case ExternalForce():
-                add(effect.body, effect.at, "others")
-            case BodyContact():
-                _add_sizes(model, found, index, effect)
-                if effect.body is not None and effect.corners is None:
-                    add(effect.body, effect.at, "others")
+        _add_sizes(model, found, index, effect)
+        for key, naming in effect.points_of.items():
+            for name in effect.named(naming, tuple(index)):
+                add(name, getattr(effect, key), "others")
     return found
 
 
 def _add_sizes(
-    model: Model, found: list[BodyPoints], index: dict[str, int], contact: BodyContact
+    model: Model, found: list[BodyPoints], index: Mapping[str, int], effect: EffectTable
 ) -> None:
     """Note the spheres or boxes of the bodies of a contact; points and repeats are left out."""
-    listed = (contact.body,) if contact.body is not None else contact.bodies or ()
-    for name in index if listed == "all" else listed:
-        if name is None or name == contact.other:
-            continue
-        own, radius = found[index[name]], contact.radii.get(name, contact.radius)
-        if contact.corners is not None:
-            if (box := (contact.at, contact.corners, radius)) not in own.boxes:
+    for shape in effect.shapes_in_contact(tuple(index)):
+        own = found[index[shape.body]]
+        if shape.corners is not None:
+            if (box := (shape.at, shape.corners, shape.radius)) not in own.boxes:
                 own.boxes.append(box)
-        elif is_drawn(model.value(radius)) and not any(contact.at == at for at, _ in own.spheres):
-            own.spheres.append((contact.at, radius))
+        elif is_drawn(model.value(shape.radius)) and shape.at not in dict(own.spheres):
+            own.spheres.append((shape.at, shape.radius))
 
 
 def length_of(model: Model, vector: Vector) -> float:
@@ -141,10 +135,4 @@ def _span(model: Model, joints: list[Vector]) -> float:
 
 def _lengths_in_effects(model: Model, points: list[BodyPoints]) -> list[float]:
     found = [length_of(model, r) for own in points for r in own.others]
-    for effect in model.effects:
-        match effect:
-            case Spring():
-                found.append(model.value(effect.rest_length))
-            case BodyContact():
-                found.append(4 * model.value(effect.radius))
-    return found
+    return found + [model.value(x) for effect in model.effects for x in effect.lengths()]

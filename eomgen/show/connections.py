@@ -9,11 +9,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from eomgen.language.formula import Constant, Formula, names_in
+from eomgen.language.rewriting import constant, valued
 from eomgen.model.model import Model
 from eomgen.scene.joints import Free
 from eomgen.scene.look import Rod, Shape
 from eomgen.show.body_points import Vector, is_drawn, length_of
-from eomgen.show.formulas import constant, valued
 from eomgen.show.outlines import extent_points
 
 THIN = 0.03

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.language.formula import Constant
+from eomgen.language.rewriting import constant, scaled, sum_of, times, total
 from eomgen.model.model import Body, Model
 from eomgen.scene.joints import Cylindrical, Free, Prismatic, Revolute
 from eomgen.scene.joints.base import spatial
 from eomgen.scene.look import Box, Cylinder, Disc, Polygon, Rod, Shape, Sphere
 from eomgen.show.body_points import BodyPoints, Vector, gyration, is_drawn, length_of
 from eomgen.show.colours import shade
-from eomgen.show.formulas import constant, scaled, sum_of, times, total
 from eomgen.show.outlines import hull
 from eomgen.show.solid import angles_of, rotation_to
 

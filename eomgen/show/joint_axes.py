@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.language.formula import Formula
+from eomgen.language.rewriting import constant
 from eomgen.model.model import Body, Model
 from eomgen.scalars.exact import orientation
 from eomgen.scene.joints import Free, Revolute
 from eomgen.scene.joints.base import spatial
-from eomgen.show.formulas import constant
 
 
 def joint_axis(model: Model, body: Body) -> tuple[Formula, ...] | None:

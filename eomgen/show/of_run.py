@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.language.formula import Constant, Formula
+from eomgen.language.rewriting import constant
 from eomgen.model.model import Model
+from eomgen.scene.effects.elements import Attraction, Element, Field, Link, Round, Support, Wind
 from eomgen.scene.look import number, numbers
 from eomgen.show.arrows import field_arrows, region_of, wind_at
-from eomgen.show.elements import Attraction, Ball, Element, Field, Link, Support, Wind
-from eomgen.show.formulas import constant
 from eomgen.show.picture import Picture
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def fixed_points(drawn: Picture) -> Array:
         match element:
             case Link(start=start, end=end):
                 found += [numbers(a.at) for a in (start, end) if a.body < 0]
-            case Ball(body=-1, at=at, radius=radius):
+            case Round(body=-1, at=at, radius=radius):
                 middle, reach = np.array(numbers(at)), number(radius)
                 found += [tuple(middle - reach), tuple(middle + reach)]
             case Attraction(center=center):

@@ -1,35 +1,32 @@
 """What is drawn of a mechanism: bodies, joints, effects and traces, as formulas of parameters."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from eomgen.language.conditions import value_of
 from eomgen.language.formula import ZERO, Constant
+from eomgen.language.rewriting import constant, valued
 from eomgen.model.frames import from_centre
 from eomgen.model.model import Body, Model
 from eomgen.scene.appearance import Appearance
-from eomgen.scene.constraints import Distance
+from eomgen.scene.effects.elements import (
+    WORLD_INDEX,
+    Attraction,
+    Element,
+    Field,
+    Support,
+    Vector,
+    without_formula,
+)
 from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.look import Polygon, Rod, Shape, is_drawable
 from eomgen.show.body_points import BodyPoints, points_of, typical_length
 from eomgen.show.colours import body_colours
 from eomgen.show.connections import hidden_rods
-from eomgen.show.effect_elements import SYMBOL, elements_of
-from eomgen.show.elements import (
-    WORLD_INDEX,
-    Attachment,
-    Attraction,
-    Element,
-    Field,
-    Link,
-    Support,
-    Vector,
-    without_formula,
-)
-from eomgen.show.formulas import constant, valued
+from eomgen.show.effect_elements import SYMBOL, elements_of, elements_of_constraints
 from eomgen.show.invented import invented_shapes, inventor_of
 from eomgen.show.joint_axes import joint_axis
 
@@ -126,7 +123,7 @@ def picture_of(model: Model, appearance: Appearance, spread: float = 0.0) -> Pic
         painted = tuple(s if s.color else s.replaced(color=colour) for s in shapes)
         bodies.append(DrawnBody(body.name, colour, painted))
     joints = tuple(_joint(model, k, body) for k, body in _holders(model))
-    elements = (*_supports(model, size), *_rods(model, size), *elements)
+    elements = (*_supports(model, size), *elements_of_constraints(model, size), *elements)
     return Picture(tuple(bodies), joints, elements, _traces(model, points, bodies), size)
 
 
@@ -167,16 +164,6 @@ def _holders(model: Model) -> list[tuple[int, Body]]:
             for k, joint in loops
         ),
     ]
-
-
-def _rods(model: Model, size: float) -> Iterator[Link]:
-    """A line for each massless rod."""
-    index = {WORLD: WORLD_INDEX, **{body.name: k for k, body in enumerate(model.bodies)}}
-    for rod in model.constraints:
-        if isinstance(rod, Distance):
-            ends = ((rod.body_1, rod.at_1), (rod.body_2, rod.at_2))
-            one, other = (Attachment(index[body], at) for body, at in ends)
-            yield Link("rope", rod.name, one, other, rod.length, Constant(SYMBOL * size))
 
 
 def _joint(model: Model, k: int, body: Body) -> DrawnJoint:

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from eomgen.language.formula import Formula, evaluate, names_in
+from eomgen.language.rewriting import plain_data
 from eomgen.scalars.floats import FloatScalars
-from eomgen.show.elements import Ball, Element, Link, without_formula
-from eomgen.show.formulas import plain_data
+from eomgen.scene.effects.elements import Element, Link, Round, without_formula
 from eomgen.show.picture import Picture
 
 Geometry = tuple[Formula, ...]
@@ -44,7 +44,7 @@ def _element(element: Element, table: dict[str, Any]) -> dict[str, Any]:
     if isinstance(element, Link):
         table["from"], table["to"] = table.pop("start"), table.pop("end")
     table.pop("formula", None)
-    if isinstance(element, Ball) and element.axis == ():
+    if isinstance(element, Round) and element.axis == ():
         table["axis"] = None
     return table
 

@@ -13,20 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.language.formula import Formula
-from eomgen.scene.look import number, numbers
-from eomgen.show.elements import (
+from eomgen.scene.effects.elements import (
     AtJoint,
     Attachment,
     Attraction,
-    Ball,
     Element,
     Field,
     Link,
     Pull,
+    Round,
     Support,
     Vector,
     Wind,
 )
+from eomgen.scene.look import number, numbers
 from eomgen.show.of_run import world_points
 from eomgen.show.picture import DrawnJoint, Picture
 
@@ -99,7 +99,7 @@ def _strokes(sight: Sight, element: Element) -> Iterator[Stroke]:
             yield from _at_joint(sight, element)
         case Support():
             yield from _support(sight, element)
-        case Ball(body=body) if body >= 0:
+        case Round(body=body) if body >= 0:
             yield from _ball(sight, element)
         case Field(center=center) if center is not None:
             yield from _center(sight, sight.seen(np.array(numbers(center))))
@@ -299,7 +299,7 @@ def _support(sight: Sight, support: Support) -> Iterator[Stroke]:
         yield Stroke(sight.seen(ends), 1.6, layer="back")
 
 
-def _ball(sight: Sight, ball: Ball) -> Iterator[Stroke]:
+def _ball(sight: Sight, ball: Round) -> Iterator[Stroke]:
     middle, radius = sight.seen(sight.world(ball.body, ball.at)), number(ball.radius)
     if not radius:
         yield Stroke(middle + 0.02 * sight.picture.size * circle(12), closed=True)

@@ -30,14 +30,17 @@ initial = { q = { foot_angle = 0.1 } }
 USE = f"""
 import numpy as np
 import eomgen
+from eomgen.model.elaborate import elaborate
 from eomgen.scene.json_schema import json_schema
 from eomgen.scene.reference import reference
+from eomgen.show.effect_elements import elements_of
 
 boat = {BOAT!r}
 run = eomgen.simulate(boat, t_end=1.0)
 assert np.abs(run.energy - run.energy[0]).max() < 1e-6
 assert 0.1 < -run["sea_up"].min() < 0.5
 assert "water" in eomgen.derive(boat).text()
+assert [e.effect for e in elements_of(elaborate(eomgen.read(boat)), 1.0)] == ["gravity", "water"]
 gate = boat.replace("telescope", "revolute")
 assert "water" in eomgen.derive(gate).text()
 ends = [eomgen.simulate(gate, t_end=0.3, route=route).y[-1] for route in ("closed", "aba")]

@@ -12,6 +12,7 @@ from effect_cases import CASES, Case
 import eomgen
 from eomgen.errors import SceneError
 from eomgen.language.formula import Constant
+from eomgen.language.rewriting import plain_data
 from eomgen.model.elaborate import elaborate, expanded
 from eomgen.model.model import Model
 from eomgen.scene.appearance import Appearance, appearance_of
@@ -20,7 +21,6 @@ from eomgen.scene.look import Box, Camera, Cylinder, Disc, Rod, Shape, Sphere, n
 from eomgen.scene.reader import built_in_names, parse_scene
 from eomgen.scene.reference import by_type
 from eomgen.scene.schema import Simulation
-from eomgen.show.formulas import plain_data
 from eomgen.show.of_run import world_points
 from eomgen.show.outlines import extent_points
 from eomgen.show.picture import Picture, picture_of, shapes_of

@@ -6,6 +6,7 @@ from typing import Literal, Protocol
 
 from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Load, Mechanism, Scalar, Vector
+from eomgen.scene.effects.elements import Element, Layout
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,10 @@ class ConstraintTable(EffectTable):
 
     def velocity_rows(self, dimensions: int) -> Sequence[str]:
         """The names of its rows that restrict velocities alone; of most constraints none."""
+        return ()
+
+    def elements(self, layout: Layout) -> Iterable[Element]:
+        """What pictures show of it; of most constraints nothing."""
         return ()
 
     def rows(self, mechanism: Linkage) -> Iterable[Row]:

@@ -9,6 +9,7 @@ from eomgen.language.base import Identifier
 from eomgen.language.quantity import Quantity, Vector, quantity
 from eomgen.scene.constraints.base import ConstraintTable, Linkage, Row
 from eomgen.scene.effects.base import Load
+from eomgen.scene.effects.elements import Attachment, Layout, Link
 from eomgen.scene.effects.vectors import dot, negative, sub
 
 
@@ -49,6 +50,12 @@ length = 0.5
         if name == info.data.get("body_1"):
             raise ValueError("is also body_1, whose points keep their distance; name another body")
         return name
+
+    def elements(self, layout: Layout) -> Iterator[Link]:
+        """A line, drawn as a rope."""
+        ends = ((self.body_1, self.at_1), (self.body_2, self.at_2))
+        one, other = (Attachment(layout.bodies[body], at) for body, at in ends)
+        yield Link("rope", self.name, one, other, self.length, layout.symbol)
 
     def row_names(self, dimensions: int) -> list[tuple[str, str]]:
         """One row, of the constraint's name."""

@@ -10,6 +10,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.language.quantity import Vector as VectorField
 from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
+from eomgen.scene.effects.elements import Attraction, Layout
 from eomgen.scene.effects.vectors import dot, negative, scale, sub
 
 
@@ -56,6 +57,12 @@ at = [5, 0]
             _, squared = self._from_point(mechanism, body)
             total = total - mu * mechanism.mass(body) / mechanism.call("sqrt", squared)
         return total
+
+    def elements(self, layout: Layout) -> Iterator[Attraction]:
+        """Its point, and the bodies that it attracts."""
+        left_out = ("world", *self.except_bodies)
+        pulled = tuple(k for name, k in layout.bodies.items() if name not in left_out)
+        yield Attraction(self.name, self.at, pulled)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

@@ -7,7 +7,9 @@ from typing import Any, ClassVar, Literal, Protocol, Self
 from eomgen.language.base import Identifier, Table
 from eomgen.language.conditions import Condition
 from eomgen.language.formula import ZERO, Formula
+from eomgen.language.rewriting import constant
 from eomgen.scalars.exact import Real
+from eomgen.scene.effects.elements import WORLD_INDEX, AtJoint, Element, Layout, Pull, Touching
 
 Scalar = Any
 """SymPy expressions, program nodes or floats. Effects use only + - * / and `Mechanism.call`."""
@@ -297,6 +299,33 @@ class EffectTable(Table):
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """Potential energy, J; 0 for an effect without one."""
         return mechanism.value(ZERO)
+
+    def elements(self, layout: Layout) -> Iterable[Element]:
+        """What pictures show of it: by default its points of bodies and the joints it names."""
+        places = {body: key for key, naming in self.points_of.items() for body in naming}
+        for field in (*self.body_fields, *self.anchor_fields):
+            at = getattr(self, places.get(field, ""), ()) or constant(*[0.0] * layout.dimensions)
+            for body in self.named((field,), tuple(layout.bodies)):
+                if layout.bodies[body] != WORLD_INDEX:
+                    yield Pull("force", self.name, layout.bodies[body], at)
+        for joint in self.named((*self.joint_fields, *self.dof_fields), tuple(layout.joints)):
+            yield AtJoint("motor", self.name, layout.child(joint), 0, layout.symbol)
+
+    def named(self, fields: Sequence[str], every: Sequence[str]) -> list[str]:
+        """The bodies or joints that some fields name; "all" are `every` one."""
+        names: list[str] = []
+        for field in fields:
+            value = getattr(self, field)
+            names += every if value == "all" else [value] if isinstance(value, str) else value or ()
+        return names
+
+    def shapes_in_contact(self, bodies: Sequence[str]) -> Iterable[Touching]:
+        """The shapes with which bodies touch others, in a mechanism with these bodies."""
+        return ()
+
+    def lengths(self) -> Iterable[Formula]:
+        """Lengths that say how large a mechanism without links is, m."""
+        return ()
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

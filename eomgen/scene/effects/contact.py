@@ -1,7 +1,7 @@
 """Soft and rigid contact of bodies with a plane, with a sphere or with each other."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -9,12 +9,15 @@ from pydantic import Field, model_validator
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.conditions import Condition, a_part, are_zero, can_meet, not_negative
-from eomgen.language.formula import ZERO
+from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity, with_components
+from eomgen.language.rewriting import constant, sum_of, times
 from eomgen.scalars.exact import direction
 from eomgen.scene.effects.base import Contact, Load, Mechanism, Scalar
 from eomgen.scene.effects.base import Vector as Components
 from eomgen.scene.effects.bodies import OnBodies, wrong
+from eomgen.scene.effects.elements import Element, Layout, Round, Touching
+from eomgen.scene.effects.elements import Plane as PlaneElement
 from eomgen.scene.effects.touching import (
     Ball,
     Plane,
@@ -43,6 +46,10 @@ AGAINST = {
     "each_other": (),
 }
 """The keys of contact with each of these, in addition to the common ones."""
+
+
+MOST_CORNERS = 400
+"""More corners of boxes in contact than these are not drawn."""
 
 
 class BodyContact(OnBodies):
@@ -243,6 +250,45 @@ dissipation = 0.2
                 part = part + force * touch.energy_term
             total = total + part
         return total
+
+    def elements(self, layout: Layout) -> Iterator[Element]:
+        """The plane or the ball that it is against, and spheres, wheels or corners of bodies."""
+        other = layout.bodies[self.other]
+        if self.against == "plane":
+            normal = constant(*map(float, direction(self.normal)))
+            yield PlaneElement(self.name, other, normal, self.offset)
+        if self.against == "ball":
+            yield Round("ball", self.name, other, self.other_at, self.other_radius)
+        names = tuple(layout.bodies)[1:]
+        for k, at in self.points_drawn(layout):
+            radius = self.radii.get(names[k], self.radius)
+            if self.corners is not None:
+                if 2 ** len(at) * len(names) > MOST_CORNERS:
+                    return
+                for signs in product((-1.0, 1.0), repeat=len(at)):
+                    half = tuple(times(*pair) for pair in zip(signs, self.corners, strict=True))
+                    yield Round("ball", self.name, k, sum_of(at, half), radius)
+                continue
+            axis = layout.wheel_axis(k, at)
+            kind: Literal["ball", "wheel"] = "ball" if axis is None else "wheel"
+            yield Round(kind, self.name, k, at, radius, axis=axis or None)
+
+    def points_drawn(self, layout: Layout) -> Iterator[tuple[int, Vector]]:
+        """The points of bodies that may touch."""
+        if self.points is not None:
+            yield from map(layout.point, self.points)
+            return
+        for body in self._in_contact(tuple(layout.bodies)[1:]):
+            yield layout.bodies[body], self.at
+
+    def shapes_in_contact(self, bodies: Sequence[str]) -> Iterator[Touching]:
+        """Of each body that it names."""
+        for body in self._in_contact(bodies) if self.points is None else ():
+            yield Touching(body, self.at, self.radii.get(body, self.radius), self.corners)
+
+    def lengths(self) -> tuple[Formula, ...]:
+        """Twice the diameter of its spheres."""
+        return (times(4.0, self.radius),)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

@@ -8,6 +8,7 @@ from pydantic import Field
 from eomgen.language.base import Identifier, Number, Table, Text
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import EffectTable, ExtraState, JointLoad, Mechanism, Scalar
+from eomgen.scene.effects.elements import AtJoint, Layout
 
 MOST = 100
 """Greatest number of states or of torques of one controller."""
@@ -59,6 +60,11 @@ torques = { elbow = "-5*elbow_angle - 2*z" }
     def rates(self, mechanism: Mechanism) -> tuple[Scalar, ...]:
         """Values of the states' formulas."""
         return tuple(mechanism.value(state.rate) for state in self.own_states.values())
+
+    def elements(self, layout: Layout) -> Iterator[AtJoint]:
+        """A servo at each joint."""
+        for joint in self.torques:
+            yield AtJoint("servo", self.name, layout.child(joint), 0, layout.symbol)
 
     def loads(self, mechanism: Mechanism) -> Iterator[JointLoad]:
         """Values of the torques' formulas."""

@@ -11,6 +11,8 @@ from eomgen.language.base import Identifier
 from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Mechanism, Scalar, Vector
 from eomgen.scene.effects.bodies import wrong
+from eomgen.scene.effects.elements import AtJoint, Layout
+from eomgen.scene.effects.elements import Vector as Formulas
 from eomgen.scene.effects.vectors import dot, length, scale
 
 
@@ -122,6 +124,19 @@ class OnJoints(EffectTable):
             known = _scalar_coordinates(joints, names, self.joint)
             _check_coordinate(self.coordinate, self.joint, known, location)
 
+    def elements(self, layout: Layout) -> Iterator[AtJoint]:
+        """A symbol at each coordinate that it acts on."""
+        for joint in self.acted_on(layout.joints):
+            names = layout.coordinates(joint)
+            for index in range(len(layout.joints[joint])):
+                if self.coordinate in (None, names[index]):
+                    at = AtJoint("brake", self.name, layout.child(joint), index, layout.symbol)
+                    yield self.drawn(at, layout.zero(joint))
+
+    def drawn(self, at: AtJoint, zero: Formulas | None) -> AtJoint:
+        """The symbol at one coordinate: by default that of friction."""
+        return at
+
     def dofs(self, mechanism: Mechanism) -> Iterator[Dof]:
         """The degrees of freedom that it acts on."""
         for joint in self.acted_on(mechanism.joints):
@@ -135,6 +150,8 @@ class OnCoordinate(EffectTable):
     """An effect on the coordinate of `joint`, or on that `coordinate` of one that has several."""
 
     dof_fields: ClassVar[tuple[str, ...]] = ("joint",)
+    symbol: ClassVar[Literal["motor", "servo"]] = "servo"
+    """What pictures show at the joint."""
 
     joint: Identifier = Field(description="joint it acts on")
     coordinate: Identifier | None = Field(
@@ -156,6 +173,12 @@ class OnCoordinate(EffectTable):
                 f"{location}.coordinate: missing; '{self.joint}' has {', '.join(known)}: give one"
             )
         _check_coordinate(self.coordinate, self.joint, known, location)
+
+    def elements(self, layout: Layout) -> Iterator[AtJoint]:
+        """A motor or a servo."""
+        names = layout.coordinates(self.joint)
+        k = names.index(self.coordinate) if self.coordinate else 0
+        yield AtJoint(self.symbol, self.name, layout.child(self.joint), k, layout.symbol)
 
     def coordinate_index(self, mechanism: Mechanism) -> int:
         """Index of the coordinate in its joint."""

@@ -8,8 +8,10 @@ from pydantic import Field, model_validator
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.language.quantity import Vector as VectorField
+from eomgen.language.rewriting import constant
 from eomgen.scene.effects.base import Load, Mechanism, Scalar, Vector
 from eomgen.scene.effects.bodies import OnBodies, local_names, wrong
+from eomgen.scene.effects.elements import Layout, Wind
 from eomgen.scene.effects.vectors import length, negative, scale, sub
 
 MADE_OF = ("density", "area", "coefficient")
@@ -101,6 +103,11 @@ wind = ["3*sin(t)", 0]
                 square = turning[1] if self.turning_quadratic != ZERO else None
                 torque = _drag(mechanism, turning[0], square, mechanism.angular_velocity(body))
             yield Load(body, force, at, "applied", torque)
+
+    def elements(self, layout: Layout) -> Iterator[Wind]:
+        """The wind, if there is any."""
+        if any(part != ZERO for part in self.wind):
+            yield Wind(self.name, constant(*[0.0] * layout.dimensions), formula=self.wind)
 
     def _quadratic(self, mechanism: Mechanism) -> Scalar | None:
         """The quadratic coefficient, N s²/m²; None if there is none."""

@@ -1,5 +1,6 @@
 """A joint whose coordinate follows a formula of time."""
 
+from collections.abc import Iterator
 from typing import ClassVar, Literal
 
 from pydantic import Field
@@ -7,6 +8,7 @@ from pydantic import Field
 from eomgen.language.base import Identifier
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import EffectTable
+from eomgen.scene.effects.elements import AtJoint, Layout
 
 
 class Driven(EffectTable):
@@ -32,3 +34,7 @@ coordinate = "0.5*sin(6*t)"
     type: Literal["driven"]
     joint: Identifier = Field(description="revolute or prismatic joint it drives")
     coordinate: Quantity = quantity("rad | m", "coordinate", sees=("t",))
+
+    def elements(self, layout: Layout) -> Iterator[AtJoint]:
+        """A drive at the joint."""
+        yield AtJoint("drive", self.name, layout.child(self.joint), 0, layout.symbol)

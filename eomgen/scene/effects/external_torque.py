@@ -9,7 +9,9 @@ from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, Vector, quantity
+from eomgen.language.rewriting import constant
 from eomgen.scene.effects.base import EffectTable, Input, Load, Mechanism
+from eomgen.scene.effects.elements import Layout, Pull
 
 
 class ExternalTorque(EffectTable):
@@ -71,6 +73,11 @@ torque = "input"
             yield Load(self.body, zeros, zeros, "applied", outside, in_body=(zeros, torque))
         else:
             yield Load(self.body, zeros, zeros, "applied", torque)
+
+    def elements(self, layout: Layout) -> Iterator[Pull]:
+        """A mark at the centre of mass."""
+        at = constant(*[0.0] * layout.dimensions)
+        yield Pull("torque", self.name, layout.bodies[self.body], at)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

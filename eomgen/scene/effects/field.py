@@ -11,6 +11,8 @@ from eomgen.language.quantity import Quantity, quantity
 from eomgen.language.quantity import Vector as VectorField
 from eomgen.scene.effects.base import Load, Mechanism, Scalar, Vector
 from eomgen.scene.effects.bodies import OnBodies, local_names, wrong
+from eomgen.scene.effects.elements import WORLD_INDEX, Element, Layout, Round
+from eomgen.scene.effects.elements import Field as Drawn
 from eomgen.scene.effects.vectors import cross, dot, length, negative, scale, sub
 
 Kind = Literal["formula", "attract", "repel", "vortex", "avoid"]
@@ -112,6 +114,18 @@ force = ["-2*(vx - 1)", "-2*vy"]
             else:
                 force = self._central(mechanism, body, at)
             yield Load(body, force, at, "applied")
+
+    def elements(self, layout: Layout) -> Iterator[Element]:
+        """An obstacle, arrows, or a centre."""
+        if self.kind == "avoid":
+            assert self.radius is not None and self.reach is not None  # by the kind
+            yield Round(
+                "obstacle", self.name, WORLD_INDEX, self.center, self.radius, reach=self.reach
+            )
+        elif self.kind == "formula":
+            yield Drawn(self.name, self.kind, formula=self.force)
+        else:
+            yield Drawn(self.name, self.kind, self.center)
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """That of "attract" and "repel", J: 0 at infinity if power > 1, at s = 1 m if power = 1, at

@@ -8,9 +8,11 @@ from pydantic import Field, field_validator
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO, evaluate
 from eomgen.language.quantity import Numbers, Quantity, quantity
+from eomgen.language.rewriting import constant
 from eomgen.scalars.exact import direction
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
+from eomgen.scene.effects.elements import Layout, Weight
 
 
 class Gravity(EffectTable):
@@ -84,6 +86,11 @@ g = 9.81
             for part, x in zip(fall, mechanism.position(body, zeros), strict=True):
                 total = total - mechanism.mass(body) * part * x
         return total
+
+    def elements(self, layout: Layout) -> Iterator[Weight]:
+        """An arrow along it."""
+        down = (0.0,) * (layout.dimensions - 1) + (-1.0,)
+        yield Weight(self.name, constant(*map(float, direction(self.direction or down))))
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

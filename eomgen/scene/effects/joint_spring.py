@@ -1,6 +1,7 @@
 """A spring and damper at a joint."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field
@@ -11,6 +12,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import JointLoad, Mechanism, Scalar
 from eomgen.scene.effects.dofs import Dof, OnJoints, spring_energy
+from eomgen.scene.effects.elements import AtJoint, Vector
 from eomgen.scene.effects.spring import check_law
 
 
@@ -81,6 +83,10 @@ rest = 0.5
             damping = mechanism.value(self.damping)
             pairs = zip(dof.along(back), dof.rates, strict=True)
             yield from dof.loads([-(force + damping * rate) for force, rate in pairs])
+
+    def drawn(self, at: AtJoint, zero: Vector | None) -> AtJoint:
+        """A torsion spring, or a coil along a slider."""
+        return replace(at, kind="torsion", rest=self.rest, zero=zero)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

@@ -1,6 +1,7 @@
 """Soft or rigid stops at the limits of a joint's coordinate."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field
@@ -11,6 +12,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import Contact, JointLoad, Mechanism, Scalar
 from eomgen.scene.effects.dofs import Dof, OnJoints, spring_energy
+from eomgen.scene.effects.elements import AtJoint, Vector
 from eomgen.scene.effects.vectors import negative
 
 
@@ -125,6 +127,10 @@ damping = 1.0
             return mechanism.number(0.0)
         excesses = (self._beyond(mechanism, dof) for dof in self.dofs(mechanism))
         return spring_energy(mechanism, self.stiffness, excesses)
+
+    def drawn(self, at: AtJoint, zero: Vector | None) -> AtJoint:
+        """Its limits."""
+        return replace(at, kind="stop", low=self.low, high=self.high, zero=zero)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

@@ -22,6 +22,7 @@ joint = "elbow"
 torque = "input"
 """
     input_field: ClassVar[str] = "torque"
+    symbol = "motor"
 
     type: Literal["motor"]
     torque: Literal["input"] | Quantity = quantity(

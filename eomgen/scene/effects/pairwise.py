@@ -1,6 +1,7 @@
 """Forces between every two bodies of a group."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -12,6 +13,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
 from eomgen.scene.effects.bodies import wrong
+from eomgen.scene.effects.elements import Layout, Link
 from eomgen.scene.effects.spring import Spring, line_of
 from eomgen.scene.effects.vectors import dot, negative, scale, sub
 
@@ -105,6 +107,13 @@ gravitation = 6.7e-11
                     mechanism
                 )
         return total
+
+    def elements(self, layout: Layout) -> Iterator[Link]:
+        """A spring between every two bodies; a line, as a rope, for other attractions."""
+        for one, two in self.pairs(tuple(layout.bodies)[1:]):
+            for link in self.spring(layout.dimensions, one, two).elements(layout):
+                plain = self.stiffness is None
+                yield replace(link, kind="rope", rest=ZERO) if plain else link
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

@@ -13,6 +13,7 @@ from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Quantity, Vector, quantity
 from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar
 from eomgen.scene.effects.base import Vector as Components
+from eomgen.scene.effects.elements import Attachment, Layout, Link
 from eomgen.scene.effects.vectors import dot, nearest_square, negative, sub
 
 
@@ -110,6 +111,24 @@ rest_length = 0.5
         taut = mechanism.call("min", stretch, tension + damping * rate)
         nothing = mechanism.number(0.0)
         return tuple(mechanism.call("select", taut, part, nothing) for part in pull)
+
+    def elements(self, layout: Layout) -> Iterator[Link]:
+        """A coil, a damper, both, or a rope."""
+        damped = self.damping != ZERO
+        kind: Literal["coil", "damper", "spring_damper", "rope"]
+        kind = "spring_damper" if damped else "coil"
+        if self.tension_only:
+            kind = "rope"
+        elif self.law is None and self.stiffness == ZERO:
+            kind = "damper"
+        ends = ((self.body_1, self.at_1), (self.body_2, self.at_2))
+        start, end = (Attachment(layout.bodies[body], at) for body, at in ends)
+        rest = None if kind == "damper" else self.rest_length
+        yield Link(kind, self.name, start, end, rest, layout.coil)
+
+    def lengths(self) -> tuple[Formula, ...]:
+        """Its rest length."""
+        return (self.rest_length,)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

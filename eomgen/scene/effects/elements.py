@@ -5,15 +5,56 @@ the body's centre of mass in body axes, or from the world's origin, m. A body is
 the world; a joint is the index of its child.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Protocol
 
 from eomgen.language.formula import Formula
-from eomgen.scene.effects.field import Kind
 
 WORLD_INDEX = -1
 
 Vector = tuple[Formula, ...]
+
+
+class Layout(Protocol):
+    """What effects can read of a model in order to say how they are drawn."""
+
+    @property
+    def dimensions(self) -> int:
+        """2 in the plane, 3 in space."""
+
+    @property
+    def bodies(self) -> Mapping[str, int]:
+        """The index of each body, -1 for "world"."""
+
+    @property
+    def joints(self) -> Mapping[str, tuple[str, ...]]:
+        """As of a `Mechanism`: the kinds of the primitives of joints that move."""
+
+    @property
+    def coil(self) -> Formula:
+        """Radius of a coil, m."""
+
+    @property
+    def symbol(self) -> Formula:
+        """Radius of what is drawn at a joint, m."""
+
+    def child(self, joint: str) -> int:
+        """The index of a joint's child."""
+
+    def coordinates(self, joint: str) -> tuple[str, ...]:
+        """The names of a joint's coordinates."""
+
+    def zero(self, joint: str) -> Vector | None:
+        """See `AtJoint.zero`."""
+
+    def point(self, name: str) -> tuple[int, Vector]:
+        """The body of a named point, and where on it."""
+
+    def wheel_axis(self, body: int, at: Vector) -> Vector | None:
+        """The axis about which a body rotates if it does so about a point of it; () in the plane,
+        None if it does not.
+        """
 
 
 @dataclass(frozen=True)
@@ -61,7 +102,7 @@ class AtJoint:
 
 
 @dataclass(frozen=True)
-class Ball:
+class Round:
     """A sphere, a circle in the plane, at a point of a body.
 
     ball      that of a contact; of radius 0 it is a point
@@ -77,6 +118,18 @@ class Ball:
     radius: Formula
     reach: Formula | None = None
     axis: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Touching:
+    """A sphere of a body, a circle in the plane, or a box of half sizes `corners` rounded by the
+    radius, with which it touches others.
+    """
+
+    body: str
+    at: Vector
+    radius: Formula
+    corners: Vector | None
 
 
 @dataclass(frozen=True)
@@ -100,7 +153,7 @@ class Field:
 
     kind: ClassVar[str] = "field"
     effect: str
-    form: Kind
+    form: str
     center: Vector | None = None
     points: tuple[Vector, ...] = ()
     forces: tuple[Vector, ...] = ()
@@ -171,7 +224,7 @@ class Support:
     high: Formula | None = None
 
 
-Element = Link | AtJoint | Ball | Plane | Field | Wind | Attraction | Pull | Weight | Support
+Element = Link | AtJoint | Round | Plane | Field | Wind | Attraction | Pull | Weight | Support
 
 
 def without_formula(element: Element) -> Element:
