@@ -92,7 +92,8 @@ def test_a_scene_built_in_python_is_refused_as_a_file_is(change: dict[str, Any])
     assert eomgen.Scene(**eomgen.read(DROP).__dict__) == eomgen.read(DROP)
 
 
-@pytest.mark.parametrize("scene", ["two_body_forced", "cart_pole", "furuta_pendulum"])
+@pytest.mark.every(2)
+@pytest.mark.parametrize("scene", ["two_body_forced", "furuta_pendulum", "cart_pole"])
 def test_the_matrices_are_the_equations(scene: str) -> None:
     """M v̇ + V + G = F, with v̇ of the generated module, and of the solution written out."""
     import sympy as sp

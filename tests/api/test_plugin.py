@@ -85,6 +85,7 @@ def test_what_a_package_adds_is_used_as_ours(tmp_path: Path) -> None:
     assert not done.returncode, done.stderr
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("group", "point", "said"),
     [

@@ -512,7 +512,7 @@ def test_the_key_names_all_that_shapes_the_code(monkeypatch: pytest.MonkeyPatch)
     code = (
         "import sys; before = set(sys.modules)\n"
         "from eomgen.pipeline import compile_scene; from eomgen.scene.reader import read_scene\n"
-        "for name in ('two_body', 'human_figure', 'bouncing_two_body'):\n"
+        "for name in ('two_body', 'spinning_top', 'bouncing_two_body'):\n"
         "    compile_scene(read_scene(name))\n"
         "print(*(set(sys.modules) - before))"
     )

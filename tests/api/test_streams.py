@@ -78,10 +78,8 @@ FAULTS = {
 }
 """What the shell does to the streams, and the exit code of a command that writes and goes well."""
 FEW = (
-    ("check", "full"),
-    ("check", "closed"),
     ("check", "both full"),
-    ("simulate", "errors closed"),
+    ("check", "errors closed"),
 )
 
 
