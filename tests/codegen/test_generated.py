@@ -18,6 +18,8 @@ from eomgen.scene.reader import parse_scene
 TOLERANCE = 1e-12
 MANY = some(150, 1000)
 TREES = [random_tree(seed) for seed in SEEDS]
+TRIES = some(6, 20)
+"""Random states of each."""
 
 
 def difference(actual: np.ndarray, expected: np.ndarray) -> float:
@@ -120,7 +122,7 @@ def test_random_trees(tree: Scene) -> None:
     c = compiled(tree)
     rng = np.random.default_rng(22)
     assert dict(c.module.PARAMETERS) == dict(tree.defaults)
-    for _ in range(20):
+    for _ in range(TRIES):
         assert_agrees(c, tree.random_state(c.module, rng), tree.random_inputs(rng))
 
 
@@ -141,7 +143,7 @@ def test_bodies_and_the_whole(c: Compiled) -> None:
     """
     scene, module = c.scene, c.module
     rng = np.random.default_rng(27)
-    for k in range(20):
+    for k in range(TRIES):
         y, u = scene.random_state(module, rng), scene.random_inputs(rng)
         p = {name: v * float(rng.uniform(0.5, 2.0)) for name, v in scene.defaults.items()}
         p = p if k % 2 else None
@@ -164,7 +166,7 @@ def test_bias_force(c: Compiled) -> None:
     """h = V + G, and with the applied forces it is what holds the accelerations at 0."""
     scene, module = c.scene, c.module
     rng, n = np.random.default_rng(28), len(scene.coordinates)
-    for _ in range(20):
+    for _ in range(TRIES):
         y, u = scene.random_state(module, rng), scene.random_inputs(rng)
         V, G, h, F = (
             getattr(module, f"{kind}_force")(0.0, y, u=u)
@@ -470,7 +472,7 @@ def test_inertia_that_is_zero_by_its_parameter() -> None:
 def test_inertia_that_may_vanish() -> None:
     """A body held away from its centre of mass may be given no inertia of its own, but no less."""
     c, rng = compiled("two_body"), np.random.default_rng(26)
-    for _ in range(20):
+    for _ in range(TRIES):
         assert_agrees(c, c.scene.random_state(c.module, rng), p={"I_B": 0.0})
     with pytest.raises(ValueError, match=r"^inertia_com of B is negative: change the parameters$"):
         c.module.derivative(0.0, Y, {"I_B": -0.1})

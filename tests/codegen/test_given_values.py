@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaign import some
 from engine import MP, engine, quick
 
 from eomgen.language.formula import Constant, Formula, evaluate, parse
@@ -302,7 +303,8 @@ def test_the_length_of_a_quaternion(spun: Any) -> None:
 
 def test_nothing_is_silently_wrong_far_away() -> None:
     """One or two states of any size: right against 60 digits, or refused; alone, among columns."""
-    cases = (SPUN, "two_body_forced", "cart_pole", "furuta_pendulum", "puma560", "spinning_top")
+    cases = (SPUN, "two_body_forced", "cart_pole", "spinning_top")
+    cases += some((), ("furuta_pendulum", "puma560"))
     without = ("jacobian", "input_jacobian", "parameter_jacobian")
     rng = np.random.default_rng(11)
     right = refused = 0
@@ -310,7 +312,7 @@ def test_nothing_is_silently_wrong_far_away() -> None:
         made = engine(scene, leave_out=without)
         module = made.module
         states = []
-        for _ in range(40):
+        for _ in range(some(20, 40)):
             y = made.random_state(rng)
             for i in rng.integers(len(y), size=2):
                 # An angle that is added to another loses its digits where both are doubles.
@@ -334,7 +336,7 @@ def test_nothing_is_silently_wrong_far_away() -> None:
                 assert error <= 1e-9 * size, (scene, name, y.tolist(), found, true)
                 together = np.asarray(columns[..., k])
                 assert np.allclose(together, found, rtol=1e-9, atol=1e-9 * float(size))
-    assert right > 100 and refused > 100
+    assert right > 60 and refused > 60
 
 
 def test_parameters_far_away() -> None:
@@ -345,10 +347,10 @@ def test_parameters_far_away() -> None:
     rng = np.random.default_rng(12)
     powers = {"kg": (1, 0), "m": (0, 1), "kg m^2": (1, 2), "m/s^2": (0, 1), "m/s": (0, 1)}
     right = refused = 0
-    for scene in ("pendulum", "double_pendulum", "cart_pole", "tumbling_body", "spinning_top"):
+    for scene in ("double_pendulum", "cart_pole", "tumbling_body"):
         made = quick(scene)
         units = made.module.UNITS
-        for _ in range(60):
+        for _ in range(some(40, 100)):
             kg, m = 10.0 ** rng.uniform(-160, 100, size=2)
             factors = {unit: float(kg**mass * m**length) for unit, (mass, length) in powers.items()}
             factor = {name: factors.get(unit, 1.0) for name, unit in units.items()}
@@ -368,7 +370,7 @@ def test_parameters_far_away() -> None:
                 error = max(abs(MP.mpf(found[i]) - true[i]) for i in own)
                 assert error <= 1e-9 * max(abs(true[i]) for i in own), (scene, p, found, true)
             right += 1
-    assert right > 100 and refused > 50
+    assert right > 50 and refused > 25
     made = quick("pendulum")
     message = "parameter 'bob_mass' is 1e+300, larger than 1e+100; choose other units"
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):

@@ -119,7 +119,7 @@ def test_outputs_are_those_of_the_python_module() -> None:
     assert not hasattr(ours, "jacobian") and ours.UNITS == python.UNITS
 
 
-@pytest.mark.parametrize("scene", some(("human_figure",), SCENES + LARGE))
+@pytest.mark.parametrize("scene", some(SCENES[1:2], SCENES + LARGE))
 def test_derivatives_are_the_generated_jacobian(scene: str) -> None:
     """Forwards and backwards, of one state and of columns."""
     ours, python = pair(scene)
@@ -177,7 +177,7 @@ def test_no_branch_makes_a_derivative_nan(longest: int, monkeypatch: pytest.Monk
 
 
 def test_float32_stays_float32() -> None:
-    ours, python = pair("chain")
+    ours, python = pair("double_pendulum")
     y = states(python, 3)
     found = jax.jit(ours.derivative)(0.0, jnp.asarray(y, jnp.float32), dict(python.PARAMETERS))
     assert found.dtype == jnp.float32 and error(found, python.derivative(0.0, y)) < 1e-3

@@ -106,6 +106,7 @@ def test_members_that_run_together(asked: Any, tmp_path: Path) -> None:
     assert alone.finished.all()
 
 
+@pytest.mark.every(2)
 @COMPILED
 @pytest.mark.parametrize(
     ("scene", "name", "asked"),
@@ -235,6 +236,7 @@ def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
         assert (one / name).read_bytes() == (two / name).read_bytes(), name
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_two_stops_at_once(number: signal.Signals, tmp_path: Path) -> None:
     """To the process and to its group, as `timeout` sends them: one line, and no hang."""
