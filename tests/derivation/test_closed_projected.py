@@ -142,7 +142,7 @@ SQUARED = [case for case in (*SMALL, *FIVE) if is_regular(squared(tree(*case)))]
 assert len(SQUARED) >= some(10, 16)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize(("seed", "dimensions", "most"), SQUARED)
 def test_closed_is_aba_in_60_digits(seed: int, dimensions: int, most: int) -> None:
     """Every joint type, rotations that are exact: to all digits but a few."""

@@ -59,7 +59,7 @@ def assert_close(ours: Any, theirs: Any, within: float = ROUNDING) -> None:
     assert float(np.max(np.abs(ours - theirs), initial=0.0)) < within * size
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("scene", built_in_names())
 def test_the_algorithm_followed_by_hand(scene: str) -> None:
     """Every equation in its order, from parameters to v̇ and F: what the numeric solver has."""

@@ -176,6 +176,7 @@ def poses_of(equations: Equations, rng: np.random.Generator, count: int) -> np.n
     return poses
 
 
+@pytest.mark.every(2)
 @every_scene
 def test_pivots_stay_away_from_zero(scene: Scene) -> None:
     """Over 1000 poses, half at multiples of π/4, no pivot falls far below its largest value.
@@ -195,6 +196,7 @@ def test_pivots_stay_away_from_zero(scene: Scene) -> None:
             assert found[row].min() > own * (1 - 1e-12)
 
 
+@pytest.mark.every(2)
 @every_scene
 def test_pivots_multiply_to_the_determinant(scene: Scene) -> None:
     """Their product is det M, the mass of a floating tree counted for x and for y.

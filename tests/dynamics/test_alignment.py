@@ -203,6 +203,7 @@ locked = {{ j_angle_deg = {key} }}
         assert (found[0] == 0.0) == (sine == 0.0)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("seed", range(some(20, 500)))
 def test_fixed_rotations_are_rounded_once(seed: int) -> None:
     """Every entry within half a unit in its own last place, 0 where it is 0: of a row of turns, of

@@ -42,7 +42,7 @@ def assert_close(
     assert np.max(np.abs(actual - expected)) <= tolerance * size
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_mass_matrix(c: Compiled) -> None:
     """½ vᵀ M v is the kinetic energy; M is symmetric with positive eigenvalues, and is SymPy's."""
     eq = c.equations
@@ -63,6 +63,7 @@ def test_mass_matrix(c: Compiled) -> None:
                 assert_close(M[i, j], both - first - second, both)
 
 
+@pytest.mark.every(2)
 def test_gravity_force_is_the_slope_of_the_potential(c: Compiled) -> None:
     """G = ∂U/∂q; without gravity both are 0."""
     n = len(c.module.STATES)
@@ -206,7 +207,7 @@ def test_jacobian(scene: str | int, form: str) -> None:
     assert_close(c.module.jacobian(0.0, both, u=inputs)[:, :, 1], expected)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize(("scene", "form"), CASES)
 def test_jacobians_by_inputs_and_parameters(scene: str | int, form: str) -> None:
     """∂f/∂u and ∂f/∂p are the derivative's, differentiated in 60 digits, in every state form."""

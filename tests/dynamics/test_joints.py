@@ -149,6 +149,7 @@ def test_motor_inertia(route: str) -> None:
         assert module.inverse_dynamics([0.0], [0.0], [2.0])[0] == pytest.approx(2 * felt)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("axis", [X, Z, -Z, np.array([0.6, 0.0, 0.8])])
 def test_prismatic(route: str, axis: np.ndarray) -> None:
     """(m + n² J) q̈ = F - m g a_z: along the axis alone, whatever the places."""

@@ -30,7 +30,7 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.max(np.abs(a - b), initial=0.0) / (1 + np.max(np.abs(b), initial=0.0)))
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("judge", JUDGES)
 @pytest.mark.parametrize("tree", trees(), ids=lambda tree: tree.name)
 def test_accelerations_and_joint_forces_agree(tree: SpatialTree, judge: str) -> None:
@@ -46,7 +46,7 @@ def test_accelerations_and_joint_forces_agree(tree: SpatialTree, judge: str) -> 
             assert apart(wrenches, motion.joint_forces) < CLOSE
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("tree", trees(), ids=lambda tree: tree.name)
 def test_energy_and_momentum_change_as_power_and_wrench_say(tree: SpatialTree) -> None:
     """Central differences along the motion; poses change as the velocities say."""

@@ -51,6 +51,7 @@ def assert_as_solved(case: Closed, seed: int) -> None:
         assert max(off) < bar, route
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("dimensions", "most", "seed"), CASES)
 def test_every_route_is_the_solver(dimensions: int, most: int, seed: int) -> None:
     assert_as_solved(drawn(dimensions, most, seed), seed)

@@ -56,6 +56,7 @@ def operations(model: Model, route: str) -> int:
     return cost(found.alone, "derivative")["total"]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("seed", [*range(12), 47])
 def test_any_split_of_a_tree_gives_the_same(seed: int) -> None:
     """Forces, torques, rotors, joints of several axes whose first ones carry no body (47)."""

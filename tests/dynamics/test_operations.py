@@ -136,6 +136,7 @@ def test_a_load_at_a_joint_adds_four_operations(name: str, joint: str) -> None:
         assert operations(loaded(name, joint, f'type = "{kind}"\n{values}')) <= alone + 4, kind
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("what", ON_ARM)
 def test_an_effect_costs_its_own_terms_and_no_route(what: str) -> None:
     """Contacts and states add no term to v̇, and a load adds those that it has by hand."""

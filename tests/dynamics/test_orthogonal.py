@@ -190,7 +190,7 @@ def check(errors: Sequence[float], *sort: object, bound: float = AT_RANDOM) -> N
         assert error < MISSED.get(sort, {}).get(seed, bound), (seed, error)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize("masses", MASSES)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
@@ -216,6 +216,7 @@ def test_torques_on_light_bodies_push_no_others(dimensions: int, seed: int) -> N
     assert off(model, state(model, "random", seed)) < 1e-15
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("masses", MASSES)
 @pytest.mark.parametrize("kind", ["prismatic", "cylindrical", "universal", "ball"])
 def test_every_digit_of_other_joints(kind: str, masses: str) -> None:
@@ -256,7 +257,7 @@ ALIGNMENTS = [
 ]
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("masses", MASSES)
 @pytest.mark.parametrize(("dimensions", "kind"), ALIGNMENTS)
 def test_every_digit_of_aligned_chains(dimensions: int, kind: str, masses: str) -> None:
@@ -269,6 +270,7 @@ def test_every_digit_of_aligned_chains(dimensions: int, kind: str, masses: str) 
     check(errors, kind, dimensions, masses, bound=AT_RANDOM if kind == "random" else ALIGNED)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("masses", MASSES)
 @pytest.mark.parametrize("kind", ["some straight", "eighths of turns"])
 def test_aligned_chains_in_space(kind: str, masses: str) -> None:
@@ -373,6 +375,7 @@ def test_force_on_what_is_light() -> None:
             assert off(model, state(model, "random", seed)) < AT_RANDOM
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("angle", [1e-20, 1e-17, 1e-10, 1e-3])
 @pytest.mark.parametrize("rate", [0.0, 0.5])
 def test_rows_that_hold_next_to_nothing_of_an_axis(angle: float, rate: float) -> None:

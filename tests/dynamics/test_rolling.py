@@ -167,6 +167,7 @@ def moving(model: Model, at: Values) -> MechanismState:
     return MechanismState(model, values, duals)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("other", ["world", "base"])
 @pytest.mark.parametrize("name", HOLDING)
 def test_the_rate_of_a_residual_is_the_power_of_its_loads(name: str, other: str) -> None:

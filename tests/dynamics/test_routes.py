@@ -62,7 +62,7 @@ def in_floats(
     return Dynamics(model, values, FloatScalars(), axes)
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(8)
 @pytest.mark.parametrize(("dimensions", "seed"), [*product((PLANE, SPACE), SEEDS)])
 def test_accelerations(dimensions: int, seed: int) -> None:
     """By both routes, in either kind of axes by turns, or in both, as three others have them."""
@@ -93,6 +93,7 @@ def test_accelerations(dimensions: int, seed: int) -> None:
             assert apart(judge(tree, q, v, u)[place], expected) < CLOSE
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("dimensions", "seed"), [*product((PLANE, SPACE), SMALL)])
 def test_regrouped_inertias(dimensions: int, seed: int) -> None:
     """They give the same mass matrix, bias and gravity forces; no body on a hinge has a mass."""
@@ -119,7 +120,7 @@ def test_regrouped_inertias(dimensions: int, seed: int) -> None:
                 assert body.first_moment[k] == 0.0 == min(across) <= max(across)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("seed", range(12))
 def test_accelerations_from_rest(dimensions: int, seed: int) -> None:
@@ -327,7 +328,7 @@ def test_module_at_other_parameters(dimensions: int, seed: int, route: str) -> N
     assert_as_solved(other, e.module, y, motion, few, u)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @by_module
 def test_columns_are_one_by_one(dimensions: int, seed: int, route: str) -> None:
     """Many states at once, inputs for each or for all: what each state gives alone."""

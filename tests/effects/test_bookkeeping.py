@@ -37,7 +37,7 @@ def moments(made: Engine, count: int) -> list[tuple[np.ndarray, float, dict[str,
     ]
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("case", TRIED, ids=lambda case: case.name)
 def test_kinetic_energy_grows_by_the_power_of_effects(case: Case) -> None:
     """dT/dt = Σ power, with the powers that the module itself gives in doubles."""
@@ -55,7 +55,7 @@ def test_kinetic_energy_grows_by_the_power_of_effects(case: Case) -> None:
     assert moved < EXACT if idle else moved > 1e-3
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("case", TRIED, ids=lambda case: case.name)
 def test_potential_energy_is_given_back(case: Case) -> None:
     """-dU/dt is the power of an effect that loses nothing, and U is 0 of one that stores nothing;

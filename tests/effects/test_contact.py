@@ -412,7 +412,7 @@ def wrench(dynamics: Dynamics, loads: tuple[Load | JointLoad, ...]) -> np.ndarra
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("geometry", GEOMETRY)
 @pytest.mark.parametrize("law", [SPRING, HERTZ, (*HUNT, *RUB)])
-@pytest.mark.every(7)
+@pytest.mark.every(14)
 def test_the_change_of_energy_is_the_power_of_the_contacts(
     law: tuple[str, ...], geometry: str, dimensions: int
 ) -> None:

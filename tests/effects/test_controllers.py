@@ -266,7 +266,7 @@ def test_numbers_are_parameters() -> None:
     assert all(f"hold_{name}" in module.PARAMETERS for name in names)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("tangents", [False, True])
 @pytest.mark.parametrize("name", SCENES)
 def test_jacobian(name: str, tangents: bool) -> None:

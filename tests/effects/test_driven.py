@@ -32,7 +32,7 @@ FEW = [(PLANE, 3), (PLANE, 38), (SPACE, 11), (SPACE, 14), (SPACE, 47)]
 ROUTES = ("aba", "ldl")
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(8)
 @pytest.mark.parametrize(("dimensions", "seed"), TREES)
 def test_as_the_judge_has_it(dimensions: int, seed: int) -> None:
     """Accelerations by both routes and in both kinds of axes, driving forces, joint forces."""
@@ -223,6 +223,7 @@ def test_many_states_at_many_times(dimensions: int, seed: int) -> None:
 # Derivatives of formulas.
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_rates_of_formulas(function: str) -> None:
     """Every function's derivatives by time, against differences of its value."""

@@ -129,6 +129,7 @@ def test_a_vortex_spins_up(dimensions: int) -> None:
     assert np.ptp(np.hypot(x, y)) > 1.0  # the body goes far, and L does not mind
 
 
+@pytest.mark.every(2)
 @both_dimensions
 @pytest.mark.parametrize("kind", ["joint_spring", "spring", "motor", "field"])
 def test_duffing_in_elliptic_functions(kind: str, dimensions: int) -> None:

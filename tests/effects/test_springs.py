@@ -479,6 +479,7 @@ def central(found: Engine, y: np.ndarray) -> np.ndarray:
     return np.array(columns).T
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_jacobians_are_those_of_central_differences(kind: str) -> None:
     """At random states."""
@@ -557,6 +558,7 @@ def test_the_energy_of_points_that_meet_has_the_force_for_a_slope() -> None:
 # Only what is there.
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_absence_is_free(kind: str) -> None:
     """Without the effect the module is that of a scene that never had it."""

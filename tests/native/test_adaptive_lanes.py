@@ -143,6 +143,7 @@ def test_a_sweep_in_lanes_is_that_of_single_runs() -> None:
         assert np.allclose(a, b, rtol=1e-9, atol=1e-9, equal_nan=True), name
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 def test_default_tolerances_are_those_of_a_single_run(
     scene: str, monkeypatch: pytest.MonkeyPatch

@@ -28,6 +28,7 @@ def test_the_bits_are_those_of_python(scene: str, method: str) -> None:
     assert compiled.trajectory.counts["steps"] == 1501 or not compiled.finished
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", METHODS)
 def test_parameters_and_inputs_count(method: str) -> None:
     options = {"parameters": {"m_A": 1.7}, "inputs": {"tau": 0.3}, "t_end": 0.5, "dt": 1e-3}
@@ -43,10 +44,10 @@ def test_parameters_and_inputs_count(method: str) -> None:
 def test_a_run_goes_on_in_either(method: str) -> None:
     """What one has begun the other continues, also from the middle of a step of the whole run."""
     options: dict[str, Any] = {"integrator": method, "dt": 1e-3}
-    whole = eomgen.simulate("two_body", t_end=4.0, backend="numpy", **options)
+    whole = eomgen.simulate("two_body", t_end=1.2, backend="numpy", **options)
     for first, second in (("c", "numpy"), ("numpy", "c"), ("c", "c")):
-        begun = eomgen.simulate("two_body", t_end=1.9995, backend=first, **options)
-        run = eomgen.simulate("two_body", t_end=4.0, resume=begun, backend=second, **options)
+        begun = eomgen.simulate("two_body", t_end=0.5995, backend=first, **options)
+        run = eomgen.simulate("two_body", t_end=1.2, resume=begun, backend=second, **options)
         assert run.y[-1].tobytes() == whole.y[-1].tobytes()
 
 
@@ -99,6 +100,7 @@ def test_steps_that_jump_are_checked_alike(
     assert looks[0] or not runs[0].finished
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", METHODS)
 def test_what_fails_fails_alike(method: str) -> None:
     compiled, python = both(FALL, t_end=5.0, integrator=method, dt=1e-3, unstable=True)
@@ -106,6 +108,7 @@ def test_what_fails_fails_alike(method: str) -> None:
     assert_same(compiled, python)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", METHODS)
 def test_time_counts(method: str) -> None:
     """A force that depends on time, at each node of a step."""

@@ -132,7 +132,7 @@ def test_the_bits_are_those_of_python(scene: str, rtol: float, made: list[int]) 
 def test_stops_and_pulses_are_seen(scene: str, share: float, made: list[int]) -> None:
     """Wherever they lie, at loose and tight tolerances. Most steps are made in C."""
     random, steps, cut = np.random.default_rng(3), 0, 0
-    for _ in range(150 if FULL else 5):
+    for _ in range(150 if FULL else 3):
         given = {
             "a": random.uniform(0.0, 3.0),
             "w": 10 ** random.uniform(-5, -1),
@@ -190,6 +190,7 @@ def test_a_run_goes_on_in_either(scene: str) -> None:
             assert run.y[-1].tobytes() == whole.y[-1].tobytes()
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", [WHEEL, HELD, *some((), built_in_names())])
 def test_works_are_the_same(scene: str, made: list[int]) -> None:
     """They need states within steps. Powers are computed in C, too."""
@@ -225,6 +226,7 @@ def test_aims_are_met_by_the_same_runs() -> None:
     assert_same(compiled, python)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("scene", "fault"),
     [

@@ -163,7 +163,7 @@ def test_aims_are_met_by_the_same_runs() -> None:
     assert_same(compiled, python)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("method", GAUSS)
 @pytest.mark.parametrize(
     "scene", some((STIFF, "spinning_top", "pendulum"), (STIFF, *built_in_names()))
@@ -198,7 +198,7 @@ def test_equal_steps_fail_alike(method: str) -> None:
         assert_same(compiled, python)
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(8)
 @pytest.mark.parametrize("scene", [PLANE, FALL, "pendulum"])
 @pytest.mark.parametrize("unstable", [False, True])
 @pytest.mark.parametrize("method", ["leapfrog", "leapfrog_4", "leapfrog_6"])

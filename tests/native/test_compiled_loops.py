@@ -87,6 +87,7 @@ def assert_all_same(compiled: Any, python: Any) -> None:
     assert compiled.trajectory.violations == python.trajectory.violations
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("scene", "options"),
     [

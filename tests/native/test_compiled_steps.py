@@ -64,6 +64,7 @@ def assert_same(compiled: Run, python: Run) -> None:
         assert value.tobytes() == theirs.resume[name].tobytes(), name
 
 
+@pytest.mark.every(2)
 @compiler
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("rtol", [1e-3, 1e-11])

@@ -234,6 +234,7 @@ def test_a_lane_has_the_same_bits_at_every_width_and_beside_any_others(scene: st
             )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", FEW)
 def test_runs_are_those_of_a_plain_loop(scene: str) -> None:
     """Of the classical Runge-Kutta method over the Python module; the last step is shorter."""
@@ -315,6 +316,7 @@ UNSTABLE = ("light_cart_pole",)
 """Scenes with motions that are too fast for the steps of the next test."""
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     "scene", some(FEW, [n for n in built_in_names() if n not in (*LARGE[1:], *UNSTABLE)])
 )

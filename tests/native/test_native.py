@@ -85,7 +85,7 @@ def same(one: Any, other: Any) -> bool:
     return a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("scene", some(SOME, built_in_names()))
 def test_the_bits_are_those_of_the_python_module(scene: str) -> None:
     """Of every output that takes time and state alone; of single states and of columns."""
@@ -232,6 +232,7 @@ HELD = [
 ]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("scene", "name", "calls"),
     [

@@ -64,7 +64,7 @@ def module(scene: str):
     return load_module(compile_scene(parse_scene(scene)))
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("method", ADAPTIVE)
 @pytest.mark.parametrize("shape", PULSES)
 def test_pulses_are_found(shape: str, method: str) -> None:

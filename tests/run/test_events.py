@@ -169,7 +169,7 @@ def test_energy_after_bounces():
 
 
 @pytest.mark.parametrize("name", GENERAL)
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_every_integrator_bounces_and_rests(name):
     """Euler's method, of order 1, is accurate to its step; methods that are exact for parabolas are
     accurate to rounding.
@@ -207,6 +207,7 @@ def test_bounces_are_as_exact_as_the_method():
         assert order > INTEGRATORS[name].order - 0.35, (name, errors)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("margin", [-1e-6, 0.0, 1e-6])
 @pytest.mark.parametrize("name", ["DOP853", "rk4", "Radau"])
 def test_grazing(name, margin):
@@ -514,7 +515,7 @@ def test_works_follow_the_order_of_the_method():
 
 
 @pytest.mark.parametrize("name", A_FEW)
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_every_integrator_books_works(name):
     problem, powers = airy()
     order = getattr(INTEGRATORS[name], "order", 4)

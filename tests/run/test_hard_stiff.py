@@ -100,6 +100,7 @@ def stopped(run: Trajectory) -> float:
     return float(found[1])
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("method", EXPLICIT)
 def test_too_long_a_step_is_refused(scene: str, method: str) -> None:

@@ -133,7 +133,7 @@ def test_infinite_at_the_start(
         ("1/max(0.9 - x, 0)", 0.5, 2.0, 0.84, 0.95),
     ],
 )
-@pytest.mark.every(6)
+@pytest.mark.every(12)
 def test_undefined_on_the_way(
     formula: str, x: float, v: float, low: float, high: float, integrator: str
 ) -> None:

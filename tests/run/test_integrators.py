@@ -201,6 +201,7 @@ def test_the_jacobian_reaches_lsoda():
 # --- invariants ---------------------------------------------------------------------------------
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", [*GAUSS, *LEAPFROGS])
 def test_symmetric_methods_run_backwards(name):
     change = INTEGRATORS[name].prepare(PENDULUM)
@@ -236,6 +237,7 @@ def growth(name):
     return np.linalg.det([by_angle, by_rate]) / (12 * e) ** 2 - 1
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["semi_implicit_euler", *LEAPFROGS, *GAUSS])
 def test_symplectic_steps_keep_areas(name):
     assert abs(growth(name)) < 1e-11

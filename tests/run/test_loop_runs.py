@@ -247,7 +247,7 @@ PARALLELOGRAM = (0.5, 0.7, 0.5, 0.7)
 SETTINGS: tuple[dict[str, Any], ...] = ({"integrator": "DOP853"}, {"integrator": "rk4", "dt": 0.01})
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("route", ["independent", "aba", "orthogonal"])
 @pytest.mark.parametrize("settings", [*SETTINGS, {"integrator": "leapfrog", "dt": 0.005}])
 def test_change_points_are_passed(route: str, settings: dict[str, Any]) -> None:

@@ -56,6 +56,7 @@ def test_left_alone_it_leaves_the_sphere() -> None:
     assert off_unit(asked, alone.y) > 1e-11
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_rows_of_adaptive_methods_are_unit(scene: str, method: str) -> None:

@@ -74,6 +74,7 @@ def motion(name: str) -> np.ndarray:
     return np.moveaxis(np.asarray(module.body_poses(run.t, run.y)), -1, 0)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", POSED)
 def test_bodies_are_in_the_picture_and_fill_it(name: str) -> None:
     """Scenes whose modules are committed."""

@@ -60,6 +60,7 @@ def both_runs(name: str, method: str, dt: float, seconds: float) -> tuple[Any, A
     return found, integrate(problem, method, seconds, dt=dt, unstable=True)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", EXPLICIT)
 @pytest.mark.parametrize("name", some(["bouncing_two_body", "four_bar"], built_in_names()))
 def test_the_same_bits(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -220,7 +220,7 @@ def resolved(data: Any, values: list[float]) -> Any:
     return [resolved(part, values) for part in data] if isinstance(data, list) else data
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(8)
 @pytest.mark.parametrize("name", [*built_in_names(), *UNTUNED], ids=str)
 def test_data_with_its_geometry_is_the_picture(name: str | Path) -> None:
     """At other values of the parameters than those of the scene, and it is plain JSON."""

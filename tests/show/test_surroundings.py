@@ -167,6 +167,7 @@ def cross_sum(count: int) -> np.ndarray:
     return np.eye(count) - np.roll(np.eye(count), 2, axis=0)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_energy_is_kept_where_effects_give_it_back(case: Case) -> None:
     """`test_bookkeeping` measures that these effects give back what they take, and that others have
