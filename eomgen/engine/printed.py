@@ -9,6 +9,7 @@ from eomgen.engine import (
     complementarity,
     contact_times,
     contacts,
+    differences,
     elimination,
     equal_steps,
     explicit,
@@ -27,28 +28,39 @@ from eomgen.subset.expander import Text
 from eomgen.subset.languages import JAVASCRIPT, C, Language
 from eomgen.subset.unrolled import unrolled_functions
 
-Roots = Iterable[tuple[str, Mapping[str, Any]]]
-"""Functions of the engine, each with the values of its `Known` parameters."""
+Root = tuple[str, Mapping[str, Any]]
+"""A function of the engine, with the values of its `Known` parameters."""
+Roots = Iterable[Root]
 CONTACTS: Roots = [
     (name, {}) for name in "begin deepest press strike release settle closing opening".split()
 ]
 """What is called for rigid contacts."""
-ON_PAGES: tuple[tuple[str, Mapping[str, Any]], ...] = (
-    ("runge_kutta", {"method": explicit.EULER}),
-    ("runge_kutta", {"method": explicit.RUNGE_KUTTA_4}),
-    ("semi_implicit_euler", {}),
-    ("leapfrog", {}),
-    ("composed", {"of": explicit.LEAPFROG_4}),
-    ("composed", {"of": explicit.LEAPFROG_6}),
+EQUAL: Mapping[str, Root] = {
+    "euler": ("runge_kutta", {"method": explicit.EULER}),
+    "semi_implicit_euler": ("semi_implicit_euler", {}),
+    "leapfrog": ("leapfrog", {}),
+    "leapfrog_4": ("composed", {"of": explicit.LEAPFROG_4}),
+    "leapfrog_6": ("composed", {"of": explicit.LEAPFROG_6}),
+    "rk4": ("runge_kutta", {"method": explicit.RUNGE_KUTTA_4}),
+    "implicit_midpoint": ("implicit_change", {"method": implicit.IMPLICIT_MIDPOINT}),
+    "gauss_4": ("implicit_change", {"method": implicit.GAUSS_4}),
+    "gauss_6": ("implicit_change", {"method": implicit.GAUSS_6}),
+}
+"""What makes a step of given length, by the names of methods."""
+METHODS: Mapping[str, Root] = {
+    **EQUAL,
+    "DOP853": ("made", {"method": DOP853}),
+    "Rodas5P": ("rodas_step", {}),
+}
+"""What makes a step, by the names of all methods of the engine."""
+ON_PAGES: tuple[Root, ...] = (
+    *EQUAL.values(),
     ("constant_rates", {}),
     ("add_compensated", {}),
     ("normalised", {}),
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
-    ("implicit_change", {"method": implicit.IMPLICIT_MIDPOINT}),
-    ("implicit_change", {"method": implicit.GAUSS_4}),
-    ("implicit_change", {"method": implicit.GAUSS_6}),
     ("moved_onto", {}),
     *CONTACTS,
 )
@@ -66,7 +78,7 @@ CODES = {
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    steps = (adaptive, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
+    steps = (adaptive, differences, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
     solved = (elimination, least_squares, complementarity, roots)
     return Text.of(*steps, *solved, contacts, contact_times, projection, system)
 

@@ -5,17 +5,14 @@ Its tolerances are relative to the size of the mechanism, `Contacts.sizes`: `in_
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.engine.contacts import Touching, deepest, press
+from eomgen.engine.differences import differences
 from eomgen.run.failure import StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
-
-_CUBE_ROOT = np.finfo(float).eps ** (1 / 3)
-
 
 Rate = Callable[[float, FloatArray], FloatArray]
 """A function of time and state, such as the derivative."""
@@ -111,19 +108,17 @@ def restrained(
     """
     if holding is None:
         return problem
-    derivative = counted(holding.derivative)
-    sizes = np.array(problem.sizes or (1.0,))
-    jacobian = partial(_differences, derivative, sizes)
-    return replace(
-        problem, derivative=derivative, jacobian=jacobian, timed=True, compiled=None, series={}
+    made = replace(
+        problem, derivative=counted(holding.derivative), timed=True, compiled=None, series={}
     )
+    sizes = np.array(problem.sizes or np.ones(len(problem.states)))
 
+    def jacobian(t: float, y: FloatArray) -> FloatArray:
+        found = np.empty((len(y), len(y)))
+        differences(made, sizes, t, y, found)
+        return found
 
-def _differences(derivative: Rate, sizes: FloatArray, t: float, y: FloatArray) -> FloatArray:
-    """The Jacobian (ny, ny) of a derivative by central differences; `sizes` of the states."""
-    steps = _CUBE_ROOT * np.maximum(sizes, np.abs(y))
-    columns = [derivative(t, y + change) - derivative(t, y - change) for change in np.diag(steps)]
-    return np.column_stack(columns) / (2 * steps)
+    return replace(made, jacobian=jacobian)
 
 
 def check_depth(contacts: Contacts, t: float, y: FloatArray) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from languages import NONE, Given, results
 
-from eomgen.engine import elimination, few, implicit, projection, rosenbrock, system
+from eomgen.engine import differences, elimination, few, implicit, projection, rosenbrock, system
 from eomgen.engine.implicit import (
     GAUSS_4,
     GAUSS_6,
@@ -19,7 +19,7 @@ from eomgen.engine.rodas_5p_coefficients import GAMMA
 from eomgen.engine.rosenbrock import MANY_SUMS, Rodas
 from eomgen.subset.expander import Text
 
-TEXT = Text.of(elimination, implicit, projection, rosenbrock, system)
+TEXT = Text.of(differences, elimination, implicit, projection, rosenbrock, system)
 SEEDED = np.random.default_rng(1)
 
 
@@ -191,6 +191,16 @@ const system = {
 };
 """,
 )
+
+
+def test_differences() -> None:
+    """The Jacobian of held contacts: to the bit, and near the exact one."""
+    starts = SEEDED.normal(size=(3, 4))
+    sizes = np.array([1.0, 0.1, 0.0, 3.0])
+    same("differences", [[SYSTEM, sizes, 0.1, y, np.zeros((4, 4))] for y in starts], SYSTEM)
+    found = np.zeros((4, 4))
+    differences.differences(SYSTEM.python, sizes, 0.1, starts[0], found)
+    np.testing.assert_allclose(found, SYSTEM.python.jacobian(0.1, starts[0]), atol=1e-9)
 
 
 def test_projection() -> None:
