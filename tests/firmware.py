@@ -23,14 +23,16 @@ real seen(real x, int quarter) { return quarter ? cos_(x) : sin_(x); }
 class Firmware:
     """The functions of a scene's firmware, over arrays of its own type of numbers."""
 
-    def __init__(self, scene: str, number: Number, integrator: str = "") -> None:
+    def __init__(self, scene: str, number: Number, integrator: str = "", *flags: str) -> None:
         with tempfile.TemporaryDirectory() as folder:
             paths = eomgen.export(scene, "firmware", folder, number=number, integrator=integrator)
             sources = {path.name: path.read_text("utf-8") for path in paths}
         self.name, self.type = Path(paths[0]).stem, TYPES[number]
         self.sources = sources
         main = f'#include "{self.name}.c"\n{SEEN}'
-        built = find_compiler().shared_library({**sources, "main.c": main}, "main.c", "-O2")
+        own = [flag.replace("LIBM", f"{self.name.upper()}_LIBM") for flag in flags]
+        files = {**sources, "main.c": main}
+        built = find_compiler().shared_library(files, "main.c", "-O1", *own)
         with tempfile.NamedTemporaryFile(suffix=".so") as file:
             file.write(built)
             file.flush()
@@ -64,11 +66,11 @@ class Firmware:
         self.call("derivative", t, y, self.k, u, out)
         return out
 
-    def stepped(self, y: Any, u: Any, dt: float, count: int) -> np.ndarray:
-        """The state after some steps."""
+    def stepped(self, y: Any, u: Any, dt: float, count: int, first: int = 0) -> np.ndarray:
+        """The state after some steps, of which the first has this number."""
         y, u = self.array(y), self.array([*u, 0.0])
-        for i in range(count):
-            self.call("step", i * dt, dt, y, self.k, u)
+        for i in range(first, first + count):
+            assert self.call("step", i * dt, dt, y, self.k, u) == 1
         return y
 
     def circular(self, x: np.ndarray, quarter: int) -> np.ndarray:

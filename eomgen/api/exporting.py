@@ -36,7 +36,7 @@ def export(
     route    to the equations; None: the scene's own
     outputs  functions beside those that the format needs; None: the scene's own
     number   type of numbers in C, "double" or "float", where the format has a choice
-    integrator  explicit method with equal steps, where the format makes steps; "" for its own
+    integrator  method of steps, of those that compiled code has; "" for the format's own
     force    also overwrite files that this program did not write
 
     Raises `SceneError` or `RunError` if the scene has something that the format cannot hold, or a

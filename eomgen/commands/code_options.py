@@ -67,7 +67,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         )
     parser.add_argument("--float", action="store_true", help="numbers in C are float, not double")
     parser.add_argument(
-        "--integrator", metavar="NAME", default="", help="an explicit method with equal steps"
+        "--integrator", metavar="NAME", default="", help="method of steps (DOP853; rk4)"
     )
     parser.add_argument(
         "-o",

@@ -4,14 +4,21 @@ Sines and cosines are polynomials of the source itself, so that most scenes need
 library; numbers are `double` or `float`.
 """
 
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.engine import implicit, printed, projection
 from eomgen.errors import SceneError
-from eomgen.exports import Options, Written, explicit_steps
+from eomgen.exports import Number, Options, Written
+from eomgen.exports.steps import method_of, size_of, start_of, step_of
 from eomgen.integrators import INTEGRATORS
 from eomgen.model.model import Model
 from eomgen.program.ordering import ordered
 from eomgen.store import interfaced_program_of
+from eomgen.subset.expander import Text
 from eomgen.subset.languages import REALS
 from eomgen.templating import render
 
@@ -44,6 +51,25 @@ FARTHEST = {"double": "1e6", "float": "4e4"}
 ERRORS = {"double": "2.3e-16", "float": "1.2e-7"}
 """Greatest errors of sine and cosine, as `tests/exports/test_firmware.py` measures them."""
 
+LIMITS = {
+    "": "no variables beside those of the caller, no loop whose length depends on data",
+    "closes": "no variables beside those of the caller; there are at most "
+    f"{projection.MOST} steps towards constraints",
+    "solves": "iterations of a step are at most "
+    f"{implicit.MAX_ITERATIONS}; it works in memory of its own, so one is made at a time",
+}
+"""What holds of explicit steps, of those with loops, and of implicit ones."""
+IN_FLOAT = {
+    "ROUNDOFF": 4 * 2.0**-23,
+    "NOISE": 1e-4,
+    "NOTHING": 1e-5,
+    "MET": 2.0**-22,
+    "CLOSE": 1e-4,
+    "SHORTEST": 1e-15,
+    "LONGEST": 1e15,
+}
+"""Constants of the engine, for numbers of 24 bits."""
+
 
 def files(model: Model, options: Options) -> Written:
     """The source, its header, and an example. Raises `SceneError` for a scene without states."""
@@ -51,12 +77,16 @@ def files(model: Model, options: Options) -> Written:
     if not interface.states:
         raise SceneError("firmware: the scene has no states, so there is nothing to step")
     values = c.context(ordered(program), interface)
-    name, number, method = interface.name, options.number, options.integrator or METHOD
-    called = [(f, name) for f, name in values["functions"] if f not in (*CIRCULAR, "abs")]
+    name, number = interface.name, options.number
+    method = method_of(options.integrator or METHOD, model, interface)
+    size = size_of(interface, start_of(program, interface))
+    step = step_of(method, interface, size, REALS, _text(number))
+    called = {f: name for f, name in values["functions"] if f not in (*CIRCULAR, "abs")}
+    called |= {"sqrt": "sqrt"} if "sqrt_(" in step or method.needed else {}
     circular = [f for f in CIRCULAR if f in {f for f, _ in values["functions"]}]
     source = {
         **{key: value for key, value in values.items() if key != "functions"},
-        "library": called,
+        "library": called.items(),
         "functions": circular,
         "suffix": "f" if number == "float" else "",
         "states": len(interface.states),
@@ -65,17 +95,15 @@ def files(model: Model, options: Options) -> Written:
         "thirds": THIRDS[number],
         "farthest": FARTHEST[number],
         "sine_error": ERRORS[number],
-        "quaternions": interface.quaternions,
-        "constrained": interface.projected,
-        "coordinates": interface.coordinates,
-        "velocities": interface.velocities,
-        **explicit_steps.context(method, model, interface, REALS),
+        "step": step,
+        "solves": bool(method.needed),
     }
     header = {
         **c.header(values, interface),
         "real": number,
         "functions": circular,
-        "method": INTEGRATORS[method].about,
+        "method": INTEGRATORS[method.name].about,
+        "limits": LIMITS["solves" if method.needed else "closes" if interface.projected else ""],
     }
     example = {
         "scene": name,
@@ -95,6 +123,18 @@ def files(model: Model, options: Options) -> Written:
         },
         _remarks(interface),
     )
+
+
+def _text(number: Number) -> Text:
+    """The engine's text for numbers of this type."""
+    text = printed.text()
+    if number == "double":
+        return text
+    constants: dict[str, Mapping[str, Any]] = {
+        name: {**each, **{key: x for key, x in IN_FLOAT.items() if key in each}}
+        for name, each in text.constants.items()
+    }
+    return replace(text, constants=constants)
 
 
 def _remarks(interface: Interface) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 The specification: "Functional Mock-up Interface Specification", version 3.0, Modelica Association,
 2022. What a unit does is in `templates/fmu`: its continuous states are those of the model, steps of
-co-simulation are made by DOP853, and rigid contacts follow the rules of `run.contacts`.
+co-simulation are those of the engine, and rigid contacts follow the rules of `run.contacts`.
 """
 
 import io
@@ -13,18 +13,20 @@ from collections.abc import Mapping
 
 from eomgen.errors import RunError
 from eomgen.exports import Options, Written
-from eomgen.exports.explicit_steps import context
 from eomgen.exports.fmu_description import description_files
 from eomgen.exports.fmu_source import MAIN, sources_of
 from eomgen.exports.fmu_unit import unit_of
+from eomgen.exports.steps import method_of
 from eomgen.model.model import Model
 from eomgen.native.compiler import find_compiler, suffix
 from eomgen.scene.schema import Simulation
-from eomgen.subset.languages import C
+from eomgen.store import interfaced_program_of
 
 SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows"}
 PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
 FLAGS = ("-O2", "-fvisibility=hidden")
+METHOD = "DOP853"
+"""The method of steps of co-simulation, if no other one is wanted."""
 DATE = (1980, 1, 1, 0, 0, 0)
 """The date of all files in the archive: the same scene gives the same bytes."""
 
@@ -35,10 +37,9 @@ def files(model: Model, options: Options) -> Written:
     Raises `SceneError` for another state form than [q, v], `RunError` if there is no derivative at
     the initial state.
     """
-    unit = unit_of(model, options.simulation or Simulation())
-    method = None
-    if options.integrator not in ("", "DOP853"):
-        method = context(options.integrator, model, unit.interface, C, "add_compensated")
+    name = options.integrator or METHOD
+    method = method_of(name, model, interfaced_program_of(model)[1], adaptive=True)
+    unit = unit_of(model, options.simulation or Simulation(), method.needed)
     sources, token = sources_of(unit, method)
     binary, remark = _binary(model.name, sources)
     content: dict[str, str | bytes] = {

@@ -1,13 +1,18 @@
 """The C sources of a unit for co-simulation."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from eomgen.codegen.backends import c
-from eomgen.engine import contacts, projection
+from eomgen.engine import contacts
 from eomgen.engine.embedded import DOP853
-from eomgen.engine.printed import CONTACTS, Roots, c_source
+from eomgen.engine.printed import CONTACTS, Root, text
+from eomgen.engine.rosenbrock import MANY_SUMS
 from eomgen.exports.fmu_unit import Observed, Unit
+from eomgen.exports.steps import Method, leading, step_of
+from eomgen.native.functions import restricted
+from eomgen.program.ordering import ordered
+from eomgen.program.tape import TIME
 from eomgen.run import events
 from eomgen.subset.languages import C
 from eomgen.templating import render, templates_folder
@@ -21,23 +26,21 @@ RTOL = 1e-10
 """Relative tolerance of steps of co-simulation, if the importer gives none."""
 
 
-def sources_of(
-    unit: Unit, method: Mapping[str, object] | None = None
-) -> tuple[Mapping[str, str], str]:
-    """The sources of a unit by name, and its instantiation token, which is a digest of them. A
-    `method` of `explicit_steps.context` makes steps of equal length.
+def sources_of(unit: Unit, method: Method) -> tuple[Mapping[str, str], str]:
+    """The sources of a unit by name, whose steps a method makes, and its instantiation token, which
+    is a digest of them.
     """
     folder = templates_folder() / "fmu" / "vendor" / "fmi3"
     others = {
         **c.files(unit.program, unit.interface),
         **{name: (folder / name).read_text("utf-8") for name in HEADERS},
     }
-    digest = hashlib.sha256("".join((_main(unit, "", method or {}), *others.values())).encode())
+    digest = hashlib.sha256("".join((_main(unit, "", method), *others.values())).encode())
     token = f"{{{digest.hexdigest()[:32]}}}"
-    return {MAIN: _main(unit, token, method or {}), **others}, token
+    return {MAIN: _main(unit, token, method), **others}, token
 
 
-def _main(unit: Unit, token: str, method: Mapping[str, object]) -> str:
+def _main(unit: Unit, token: str, method: Method) -> str:
     interface = unit.interface
     held = c.context(unit.program, interface)["held"]
     context = {
@@ -56,28 +59,47 @@ def _main(unit: Unit, token: str, method: Mapping[str, object]) -> str:
         "input_starts": [repr(i.default) for i in interface.inputs],
         "rtol": repr(RTOL),
         "span": repr(unit.simulation.t_end),
-        "quaternions": interface.quaternions,
         "observed": list(_observed(unit.outputs, 0)),
         "switching": [(n, s) for n, s, _, _ in _observed(unit.switches, len(interface.contacts))],
-        **_closure(unit),
-        **_contacts(unit),
+        **_contacts(unit, method),
+        "rows": unit.interface.projected,
+        "drift": repr(DRIFT),
+        "step": step_of(method, interface, unit.size, C, text(), _more(unit, method)),
+        "method": method.name,
+        "adapts": method.adapts,
+        "solves": bool(method.needed),
         "dt": repr(unit.simulation.dt),
-        "steps": c_source(_steps(unit)),
-        "explicit_step": "",
-        "positions": 0,
-        **method,
         "slopes": len(DOP853.nodes),
+        "last": DOP853.last,
+        "sums": MANY_SUMS,
+        "leading": leading(interface),
+        "timed": _timed(unit),
     }
     return render("fmu", "unit.c.jinja", context)
 
 
-def _steps(unit: Unit) -> Roots:
-    """What of the engine's text steps are made with: states within steps only where events are."""
-    method = {"method": DOP853}
-    roots: Roots = (("first_length", {}), ("made", method))
-    if unit.switches or unit.interface.contacts:
-        roots = (*roots, ("interpolate", method), ("within", {}))
-    return roots
+def _more(unit: Unit, method: Method) -> Iterator[Root]:
+    """What is called of the engine beside steps: states within them only where events are."""
+    contacts = unit.interface.contacts
+    yield ("first_length" if method.adapts else "add_compensated"), {}
+    if method.adapts and (unit.switches or contacts):
+        if method.needed:
+            yield "rodas_within", {}
+        else:
+            yield "interpolate", {"method": DOP853}
+            yield "within", {}
+    if contacts:
+        yield from CONTACTS
+        if method.needed:
+            yield "differences", {}
+
+
+def _timed(unit: Unit) -> str:
+    """C that tells whether the derivative depends on time."""
+    program, _ = restricted(unit.program, unit.interface, ("derivative",))
+    if any(step.value == TIME for step in ordered(program).steps if step.operation == "input"):
+        return "1"
+    return "any_held(&f->now)" if unit.interface.contacts else "0"
 
 
 def _observed(parts: Sequence[Observed], start: int) -> list[tuple[str, int, int, Sequence[int]]]:
@@ -89,22 +111,7 @@ def _observed(parts: Sequence[Observed], start: int) -> list[tuple[str, int, int
     return found
 
 
-def _closure(unit: Unit) -> dict[str, object]:
-    interface = unit.interface
-    rows = interface.constraints if interface.projected else ()
-    return {
-        "rows": len(rows),
-        "row_sizes": [repr(unit.size if force == "N" else 1.0) for _, force in rows],
-        "coordinates": interface.coordinates,
-        "velocities": interface.velocities,
-        "projection": c_source([("moved_onto", {})]),
-        "on_constraints": projection.PROJECTED,
-        "far": projection.FAR,
-        "drift": repr(DRIFT),
-    }
-
-
-def _contacts(unit: Unit) -> dict[str, object]:
+def _contacts(unit: Unit, method: Method) -> dict[str, object]:
     held, rest = unit.function("held"), unit.simulation.rest_speed
     sizes = [unit.size if contact.unit == "m" else 1.0 for contact in unit.interface.contacts]
     return {
@@ -116,7 +123,6 @@ def _contacts(unit: Unit) -> dict[str, object]:
         "struck": contacts.STRUCK,
         "endless": contacts.ENDLESS,
         "no_forces": contacts.NO_FORCES,
-        "share": repr(events.GAP_CHECKS[1]),
-        "engine": c_source(CONTACTS),
+        "share": repr(events.GAP_CHECKS[1] if method.adapts else 1.0),
         "most_events": events.MOST_EVENTS,
     }

@@ -1,7 +1,7 @@
 """What a unit for co-simulation is made of: its program, variables, sizes and start values."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,13 +10,14 @@ import numpy as np
 from eomgen.codegen.interface import Function, Interface, Variable
 from eomgen.errors import RunError, SceneError
 from eomgen.exports.directions import with_directions
+from eomgen.exports.steps import size_of, start_of
 from eomgen.exports.units import rate_of
 from eomgen.model.model import Model
 from eomgen.native.functions import restricted
 from eomgen.program.program import Program, interpret
 from eomgen.program.switching import OF_STATE, OF_TIME
 from eomgen.program.tape import TIME
-from eomgen.run.sizes import mechanism_size, state_sizes
+from eomgen.run.sizes import state_sizes
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Simulation
 from eomgen.store import interfaced_program_of
@@ -96,17 +97,17 @@ class Unit:
         return next((f for f in self.interface.functions if f.name == name), None)
 
 
-def unit_of(model: Model, simulation: Simulation) -> Unit:
-    """The unit of a model. Raises `SceneError` for another state form than [q, v], `RunError` if
-    there is no derivative at the initial state.
+def unit_of(model: Model, simulation: Simulation, needed: Sequence[str] = ()) -> Unit:
+    """The unit of a model, with functions that are `needed`, too. Raises `SceneError` for another
+    state form than [q, v], `RunError` if there is no derivative at the initial state.
     """
     if model.form != "velocity":
         raise SceneError(
             f"form: an FMU has the state [q, v], not the form '{model.form}'; leave it out"
         )
     program, interface = interfaced_program_of(replace(model, outputs=(*ENERGIES, POSES)))
-    starts = tuple(interpret(program, "initial_state", _defaults(interface), FloatScalars()))
-    names = [name for name in KERNELS if name in program.outputs]
+    starts = start_of(program, interface)
+    names = [name for name in (*KERNELS, *needed) if name in program.outputs]
     program, interface = restricted(program, interface, names)
     size, nominals = _sizes(program, interface, starts)
     outputs = (*_energies(), *_positions(interface))
@@ -137,7 +138,7 @@ def _sizes(
         slope = [math.nan]
     if not all(map(math.isfinite, slope)):
         raise RunError("the equations have no solution at the initial state; change that state")
-    size = float(mechanism_size(units, _defaults(interface), dict(first)))
+    size = size_of(interface, starts)
     sizes = state_sizes(names, units, np.array(starts), np.array(slope), size)
     return size, tuple(sizes.tolist())
 

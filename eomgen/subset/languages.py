@@ -59,8 +59,14 @@ static inline double next_after(double t) {
 """,
     typed=True,
 )
-REALS = replace(C, number="real", arrays=("real", "int64_t"), literal="R({})")
-"""C with numbers of a type `real`, for which R(x) writes constants."""
+REALS = replace(
+    C,
+    number="real",
+    arrays=("real", "int64_t"),
+    names={**C.names, "abs": "abs_", "sqrt": "sqrt_"},
+    literal="R({})",
+)
+"""C with numbers of a type `real`, for which R(x) writes constants, and `abs_` and `sqrt_`."""
 VECTORS = replace(C, number="V", arrays=("V", "int64_t"), literal="N({})")
 """C with a type V of vectors in place of numbers: text without decisions makes several at once."""
 JAVASCRIPT = Language(

@@ -8,6 +8,7 @@ import pytest
 from firmware import Firmware
 
 import eomgen
+from eomgen.engine.printed import EQUAL
 from eomgen.errors import RunError
 from eomgen.exports import Number
 from eomgen.exports.firmware import ERRORS, FARTHEST
@@ -65,14 +66,43 @@ def test_steps_keep_quaternions_and_loops(scene: str) -> None:
     np.testing.assert_allclose(made.stepped(run.y[0], inputs, 1e-3, 500), run.y[-1], atol=1e-11)
 
 
-@pytest.mark.parametrize("method", ["euler", "leapfrog", "leapfrog_6", "semi_implicit_euler"])
-def test_each_explicit_method_steps(method: str) -> None:
-    """Beside our own run of it, in double; and one that is not explicit is refused."""
-    made = Firmware("pendulum", "double", method)
-    run = eomgen.simulate("pendulum", integrator=method, dt=1e-3, t_end=0.5, samples=2)
-    np.testing.assert_allclose(made.stepped(run.y[0], [], 1e-3, 500), run.y[-1], atol=1e-11)
-    with pytest.raises(RunError, match="rk4"):
-        Firmware("double_pendulum", "float", "leapfrog" if "leap" in method else "gauss_4")
+@pytest.mark.every(3)
+@pytest.mark.parametrize("method", EQUAL)
+def test_each_method_with_equal_steps(method: str) -> None:
+    """Beside our own run of it, in double and in float; and each step has the bits of `stepper`
+    where that makes such.
+    """
+    own = "pendulum" if "leapfrog" in method else "tumbling_body"
+    made = {number: Firmware(own, number, method) for number in LIMITS}
+    run = eomgen.simulate(own, integrator=method, dt=1e-3, t_end=0.2, samples=2, backend="numpy")
+    for number, firmware in made.items():
+        found = firmware.stepped(run.y[0], [], 1e-3, 200)
+        np.testing.assert_allclose(found, run.y[-1], atol=1e2 * LIMITS[number])
+    with pytest.raises(RunError, match=r"DOP853.* makes no steps of exported code.*gauss_6"):
+        Firmware("pendulum", "float", "DOP853")
+
+
+@pytest.mark.parametrize(("scene", "method"), [("four_bar", "rk4"), ("pendulum", "leapfrog_4")])
+def test_a_step_is_that_of_the_stepper(scene: str, method: str) -> None:
+    """The same bits, with the sines of the library."""
+    made = Firmware(scene, "double", method, "-DLIBM")
+    step = eomgen.stepper(scene, dt=1e-3, method=method, backend="numpy")
+    y = step.initial()
+    for i in range(20):
+        after = step(y, t=i * 1e-3)
+        assert made.stepped(y, [], 1e-3, 1, i).tolist() == after.tolist()
+        y = after
+
+
+def test_a_step_that_is_not_found_leaves_the_state(tmp_path: Path) -> None:
+    """Newton's iteration does not converge in a step that is far too long; and then it goes on."""
+    made = Firmware("double_pendulum", "double", "gauss_6")
+    y = made.array([0.3, 2.0, 30.0, -40.0])
+    before = y.copy()
+    k, u = made.k, made.array([0.0, 0.0])
+    assert made.call("step", 0.0, 50.0, y, k, u) == 0
+    assert y.tolist() == before.tolist()
+    assert made.call("step", 0.0, 1e-3, y, k, u) == 1
 
 
 def test_the_example_estimates_what_is_not_measured(tmp_path: Path) -> None:
