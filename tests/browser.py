@@ -315,6 +315,23 @@ def check_keys(opened: Opened) -> None:
         assert opened.mode == ("live" if sliders else "replay")
 
 
+def check_layout(opened: Opened, run: Run) -> None:
+    """All that the page has lies in its window or its panels, plots leave no state out, and a
+    message of the page covers no scale of arrows.
+    """
+    page = opened.page
+    assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
+    names = page.locator(".plot-name").all_inner_texts()
+    assert len(run.states) > 40 or set(run.states) <= set(names), names
+    page.evaluate(
+        "for (const id of ['message', 'legend']) document.getElementById(id).hidden = false"
+    )
+    page.evaluate("tools.byId('message').textContent = 'a line '.repeat(40)")
+    page.evaluate("tools.byId('legend').innerHTML ||= '<li>1 N</li>'")
+    message, legend = (page.locator(f"#{name}").bounding_box() for name in ("message", "legend"))
+    assert message["y"] + message["height"] <= legend["y"]
+
+
 def check_phone(opened: Opened, run: Run) -> None:
     """Nothing is wider than the screen of a phone, and the bodies are in the picture."""
     width = PHONE[0]
@@ -337,6 +354,7 @@ def check_page(browser: Any, path: Path, run: Run) -> str:
         if page.page.evaluate("DATA.live"):
             slider = check_slider(page)
             check_dragging(page)
+        check_layout(page, run)
     with opened(browser, path, PHONE, has_touch=True, is_mobile=True) as page:
         check_phone(page, run)
     return f"bodies fill {part:.2f}; {slider or 'no live page'}"

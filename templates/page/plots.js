@@ -5,6 +5,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   const MOST_SAMPLES = 6000; // of a live run within the time shown
   const SPANS = [2, 5, 10, 30, 60]; // seconds of a live run that are shown
   const CURVES = 8; // colours; more curves are dashed
+  const FIRST = 6; // plots of states that a page begins with; the states of larger mechanisms are under + Plot
   const DASHES = [[], [6, 4], [2, 3]];
   const READING = 100; // ms between changes of the numbers while the picture moves
   const LEAST_PAUSE = 50; // ms between two drawings of a live run
@@ -21,10 +22,12 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     if (text !== undefined) element.textContent = text;
     return element;
   };
+  // Who says what a button shows must reach it: its name has its words.
+  const named = (text, label) => (text.length === 1 || label.toLowerCase().includes(text.toLowerCase()) ? label : `${text}: ${label}`);
   function button(text, label, act, className = "small") {
     const element = make("button", className, text);
     element.type = "button";
-    if (label) Object.assign(element, { title: label, ariaLabel: label });
+    if (label) Object.assign(element, { title: label, ariaLabel: named(text, label) });
     element.addEventListener("click", act);
     return element;
   }
@@ -45,7 +48,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   const whole = button("Whole time", "Show the whole time (0, or a double click)", () => look(null));
   bar.append(
     button("+ Plot", "Add a plot", () => choose(null)),
-    button("+ Phase portrait", "Plot a velocity against its position", () => addPlot(portrait())),
+    button("+ Phase portrait", "Plot a velocity against its position", () => seen(addPlot(portrait()))),
     spanField, whole, note,
   );
   const picker = makePicker(container, channels);
@@ -164,6 +167,11 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     return plot;
   }
 
+  function seen(plot) {
+    plot.root.scrollIntoView({ block: "nearest" });
+    return plot;
+  }
+
   // A position and its velocity which are not shown yet, if there are such.
   function portrait() {
     const { pairs } = channels;
@@ -187,7 +195,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       plot.slots.delete(key);
     } else if (!joins(plot, key)) {
       note.textContent = `${channels.get(key).label} has another unit and got a plot of its own.`;
-      addPlot({ y: [key] });
+      seen(addPlot({ y: [key] }));
       return;
     } else {
       const taken = new Set(plot.slots.values());
@@ -241,7 +249,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
       choose(key) {
         note.textContent = "";
         if (target) toggle(target, key);
-        else target = addPlot({ y: [key] });
+        else target = seen(addPlot({ y: [key] }));
       },
     });
   }
@@ -393,12 +401,16 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
     // Each plot as SVG, and the box that it is drawn in.
     drawings: () => plots.filter(({ chart }) => chart).map((plot) => ({ box: plot.box, source: vectorsOf(plot) })),
     keys: () => [...new Set(plots.flatMap(({ spec }) => [...(spec.x ? [spec.x] : []), ...spec.y]))],
-    // What to show at first: the first positions of one unit, and the energies.
+    // What to show at first: the states, in as few plots as they fit in, and the energies.
     first() {
-      const positions = channels.list.filter((c) => c.group === "States").slice(0, 40);
-      const alike = positions.filter((c) => c.unit === positions[0].unit).slice(0, 3).map((c) => c.key);
+      const shown = [];
+      for (const { key, unit } of channels.list.filter((c) => c.group === "States")) {
+        const last = shown.at(-1);
+        if (last && last.length < CURVES && new Set([unit, ...last.map((k) => channels.get(k).unit)]).size <= 2) last.push(key);
+        else shown.push([key]);
+      }
       const energies = ["kinetic_energy", "potential_energy", "energy"].filter(channels.get);
-      return [alike, energies].filter((y) => y.length).map((y) => ({ x: null, y }));
+      return [...shown.slice(0, FIRST), energies].filter((y) => y.length).map((y) => ({ x: null, y }));
     },
     // After a change of the theme, or when the panel was hidden.
     refresh() {
