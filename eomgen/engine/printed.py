@@ -21,6 +21,7 @@ from eomgen.engine import (
     rosenbrock,
     sums,
     system,
+    taylor,
 )
 from eomgen.engine.embedded import DOP853
 from eomgen.subset.braces import printed
@@ -80,7 +81,7 @@ def text() -> Text:
     """The text of the whole engine."""
     steps = (adaptive, differences, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
     solved = (elimination, least_squares, complementarity, roots)
-    return Text.of(*steps, *solved, contacts, contact_times, projection, system)
+    return Text.of(*steps, *solved, contacts, contact_times, projection, taylor, system)
 
 
 def c_source(functions: Roots, language: Language = C) -> str:

@@ -2,30 +2,31 @@
 
 import ctypes
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.engine.adaptive import AT_END, UNUSUAL, Bounds, Progress, Records
+from eomgen.engine.taylor import Room, convolved, expanded
 from eomgen.errors import RunError
-from eomgen.native.memory import address
-from eomgen.native.taylor_source import Writer
+from eomgen.loading import load_source
+from eomgen.native.memory import address, placed
 from eomgen.program.program import Program, live_steps
-from eomgen.program.series import coefficients
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 from eomgen.program.taylor import NoSeriesError, Recurrences, recurrences
+from eomgen.program.taylor_text import SeriesText, series_text
 from eomgen.run.compiled import Array, Constrained, Series, Stride, Watched
 from eomgen.run.integrators.taylor import HIGHEST, order_of
 from eomgen.run.module import given_values
-from eomgen.run.problem import USUAL_LENGTH
 from eomgen.scalars.floats import FloatScalars
+from eomgen.subset.structures import filled, structure
 from eomgen.templating import render
 
 MAIN = "taylor.c"
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-_AT_END, _UNUSUAL = 1, 2
-"""What C returns at the end of a run, and before a step that Python must make."""
 
 
 def system_of(program: Program, interface: Interface) -> Recurrences:
@@ -41,13 +42,25 @@ def system_of(program: Program, interface: Interface) -> Recurrences:
 
 def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C source of the series and the steps."""
-    low, high = USUAL_LENGTH
+    # Imported here because runs whose library is in the store do without the printer.
+    from eomgen.engine.printed import c_source
+    from eomgen.subset.braces import printed
+    from eomgen.subset.expander import Text
+    from eomgen.subset.languages import VECTORS, C
+
+    text = series_text(system_of(program, interface), [s.name for s in interface.states])
+    functions = Text()
+    functions.add(text.source)
+    by_four = replace(C, listed="*(V *)&{first} = (V){{ {entries} }};")
     context = {
-        **Writer(system_of(program, interface), [s.name for s in interface.states]).context,
-        "highest": HIGHEST,
+        "states": len(interface.states),
+        "series": text,
+        "orders": HIGHEST + 1,
+        "prelude": C.prelude,
+        "engine": c_source([("taylor_steps", {}), ("normalised", {})]),
+        "convolved": c_source([("convolved", {})], VECTORS),
+        "functions": printed(functions, [(name, {}) for name in functions.functions], by_four),
         "quaternions": interface.quaternions,
-        "shortest": repr(low),
-        "longest": repr(high),
     }
     return {MAIN: render(c.TEMPLATES, "taylor.c.jinja", context)}
 
@@ -80,33 +93,42 @@ def fixed_values(system: Recurrences, module: Any, p: Any, u: Any) -> dict[int, 
     return {i: values[i] for i in system.fixed}
 
 
+class InPython:
+    """The recurrences of a program in Python."""
+
+    sums_of_products = staticmethod(convolved)
+
+    def __init__(self, text: Any, fixed: list[float]) -> None:
+        self._first, self._next = text.first_coefficients, text.next_coefficients
+        self._fixed = fixed
+
+    def begun(self, t: float, y: Any, first: Any, rates: Any) -> None:
+        self._first(t, y, self._fixed, first, rates)
+
+    def extended(self, k: int, first: Any, *others: Any) -> None:
+        self._next(k, self._fixed, first, *others)
+
+
+def room_of(text: SeriesText, kind: Any = float) -> Room:
+    """Room for the series of a text, in numbers of a kind."""
+    shapes = (text.first,), (text.products,), *[(HIGHEST + 1, text.products)] * 2
+    return Room(*(np.zeros(shape, kind) for shape in shapes))
+
+
 def plain_series(program: Program, interface: Interface, module: Any, p: Any, u: Any) -> Series:
-    """The series of a module at given parameters and inputs, computed by Python: slow."""
+    """The series of a module at given parameters and inputs, computed by Python."""
     system = system_of(program, interface)
-    fixed, scalars = fixed_values(system, module, p, u), FloatScalars()
-    names = [state.name for state in interface.states]
+    text = series_text(system, [state.name for state in interface.states])
+    values = list(fixed_values(system, module, p, u).values())
+    of = InPython(load_source(text.source, "series"), values)
+    room = room_of(text)
 
     def series(t: float, y: Array, order: int) -> Array:
-        states = dict(zip(names, y.tolist(), strict=True))
-        return np.array(coefficients(system, fixed, t, states, order, scalars))
+        rows = np.empty((order + 1, len(y)))
+        expanded(of, t, y, order, room, rows)
+        return rows
 
     return series
-
-
-class _Settings(ctypes.Structure):
-    _fields_ = (
-        *((name, _POINTER) for name in ("k", "atol")),
-        *((name, _REAL) for name in ("rtol", "longest", "t_end")),
-        ("order", _WHOLE),
-    )
-
-
-class _Records(ctypes.Structure):
-    _fields_ = (
-        *((name, _POINTER) for name in ("ends", "lengths", "states", "losses")),
-        *((name, _POINTER) for name in ("derivatives", "sampled", "times", "rows")),
-        ("count", _WHOLE),
-    )
 
 
 class CompiledTaylor:
@@ -117,15 +139,16 @@ class CompiledTaylor:
     ) -> None:
         values = fixed_values(system_of(program, interface), module, *given)
         self._fixed, self._states = np.array([*values.values(), 0.0]), len(interface.states)
-        self._library, self._at = library, self._fixed.ctypes.data
-        library.taylor_series.argtypes = [_POINTER, _REAL, *[_POINTER] * 2]
-        library.taylor_steps.argtypes = [_POINTER, _WHOLE, _REAL, *[_POINTER] * 4]
+        self._at = self._fixed.ctypes.data
+        self._series, self._steps = library.series, library.steps
+        self._series.argtypes = [_POINTER, _REAL, _POINTER, _WHOLE, _POINTER]
+        self._steps.argtypes = [*[_POINTER] * 2, _WHOLE, *[_POINTER] * 4]
+        self._steps.restype = _WHOLE
 
     def series(self, t: float, y: Array, order: int) -> Array:
         """The Taylor coefficients (order + 1, ny) from the state y at t on."""
         rows, start = np.empty((order + 1, self._states)), np.ascontiguousarray(y)
-        settings = _Settings(self._at, None, 0.0, 0.0, 0.0, order)
-        self._library.taylor_series(ctypes.byref(settings), t, start.ctypes.data, rows.ctypes.data)
+        self._series(self._at, t, start.ctypes.data, order, rows.ctypes.data)
         return rows
 
     def steps(
@@ -150,24 +173,21 @@ class CompiledTaylor:
         """
         most = 0 if dense or watched or constrained or sizes is not None else most
         ny = self._states
-        # Numbers and counts are parts of one array each: so there are fewer to make.
-        numbers, counts = np.empty((2 + 2 * ny) * most), np.empty(2 * most, np.int64)
-        at, of_counts, n = address(numbers), address(counts), 8 * most
-        rows, made = np.empty((len(times), ny)), ctypes.c_int64()
-        records = _Records(
-            *(at, at + n, at + 2 * n, at + (2 + ny) * n, of_counts, of_counts + n),
-            *(address(times), address(rows), len(times)),
-        )
-        settings = _Settings(self._at, address(atol), rtol, longest, t_end, order_of(rtol))
+        (ends, lengths, states, losses), reals = placed([(most,)] * 2 + [(most, ny)] * 2)
+        (derivatives, sampled), wholes = placed([(most,)] * 2, np.int64)
+        rows = np.empty((len(times), ny))
+        run = structure(Bounds)(address(atol), rtol, longest, t_end, False)
+        at = filled(Progress(t))
         start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
-        why = self._library.taylor_steps(
-            *(ctypes.byref(settings), most, t, *map(address, start)),
-            *(ctypes.byref(records), ctypes.byref(made)),
+        kept = structure(Records)(
+            *(*reals[:2], *wholes, reals[2], None, reals[3], None, address(times), address(rows)),
+            *(len(times), most),
         )
-        ends, lengths = numbers[:most], numbers[most : 2 * most]
-        states, losses = numbers[2 * most :].reshape(2, most, ny)
-        derivatives, sampled = counts[:most], counts[most:]
-        n = made.value
+        why = self._steps(
+            *(self._at, ctypes.addressof(run), order_of(rtol), ctypes.addressof(at)),
+            *(*map(address, start), ctypes.addressof(kept)),
+        )
+        n: int = at.made
         passed = int(sampled[n - 1]) if n else 0
         return Stride(
             ends[:n],
@@ -180,6 +200,6 @@ class CompiledTaylor:
             np.empty((n, 0)),
             np.zeros(n, np.int64),
             np.zeros(n, np.int64),
-            usual=why != _UNUSUAL,
-            ended=why == _AT_END,
+            usual=why != UNUSUAL,
+            ended=why == AT_END,
         )

@@ -204,6 +204,8 @@ class _Function(Expressions):
             return isinstance(s.targets[0], ast.Name)
         if called(s.value) in ("rows", "matrix", "whole", "product") or self._given(s.value):
             return False
+        if isinstance(s.value, ast.List):
+            return False
         return len(self.kinds.of(s.targets[0]).sizes) == 1
 
     def _span(self, s: ast.Assign) -> str:
@@ -363,6 +365,9 @@ class _Function(Expressions):
                 return
         if called(value) == "rows":
             return
+        if isinstance(value, ast.List):
+            self._listed(target, value)
+            return
         if called(value) == "product":
             assert isinstance(value, ast.Call)
             self._product_of(target, *value.args)
@@ -374,6 +379,18 @@ class _Function(Expressions):
             self._line(f"    {self._expr(target, ONE)} = {entry};")
             return
         self._change(target, "", value)
+
+    def _listed(self, target: ast.expr, value: ast.List) -> None:
+        """The entries of an array, one after another, or four at a time."""
+        if base_of(target) in names_in(value):
+            raise NotInSubsetError(value, "an array would change while it is read")
+        entries = list(map(self._expr, value.elts))
+        together = len(entries) // 4 * 4 if self.to.listed else 0
+        for n in range(0, together, 4):
+            first = self._expr(target, (str(n),))
+            self._line(self.to.listed.format(first=first, entries=", ".join(entries[n : n + 4])))
+        for n in range(together, len(entries)):
+            self._line(f"{self._expr(target, (str(n),))} = {bare(entries[n])};")
 
     def _product_of(self, target: ast.expr, a: ast.expr, x: ast.expr) -> None:
         """A matrix by a vector, row by row."""

@@ -22,6 +22,7 @@ OPERATORS: dict[type, Callable[..., Any]] = {
     ast.NotEq: op.ne, ast.USub: op.neg, ast.Not: op.not_,
 }  # fmt: skip
 
+NONE: Mapping[str, Any] = {}
 LISTS = {"numbers": "zeros", "counts": "whole", "table": "matrix"}
 """Lists in Python, and what they are in other languages."""
 
@@ -50,17 +51,22 @@ class Text:
         text = cls()
         for module in modules:
             constants = {n: x for n, x in vars(module).items() if n.isupper()}
-            for d in ast.parse(inspect.getsource(module)).body:
-                name = d.name if isinstance(d, ast.FunctionDef | ast.ClassDef) else ""
-                if name in text.functions or name in text.classes:
-                    raise NotInSubsetError(d, "another module of the text has this name")
-                if isinstance(d, ast.FunctionDef):
-                    text.functions[d.name] = d
-                    text.constants[d.name] = constants
-                    text.python[d.name] = getattr(module, d.name)
-                elif isinstance(d, ast.ClassDef):
-                    text.classes[d.name] = d
+            text.add(inspect.getsource(module), constants, vars(module))
         return text
+
+    def add(
+        self, source: str, constants: Mapping[str, Any] = NONE, python: Mapping[str, Any] = NONE
+    ) -> None:
+        """Add what a source defines. Raises `NotInSubsetError` if a name is there already."""
+        for d in ast.parse(source).body:
+            name = d.name if isinstance(d, ast.FunctionDef | ast.ClassDef) else ""
+            if name in self.functions or name in self.classes:
+                raise NotInSubsetError(d, "another module of the text has this name")
+            if isinstance(d, ast.FunctionDef):
+                self.functions[name], self.constants[name] = d, constants
+                self.python[name] = python.get(name, _nothing)
+            elif isinstance(d, ast.ClassDef):
+                self.classes[name] = d
 
     def expanded(self, roots: Iterable[tuple[str, Mapping[str, Any]]]) -> list[ast.FunctionDef]:
         """Functions, each specialised by values of its `Known` parameters, and all that they call,

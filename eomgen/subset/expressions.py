@@ -163,7 +163,9 @@ class Expressions:
             return self._size(self.kinds.of(args[0]).sizes[0])
         if name == "abs" and kind.of == "int":
             raise NotInSubsetError(e, "of a whole number")
-        return f"{self.to.names.get(name, name)}({bare(self._expr(args[0], at))})"
+        return (
+            f"{self.to.names.get(name, name)}({', '.join(bare(self._expr(a, at)) for a in args)})"
+        )
 
     def _product(self, sizes: Sequence[str]) -> str:
         if len(sizes) == 1:

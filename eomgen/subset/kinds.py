@@ -8,9 +8,10 @@ from functools import cache
 from eomgen.subset.expander import NotInSubsetError, Text, called
 
 ARRAYS = {"Vector": "float", "Matrix": "float", "Whole": "int"}
+OF_NUMBERS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "tanh", "atan2")
 FUNCTIONS = {
-    "sqrt": "float", "next_after": "float", "isfinite": "int", "ordered": "float",
-    "all_within": "int",
+    "next_after": "float", "isfinite": "int", "ordered": "float", "all_within": "int",
+    **dict.fromkeys(OF_NUMBERS, "float"),
 }  # fmt: skip
 """The kinds of what functions of numbers, or of whole arrays, return."""
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from eomgen.subset.kinds import INT, Kind
+from eomgen.subset.kinds import INT, OF_NUMBERS, Kind
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,8 @@ class Language:
     prelude       what the printed functions need
     literal       how a number is written
     typed         whether arguments and results have types, and records structures
+    listed        how four entries of an array of numbers that follow one another are given, from
+                  the place of the first; one by one if it is empty
     """
 
     function: str
@@ -35,6 +37,7 @@ class Language:
     prelude: str
     literal: str = "{}"
     typed: bool = False
+    listed: str = ""
 
 
 C = Language(
@@ -75,8 +78,8 @@ JAVASCRIPT = Language(
     whole="let",
     infinite="Infinity",
     names={
-        "abs": "Math.abs", "sqrt": "Math.sqrt", "pow": "Math.pow", "nan": "NaN",
-        "isfinite": "Number.isFinite", "next_after": "nextAfter",
+        **{name: f"Math.{name}" for name in ("abs", "pow", *OF_NUMBERS)},
+        "nan": "NaN", "isfinite": "Number.isFinite", "next_after": "nextAfter",
     },
     array="const {name} = {function}.{name}_ = roomFor({function}.{name}_, {type}Array, {size});",
     arrays=("Float64", "Int32"),

@@ -17,6 +17,7 @@ order, and so the same bits. `place = …` makes a new array, `place[:] = …` c
 one name: `copy(x)`. Arrays are never resized; functions change those that they are given. An index
 may be an array of whole numbers, which differ: `place[positions] += h * rates`. A record's array
 may be assigned as a whole, `step.place = place`; then only one of the two is used, or none changed.
+Entries may be given at once, `place[0:2] = [a, b]`.
 
 Where few numbers are taken one by one, lists are several times as fast in Python as arrays:
 `numbers`, `counts` and `table`, of which an entry is `a[i][j]`. Elsewhere they are arrays too, and
@@ -26,7 +27,7 @@ Python gives functions that take entries only either of them.
 import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
-from math import inf, isfinite, nan, sqrt
+from math import exp, inf, isfinite, log, nan, sqrt
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -34,9 +35,9 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Known", "Matrix", "Row", "Vector", "Whole", "added", "all_within", "combined", "copy",
-    "counts", "inf", "isfinite", "larger", "matrix", "nan", "next_after", "numbers", "ordered",
-    "outer", "product", "rows", "sqrt", "table", "transposed", "unrolled", "whole", "with_arrays",
-    "with_lists", "zeros",
+    "counts", "exp", "inf", "isfinite", "larger", "log", "matrix", "nan", "next_after", "numbers",
+    "ordered", "outer", "product", "rows", "sqrt", "table", "transposed", "unrolled", "whole",
+    "with_arrays", "with_lists", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]

@@ -4,22 +4,27 @@ import math
 import shutil
 import sys
 from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from languages import Given, results
 
 import eomgen
+from eomgen.engine import adaptive
+from eomgen.engine import taylor as engine
+from eomgen.engine.taylor import expanded
 from eomgen.errors import RunError
+from eomgen.loading import load_source
 from eomgen.model.elaborate import elaborate
 from eomgen.native import accelerator, taylor
 from eomgen.native.library import compiled_library
 from eomgen.precision.precise import digits
 from eomgen.program.program import Output, Program, finish, interpret
-from eomgen.program.series import coefficients
-from eomgen.program.tape import TIME, Node, Stage, Tape
+from eomgen.program.tape import FUNCTIONS, TIME, Node, Stage, Tape
 from eomgen.program.taylor import (
     NoSeriesError,
     Quotient,
@@ -30,13 +35,14 @@ from eomgen.program.taylor import (
     Term,
     recurrences,
 )
+from eomgen.program.taylor_text import series_text
 from eomgen.run.module import load_module
 from eomgen.scalars.extended import Digits
-from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import read_scene
 from eomgen.store import generated_code
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.reference import reference
+from eomgen.subset.expander import Text
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 compiler = pytest.mark.skipif(CC is None, reason="there is no C compiler")
@@ -97,12 +103,34 @@ def residual(program: Program, system: Recurrences) -> float:
         fixed = {i: _fixed(program, i, values) for i in system.fixed}
         start = {name: scalars.number(x) for name, x in START.items()}
         t, h = scalars.number(0.5), scalars.number(LATER)
-        rows = coefficients(system, fixed, t, start, ORDER, scalars)
+        rows = coefficients(system, fixed, t, start, scalars)
         at = {n: sum(row[j] * h**k for k, row in enumerate(rows)) for j, n in enumerate(STATES)}
         slopes = interpret(program, "derivative", {**values, **at, TIME: t + h}, scalars)
         terms = [(k * h ** (k - 1), row) for k, row in enumerate(rows) if k]
         there = [sum(factor * row[j] for factor, row in terms) for j in range(4)]
         return max(float(abs(x - y)) for x, y in zip(slopes, there, strict=True))
+
+
+class Exactly(taylor.InPython):
+    """Recurrences whose fractions have all digits, too."""
+
+    def extended(self, k: int, *others: Any) -> None:
+        super().extended(Digits().number(k), *others)
+
+
+def coefficients(
+    system: Recurrences, fixed: dict[int, Any], t: Any, y: dict[str, Any], scalars: Digits
+) -> Any:
+    """The Taylor coefficients (ORDER + 1, ny) of a solution, by the text that all places have."""
+    text = series_text(system, list(y))
+    functions: Any = load_source(text.source, "series")
+    vars(functions).update((name, partial(scalars.call, name)) for name in FUNCTIONS)
+    rows = np.zeros((ORDER + 1, len(y)), object)
+    room = taylor.room_of(text, object)
+    expanded(
+        Exactly(functions, list(fixed.values())), t, np.array([*y.values()]), ORDER, room, rows
+    )
+    return rows
 
 
 def _fixed(program: Program, i: int, values: dict[str, Any]) -> Any:
@@ -144,27 +172,42 @@ def test_each_wrong_rule_shows() -> None:
 
 @pytest.mark.every(2)
 @compiler
-@pytest.mark.parametrize("small", [0, 64])
-def test_compiled_coefficients(small: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those of small and of large systems, whose code differs."""
-    monkeypatch.setattr("eomgen.native.taylor_source.SMALL", small)
+def test_compiled_coefficients() -> None:
+    """They have the bits of those in Python."""
     program = everything()
     states = [SimpleNamespace(name=name) for name in STATES]
     interface: Any = SimpleNamespace(name="everything", states=states, quaternions=())
     texts = taylor.sources(program, interface)
     library = compiled_library(repr(texts), lambda: texts, taylor.MAIN)
-    system = recurrences(program, STATES)
     module: Any = SimpleNamespace(
         PARAMETERS={"p": 1.3}, INPUTS={"u": 0.0}, _DEFAULT={"derivative": (1.3,)}
     )
     made = taylor.CompiledTaylor(program, interface, module, library, (None, VALUES))
-    fixed = taylor.fixed_values(system, module, None, VALUES)
-    for order in (8, 15, 24):
-        found = made.series(0.5, np.array(list(START.values())), order)
-        true = np.array(coefficients(system, fixed, 0.5, START, order, FloatScalars()))
-        sizes = np.abs(true).max(axis=1, keepdims=True)
-        assert found.shape == (order + 1, 4)
-        assert (np.abs(found - true) < 1e-12 * sizes).all()
+    plain = taylor.plain_series(program, interface, module, None, VALUES)
+    for order in (2, 3, 8, 15, 24):
+        for start in np.array(list(START.values())) * np.linspace(0.5, 1.2, 10)[:, None]:
+            found, true = (series(0.5, start, order) for series in (made.series, plain))
+            assert found.shape == (order + 1, 4)
+            assert found.tobytes() == true.tobytes()
+
+
+@pytest.mark.every(2)
+@compiler
+def test_the_engine_in_three_languages() -> None:
+    """Sums of products, and polynomials."""
+    rng = np.random.default_rng(1)
+    sizes = {"STATES": 4, "ORDERS": 9, "PRODUCTS": 8}
+    given = Given(
+        None,
+        f"enum {{ {', '.join(f'{n} = {x}' for n, x in sizes.items())} }};\n",
+        "".join(f"const {n} = {x};\n" for n, x in sizes.items()) + "const system = {};\n",
+    )
+    text = Text.of(adaptive, engine)
+    factors = [[k, *rng.normal(size=(2, 9, 8)), np.zeros(8)] for k in range(1, 9)]
+    changes = [[0.3, order, rng.normal(size=(9, 4)), np.zeros(4)] for order in range(2, 9)]
+    for name, cases in (("convolved", factors), ("change_after", changes)):
+        python, *others = results(text, name, cases, given=given)
+        assert others == [python, python]
 
 
 def test_functions_with_corners_are_refused() -> None:

@@ -193,3 +193,10 @@ def known(method: Known, x: float) -> float:
     if method.extra and x > 0.0:
         total = total - added(factor * x for factor in method.factors)
     return total
+
+
+def listed(n: int, x: Annotated[Vector, "n"], y: Annotated[Vector, "n"]) -> None:
+    """Entries that are given at once."""
+    first = y[0]
+    x[:] = [first, sqrt(2.0 + abs(first)) - first, 3.0 if n == 4 else 4.0, y[n - 1]]
+    y[1:3] = [x[1] * 2.0, first]

@@ -81,6 +81,7 @@ CASES: dict[str, list[list[Any]]] = {
     "records": [
         [constructs.Memory(N, 0.5, steps, some(N), np.arange(N)), 0.25] for steps in (0, 3)
     ],
+    "listed": [[N, some(N), some(N)] for _ in range(3)],
     "with_given": [[GIVEN, 0.3, some(2)]],
 }
 
@@ -119,6 +120,7 @@ REFUSED = {
     "z = product(a, x) + x": "to a name first",
     "x[:] = product(a, x * 2.0)": "while it is read",
     "x[which] = x[others]": "shifted",
+    "x[:] = [t, x[0]]": "while it is read",
     "for j_ in range(n): pass": "the name of an index",
     "i_ = 1": "the name of an index",
     "z = x[::2] * 1.0": "no steps",

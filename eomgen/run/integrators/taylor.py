@@ -1,11 +1,8 @@
-"""Steps by Taylor series of the solution, of an order that follows from the tolerance.
+"""Steps by Taylor series of the solution: those of `eomgen.engine.taylor`.
 
-A step is as long as its last two terms stay below the tolerance: Jorba and Zou, A software package
-for the numerical integration of ODEs by means of high-order Taylor methods, Experimental
-Mathematics 14 (2005), section 3. So no step is refused. The best order grows with the logarithm of
-the tolerance; they assume a cost per step like the square of the order, but it grows more slowly if
-products are added up several at a time, so ours is higher. The polynomial of a step is its dense
-output. C makes the same steps: see `templates/c/taylor.c.jinja`.
+The best order grows with the logarithm of the tolerance. Jorba and Zou assume a cost per step like
+the square of the order, but it grows more slowly if products are added up several at a time, so
+ours is higher.
 """
 
 import math
@@ -14,6 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from eomgen.engine.adaptive import Bounds, round_off
+from eomgen.engine.taylor import change_after, reach
 from eomgen.run.compiled import Series
 from eomgen.run.integrators.dormand_prince_8 import TOO_SHORT, DormandPrince8
 from eomgen.run.integrators.interface import Adaptive
@@ -55,7 +54,8 @@ class TaylorSeries:
         series: Series,
         max_step: float = math.inf,
     ) -> None:
-        self.fun, self.rtol, self.atol, self.max_step = fun, rtol, atol, max_step
+        self.fun = fun
+        self._bounds = Bounds(np.zeros(len(y0)) + atol, rtol, max_step)
         self.t, self.y, self.t_bound = float(t0), y0, t_bound
         self.t_old = self.t
         self.status: Literal["running", "finished", "failed"] = "running"
@@ -76,11 +76,7 @@ class TaylorSeries:
     @property
     def h_abs(self) -> float:
         """The length of the next step, s."""
-        terms, order = self._terms(), self.order
-        allowed = self.atol + self.rtol * np.abs(self.y)
-        last, other = (np.max(np.abs(row) / allowed, initial=0.0) for row in (terms[-1], terms[-2]))
-        larger = max(_log(float(last)) / order, _log(float(other)) / (order - 1))
-        return min(math.exp(-larger) if larger > -math.inf else math.inf, self.max_step)
+        return reach(self._bounds, self.order, self._terms(), self.y)
 
     @h_abs.setter
     def h_abs(self, length: float) -> None:
@@ -95,10 +91,12 @@ class TaylorSeries:
             self.status = "failed"
             return TOO_SHORT
         end = min(t + length, self.t_bound)
-        change = _change(terms, end - t) + self.lost
+        change, lost = np.empty(len(y)), np.empty(len(y))
+        change_after(end - t, self.order, terms, change)
+        change += self.lost
         last = y + change
-        rest = last - y
-        self.lost = (y - (last - rest)) + (change - rest)
+        round_off(y, last, change, lost)
+        self.lost = lost
         self.t_old, self.t, self.y, self._taken = t, end, last, (t, terms)
         if end >= self.t_bound:
             self.status = "finished"
@@ -109,22 +107,12 @@ class TaylorSeries:
         start, terms = self._taken
 
         def states(times: FloatArray | float) -> FloatArray:
-            x = (np.asarray(times) - start)[..., None]
-            return np.asarray(terms[0] + _change(terms, x)).T
+            lengths: Any = (np.asarray(times) - start)[..., None]
+            change: Any = np.empty((*np.shape(times), terms.shape[1]))
+            change_after(lengths, self.order, terms, change)
+            return np.asarray(terms[0] + change).T
 
         return states
-
-
-def _log(size: float) -> float:
-    return math.log(size) if size > 0 else -math.inf
-
-
-def _change(terms: FloatArray, h: Any) -> FloatArray:
-    """The change of the state after h s, (ny,) or for times (m, 1), by Horner's rule."""
-    found: FloatArray = terms[-1]
-    for row in terms[-2:0:-1]:
-        found = found * h + row
-    return np.asarray(found * h)
 
 
 class _Held(DormandPrince8):

@@ -1,0 +1,265 @@
+"""Steps by Taylor series of the solution, of an order that follows from the tolerance.
+
+A step is as long as its last two terms stay below the tolerance: Jorba and Zou, A software package
+for the numerical integration of ODEs by means of high-order Taylor methods, Experimental
+Mathematics 14 (2005), section 3. So no step is refused, and its polynomial is its dense output.
+What rounding takes from the state is added to its next change.
+
+The coefficients come from recurrences (section 2) in two functions that are given, the text of
+which `eomgen.program.taylor_text` writes for a mechanism. Sums of products, which take most of the
+operations, are computed for all products at once.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, Protocol
+
+import numpy as np
+
+from eomgen.engine.adaptive import (
+    AT_END,
+    MADE,
+    UNUSUAL,
+    Bounds,
+    Checks,
+    Progress,
+    Records,
+    round_off,
+)
+from eomgen.subset.words import (
+    Matrix,
+    Vector,
+    Whole,
+    copy,
+    exp,
+    inf,
+    log,
+    next_after,
+    ordered,
+    unrolled,
+    with_arrays,
+    zeros,
+)
+
+AT_ONCE = 4
+"""So many sums are computed at once; the number of products is a multiple of it."""
+
+
+class Recurrences(Protocol):
+    """The series of a mechanism; see `eomgen.program.taylor_text`."""
+
+    def begun(
+        self,
+        t: float,
+        y: Annotated[Vector, "STATES"],
+        first: Annotated[Vector, "FIRST"],
+        rates: Annotated[Vector, "STATES"],
+    ) -> None:
+        """Coefficients 0 of all series that are needed later, and 1 of the states."""
+
+    def extended(
+        self,
+        k: int,
+        first: Annotated[Vector, "FIRST"],
+        sums: Annotated[Vector, "PRODUCTS"],
+        state: Annotated[Vector, "STATES"],
+        rates: Annotated[Vector, "STATES"],
+        left: Annotated[Vector, "PRODUCTS"],
+        right: Annotated[Vector, "PRODUCTS"],
+    ) -> None:
+        """Coefficients k of the factors of all products, and k + 1 of the states, from those before
+        and the sums of products.
+        """
+
+    def sums_of_products(
+        self,
+        k: int,
+        left: Annotated[Matrix, "ORDERS", "PRODUCTS"],
+        right: Annotated[Matrix, "ORDERS", "PRODUCTS"],
+        sums: Annotated[Vector, "PRODUCTS"],
+    ) -> None:
+        """As `convolved`, with as many products at once as the place can."""
+
+
+@dataclass(slots=True)
+class Room:
+    """Where coefficients are computed: the first ones, sums of products, and those of factors."""
+
+    first: Annotated[Vector, "FIRST"]
+    sums: Annotated[Vector, "PRODUCTS"]
+    left: Annotated[Matrix, "ORDERS", "PRODUCTS"]
+    right: Annotated[Matrix, "ORDERS", "PRODUCTS"]
+
+
+@cache
+def _factors(k: int) -> tuple[Whole, Whole]:
+    """The numbers of the left and of the right factors of each sum's products, in order."""
+    left = np.array([*range(2, k - 1), *range(1, k, max(1, k - 2))], np.int64)
+    return left, k - left
+
+
+def _by_numpy(k: int, left: Matrix, right: Matrix, sums: Vector) -> None:
+    """As `convolved`."""
+    i, j = _factors(k)
+    sums[:] = np.add.reduce(left[i] * right[j], axis=0, initial=0.0)
+
+
+@with_arrays(_by_numpy)
+def convolved(
+    k: int,
+    left: Annotated[Matrix, "ORDERS", "PRODUCTS"],
+    right: Annotated[Matrix, "ORDERS", "PRODUCTS"],
+    sums: Annotated[Vector, "PRODUCTS"],
+) -> None:
+    """Sums over i from 1 to k - 1 of the products left[i] right[k - i]. Those with the last
+    coefficients, which have only just been computed, are added last.
+    """
+    n = 0
+    while n < len(sums):
+        total = zeros(AT_ONCE)
+        for i in range(2, k - 1):
+            for j in unrolled(range(AT_ONCE)):
+                total[j] += left[i, n + j] * right[k - i, n + j]
+        if k > 1:
+            for j in unrolled(range(AT_ONCE)):
+                total[j] += left[1, n + j] * right[k - 1, n + j]
+        if k > 2:
+            for j in unrolled(range(AT_ONCE)):
+                total[j] += left[k - 1, n + j] * right[1, n + j]
+        for j in unrolled(range(AT_ONCE)):
+            sums[n + j] = total[j]
+        n += AT_ONCE
+
+
+def _expanded(of: Any, t: float, y: Vector, order: int, room: Room, rows: Matrix) -> None:
+    """As `expanded`, with numbers in lists where they are taken one by one."""
+    first, n = room.first.tolist(), room.left.shape[1]
+    state, rates = y.tolist(), [0.0] * len(y)
+    left, right = [0.0] * n, [0.0] * n
+    of.begun(t, state, first, rates)
+    rows[0], rows[1] = y, rates
+    for k in range(1, order):
+        of.sums_of_products(k, room.left, room.right, room.sums)
+        state, rates = rates, [0.0] * len(y)
+        of.extended(k, first, room.sums.tolist(), state, rates, left, right)
+        room.left[k], room.right[k], rows[k + 1] = left, right, rates
+
+
+@with_arrays(_expanded)
+def expanded(
+    of: Recurrences,
+    t: float,
+    y: Annotated[Vector, "STATES"],
+    order: int,
+    room: Room,
+    rows: Annotated[Matrix, "ORDERS", "STATES"],
+) -> None:
+    """The Taylor coefficients of the solution from y at t on, up to an order of at least 2."""
+    rows[0] = y
+    of.begun(t, y, room.first, rows[1])
+    for k in range(1, order):
+        of.sums_of_products(k, room.left, room.right, room.sums)
+        of.extended(k, room.first, room.sums, rows[k], rows[k + 1], room.left[k], room.right[k])
+
+
+def reach(
+    run: Bounds,
+    order: int,
+    rows: Annotated[Matrix, "ORDERS", "STATES"],
+    y: Annotated[Vector, "STATES"],
+) -> float:
+    """The length of a step, s: at its end the last two terms are still below the tolerance."""
+    last = 0.0
+    other = 0.0
+    allowed = run.atol + run.rtol * abs(y)
+    one = abs(rows[order]) / allowed
+    two = abs(rows[order - 1]) / allowed
+    for j in range(len(y)):
+        last = max(last, one[j])
+        other = max(other, two[j])
+    larger = -inf
+    if last > 0.0:
+        larger = log(last) / order
+    if other > 0.0:
+        before = log(other) / (order - 1)
+        larger = max(larger, before)
+    length = exp(-larger)
+    return min(length, run.longest)
+
+
+def change_after(
+    h: float,
+    order: int,
+    rows: Annotated[Matrix, "ORDERS", "STATES"],
+    change: Annotated[Vector, "STATES"],
+) -> None:
+    """The change of the state after h s, by Horner's rule."""
+    change[:] = rows[order]
+    for k in range(order - 1, 0, -1):
+        change[:] = change * h + rows[k]
+    change[:] = change * h
+
+
+def taylor_steps(
+    of: Recurrences,
+    checks: Checks,
+    run: Bounds,
+    order: int,
+    at: Progress,
+    state: Annotated[Vector, "STATES"],
+    loss: Annotated[Vector, "STATES"],
+    room: Room,
+    rows: Annotated[Matrix, "ORDERS", "STATES"],
+    kept: Records,
+) -> int:
+    """Up to `kept.most` steps from a state at `at.t`, with what rounding took from it. They end at
+    the end of the run, or before one that anything is unusual in. Returns why.
+    """
+    y = copy(state)
+    lost = copy(loss)
+    raw = zeros(len(y))
+    change = zeros(len(y))
+    passed = 0
+    while True:
+        expanded(of, at.t, y, order, room, rows)
+        at.length = reach(run, order, rows, y)
+        if at.made > 0:
+            kept.lengths[at.made - 1] = at.length
+        if at.made >= kept.most:
+            return MADE
+        if not at.length >= 10.0 * abs(next_after(at.t) - at.t):
+            return UNUSUAL
+        at.end = min(at.t + at.length, run.until)
+        at.h = at.end - at.t
+        row = passed
+        while row < kept.count and kept.times[row] < at.end:
+            change_after(kept.times[row] - at.t, order, rows, change)
+            raw[:] = y + change
+            if not checks.placed(kept.times[row], raw):
+                return UNUSUAL
+            kept.rows[row] = raw
+            row += 1
+        change_after(at.h, order, rows, change)
+        change[:] = change + lost
+        raw[:] = y + change
+        round_off(y, raw, change, lost)
+        wrong = ordered(raw * 0.0)
+        if wrong != 0.0 or not checks.placed(at.end, raw):
+            return UNUSUAL
+        while row < kept.count and kept.times[row] <= at.end:
+            kept.rows[row] = raw
+            row += 1
+        passed = row
+        y[:] = raw
+        at.t = at.end
+        at.derivatives += order
+        i = at.made
+        kept.ends[i] = at.t
+        kept.derivatives[i] = at.derivatives
+        kept.sampled[i] = passed
+        kept.states[i] = y
+        kept.losses[i] = lost
+        at.made += 1
+        if not at.end < run.until:
+            kept.lengths[i] = at.length
+            return AT_END
