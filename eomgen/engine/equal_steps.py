@@ -12,15 +12,16 @@ from eomgen.subset.words import Matrix, Vector, Whole, all_within, ordered
 
 @dataclass(slots=True)
 class Course:
-    """Where steps lead: step i ends at t_start + i dt, and at t_end at the latest; `before` are
-    made, and at most `most` are to be. Then the rate of the last step, and the change from it that
-    is no jump; the last derivative evaluated, `slope` at `place`; and the four states of each
-    quaternion.
+    """Where steps lead: step i ends at t_start + i dt, and at t_end at the latest, and is made as
+    one of `length`; `before` are made, and at most `most` are to be. Then the rate of the last
+    step, and the change from it that is no jump; the last derivative evaluated, `slope` at `place`;
+    and the four states of each quaternion.
     """
 
     t_start: float
     t_end: float
     dt: float
+    length: float
     before: int
     most: int
     rate: Annotated[Vector, "STATES"]
@@ -47,7 +48,9 @@ class Kept:
 
 
 class Constrained(Protocol):
-    """What is held along the way: flags of the processor, and constraints if there are any."""
+    """What is held along the way: flags of the processor, the stability of steps, and constraints
+    if there are any.
+    """
 
     def clear(self) -> None:
         """Forget what was raised."""
@@ -55,6 +58,12 @@ class Constrained(Protocol):
 
     def is_raised(self) -> bool:
         """Whether there was an overflow, a division by 0, or a result that is no number."""
+        ...
+
+    def may_jump(
+        self, t: float, y: Annotated[Vector, "STATES"], change: Annotated[Vector, "STATES"]
+    ) -> bool:
+        """Whether a step from this state may be made although its rate jumps."""
         ...
 
     def projected(self, t: float, y: Annotated[Vector, "STATES"]) -> bool:
@@ -71,22 +80,24 @@ class Constrained(Protocol):
 def equal_steps(
     held: Constrained, method: Method, t: float, at: Sum, course: Course, step: Step, kept: Kept
 ) -> int:
-    """Steps from t on. Ends before a step whose rate jumps, or one with anything unusual: these are
-    made elsewhere.
+    """Steps from t on. Ends before a step whose rate may not jump, or one with anything unusual:
+    these are made elsewhere.
     """
     start = t
     kept.made = 0
     for n in range(course.most):
         end = min(course.t_end, course.t_start + (course.before + n + 1) * course.dt)
         held.clear()
-        iterations = method.changed(start, at.value, course.dt, step)
+        iterations = method.changed(start, at.value, course.length, step)
         if iterations == 0:
             return UNUSUAL
-        add_compensated(at, step.change)
-        rate = step.change / course.dt
+        rate = step.change / course.length
         smooth = all_within(abs(rate - course.rate), course.allowed)
+        if not smooth and not held.may_jump(start, at.value, step.change):
+            return UNUSUAL
+        add_compensated(at, step.change)
         zero = ordered((at.value + step.slope) * 0.0)
-        if not smooth or zero != 0.0 or not normalised(course.many, course.quaternions, at.value):
+        if zero != 0.0 or not normalised(course.many, course.quaternions, at.value):
             return UNUSUAL
         if held.is_raised() or not held.projected(end, at.value):
             return UNUSUAL

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from eomgen.codegen.interface import Interface
-from eomgen.engine.adaptive import MADE
 from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.explicit import EULER, LEAPFROG_4, LEAPFROG_6, RUNGE_KUTTA_4
+from eomgen.engine.sums import Sum
 from eomgen.native.checked import Function
-from eomgen.native.constrained import address, constraints, made_margins
-from eomgen.run.compiled import Array, Constrained, EqualSteps, EqualStride
+from eomgen.native.constrained import address, constraints
+from eomgen.run.compiled import Array, Constrained, EqualSteps
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.problem import Problem
 from eomgen.subset.structures import filled, take
@@ -85,67 +85,38 @@ def steps(
     system = System(ctypes.cast(constants, _POINTER), inputs.ctypes.data, rates.ctypes.data)
     system.kept = constants, inputs, rates
     held = inputs, functions, sum(problem.quaternions, ())
-    return partial(made, library[f"steps_{name}"], METHODS[name], system, *held)
+    return EqualSteps(partial(made, library[f"steps_{name}"], system, *held), METHODS[name])
 
 
 def made(
     call: Any,
-    calls: int,
     system: ctypes.Structure,
     inputs: Array | None,
     functions: Mapping[str, Function],
     quaternions: Sequence[int],
     t: float,
-    y: Array,
-    lost: Array,
-    *,
-    t_start: float,
-    t_end: float,
-    dt: float,
-    made: int,
-    most: int,
-    limits: tuple[Array, Array],
-    constrained: Constrained | None = None,
-    iterates: bool = False,
-) -> EqualStride:
+    at: Sum,
+    course: Course,
+    kept: Kept,
+    constrained: Constrained | None,
+) -> int:
     """Make steps, with the arguments of `run.compiled.EqualSteps`.
 
     call    the method's function
-    calls   derivatives in a step, or in an iteration if it `iterates`
     system  what the method is given
     functions    that keep constraints, by name
     quaternions  the four states of each, one after another
     """
     call.restype = ctypes.c_int64
     call.argtypes = [_POINTER, _POINTER, _REAL, *[_POINTER] * 4]
-    ny = len(y)
-    start = [np.ascontiguousarray(array) for array in (y, lost)]
-    margins = made_margins(constrained, most)
-    keeps = constraints(functions, constrained, inputs, ny)
-    course = Course(
-        t_start=t_start,
-        t_end=t_end,
-        dt=dt,
-        before=made,
-        most=most,
-        rate=np.array(limits[0]),
-        allowed=np.ascontiguousarray(limits[1]),
-        place=np.empty(ny),
-        slope=np.empty(ny),
-        many=len(quaternions) // 4,
-        quaternions=np.array(quaternions, np.int64),
-    )
-    kept = Kept(
-        made=0,
-        most=most,
-        ends=np.empty(most),
-        states=np.empty((most, ny)),
-        losses=np.empty((most, ny)),
-        iterations=np.empty(most, np.int64),
-        margins=margins[1:],
-    )
+    keeps = constraints(functions, constrained, inputs, len(at.value))
+    start = [np.ascontiguousarray(array) for array in (at.value, at.lost)]
+    places = np.array(quaternions, np.int64)
+    limits = np.array(course.rate), np.ascontiguousarray(course.allowed)
+    course.rate, course.allowed = limits
+    course.many, course.quaternions = len(quaternions) // 4, places
     left = filled(kept)
-    why = call(
+    why: int = call(
         ctypes.byref(system),
         address(keeps),
         t,
@@ -154,16 +125,4 @@ def made(
         ctypes.byref(left),
     )
     take(kept, left)
-    n = kept.made
-    return EqualStride(
-        kept.ends[:n],
-        kept.states[:n],
-        kept.losses[:n],
-        calls,
-        course.rate,
-        course.place,
-        course.slope,
-        usual=why == MADE,
-        iterations=kept.iterations[:n] if iterates else None,
-        margins=margins[: n + 1] if constrained else None,
-    )
+    return why

@@ -180,7 +180,7 @@ class CompiledImplicit:
         with_them.kept = self, reals, wholes
         call = self._methods[f"steps_{name}"]
         held = with_them, self._inputs, functions, self._quaternions
-        return partial(equal_steps.made, call, stages, *held, iterates=True)
+        return EqualSteps(partial(equal_steps.made, call, *held), stages, iterates=True)
 
 
 def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:

@@ -60,4 +60,4 @@ def steps(
     more.kept = system, reals, wholes, inputs, libraries
     call = libraries[METHODS_LIBRARY][f"steps_{name}"]
     count = DERIVATIVES * equal_steps.LEAPFROGS[name]
-    return partial(equal_steps.made, call, count, more, inputs, functions, ())
+    return EqualSteps(partial(equal_steps.made, call, more, inputs, functions, ()), count)

@@ -10,6 +10,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.engine.equal_steps import Course, Kept
+from eomgen.engine.sums import Sum
+
 Array = NDArray[np.float64]
 
 
@@ -139,57 +142,19 @@ Series = Callable[[float, Array, int], Array]
 """The Taylor coefficients (order + 1, ny) of the solution from a state y on: `(t, y, order)`."""
 
 
-@dataclass(frozen=True, eq=False)
-class EqualStride:
-    """Some steps of equal length, in order: m of them, which may be none.
+@dataclass(frozen=True)
+class EqualSteps:
+    """Steps of equal length, which a place makes by `eomgen.engine.equal_steps`.
 
-    ends         (m,), their times, s
-    states       (m, ny), the states there
-    losses       (m, ny), the rounding errors of the sums there, which the next step adds
-    calls        derivatives in each step, or in each iteration
-    rate         (ny,), change of the state in the last step, by its length
-    place, slope (ny,), the last derivative evaluated, and the state where
-    usual        whether the next step may be made so, too
-    iterations   (m,), those in each step, with as many Jacobians as derivatives; None if the method
-                 does not iterate
-    margins      (m + 1,), the least margins of constraints at the start and at their ends; None if
-                 there are none
+    make      makes steps from a sum at t along a course, and keeps them; constraints are kept if
+              they are given. Returns why they end, as the engine does
+    calls     derivatives in each step, or in each iteration
+    iterates  whether the method iterates, with as many Jacobians as derivatives
     """
 
-    ends: Array
-    states: Array
-    losses: Array
+    make: Callable[[float, Sum, Course, Kept, Constrained | None], int]
     calls: int
-    rate: Array
-    place: Array
-    slope: Array
-    usual: bool
-    iterations: NDArray[np.int64] | None = None
-    margins: Array | None = None
-
-
-class EqualSteps(Protocol):
-    """Makes `most` steps, or fewer, from the state `y` at t, where `made` steps end.
-
-    Step i ends at t_start + i dt, and before `t_end`. No step is made whose rate differs from that
-    of the step before by more than `limits[1]`; the first one's is compared with `limits[0]`.
-    Constraints are kept if they are given.
-    """
-
-    def __call__(
-        self,
-        t: float,
-        y: Array,
-        lost: Array,
-        *,
-        t_start: float,
-        t_end: float,
-        dt: float,
-        made: int,
-        most: int,
-        limits: tuple[Array, Array],
-        constrained: Constrained | None = None,
-    ) -> EqualStride: ...
+    iterates: bool = False
 
 
 @dataclass(frozen=True, eq=False)

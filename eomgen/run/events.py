@@ -152,7 +152,7 @@ def advances(
             made += advance.steps
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
-            step = replace(advance, contact_powers=powers)
+            step = advance._replace(contact_powers=powers)
             closes, opens = np.inf, np.inf
             opened = np.zeros(len(closed), np.int64)
             within, search = _Within(now.t, now.y, step), Search()
@@ -174,7 +174,7 @@ def advances(
                 break
             now.t, now.y = step.t, step.y
             settle(contacts, now.held, now.t, now.y)
-            yield replace(step, resume=_resume(step, now.held, begun))
+            yield step._replace(resume=_resume(step, now.held, begun))
 
 
 def _resume(
@@ -277,7 +277,7 @@ def _strike(problem: Problem, now: _Status, closed: Flags) -> Iterator[Advance]:
             speed = 0.0 if kind == "lift" else found[k]
             events.append(Event(t, contacts.names[k], kind, speed))
     rows = [(t, now.y)] if made else []
-    yield replace(instant(now.y), samples=rows, events=tuple(events))
+    yield instant(now.y)._replace(samples=rows, events=tuple(events))
 
 
 def _open(contacts: Contacts, problem: Problem, now: _Status, opened: Flags) -> Advance:
@@ -298,4 +298,4 @@ def _cut(now: _Status, step: Advance, t: float, keep: bool) -> Iterator[Advance]
     samples = [sample for sample in step.samples if sample[0] < t or (sample[0] == t and not keep)]
     now.t, now.y = t, y
     rows = [*samples, (t, y)] if keep else samples
-    yield replace(step, t=t, y=y, samples=rows, resume=None)
+    yield step._replace(t=t, y=y, samples=rows, resume=None)

@@ -19,3 +19,7 @@ class StepFailure(RunError):
 
 class EndedRunError(StepFailure):
     """Raised by a callback of a run to end it; the text says why."""
+
+
+NOT_FINITE = "the state overflows or is not a number"
+"""Why a run stops at a state that is not finite."""

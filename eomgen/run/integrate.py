@@ -11,6 +11,7 @@ import numpy as np
 from eomgen.run import events
 from eomgen.run.calls import Calls, Count
 from eomgen.run.checks import check_repairs, check_rest_speed, numbers
+from eomgen.run.failure import NOT_FINITE
 from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, repaired
 from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
@@ -20,7 +21,7 @@ from eomgen.run.passage import Passage
 from eomgen.run.problem import Explanation, FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.projection import Violations
-from eomgen.run.rows import Record, Rows, all_finite
+from eomgen.run.rows import Record, all_finite
 from eomgen.run.shaking import Shaken
 from eomgen.run.singular import watched
 from eomgen.run.stepping import (
@@ -138,8 +139,10 @@ def integrate(
         checked = None if unstable or repairs or not method.steps_explicitly(problem) else problem
         plain = not (monitor or powers or problem.contacts)
         compiled = compiled_steps(problem) if plain else None
+        looked = problem.projection or problem.closed_form
+        ahead = calls if plain and not looked else None
         begin, rows, settings = equal_steps(
-            asked, method, counted, checked, compiled=compiled, each=tally is not None
+            asked, method, counted, checked, compiled=compiled, calls=ahead, each=tally is not None
         )
     else:
         compiled = None if monitor else compiled_steps(problem)
@@ -329,8 +332,8 @@ def _follow(
         with np.errstate(all="ignore"):
             _check_start(problem, run)
             for advance in advances:
-                if not _is_finite(advance):
-                    raise StepFailure("the state overflows or is not a number", method.remedy)
+                if not all_finite(advance.y):
+                    raise StepFailure(NOT_FINITE, method.remedy)
                 run.take(advance)
                 calls.derivatives.calls += advance.derivatives
                 calls.jacobians.calls += advance.jacobians
@@ -391,12 +394,6 @@ def _check_start(problem: Problem, run: _Run) -> None:
     assert slope.shape == run.y.shape, f"derivative has shape {slope.shape}"
     if not all_finite(slope):
         raise StepFailure("the derivative there is not finite", "change the initial state")
-
-
-def _is_finite(advance: Advance) -> bool:
-    rows = advance.samples
-    states = [rows.y] if isinstance(rows, Rows) else [y for _, y in rows]
-    return all_finite(advance.y) and all(map(all_finite, states))
 
 
 def _place(problem: Problem, run: _Run) -> str:

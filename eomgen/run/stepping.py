@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from eomgen.errors import RunError
+from eomgen.run.calls import Calls
 from eomgen.run.checks import (
     allowed_errors,
     check_no_step,
@@ -22,6 +23,7 @@ from eomgen.run.checks import (
 )
 from eomgen.run.compiled import Compiled
 from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
+from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume, always
 from eomgen.run.problem import FloatArray, Problem
 
@@ -71,6 +73,7 @@ def equal_steps(
     checked: Problem | None,
     *,
     compiled: Compiled | None = None,
+    calls: Calls | None = None,
     each: bool = True,
 ) -> tuple[Begin, Rows, Resume]:
     """A function that begins equal steps, one that gives the times of rows, and the settings that a
@@ -78,13 +81,15 @@ def equal_steps(
 
     checked   the problem by whose Jacobian the stability of steps is checked; None for no check
     compiled  compiled steps of the problem, if it has some
-    each      whether each compiled step becomes an `Advance`
+    calls     see `fixed_step.advances`
+    each      whether each step becomes an `Advance`
 
     Raises `RunError` for an invalid step.
     """
     if asked.max_step is not None:
         raise RunError(f"max_step: {asked.integrator} takes equal steps; give --dt instead")
     dt, every = check_steps(asked.integrator, asked.span, asked.dt, asked.samples, asked.max_steps)
+    grid = Grid(asked.grid, asked.t_end, dt, every)
     change = method.prepare(problem)
     steps = partial(compiled.equal, method.compiled) if compiled and method.compiled else None
 
@@ -96,17 +101,15 @@ def equal_steps(
         compiles: Callable[[], bool] = always,
     ) -> Iterator[Advance]:
         return fixed_step.advances(
+            method,
             change,
             problem,
             t,
-            t_start=asked.grid,
-            t_end=asked.t_end,
-            dt=dt,
-            every=every,
+            grid,
             checked=problem if checked and problem.contacts else checked,
-            stability=method.stability,
             resume=resume,
             compiled=steps,
+            calls=calls,
             each=each,
         )
 

@@ -12,8 +12,8 @@ from crank_rocker import four_bar
 from test_compiled_steps import assert_same, both, compiler
 
 import eomgen
+from eomgen.native import equal_steps
 from eomgen.run import singular
-from eomgen.run.integrators.equal_strides import EqualStrides
 from eomgen.run.integrators.strides import Strides
 
 pytestmark = compiler
@@ -70,15 +70,20 @@ RK4, _, DOP853, _, RODAS, GAUSS, *_ = METHODS
 def compiled_steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     """The numbers of steps that C has made at once."""
     made: list[int] = []
-    for kind in (EqualStrides, Strides):
-        usual = kind.made
+    adaptive, equal = Strides.made, equal_steps.made
 
-        def noted(self: Any, *given: Any, usual: Any = usual) -> Any:
-            stride = usual(self, *given)
-            made.append(len(stride.ends) if stride else 0)
-            return stride
+    def adaptive_noted(*given: Any) -> Any:
+        stride = adaptive(*given)
+        made.append(len(stride.ends) if stride else 0)
+        return stride
 
-        monkeypatch.setattr(kind, "made", noted)
+    def equal_noted(*given: Any) -> int:
+        why = equal(*given)
+        made.append(given[-2].made)
+        return why
+
+    monkeypatch.setattr(Strides, "made", adaptive_noted)
+    monkeypatch.setattr(equal_steps, "made", equal_noted)
     yield made
 
 

@@ -34,6 +34,9 @@ class Python:
     def is_raised(self) -> bool:
         return False
 
+    def may_jump(self, t: float, y: Any, change: Any) -> bool:
+        return bool(change[0] > y[2] * t)
+
     def projected(self, t: float, y: Any) -> bool:
         y[1] *= 1.0 + 1e-3 * t
         return bool(y[1] < 2.0)
@@ -57,6 +60,10 @@ static void derivative(System *s, double t, const double *y, double *out) {
 static int64_t changed(Method *m, double t, const double *y, double h, struct Step *step);
 static void clear(Constrained *h) { (void)h; }
 static int64_t is_raised(Constrained *h) { (void)h; return 0; }
+static int64_t may_jump(Constrained *h, double t, const double *y, const double *change) {
+    (void)h;
+    return change[0] > y[2] * t;
+}
 static int64_t projected(Constrained *h, double t, double *y) {
     (void)h;
     y[1] *= 1.0 + 1e-3 * t;
@@ -79,6 +86,7 @@ const system = {
   },
   clear: () => {},
   is_raised: () => 0,
+  may_jump: (t, y, change) => change[0] > y[2] * t,
   projected: (t, y) => { y[1] *= 1 + 1e-3 * t; return y[1] < 2; },
   keep_step: (t, y, margin) => { margin[0] = y[0]; return 1; },
 };
@@ -112,7 +120,7 @@ def course(many: int, most: int, allowed: float) -> equal_steps.Course:
     """Steps that may be made."""
     places = np.array([3, 0, 2, 4] * many)
     given = some(N), np.full(N, allowed), some(N), some(N)
-    return equal_steps.Course(0.1, 0.52, 0.1, 1, most, *given, many, places)
+    return equal_steps.Course(0.1, 0.52, 0.1, 0.09, 1, most, *given, many, places)
 
 
 def kept(most: int) -> equal_steps.Kept:

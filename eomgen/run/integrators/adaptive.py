@@ -17,7 +17,7 @@ import numpy as np
 from eomgen.run.branches import BranchMonitor, Retry
 from eomgen.run.compiled import Steps
 from eomgen.run.crossings import Step
-from eomgen.run.failure import StepFailure
+from eomgen.run.failure import NOT_FINITE, StepFailure
 from eomgen.run.integrators.interface import (
     Adaptive,
     Advance,
@@ -28,6 +28,7 @@ from eomgen.run.integrators.interface import (
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.integrators.strides import Before, Strides, continuation
 from eomgen.run.problem import FloatArray, Problem, Switching
+from eomgen.run.rows import Row, all_finite
 from eomgen.run.shaking import Shaken
 
 _STALLED = 100
@@ -108,7 +109,7 @@ def advances(
         stride = use.made(stepper, sampled, most) if use else None
         if use and stride:
             before = Before(cut, stepper.factorisations - factored, stepper.is_limited)
-            yield from use.advances(stride, sampled, stepper.is_whole, each, before)
+            yield from use.portion(stride, sampled, stepper.is_whole, before).advances(each)
             here, sampled = here + len(stride.ends), sampled + int(stride.sampled[-1])
             cut, factored = 0, stepper.factorisations
             if stepper.ended:
@@ -130,7 +131,7 @@ def advances(
             cut += retry.seen
             continue
         passed = int(np.searchsorted(times, t, side="right"))
-        samples = _samples(problem, step, times[sampled:passed])
+        samples = _samples(problem, step, times[sampled:passed], method.remedy)
         yield Advance(
             t,
             y,
@@ -151,13 +152,13 @@ def advances(
     raise StepFailure(f"{bounds.most} steps did not suffice", method.remedy)
 
 
-def _samples(problem: Problem, step: Step, times: FloatArray) -> list[tuple[float, FloatArray]]:
+def _samples(problem: Problem, step: Step, times: FloatArray, remedy: str) -> list[Row]:
     """The rows of a step at times after its start; at its end no dense output is needed."""
     within = times[times < step.end]
-    states = step.states(within) if within.size else ()
-    samples = list(
-        zip(within.tolist(), map(problem.projected, within.tolist(), states), strict=True)
-    )
+    states = map(problem.projected, within.tolist(), step.states(within) if within.size else ())
+    samples = list(zip(within.tolist(), states, strict=True))
+    if not all(all_finite(y) for _, y in samples):
+        raise StepFailure(NOT_FINITE, remedy)
     return samples + [(step.end, step.last)] * (times.size - within.size)
 
 

@@ -1,18 +1,31 @@
-"""Steps of equal length."""
+"""Steps of equal length, which in every place are those of `eomgen.engine.equal_steps`."""
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
-from eomgen.engine.sums import Sum, add_compensated
+from eomgen.engine.adaptive import MADE, UNUSUAL
+from eomgen.engine.equal_steps import Course, Kept, equal_steps
+from eomgen.engine.explicit import Step
+from eomgen.engine.sums import Sum
+from eomgen.run.calls import Calls, Count
 from eomgen.run.compiled import EqualSteps
-from eomgen.run.integrators.equal_strides import EqualStrides, advances_of
-from eomgen.run.integrators.interface import Advance, Change, Resume, Stability
+from eomgen.run.failure import NOT_FINITE, StepFailure
+from eomgen.run.integrators.interface import Advance, Change, FixedStep, Resume
+from eomgen.run.integrators.portions import Portion, Size
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.projection import constrained_by
+from eomgen.run.rows import Rows
 from eomgen.run.shaking import Shaken
+
+AHEAD = 256
+"""Numbers of states that Python computes at once where nothing has to look at each step."""
+_NO_QUATERNIONS = np.empty(0, np.int64)
 
 
 def count_steps(span: float, dt: float) -> float:
@@ -25,85 +38,250 @@ def count_steps(span: float, dt: float) -> float:
     return max(1, math.ceil(steps - 1e-9)) if math.isfinite(steps) else math.inf
 
 
+@dataclass(frozen=True)
+class Grid:
+    """Steps end at t_start + i dt, and at `t_end`; every `every`-th is a row, and the last."""
+
+    t_start: float
+    t_end: float
+    dt: float
+    every: int
+
+    @cached_property
+    def steps(self) -> int:
+        """Their number."""
+        return int(count_steps(self.t_end - self.t_start, self.dt))
+
+    def end(self, i: int) -> tuple[float, float | None]:
+        """When step i ends, from 1 on, and when it does by the grid; None if it is shorter."""
+        # From the start each time: a sum of steps would accumulate rounding errors.
+        mark = self.t_start + i * self.dt
+        if i < self.steps:
+            return min(mark, self.t_end), mark
+        return self.t_end, mark if abs(mark - self.t_end) <= 4 * math.ulp(self.t_end) else None
+
+
 def advances(
+    method: FixedStep,
     change: Change,
     problem: Problem,
     t: float,
+    grid: Grid,
     *,
-    t_start: float,
-    t_end: float,
-    dt: float,
-    every: int,
     checked: Problem | None = None,
-    stability: Stability | None = None,
     resume: Resume | None = None,
     compiled: Callable[[], EqualSteps | None] | None = None,
+    calls: Calls | None = None,
     each: bool = True,
 ) -> Iterator[Advance]:
-    """Yield the steps of a method from time `t` on, with a sample at every `every`-th and the last.
+    """Yield the steps of a method from time `t` on, of which `change` is one.
 
-    Steps end at t_start + i dt and at `t_end`; if `t` lies between, the first one is shorter.
-    Quaternions are normalised after every step. The state within a step is that after a shorter
-    step. Sums are compensated.
+    If `t` lies between the ends of steps, the first one is shorter. Quaternions are normalised
+    after every step. The state within a step is that after a shorter step. Sums are compensated.
 
-    checked    the problem by whose Jacobian the stability of steps is checked; None for no check
-    stability  the method's stability function, if it has one
-    resume     what an `Advance` of an earlier run gave
-    compiled   compiled steps of the method, of which it is asked again and again; None if there
-               are none. They have the same bits
-    each       whether each compiled step is yielded, or many at once
+    checked   the problem by whose Jacobian the stability of steps is checked; None for no check
+    resume    what an `Advance` of an earlier run gave
+    compiled  the steps in compiled code, which it is asked for before each portion of steps; None
+              if there are none. They have the same bits. Python makes the first step and the last,
+              and those that are not usual
+    calls     counts the calls of the problem's functions; given if steps may be made before the
+              earlier ones have been looked at
+    each      whether each step is yielded, or many at once
+
+    Raises `StepFailure` where there is no step, or if steps are too long for stability.
     """
-    steps = int(count_steps(t_end - t_start, dt))
-    first = min(math.floor((t - t_start) / dt + 1e-9) + 1, steps)
-    regular, y = t == t_start or resume is not None, problem.initial
+    own = InPython(change, problem, checked, StabilityMonitor(change, method.stability), calls)
+    regular, y, steps = t == grid.t_start or resume is not None, problem.initial, grid.steps
     lost = np.zeros_like(y) if resume is None else resume["lost"]
-    monitor = StabilityMonitor(change, stability)
-    recorded = monitor.recording(problem) if checked else problem
-    strides = EqualStrides(compiled, t_start, t_end, dt) if compiled else None
     seed = problem.scrutiny.seed if problem.scrutiny else None
     shaken = None if seed is None else Shaken(problem.derivative, seed)
-    i = first - 1
+    i, usual, size = min(math.floor((t - grid.t_start) / grid.dt + 1e-9), steps - 1), False, Size()
+    ahead = max(1, AHEAD // len(y)) if calls and len(y) else 1
     while i < steps:
-        if strides and i >= first:
-            given = (monitor if checked else None), problem
-            last = min(steps, i + 1 + shaken.left) if shaken else steps
-            stride = strides.made(i, last, t, y, lost, *given)
-            if stride:
-                shorter = partial(_shorter, change, problem)
-                how = (problem, (t, y), shorter, _continuation, each)
-                yield from advances_of(stride, i, every, *how)
-                i += len(stride.ends)
-                t, y, lost = float(stride.ends[-1]), stride.states[-1], stride.losses[-1]
-                if shaken:
-                    lost = lost + shaken.error(t, y, dt, len(stride.ends))
-                continue
-        i += 1
-        # From the start each time: a sum of steps would accumulate rounding errors.
-        mark = t_start + i * dt
-        whole = i < steps or abs(mark - t_end) <= 4 * math.ulp(t_end)
-        end = min(mark, t_end) if i < steps else t_end
-        within = partial(_shorter, change, problem, t, y)
-        length = dt if regular and whole else end - t
-        step = change(recorded, t, y, length)
-        if checked:
-            monitor.check(checked, t, y, step, length)
-            if i == steps:
-                monitor.finish(checked, t, y, step, length)
-        total = Sum(y, lost)
-        add_compensated(total, step)
-        y, lost = problem.projected(end, total.value), total.lost
-        t, regular = end, True
-        if shaken:
-            lost = lost + shaken.error(t, y, length, 1)
-        samples = [(t, y)] if i == steps or i % every == 0 else []
-        continuation = partial(_continuation, mark, y, lost) if whole else None
-        yield Advance(t, y, samples, problem, within, resume=continuation)
+        end, mark = grid.end(i + 1)
+        alone = i + 1 == steps or not regular
+        place = compiled() if compiled and usual and not alone else None
+        most = size.most if place else ahead if usual or not compiled else 1
+        most = 1 if alone else min(most, steps - 1 - i, shaken.left if shaken else most)
+        length = grid.dt if regular and mark is not None else end - t
+        ends = (end, grid.t_end, 0.0) if alone else (grid.t_start, grid.t_end, grid.dt)
+        limits, last = own.limits, (np.empty_like(y), np.empty_like(y))
+        course = Course(*ends, length, i, most, *limits, *last, 0, _NO_QUATERNIONS)
+        kept = _room(most, len(y))
+        held = constrained_by(problem.projection) if place else None
+        given = t, Sum(y, lost), course, kept
+        why = place.make(*given, held) if place else own.make(*given, i + 1 == steps)
+        n = kept.made
+        margins = np.concatenate(([held.margins[1][1]], kept.margins[:n])) if held else None
+        if place and n and problem.closed_form:
+            margins = problem.closed_form.passed(t, y, kept.ends[:n], kept.states[:n])
+            n = n if size.fits(margins is not None) else 0
+        usual = n > 0 and (not place or why == MADE)
+        if n:
+            if place:
+                own.passed(n, place.calls, course)
+            counts = _counts(place, kept, n) if place else own.counts
+            within = partial(_within, change, problem, (t, y), kept)
+            resumes = partial(_continuation, kept, mark) if mark is not None else None
+            rows = _rows(kept, n, i, grid)
+            made = (kept.ends[:n], kept.states[:n], *rows, counts, within, resumes, margins)
+            yield from Portion(problem, t, *made).advances(each)
+            i, regular = i + n, True
+            t, y, lost = float(kept.ends[n - 1]), kept.states[n - 1], kept.losses[n - 1]
+            if shaken:
+                lost = lost + shaken.error(t, y, length, n)
+        if not place and why != MADE:
+            own.count_failed()
+            raise own.failure or StepFailure(NOT_FINITE, method.remedy)
 
 
-def _continuation(t: float, y: FloatArray, lost: FloatArray) -> Resume:
-    return {"t": np.array(t), "y": y, "lost": lost}
+def _room(most: int, states: int) -> Kept:
+    """Room for the records of `most` steps."""
+    ends, margins, iterations = np.empty(most), np.empty(most), np.empty(most, np.int64)
+    found, losses = np.empty((2, most, states))
+    return Kept(0, most, ends, found, losses, iterations, margins)
 
 
-def _shorter(change: Change, problem: Problem, t: float, y: FloatArray, end: float) -> FloatArray:
-    """The state at `end` by a single step from `t`."""
-    return problem.projected(end, y + change(problem, t, y, end - t)) if end > t else y
+def _rows(kept: Kept, n: int, made: int, grid: Grid) -> tuple[Any, Any]:
+    """The rows in the first n of these steps, after `made` earlier ones; and the numbers of rows so
+    far.
+    """
+    every = grid.every
+    if made + n == grid.steps:  # the last one, alone
+        return [(grid.t_end, kept.states[0])], [1]
+    hit = slice(-(made + 1) % every, n, every)
+    if n <= AHEAD:
+        rows = list(zip(kept.ends[hit].tolist(), kept.states[hit].copy(), strict=True))
+        return rows, [(made + k) // every - made // every for k in range(1, n + 1)]
+    # No views, which keep all of the states.
+    found = Rows(kept.ends[hit].copy(), kept.states[hit].copy())
+    return found, np.arange(made + 1, made + n + 1) // every - made // every
+
+
+def _counts(place: EqualSteps, kept: Kept, n: int) -> dict[str, Any]:
+    """The derivatives and Jacobians so far in the first n of these steps."""
+    if not place.iterates:
+        return {"derivatives": place.calls * np.arange(1, n + 1)}
+    made = place.calls * np.cumsum(kept.iterations[:n])
+    return {"derivatives": made, "jacobians": made}
+
+
+def _continuation(kept: Kept, mark: float, i: int) -> Resume:
+    """What a later run needs to continue after step i of these; the first one ends at `mark`."""
+    t = kept.ends[i] if i else mark
+    return {"t": np.array(t), "y": kept.states[i], "lost": kept.losses[i]}
+
+
+def _within(
+    change: Change,
+    problem: Problem,
+    start: tuple[float, FloatArray],
+    kept: Kept,
+    i: int,
+    time: float,
+) -> FloatArray:
+    """The state at a time in step i of these, by a single step from its start."""
+    t, y = (float(kept.ends[i - 1]), kept.states[i - 1]) if i else start
+    return problem.projected(time, y + change(problem, t, y, time - t)) if time > t else y
+
+
+class InPython:
+    """Makes steps in Python: what the engine's text is given, which runs as it stands.
+
+    Steps are checked for stability. An error ends the steps, and is then in `failure`. If `calls`
+    are given, `counts` has the numbers of those in the last steps, up to the end of each, and
+    `calls` is without them: they count as the steps are taken.
+    """
+
+    def __init__(
+        self,
+        change: Change,
+        problem: Problem,
+        checked: Problem | None,
+        monitor: StabilityMonitor,
+        calls: Calls | None,
+    ) -> None:
+        self._change, self._problem = change, problem
+        self._checked, self._monitor, self._looked = checked, monitor, False
+        self._recorded = monitor.recording(problem) if checked else problem
+        ny = len(problem.initial)
+        self._no_limits = np.zeros(ny), np.full(ny, np.inf)
+        self._counted: dict[str, Count] = vars(calls) if calls else {}
+        self.counts: dict[str, list[int]] = {name: [] for name in self._counted}
+        self._both = list(zip(self.counts.values(), self._counted.values(), strict=True))
+        self._unkept: list[int] = []
+        self.failure: BaseException | None = None
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """The rate of the last step, and the changes from it that are not to be looked at."""
+        return self._monitor.limits if self._checked else self._no_limits
+
+    def make(self, t: float, at: Sum, course: Course, kept: Kept, last: bool) -> int:
+        """Steps, as `EqualSteps.make`; `last` if it is the last one of a run."""
+        self._course, self._last = course, last
+        begun = [count.calls for _, count in self._both]
+        self._unkept.clear()
+        for calls, _ in self._both:
+            calls.clear()
+        try:
+            why = equal_steps(self, self, t, at, course, Step(), kept)
+        except BaseException as failure:  # those before it are kept
+            self.failure, why = failure, UNUSUAL
+        for (calls, count), before in zip(self._both, begun, strict=True):
+            self._unkept.append(count.calls - (calls[-1] if calls else before))
+            count.calls = before
+            calls[:] = [n - before for n in calls]
+        if self._monitor.rate is not None:
+            self._monitor.rate = course.rate
+        return why
+
+    def passed(self, steps: int, calls: int, course: Course) -> None:
+        """Take account of compiled steps, of `calls` derivatives each."""
+        if self._checked:
+            self._monitor.passed(steps, calls, course.rate, course.place, course.slope)
+
+    def count_failed(self) -> None:
+        """Count the calls of a step that was not made."""
+        for (_, count), calls in zip(self._both, self._unkept, strict=True):
+            count.calls += calls
+
+    def changed(self, t: float, y: FloatArray, h: float, step: Step) -> int:
+        """A step of the method."""
+        change = self._change(self._recorded, t, y, h)
+        step.change = step.place = step.slope = change
+        self._step = t, y, change, h
+        return 1
+
+    def may_jump(self, t: float, y: FloatArray, change: FloatArray) -> bool:
+        """Whether a step whose rate jumps may be made: it may, or this raises `StepFailure`."""
+        if self._checked:
+            if self._monitor.rate is not None:
+                self._monitor.rate = self._course.rate
+            self._monitor.check(self._checked, *self._step)
+            self._course.allowed = self._monitor.limits[1]
+            self._looked = True
+        return True
+
+    def clear(self) -> None:
+        """There are no flags: errors are raised."""
+
+    def is_raised(self) -> bool:
+        """Whether there was an error."""
+        return False
+
+    def projected(self, t: float, y: FloatArray) -> bool:
+        """Put the state on the constraints, and normalise its quaternions."""
+        y[:] = self._problem.projected(t, y)
+        return True
+
+    def keep_step(self, t: float, y: FloatArray, margin: FloatArray) -> bool:
+        """Take account of the step."""
+        if self._checked and not self._looked:
+            self._monitor.take()
+        self._looked = False
+        if self._checked and self._last:
+            self._monitor.finish(self._checked, *self._step)
+        for calls, count in self._both:
+            calls.append(count.calls)
+        return True

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,8 +96,7 @@ class Adaptive:
     smallest_rtol: float = SMALLEST_RTOL
 
 
-@dataclass(frozen=True)
-class Advance:
+class Advance(NamedTuple):
     """A step, or several, from the end of the one before: the state `y` (ny,) at the end, time `t`.
 
     samples  the rows to keep: times and states in the step
@@ -105,18 +104,18 @@ class Advance:
     within   gives the state at any time in the step; valid until the next step is made
     steps    number of steps; 0 if no time passes: an impact, or `events` only
     derivatives, jacobians, switches, gap_checks
-             calls that compiled code made of these, of switching functions, and of gaps and their
-             rates, which are not counted otherwise
+             calls of these, of switching functions, and of gaps and their rates, that are not
+             counted otherwise
+    factorisations  LU factorisations in the step, as far as the method counts them
+    capped   number of steps that have the greatest length allowed
+    cut      number of longer attempts that passed over a branch of the derivative
     checked  whether compiled code has checked that no rigid contact closes
     struck   number of the contact of an impact
     events   changes of contacts at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts and of the drives during the step,
                     W, if contacts were held
-    factorisations  LU factorisations in the step, as far as the method counts them
     resume   returns what a later run needs to continue from here exactly as this one does; None if
              this run would not have ended a step here, or if the method cannot continue so
-    capped   number of steps that have the greatest length allowed
-    cut      number of longer attempts that passed over a branch of the derivative
     margins  of its last step, if compiled code has checked all of its steps
     """
 
@@ -128,17 +127,17 @@ class Advance:
     steps: int = 1
     derivatives: int = 0
     jacobians: int = 0
+    factorisations: int = 0
     switches: int = 0
     gap_checks: int = 0
+    capped: int = 0
+    cut: int = 0
     checked: bool = False
+    resume: Callable[[], Resume] | None = None
+    margins: Margins | None = None
     struck: int | None = None
     events: tuple[Event, ...] = ()
     contact_powers: Callable[[float, FloatArray], FloatArray] | None = None
-    factorisations: int = 0
-    resume: Callable[[], Resume] | None = None
-    capped: int = 0
-    cut: int = 0
-    margins: Margins | None = None
 
 
 def always() -> bool:

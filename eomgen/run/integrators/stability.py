@@ -72,12 +72,13 @@ class StabilityMonitor:
     n/2 + 60/n, as measured on mechanisms with 2 to 90 states.
 
     stability  R of the method; None to find the factors from a step on the linear problem
+    rate       (ny,), that of the last step; None before the first
     """
 
     change: Change
     stability: Stability | None
+    rate: FloatArray | None = None
     _evaluated: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
-    _last: FloatArray | None = None
     _largest: FloatArray | float = 0.0
     _allowed: FloatArray | float = 0.0
     _steps: int = 0
@@ -99,22 +100,16 @@ class StabilityMonitor:
         return replace(problem, derivative=recorded)
 
     def check(self, problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float) -> None:
-        """Check a step of h from `y` at `t` to y + `step`, (ny,) each, if rates jump in it.
+        """Check a step of h from `y` at `t` to y + `step`, (ny,) each, in which rates may jump. The
+        largest rates so far are only updated here.
 
         Raises `UnstableStepError` if it is too long.
         """
         if not y.size:  # all is given by the time
             return
-        evaluated = self._evaluated
-        self._count(1, len(evaluated))
-        rate, last = step / h, self._last
-        self._last = rate
-        # Most steps end here: the largest rates are only updated at a jump.
-        if last is not None and (np.abs(rate - last) <= self._allowed).all():
-            del evaluated[:-1]
-            return
-        evaluated = evaluated.copy()
-        del self._evaluated[:-1]
+        evaluated, rate, last = self._evaluated.copy(), step / h, self.rate
+        self.rate = rate
+        self.take()
         first = last is None
         earlier = rate if last is None else last
         self._update(earlier)
@@ -139,14 +134,19 @@ class StabilityMonitor:
         self._steps += steps
         self._calls += calls
 
+    def take(self) -> None:
+        """Take account of a step whose derivatives were recorded."""
+        self._count(1, len(self._evaluated))
+        del self._evaluated[:-1]
+
     @property
-    def limits(self) -> tuple[FloatArray, FloatArray] | None:
-        """The rate of the last step and the changes from it that are not jumps, (ny,) each; None
-        before the first step. A step with such rates needs no check: see `passed`.
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """The rate of the last step and the changes from it that are not jumps, (ny,) each; before
+        the first step all are. A step with such rates needs no check: see `take` and `passed`.
         """
-        if self._last is None:
-            return None
-        return self._last, np.asarray(self._allowed)
+        if self.rate is None:
+            return np.zeros(1), np.array([-1.0])
+        return self.rate, np.asarray(self._allowed)
 
     def passed(
         self, steps: int, calls: int, rate: FloatArray, place: FloatArray, slope: FloatArray
@@ -155,7 +155,7 @@ class StabilityMonitor:
         last one, the state at which it evaluated its last derivative, and this, (ny,) each.
         """
         self._count(steps, steps * (len(self._evaluated) + calls))
-        self._last, self._evaluated[:] = rate, [(place, slope)]
+        self.rate, self._evaluated[:] = rate, [(place, slope)]
 
     def finish(self, problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float) -> None:
         """At the end of a run, check the step with the largest jump that was not checked and, if

@@ -8,18 +8,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from eomgen.run.branches import BranchMonitor
-from eomgen.run.compiled import Margins, Steps, Stride, Watched
-from eomgen.run.integrators.closed_strides import FEWER, MORE, MOST, kept_closed
-from eomgen.run.integrators.interface import Adaptive, Advance, Resume
+from eomgen.run.compiled import Steps, Stride, Watched
+from eomgen.run.integrators.interface import Adaptive, Resume
+from eomgen.run.integrators.portions import Portion, Size
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import PROJECTS, constrained_by
 from eomgen.run.rows import Rows
 
 OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates")
 """Functions of a module that steps are checked with."""
-
-_COUNTED = ("derivatives", "jacobians", "factorisations", "switches", "gap_checks")
-_FACTORISATIONS = 3 + _COUNTED.index("factorisations")
 
 
 class Tolerances(Protocol):
@@ -73,7 +70,7 @@ class Strides:
         self._sizes = None
         if contacts:
             self._sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
-        self._unusual, self._most = False, MOST
+        self._unusual, self._size = False, Size()
 
     def made(self, stepper: Stepper, sampled: int, most: int) -> Stride | None:
         """Make at most `most` steps and put the stepper at their end; None if Python must make the
@@ -87,7 +84,7 @@ class Strides:
         if self._unusual:  # the last stride ended before a step that Python must make
             self._unusual = False
             return None
-        lengths = self._lengths(stepper, min(most, self._most))
+        lengths = self._lengths(stepper, min(most, self._size.most))
         if lengths is None:
             return None
         solver, branches, until = stepper.solver, stepper.branches, stepper.until
@@ -115,14 +112,16 @@ class Strides:
             return None
         if branches and branches.features and not self._passes_nothing(branches, solver, stride):
             return None
-        kept, self._most = kept_closed(self._problem, solver.t, solver.y, stride, self._most)
-        if kept is None:
-            return None
+        if self._problem.closed_form:
+            given = solver.t, solver.y, stride.ends, stride.states
+            margins = self._problem.closed_form.passed(*given)
+            if not self._size.fits(margins is not None):
+                return None
+            stride = replace(stride, margins=margins)
         if t_end == np.inf:
             stepper.shorten()
-        reached = not float(kept.ends[-1]) < until
-        ended = reached and until == stepper.t_end
-        stride = kept if kept.ended == ended else replace(kept, ended=ended)
+        reached = not float(stride.ends[-1]) < until
+        stride = replace(stride, ended=reached and until == stepper.t_end)
         self._unusual = not stride.usual
         self._start, self._longest, self._watched = solver.t, stepper.longest, watched
         self._until = np.inf if reached or until == stepper.t_end else until
@@ -160,61 +159,35 @@ class Strides:
         t = np.concatenate(([solver.t], stride.ends))
         y = np.concatenate((solver.y[None], stride.states))
         slopes = np.concatenate((solver.f[None], stride.memory["f"]))
-        passes = branches.tame(t, y, slopes)
-        self._most = min(MOST, MORE * self._most) if passes else max(1, self._most // FEWER)
-        return passes
+        return self._size.fits(branches.tame(t, y, slopes))
 
-    def advances(
-        self, stride: Stride, sampled: int, resumes: bool, each: bool, before: "Before"
-    ) -> Iterator[Advance]:
-        """The steps as one `Advance`, or as one for each; with `resumes` a run can continue from
-        their ends.
-        """
-        ends, last = stride.ends, len(stride.ends) - 1
-        capped = none = np.zeros_like(stride.derivatives)
+    def portion(self, stride: Stride, sampled: int, resumes: bool, before: "Before") -> Portion:
+        """These steps, after `sampled` rows; with `resumes` a run can continue from their ends."""
+        ends, states, none = stride.ends, stride.states, np.zeros_like(stride.derivatives)
+        capped = none
         if before.limited or self._longest < np.inf:
             longest = np.diff(ends, prepend=self._start) >= self._longest * (1 - 1e-9)
-            longest[last] |= before.limited
+            longest[-1] |= before.limited
             capped = np.cumsum(longest)
-        solved = (none if x is None else x for x in (stride.jacobians, stride.factorisations))
-        counted = (stride.derivatives, *solved, stride.switches, stride.gap_checks)
-        sums = (stride.sampled, capped, *counted)
-        if each:
-            made = np.diff(np.column_stack((np.arange(1, last + 2), *sums)), axis=0, prepend=0)
-            numbers, parts = range(last + 1), made.tolist()
-        else:
-            numbers, parts = range(last, last + 1), [[last + 1, *(int(x[-1]) for x in sums)]]
+        solved = none if stride.factorisations is None else stride.factorisations
+        counts = {
+            "derivatives": stride.derivatives,
+            "jacobians": stride.jacobians,
+            "factorisations": solved + before.factorisations,
+            "switches": stride.switches,
+            "gap_checks": stride.gap_checks,
+            "capped": capped,
+            "cut": none + before.cut,
+        }
+        times = self._times[sampled : sampled + int(stride.sampled[-1])]
+        within = partial(_within, self._problem, stride.within) if stride.within else _unknown
         whole = len(ends) - stride.ended  # the end shortens the last step
-        times, rows = self._times[sampled:], 0
-        parts[0][_FACTORISATIONS] += before.factorisations
-        for i, (steps, passed, shortened, *calls) in zip(numbers, parts, strict=True):
-            at = slice(rows, rows + passed)
-            yield Advance(
-                float(ends[i]),
-                stride.states[i],
-                Rows(times[at], stride.rows[at]) if passed else (),
-                self._problem,
-                partial(_within, self._problem, stride.within, i) if stride.within else _unknown,
-                steps=steps,
-                **dict(zip(_COUNTED, calls, strict=True)),
-                checked=True,
-                resume=self._resume(stride, min(i, whole - 1)) if resumes and whole else None,
-                capped=shortened,
-                cut=before.cut if i == numbers[0] else 0,
-                margins=self._margins(stride, i),
-            )
-            rows += passed
-
-    def _margins(self, stride: Stride, i: int) -> Margins | None:
-        """The margins of step i."""
-        if stride.margins is None:
-            return None
-        start = float(stride.ends[i - 1]) if i else self._start
-        return Margins(start, float(stride.margins[i]), float(stride.margins[i + 1]))
-
-    def _resume(self, stride: Stride, i: int) -> Callable[[], Resume]:
-        """A function that gives what a later run needs to continue after step i."""
-        return partial(_after, stride, self._watched, self._until, i)
+        kept = stride, self._watched, self._until, whole - 1
+        return Portion(
+            *(self._problem, self._start, ends, states, Rows(times, stride.rows), stride.sampled),
+            *(counts, within, partial(_after, *kept) if resumes and whole else None),
+            *(stride.margins, True),
+        )
 
 
 @dataclass(frozen=True)
@@ -246,8 +219,11 @@ class _Memory(Mapping[str, Any]):
         return len(self.names)
 
 
-def _after(stride: Stride, watched: Watched | None, until: float, i: int) -> Resume:
-    """What a later run needs to continue after step i, which does not go beyond `until`."""
+def _after(stride: Stride, watched: Watched | None, until: float, last: int, i: int) -> Resume:
+    """What a later run needs to continue after step i, which does not go beyond `until`, or after
+    the `last`.
+    """
+    i = min(i, last)
     memory: dict[str, Any] = {name: values[i] for name, values in stride.memory.items()}
     if watched:
         memory |= {"until": until, **_checks(watched, stride, i)}
@@ -277,5 +253,5 @@ def _within(
     return problem.projected(t, states(i, t))
 
 
-def _unknown(t: float) -> FloatArray:
+def _unknown(i: int, t: float) -> FloatArray:
     raise AssertionError("states within these compiled steps were not asked for")

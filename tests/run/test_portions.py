@@ -1,0 +1,59 @@
+"""Steps that a place makes several at once."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from eomgen.run.integrate import integrate
+from eomgen.run.integrators import fixed_step
+from eomgen.run.problem import Problem
+from eomgen.run.tally import Tally
+
+
+def pendulum(fails_at: float = np.inf) -> Problem:
+    """A pendulum whose derivative has no value from a time on."""
+
+    def derivative(t: float, y: Any) -> Any:
+        if t >= fails_at:
+            raise ZeroDivisionError("nothing there")
+        return np.array([y[1], -np.sin(y[0])])
+
+    def jacobian(t: float, y: Any) -> Any:
+        return np.array([[0.0, 1.0], [-np.cos(y[0]), 0.0]])
+
+    return Problem("pendulum", ("q", "v"), (0,), derivative, jacobian, np.array([1.0, 0.0]))
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_4"])
+def test_python_makes_the_steps_of_the_engine(method: str, monkeypatch: Any) -> None:
+    """Many at once, where nothing has to look at each: the first and the last alone."""
+    made: list[int] = []
+    usual = fixed_step.equal_steps
+
+    def noted(*given: Any) -> int:
+        why = usual(*given)
+        made.append(given[-1].made)
+        return why
+
+    monkeypatch.setattr(fixed_step, "equal_steps", noted)
+    run = integrate(pendulum(), method, 2.005, dt=0.01)
+    assert run.finished and sum(made) == run.counts["steps"] == 201
+    assert max(made) == fixed_step.AHEAD // 2 and made[-1] == 1
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_4"])
+def test_steps_before_an_error_are_kept(method: str) -> None:
+    """They are kept, and counted, as in a run whose every step is looked at."""
+    seen: list[tuple[float, int, int]] = []
+
+    def check(tally: Tally, t: float) -> None:
+        seen.append((t, tally.derivatives, tally.jacobians))
+
+    many = integrate(pendulum(0.505), method, 2.0, dt=0.01)
+    each = integrate(pendulum(0.505), method, 2.0, dt=0.01, tally=Tally(check))
+    assert many.outcome == each.outcome and "nothing there" in many.message
+    assert many.t.tolist() == each.t.tolist() and abs(many.t[-1] - 0.5) < 1e-9
+    assert many.y.tobytes() == each.y.tobytes() and many.counts == each.counts
+    assert len(seen) == 50 and np.ptp(np.diff([d for _, d, _ in seen])) <= (method == "gauss_4") * 8
+    assert many.counts["derivatives"] > seen[-1][1]  # with those of the step that failed
