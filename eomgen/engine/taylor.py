@@ -41,6 +41,10 @@ from eomgen.subset.words import (
     zeros,
 )
 
+LOOKED_AT = 6
+"""So many terms say how long a step may be. Series without so many in a row are hardly ever met."""
+HARDLY = 0.2
+"""Terms before the last two may allow a length that is greater by this factor's exponential."""
 AT_ONCE = 4
 """So many sums are computed at once; the number of products is a multiple of it."""
 
@@ -168,21 +172,24 @@ def reach(
     rows: Annotated[Matrix, "ORDERS", "STATES"],
     y: Annotated[Vector, "STATES"],
 ) -> float:
-    """The length of a step, s: at its end the last two terms are still below the tolerance."""
-    last = 0.0
-    other = 0.0
+    """The length of a step, s: at its end the last two terms are still below the tolerance.
+
+    Both vanish where the motion is symmetric in time, as of a pendulum let go at a right angle,
+    whose series have every fourth term. So some terms before say how fast terms fall, too: they
+    may allow hardly more than the last ones.
+    """
     allowed = run.atol + run.rtol * abs(y)
-    one = abs(rows[order]) / allowed
-    two = abs(rows[order - 1]) / allowed
-    for j in range(len(y)):
-        last = max(last, one[j])
-        other = max(other, two[j])
     larger = -inf
-    if last > 0.0:
-        larger = log(last) / order
-    if other > 0.0:
-        before = log(other) / (order - 1)
-        larger = max(larger, before)
+    for k in range(order, order - LOOKED_AT, -1):
+        term = abs(rows[k]) / allowed
+        largest = 0.0
+        for j in range(len(y)):
+            largest = max(largest, term[j])
+        if largest > 0.0:
+            slope = log(largest) / k
+            if k < order - 1:  # the fall of terms, by that of the tolerance from here to the end
+                slope = log(largest * run.rtol) / k - log(run.rtol) / order - HARDLY
+            larger = max(larger, slope)
     length = exp(-larger)
     return min(length, run.longest)
 
