@@ -20,7 +20,6 @@ class IntegratorSpec:
     about   what it is
     kind    by which tables and figures group it
     method  "module:attribute" in `package`: its `FixedStep` or `Adaptive`
-    extra   whether it needs an extra of this program
     rattle  whether its steps with constraints are those of RATTLE, on all coordinates
     package where the module of its method is
     """
@@ -28,7 +27,6 @@ class IntegratorSpec:
     about: str
     kind: Kind
     method: str
-    extra: bool = False
     rattle: bool = False
     package: str = "eomgen.run.integrators"
 
@@ -62,7 +60,6 @@ _OWN: Mapping[str, IntegratorSpec] = {
     "RK45": IntegratorSpec("Dormand-Prince 5(4), by SciPy", "explicit", "from_scipy:RK45"),
     "DOP853": IntegratorSpec("Dormand-Prince 8(5,3)", "explicit", "dormand_prince_8:INTEGRATOR"),
     "taylor": IntegratorSpec("Taylor series, order 8 to 24", "explicit", "taylor:INTEGRATOR"),
-    "heyoka": IntegratorSpec("Taylor series, by heyoka", "explicit", "taylor:HEYOKA", True),
     "Rodas5P": IntegratorSpec("Rosenbrock method, order 5", "implicit", "rodas_5p:INTEGRATOR"),
     "Radau": IntegratorSpec("Radau IIA, order 5, by SciPy", "implicit", "from_scipy:RADAU"),
     "Radau_differences": IntegratorSpec(

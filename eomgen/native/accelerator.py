@@ -23,7 +23,7 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.errors import RunError
 from eomgen.model.model import Model
-from eomgen.native import equal_steps, functions, heyoka, implicit, rattle, runs, taylor
+from eomgen.native import equal_steps, functions, implicit, rattle, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.program.program import Program
 from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
@@ -334,14 +334,7 @@ def with_series(problem: Problem, model: Model, module: Any, values: tuple[Any, 
     def plain() -> Series:
         return taylor.plain_series(*interfaced_program_of(model), module, *values)
 
-    def by_heyoka() -> Series:
-        given = heyoka.parameter_values(*interfaced_program_of(model), module, *values)
-        key = key_of(model)
-        if key not in _BY_HEYOKA:  # they take long to compile
-            _BY_HEYOKA[key] = heyoka.integrators_of(*interfaced_program_of(model))
-        return heyoka.heyoka_series(_BY_HEYOKA[key], given)
-
-    return replace(problem, series={"taylor": cache(plain), "heyoka": cache(by_heyoka)})
+    return replace(problem, series={"taylor": cache(plain)})
 
 
 def without_compiler(model: Model, module: Any, values: tuple[Any, Any]) -> Callable[..., Problem]:
@@ -351,10 +344,6 @@ def without_compiler(model: Model, module: Any, values: tuple[Any, Any]) -> Call
         return with_series(problem, model, other or module, values)
 
     return of
-
-
-_BY_HEYOKA: dict[str, Callable[[int], Any]] = {}
-"""heyoka's integrators of each model so far, by its key."""
 
 
 def library_key(model: Model, name: str = "derivative") -> str:

@@ -320,7 +320,7 @@ def test_columns(name: str) -> None:
 @pytest.mark.every(4)
 @pytest.mark.parametrize(
     "integrator",
-    [name for name in INTEGRATORS if not name.startswith(("leapfrog", "taylor", "heyoka"))],
+    [name for name in INTEGRATORS if not name.startswith(("leapfrog", "taylor"))],
 )
 def test_integrators(integrator: str) -> None:
     """Each goes its way with states that are neither positions nor velocities."""

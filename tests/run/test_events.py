@@ -21,7 +21,7 @@ from eomgen.run.works import Powers
 G = 9.81
 FIXED = [name for name, method in INTEGRATORS.items() if isinstance(method, FixedStep)]
 # Leapfrog cannot run contacts.
-GENERAL = [name for name in INTEGRATORS if not name.startswith(("leapfrog", "taylor", "heyoka"))]
+GENERAL = [name for name in INTEGRATORS if not name.startswith(("leapfrog", "taylor"))]
 A_FEW = some([n for n in GENERAL if not n.endswith(("_differences", "_6", "euler"))], GENERAL)
 EXACT = {"rtol": 1e-12, "atol": 1e-14}
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}

@@ -48,7 +48,7 @@ v = [{v}]
 ATTRACT = 'type = "field"\nkind = "attract"\nbody = "bead"\nstrength = 1.0'
 CENTRE = 'type = "point_gravity"\nmu = 0.5'
 MOTOR = 'type = "motor"\njoint = "wire"\ntorque = "{}"'
-SERIES = ("taylor", "heyoka")
+SERIES = ("taylor",)
 ADAPTIVE = [
     name
     for name, method in INTEGRATORS.items()

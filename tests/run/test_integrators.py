@@ -625,7 +625,7 @@ def test_adaptive_run_stops_after_max_steps():
             "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
             "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
             "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, taylor, heyoka, Rodas5P, Radau, Radau_differences, BDF, "
+            "DOP853, taylor, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
         (
@@ -634,7 +634,7 @@ def test_adaptive_run_stops_after_max_steps():
             "integrator: unknown name 'radau' (did you mean 'Radau'?); known: euler, "
             "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
             "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, taylor, heyoka, Rodas5P, Radau, Radau_differences, BDF, "
+            "DOP853, taylor, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
         ("euler", {}, "dt: euler needs a step; give e.g. --dt 0.001"),

@@ -2,10 +2,8 @@
 
 import math
 import shutil
-import sys
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,7 +18,7 @@ from eomgen.engine.taylor import expanded
 from eomgen.errors import RunError
 from eomgen.loading import load_source
 from eomgen.model.elaborate import elaborate
-from eomgen.native import accelerator, taylor
+from eomgen.native import taylor
 from eomgen.native.library import compiled_library
 from eomgen.precision.precise import digits
 from eomgen.program.program import Output, Program, finish, interpret
@@ -301,18 +299,3 @@ def test_without_a_compiler_the_run_says_so(monkeypatch: pytest.MonkeyPatch, tmp
 def test_guards_cannot_repair() -> None:
     with pytest.raises(RunError, match="Taylor series cannot be repaired"):
         eomgen.simulate("pendulum", t_end=0.5, integrator="taylor", guard="repair")
-
-
-def test_heyoka(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its series are ours; where it is not installed, a run says how to install it."""
-    if find_spec("heyoka"):
-        options: dict[str, Any] = {"t_end": 1.0, "rtol": 1e-12, "atol": 1e-13}
-        options["inputs"] = {"tau": 0.3}
-        run = eomgen.simulate("two_body_forced", integrator="heyoka", **options)
-        ours = eomgen.simulate("two_body_forced", integrator="taylor", **options)
-        assert np.abs(run.y - ours.y).max() < 1e-11
-        assert run.trajectory.counts == ours.trajectory.counts
-    accelerator._BY_HEYOKA.clear()
-    monkeypatch.setitem(sys.modules, "heyoka", None)
-    with pytest.raises(RunError, match=r"pip install 'eomgen\[heyoka\]'"):
-        eomgen.simulate("two_body_forced", integrator="heyoka", t_end=0.1)

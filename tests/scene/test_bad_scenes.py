@@ -825,7 +825,7 @@ def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: 
             "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
             "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
             "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, taylor, heyoka, Rodas5P, Radau, Radau_differences, BDF, "
+            "DOP853, taylor, Rodas5P, Radau, Radau_differences, BDF, "
             "BDF_differences, LSODA",
         ),
         (

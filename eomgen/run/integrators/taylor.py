@@ -138,10 +138,3 @@ INTEGRATOR = Adaptive(
     series="taylor",
     smallest_rtol=SMALLEST_RTOL,
 )
-HEYOKA = Adaptive(
-    _solver,
-    memory=("h_abs", "lost"),
-    vectors=("lost",),
-    series="heyoka",
-    smallest_rtol=SMALLEST_RTOL,
-)

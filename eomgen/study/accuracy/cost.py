@@ -71,7 +71,6 @@ METHODS: Mapping[str, Overhead] = {
     "RK45": Overhead(25.0, 9.0, 0.3, 8.0),
     "DOP853": Overhead(20.0, 7.5, 0.1, 12.0),
     "taylor": Overhead(10.0, 1.0, 0.1, 2.0),
-    "heyoka": Overhead(40.0, 1.0, 0.1, 2.0),
     "Rodas5P": Overhead(10.0, 2.0, 0.2, 1.0, compiled=True),
     "Radau": Overhead(150.0, 30.0, 1.0, 12.0),
     "Radau_differences": Overhead(150.0, 30.0, 1.0, 12.0),

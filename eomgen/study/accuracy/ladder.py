@@ -12,7 +12,6 @@ from typing import Literal
 import numpy as np
 
 from eomgen.errors import RunError
-from eomgen.integrators import INTEGRATORS as SPECS
 from eomgen.run.integrators import INTEGRATORS, FixedStep, find_integrator
 from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import FloatArray, Problem
@@ -194,12 +193,12 @@ def _ends(ladder: Ladder, climbed: Sequence[Work], fixed: bool) -> bool:
 
 
 def methods_named(text: str | None) -> Sequence[str]:
-    """The methods in `--methods A,B`, in the order of `INTEGRATORS`; if None, those without extras.
+    """The methods in `--methods A,B`, in the order of `INTEGRATORS`; if None, all.
 
     Raises `RunError` for an unknown name, or if there is none.
     """
     if text is None:
-        return tuple(name for name in INTEGRATORS if not SPECS[name].extra)
+        return tuple(INTEGRATORS)
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
         raise RunError(f"--methods: names no integrator; known: {', '.join(INTEGRATORS)}")

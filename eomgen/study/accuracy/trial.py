@@ -21,7 +21,7 @@ from eomgen.run.works import Powers
 from eomgen.study.accuracy.cost import meter
 from eomgen.study.accuracy.measure import scales
 
-TIGHTEST = {"LSODA": 1e-12, "DOP853": 1e-16, "taylor": 1e-16, "heyoka": 1e-16, "Rodas5P": 3e-15}
+TIGHTEST = {"LSODA": 1e-12, "DOP853": 1e-16, "taylor": 1e-16, "Rodas5P": 3e-15}
 """Relative tolerances below which a method fails for many scenes, or gains nothing. The sums of
 DOP853, Rodas5P and Taylor series are compensated: their errors go on to fall with the tolerance."""
 TIGHTEST_OF_ALL = 1e-13
@@ -33,7 +33,6 @@ ORDERS = {
     "Radau": 5,
     "BDF": 4,
     "taylor": 20,
-    "heyoka": 20,
 }
 """Orders of adaptive methods: the time for an error e grows like e^(-1/order). LSODA has orders up
 to 12; Taylor series choose their own."""
