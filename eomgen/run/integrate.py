@@ -10,10 +10,10 @@ import numpy as np
 
 from eomgen.run import events
 from eomgen.run.calls import Calls, Count
-from eomgen.run.checks import check_repairs, check_rest_speed, numbers
+from eomgen.run.checks import check_repairs
 from eomgen.run.failure import NOT_FINITE
 from eomgen.run.guard import OF_TOLERANCE, Guard, RoundingMonitor, monitored, repaired
-from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure, find_integrator
+from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.margins import Seen
@@ -24,15 +24,7 @@ from eomgen.run.projection import Violations
 from eomgen.run.rows import Record, all_finite
 from eomgen.run.shaking import Shaken
 from eomgen.run.singular import watched
-from eomgen.run.stepping import (
-    ANEW,
-    Asked,
-    adaptive_steps,
-    begun,
-    can_go_on,
-    compiled_steps,
-    equal_steps,
-)
+from eomgen.run.stepping import Asked, Steps, begun, can_go_on, steps_of
 from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Event, Outcome, Trajectory
 from eomgen.run.works import Account, Powers
@@ -90,115 +82,150 @@ def integrate(
     ends it early instead: the trajectory then holds the finite rows up to there, is not `finished`,
     and its `message` says where it stopped, why, and what to change.
     """
-    method = find_integrator(integrator)
-    grid = float(t_start)
-    if resume is not None:
-        t_start = float(resume["t"])
-        problem = replace(problem, initial=resume["y"])
-        grid = float(resume.get("grid", t_start))
-        if ANEW in resume:  # that run made no whole step
-            resume = None
-    asked = Asked(
+    asked, problem = Asked.of(
+        problem,
+        t_start,
+        resume,
         integrator=integrator,
-        t_start=float(t_start),
         t_end=float(t_end),
-        grid=grid,
         dt=dt,
         rtol=rtol,
         atol=atol,
         samples=samples,
         max_step=max_step,
         max_steps=max_steps,
-        resume=resume,
+        rest_speed=rest_speed,
+        powers=powers,
+        guard=guard,
+        unstable=unstable,
+        tally=tally,
+        progress=progress,
     )
-    check_rest_speed(rest_speed)
-    monitor = _monitor(guard, problem, method, asked) if guard else None
-    repairs = monitor is not None and monitor.guard.repairs
-    calls = Calls(Count(1), Count(2))
+    plan = _planned(asked, problem)
+    run, advances = plan.run(), plan.advances()
+    outcome, trouble = _follow(plan, run, advances)
+    return _trajectory(plan, run, outcome, plan.message(trouble))
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """How a run is made.
+
+    asked, problem  what is asked
+    counted   the problem whose calls are counted, and whose constraints are watched
+    calls     these calls
+    steps     how its steps are made
+    monitor   of its rounding errors, if they are guarded
+    passage   through change points of its constraints, if they may be
+    remarks   those of the method so far
+    """
+
+    asked: Asked
+    problem: Problem
+    counted: Problem
+    calls: Calls
+    steps: Steps
+    monitor: RoundingMonitor | None
+    passage: Passage | None
+    remarks: list[str]
+
+    def run(self) -> "_Run":
+        """The run before its first step."""
+        asked, problem, method = self.asked, self.problem, self.asked.method
+        account = None
+        if asked.powers:
+            account = Account(asked.powers, problem.contacts, isinstance(method, Adaptive))
+        run = _Run(asked.t_start, problem.initial, account)
+        if can_go_on(method) and not asked.repairs:
+            run.resume = partial(begun, asked, problem)
+        if asked.tally:
+            asked.tally.begin(problem.initial)
+        return run
+
+    def advances(self) -> Iterator[Advance]:
+        """Its steps, with event location if it has contacts, checked by its guard."""
+        asked, problem, monitor = self.asked, self.counted, self.monitor
+        t_start, begin = asked.t_start, self.steps.begin
+        if monitor and asked.repairs:
+            return repaired(monitor, begin, problem, t_start, asked.max_steps)
+        if problem.contacts is None:
+            advances = begin(problem, t_start, 0, asked.resume)
+        else:
+            share = 1.0 if isinstance(asked.method, FixedStep) else events.GAP_CHECKS[1]
+            advances = events.advances(
+                events.Stepper(begin, share, self.calls.derivatives.of),
+                problem,
+                t_start,
+                asked.t_end,
+                rest_speed=asked.rest_speed,
+                max_steps=asked.max_steps,
+                resume=asked.resume,
+            )
+        held = problem.projection or problem.closed_form
+        if held:
+            advances = watched(held, advances, t_start, problem.initial, self.passage)
+        return monitored(monitor, advances, t_start, problem.initial) if monitor else advances
+
+    def message(self, trouble: str) -> str:
+        """What is said of the run, beside what troubled it."""
+        repaired = self.monitor.words() if self.monitor else ""
+        through = self.passage.words() if self.passage else ""
+        notes = (trouble, repaired, through, *dict.fromkeys(self.remarks))
+        return " ".join("; ".join(filter(None, notes)).split())
+
+
+def _planned(asked: Asked, problem: Problem) -> _Plan:
+    """The plan of a run. Raises `RunError` for an invalid argument."""
+    calls, remarks = Calls(Count(1), Count(2)), list[str]()
+    monitor = _monitor(asked.guard, problem, asked) if asked.guard else None
+    counted = _counted(asked, problem, calls, monitor)
+    steps = steps_of(asked, problem, counted, calls, remarks.append)
+
+    def beyond(t: float, y: FloatArray, made: int) -> Iterator[Advance]:
+        return steps.begin(replace(counted, initial=y), t, made)
+
+    passage = None
+    if counted.projection and counted.contacts is None and not asked.repairs:
+        passage = Passage(counted, beyond, steps.rows, asked.t_end)
+    return _Plan(asked, problem, counted, calls, steps, monitor, passage, remarks)
+
+
+def _counted(
+    asked: Asked, problem: Problem, calls: Calls, monitor: RoundingMonitor | None
+) -> Problem:
+    """The problem of a run whose calls are counted, and whose constraints are watched."""
     functions: dict[str, Any] = {
         "derivative": calls.derivatives.of(monitor.derivative if monitor else problem.derivative),
         "jacobian": calls.jacobians.of(problem.jacobian),
     }
-    violations = None
     if problem.projection:
         violations = Violations(len(problem.projection.names))
-        projection = replace(problem.projection, violations=violations, seen=Seen())
-        functions["projection"] = projection
+        functions["projection"] = replace(problem.projection, violations=violations, seen=Seen())
     if problem.closed_form:
         functions["closed_form"] = replace(problem.closed_form, seen=Seen())
     counted = problem.having(**functions)
-    if tally:
-        counted = tally.counting(counted)
-    seed = problem.scrutiny.seed if problem.scrutiny else None
+    if asked.tally:
+        counted = asked.tally.counting(counted)
+    seed, method = problem.scrutiny.seed if problem.scrutiny else None, asked.method
     if seed is not None and isinstance(method, Adaptive) and "lost" not in method.memory:
         counted = counted.having(derivative=Shaken(counted.derivative, seed).derivative)
-    remarks: list[str] = []
-    if isinstance(method, FixedStep):
-        # Evaluations to check stability do not count. They need a Jacobian with all digits, which
-        # doubles do not give where the derivative is repaired.
-        checked = None if unstable or repairs or not method.steps_explicitly(problem) else problem
-        plain = not (monitor or powers or problem.contacts)
-        compiled = compiled_steps(problem) if plain else None
-        looked = problem.projection or problem.closed_form
-        ahead = calls if plain and not looked else None
-        begin, rows, settings = equal_steps(
-            asked, method, counted, checked, compiled=compiled, calls=ahead, each=tally is not None
-        )
-    else:
-        compiled = None if monitor else compiled_steps(problem)
-        each, dense = bool(tally or powers), powers is not None
-        begin, rows, settings = adaptive_steps(
-            asked, method, problem, remarks.append, compiled=compiled, each=each, dense=dense
-        )
-
-    share = 1.0 if isinstance(method, FixedStep) else events.GAP_CHECKS[1]
-    stepper = events.Stepper(begin, share, calls.derivatives.of)
-    passage = None
-    if counted.projection and counted.contacts is None and not repairs:
-        passage = Passage(
-            counted,
-            lambda t, y, made: begin(replace(counted, initial=y), t, made),
-            rows,
-            asked.t_end,
-        )
-    advances = _advances(stepper, counted, asked, monitor, rest_speed, passage)
-    account = Account(powers, problem.contacts, isinstance(method, Adaptive)) if powers else None
-    run = _Run(asked.t_start, problem.initial, account)
-    if can_go_on(method) and not repairs:
-        run.resume = partial(begun, asked, problem)
-    if tally:
-        tally.begin(problem.initial)
-    report = progress or _ignore
-    outcome, trouble = _follow(run, advances, calls, problem, method, asked.t_end, report, tally)
-    kept = _kept(run, problem, {**settings, **numbers(rest_speed=rest_speed)})
-    through = passage.words() if passage else ""
-    notes = (trouble, monitor.words() if monitor else "", through, *dict.fromkeys(remarks))
-    message = " ".join("; ".join(filter(None, notes)).split())
-    found = _trajectory(run, problem, integrator, calls, outcome, message, kept)
-    if problem.projection is None or violations is None:
-        return found
-    largest = zip(violations.before.tolist(), violations.after.tolist(), strict=True)
-    return replace(found, violations=dict(zip(problem.projection.names, largest, strict=True)))
+    return counted
 
 
-def _trajectory(
-    run: "_Run",
-    problem: Problem,
-    integrator: str,
-    calls: Calls,
-    outcome: Outcome,
-    message: str,
-    resume: Resume,
-) -> Trajectory:
+def _trajectory(plan: _Plan, run: "_Run", outcome: Outcome, message: str) -> Trajectory:
     """The trajectory of a run that has ended."""
-    account = run.account
+    account, problem, calls, held = run.account, plan.problem, plan.calls, plan.counted.projection
     t, y = run.rows.arrays()
+    violations: dict[str, tuple[float, float]] = {}
+    if held and held.violations:
+        largest = zip(held.violations.before.tolist(), held.violations.after.tolist(), strict=True)
+        violations = dict(zip(held.names, largest, strict=True))
     return Trajectory(
         name=problem.name,
         states=problem.states,
         t=t,
         y=y,
-        integrator=integrator,
+        integrator=plan.asked.integrator,
         finished=outcome.kind == "finished",
         message=message,
         counts={
@@ -212,9 +239,10 @@ def _trajectory(
         events=tuple(run.events),
         works=np.array(run.works) if account and account.names else None,
         work_names=account.names if account else (),
-        resume=resume,
+        resume=_kept(run, problem, plan.steps.settings),
         origin=problem.origin,
         outcome=outcome,
+        violations=violations,
     )
 
 
@@ -232,16 +260,14 @@ def _kept(run: "_Run", problem: Problem, settings: Resume) -> Resume:
     return {**kept, **settings, "derivative": rate}
 
 
-def _monitor(
-    guard: Guard, problem: Problem, method: FixedStep | Adaptive, asked: Asked
-) -> RoundingMonitor:
+def _monitor(guard: Guard, problem: Problem, asked: Asked) -> RoundingMonitor:
     """The monitor of a guarded run; its bound is at most that of the run's tolerance.
 
     Raises `RunError` if the run cannot be repaired.
     """
     if guard.repairs:
-        check_repairs(problem, method, asked.resume is not None)
-    tight = OF_TOLERANCE * asked.rtol if isinstance(method, Adaptive) else guard.bound
+        check_repairs(problem, asked.method, asked.resume is not None)
+    tight = OF_TOLERANCE * asked.rtol if isinstance(asked.method, Adaptive) else guard.bound
     return RoundingMonitor(guard, problem, min(guard.bound, tight))
 
 
@@ -286,48 +312,10 @@ class _Run:
             self.works.append(self.account.total)
 
 
-def _advances(
-    stepper: events.Stepper,
-    problem: Problem,
-    asked: Asked,
-    monitor: RoundingMonitor | None,
-    rest_speed: float | None,
-    passage: Passage | None,
-) -> Iterator[Advance]:
-    """The steps of a run, with event location if it has contacts, checked by its guard."""
-    t_start, resume = asked.t_start, asked.resume
-    if monitor and monitor.guard.repairs:
-        return repaired(monitor, stepper.begin, problem, t_start, asked.max_steps)
-    if problem.contacts is None:
-        advances = stepper.begin(problem, t_start, 0, resume)
-    else:
-        advances = events.advances(
-            stepper,
-            problem,
-            t_start,
-            asked.t_end,
-            rest_speed=rest_speed,
-            max_steps=asked.max_steps,
-            resume=resume,
-        )
-    held = problem.projection or problem.closed_form
-    if held:
-        advances = watched(held, advances, t_start, problem.initial, passage)
-    return monitored(monitor, advances, t_start, problem.initial) if monitor else advances
-
-
-def _follow(
-    run: _Run,
-    advances: Iterator[Advance],
-    calls: Calls,
-    problem: Problem,
-    method: FixedStep | Adaptive,
-    t_end: float,
-    progress: Progress,
-    tally: Tally | None,
-) -> tuple[Outcome, str]:
-    """Make the steps up to `t_end`; return the outcome and, if it did not finish, a message."""
-    t_start, report = run.t, throttled(progress)
+def _follow(plan: _Plan, run: _Run, advances: Iterator[Advance]) -> tuple[Outcome, str]:
+    """Make the steps of a run; return the outcome and, if it did not finish, a message."""
+    problem, calls, asked, method = plan.problem, plan.calls, plan.asked, plan.asked.method
+    report = throttled(asked.progress or _ignore)
     try:
         with np.errstate(all="ignore"):
             _check_start(problem, run)
@@ -337,9 +325,9 @@ def _follow(
                 run.take(advance)
                 calls.derivatives.calls += advance.derivatives
                 calls.jacobians.calls += advance.jacobians
-                if tally:
-                    tally.take(advance, calls.derivatives.calls, calls.jacobians.calls)
-                report((run.t - t_start) / (t_end - t_start))
+                if asked.tally:
+                    asked.tally.take(advance, calls.derivatives.calls, calls.jacobians.calls)
+                report((run.t - asked.t_start) / asked.span)
         return Outcome(), ""
     except KeyboardInterrupt:
         run.end()

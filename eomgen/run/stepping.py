@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import cast
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from eomgen.run.calls import Calls
 from eomgen.run.checks import (
     allowed_errors,
     check_no_step,
+    check_rest_speed,
     check_samples,
     check_series,
     check_steps,
@@ -22,10 +23,14 @@ from eomgen.run.checks import (
     numbers,
 )
 from eomgen.run.compiled import Compiled
+from eomgen.run.guard import Guard
 from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
 from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume, always
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.progress import Progress
+from eomgen.run.tally import Tally
+from eomgen.run.works import Powers
 
 Rows = Callable[[float, float], Sequence[float]]
 """(a, b) -> the times of the rows of a run after a, up to b, s."""
@@ -37,8 +42,7 @@ ANEW = "anew"
 
 @dataclass(frozen=True)
 class Asked:
-    """The arguments of `integrate` that determine the steps; `grid`, s, is the time from which
-    equal steps are counted.
+    """The arguments of `integrate`; `grid`, s, is the time from which equal steps are counted.
 
     Raises `RunError` for arguments that are invalid for every method.
     """
@@ -47,51 +51,92 @@ class Asked:
     t_start: float
     t_end: float
     grid: float
+    resume: Resume | None
     dt: float | None
     rtol: float
     atol: float | None
     samples: int | None
     max_step: float | None
     max_steps: int
-    resume: Resume | None
+    rest_speed: float | None
+    powers: Powers | None
+    guard: Guard | None
+    unstable: bool
+    tally: Tally | None
+    progress: Progress | None
 
     def __post_init__(self) -> None:
         check_times(self.t_start, self.t_end)
-        check_tolerances(find_integrator(self.integrator), self.rtol, self.atol)
+        check_tolerances(self.method, self.rtol, self.atol)
         check_samples(self.samples)
+        check_rest_speed(self.rest_speed)
+
+    @classmethod
+    def of(
+        cls, problem: Problem, t_start: float, resume: Resume | None, **given: Any
+    ) -> tuple["Asked", Problem]:
+        """What is asked, and the problem of a run that may continue another one."""
+        grid = t_start = float(t_start)
+        if resume is not None:
+            t_start = float(resume["t"])
+            grid = float(resume.get("grid", t_start))
+            problem = replace(problem, initial=resume["y"])
+            if ANEW in resume:  # that run made no whole step
+                resume = None
+        return cls(t_start=t_start, grid=grid, resume=resume, **given), problem
+
+    @cached_property
+    def method(self) -> FixedStep | Adaptive:
+        """The integrator."""
+        return find_integrator(self.integrator)
 
     @property
     def span(self) -> float:
         """Length of the run, s."""
         return self.t_end - self.t_start
 
+    @property
+    def repairs(self) -> bool:
+        """Whether the derivative is repaired where it loses digits."""
+        return self.guard is not None and self.guard.repairs
 
-def equal_steps(
-    asked: Asked,
-    method: FixedStep,
-    problem: Problem,
-    checked: Problem | None,
-    *,
-    compiled: Compiled | None = None,
-    calls: Calls | None = None,
-    each: bool = True,
-) -> tuple[Begin, Rows, Resume]:
-    """A function that begins equal steps, one that gives the times of rows, and the settings that a
-    later run compares.
 
-    checked   the problem by whose Jacobian the stability of steps is checked; None for no check
-    compiled  compiled steps of the problem, if it has some
-    calls     see `fixed_step.advances`
-    each      whether each step becomes an `Advance`
+class Steps(NamedTuple):
+    """How the steps of a run are begun, the times of its rows, and what a later run compares."""
 
-    Raises `RunError` for an invalid step.
+    begin: Begin
+    rows: Rows
+    settings: Resume
+
+
+def steps_of(
+    asked: Asked, problem: Problem, counted: Problem, calls: Calls, remark: Remark
+) -> Steps:
+    """The steps of a run; `counted` is the problem with its calls counted, and `remark` is called
+    with the remarks of an adaptive method.
+
+    Raises `RunError` for an invalid step, or arguments that the method does not take.
     """
+    if isinstance(asked.method, FixedStep):
+        return _equal_steps(asked, asked.method, problem, counted, calls)
+    return _adaptive_steps(asked, asked.method, problem, remark)
+
+
+def _equal_steps(
+    asked: Asked, method: FixedStep, whole: Problem, counted: Problem, calls: Calls
+) -> Steps:
+    """The same for steps of equal length."""
     if asked.max_step is not None:
         raise RunError(f"max_step: {asked.integrator} takes equal steps; give --dt instead")
     dt, every = check_steps(asked.integrator, asked.span, asked.dt, asked.samples, asked.max_steps)
     grid = Grid(asked.grid, asked.t_end, dt, every)
-    change = method.prepare(problem)
-    steps = partial(compiled.equal, method.compiled) if compiled and method.compiled else None
+    change = method.prepare(counted)
+    # Evaluations to check stability do not count. They need a Jacobian with all digits, which
+    # doubles do not give where the derivative is repaired.
+    unchecked = asked.unstable or asked.repairs or not method.steps_explicitly(whole)
+    plain = not (asked.guard or asked.powers or whole.contacts)
+    compiled = _compiled(whole) if plain and method.compiled else None
+    ahead = plain and not (whole.projection or whole.closed_form)
 
     def begin(
         problem: Problem,
@@ -106,11 +151,11 @@ def equal_steps(
             problem,
             t,
             grid,
-            checked=problem if checked and problem.contacts else checked,
+            checked=None if unchecked else problem if problem.contacts else whole,
             resume=resume,
-            compiled=steps,
-            calls=calls,
-            each=each,
+            compiled=partial(compiled.equal, method.compiled) if compiled else None,
+            calls=calls if ahead else None,
+            each=asked.tally is not None,
         )
 
     def rows(a: float, b: float) -> list[float]:
@@ -119,29 +164,11 @@ def equal_steps(
         found = [mark for mark in marks if a < mark <= b and mark < asked.t_end]
         return [*found, b] if b == asked.t_end else found
 
-    return begin, rows, _settings(asked, dt)
+    return Steps(begin, rows, _settings(asked, dt))
 
 
-def adaptive_steps(
-    asked: Asked,
-    method: Adaptive,
-    problem: Problem,
-    remark: Remark,
-    *,
-    compiled: Compiled | None = None,
-    each: bool = True,
-    dense: bool = True,
-) -> tuple[Begin, Rows, Resume]:
-    """A function that begins adaptive steps, one that gives the times of rows, and the settings
-    that a later run compares.
-
-    remark    called with the method's remarks
-    compiled  compiled steps of the problem, if it has some
-    each      whether each compiled step becomes an `Advance`
-    dense     whether these give the states within steps
-
-    Raises `RunError` if `dt` is given, or `max_step` is invalid.
-    """
+def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Remark) -> Steps:
+    """The same for steps whose lengths follow from tolerances."""
     check_no_step(asked.integrator, asked.dt)
     if problem.projection and not method.one_step:
         raise RunError(
@@ -156,6 +183,7 @@ def adaptive_steps(
         longest, unseen = float(asked.resume["longest"]), float(asked.resume["unseen"])
     atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
     bounds = adaptive.Bounds(asked.rtol, atol, longest, unseen, asked.max_steps)
+    compiled = None if asked.guard else _compiled(problem)
 
     def begin(
         problem: Problem,
@@ -176,15 +204,16 @@ def adaptive_steps(
             resume=resume,
             steps=compiled.steps if compiled and problem.compiled else None,
             compiles=compiles,
-            each=each,
-            dense=dense,
+            each=bool(asked.tally or asked.powers),
+            dense=asked.powers is not None,
         )
 
     def rows(a: float, b: float) -> list[float]:
         first, last = np.searchsorted(times, (a, b), side="right")
         return cast(list[float], times[first:last].tolist())
 
-    return begin, rows, {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
+    kept = {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
+    return Steps(begin, rows, kept)
 
 
 def _spaced(start: float, end: float, count: int) -> FloatArray:
@@ -196,10 +225,10 @@ def _spaced(start: float, end: float, count: int) -> FloatArray:
 
 def _settings(asked: Asked, dt: float | None) -> Resume:
     given = {"rtol": asked.rtol, "atol": asked.atol, "max_step": asked.max_step}
-    return numbers(grid=asked.grid, dt=dt, **given)
+    return numbers(grid=asked.grid, dt=dt, rest_speed=asked.rest_speed, **given)
 
 
-def compiled_steps(problem: Problem) -> Compiled | None:
+def _compiled(problem: Problem) -> Compiled | None:
     """The compiled steps of a problem; None if it has none, or another derivative than they."""
     compiled = problem.compiled
     if compiled is None or compiled.derivative is not problem.derivative:
