@@ -1,10 +1,10 @@
 """Soft contacts and stops that overlap at the initial state of a model."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from eomgen.dynamics.diagnostics import initial_overlaps
 from eomgen.model.model import Model, dofs_of
-from eomgen.scene.effects import JointStop
 
 
 @dataclass(frozen=True)
@@ -29,16 +29,14 @@ def overlaps_at_start(model: Model) -> list[StartOverlap]:
     found = []
     for overlap in initial_overlaps(model):
         effect = effects[overlap.effect]
-        if isinstance(effect, JointStop):
-            kind, unit = "stop", _unit(model, effect)
-        else:
-            kind, unit = "contact", "m"
+        dofs = dofs_of(model.bodies, model.dimensions)
+        limited = [dof for joint in effect.limited(dofs) for dof in dofs[joint]]
+        kind, unit = ("stop", _unit(limited)) if limited else ("contact", "m")
         found.append(StartOverlap(effect.name, kind, overlap.depth, unit, overlap.energy))
     return found
 
 
-def _unit(model: Model, stop: JointStop) -> str:
+def _unit(dofs: Iterable[str]) -> str:
     """The unit of the coordinates that a stop limits."""
-    dofs = dofs_of(model.bodies, model.dimensions)
-    prismatic = {dof == "prismatic" for joint in stop.acted_on(dofs) for dof in dofs[joint]}
+    prismatic = {dof == "prismatic" for dof in dofs}
     return "rad or m" if len(prismatic) == 2 else "m" if True in prismatic else "rad"

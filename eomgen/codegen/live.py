@@ -8,13 +8,12 @@ from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System, optimised
 from eomgen.language.formula import Formula, evaluate
-from eomgen.model.interactive import Switched, interactive, switches_of
+from eomgen.model.interactive import Pull, interactive, switches_of
 from eomgen.model.model import Model
 from eomgen.program.passes import optimise
 from eomgen.program.program import Output, Program, cost, finish, interpreter
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import TIME, Node, Stage, Tape
-from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad
 from eomgen.scene.joints.base import WORLD
 
@@ -60,7 +59,7 @@ def _loads(record: Recording) -> tuple[tuple[tuple[str, str], ...], list[Node]]:
     found: list[tuple[str, str]] = []
     nodes: list[Node] = []
     for effect in record.model.effects:
-        if not isinstance(effect, Switched | Gravity):
+        if isinstance(effect, Pull):
             continue
         for load in effect.loads(d):
             if isinstance(load, JointLoad) or load.body == WORLD:

@@ -18,7 +18,7 @@ from eomgen.model.dependence import is_plain
 from eomgen.model.model import Model
 from eomgen.program.tape import Node, Stage
 from eomgen.scalars.protocol import Scalars
-from eomgen.scene.effects import Effect, Gravity
+from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import EffectTable, Input, JointLoad, Load, Mechanism, Vector
 from eomgen.scene.joints.base import WORLD
 
@@ -58,14 +58,14 @@ class Fall(EffectTable):
     """
 
     type: Literal["fall"] = "fall"
-    acceleration: Any
+    components: Any
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The weight of each body, at its centre of mass."""
         zeros = (mechanism.value(ZERO),) * mechanism.dimensions
         for body in mechanism.bodies:
             m = mechanism.mass(body)
-            force = tuple(m * part for part in _fixed(self.acceleration, mechanism))
+            force = tuple(m * part for part in _fixed(self.components, mechanism))
             yield Load(body, force, zeros, "gravity")
 
 
@@ -118,8 +118,8 @@ def with_stand_ins(
     for effect in model.effects:
         if is_plain(effect, model):
             effects.append(effect)
-        elif isinstance(effect, Gravity) and not effect.except_bodies:
-            effects.append(Fall(name=effect.name, acceleration=names.fixed(effect.acceleration(d))))
+        elif effect.uniform:
+            effects.append(Fall(name=effect.name, components=names.fixed(effect.acceleration(d))))
         elif loads := [names.named(load) for load in _loads(effect, d)]:
             effects.append(StandIn(name=effect.name, components=loads))
     inputs = (*model.inputs, *(Input(name, "", "") for name in names.inputs))

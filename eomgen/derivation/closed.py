@@ -20,7 +20,6 @@ from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
 from eomgen.errors import SceneError
 from eomgen.language.formula import is_zero
 from eomgen.model.model import Model
-from eomgen.scene.joints import Free
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ def _recovered_forces(
         (symbol, expression)
         for tree in trees(model)
         for k in tree.bodies
-        if not isinstance(model.bodies[k].joint, Free)
+        if model.bodies[k].joint.holds
         for symbol, expression in zip(symbols.force[k], found[k], strict=True)
     )
 
@@ -128,7 +127,7 @@ def written_out_forces(equations: Equations) -> tuple[Definition, ...]:
     for symbol, expression in equations.joint_force:
         for k in reversed(range(len(model.bodies))):
             ddx, ddy = symbols.xdd[k], symbols.ydd[k]
-            if isinstance(model.bodies[k].joint, Free):
+            if not model.bodies[k].joint.holds:
                 inner = (found[ddx], found[ddy])
             else:
                 inner = tuple(e.xreplace(inward) for e in kinematics.acceleration[k])

@@ -19,7 +19,6 @@ from eomgen.derivation.symbols import (
     tidy,
 )
 from eomgen.model.model import Model
-from eomgen.scene.joints import Free
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ def trees(model: Model) -> tuple[Tree, ...]:
     for k, root in enumerate(model.roots):
         members.setdefault(root, []).append(k)
     return tuple(
-        Tree(root, isinstance(model.bodies[root].joint, Free), tuple(bodies))
+        Tree(root, not model.bodies[root].joint.holds, tuple(bodies))
         for root, bodies in members.items()
     )
 
@@ -75,7 +74,7 @@ def joint_forces(model: Model, residuals: Sequence[Vec]) -> dict[int, Vec]:
     forces: dict[int, Vec] = {}
     for tree in trees(model):
         for k in tree.bodies:
-            if isinstance(model.bodies[k].joint, Free):
+            if not model.bodies[k].joint.holds:
                 continue
             outer = subtree(model, k)
             total: Vec = (sp.Integer(0), sp.Integer(0))
@@ -103,7 +102,7 @@ def collect(
     inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
     rows = [row.xreplace(inward) for row in _rows(model, kinematics, inertial)]
     for k in reversed(range(len(model.bodies))):
-        if not isinstance(model.bodies[k].joint, Free):
+        if model.bodies[k].joint.holds:
             ddx, ddy = (e.xreplace(inward) for e in kinematics.acceleration[k])
             rows = [row.xreplace({symbols.xdd[k]: ddx, symbols.ydd[k]: ddy}) for row in rows]
     rows = [sp.expand(row) for row in rows]

@@ -13,7 +13,6 @@ from eomgen.derivation.closed import Equations
 from eomgen.derivation.symbols import Expr, over_bodies, over_coordinates
 from eomgen.errors import SceneError
 from eomgen.model.states import State, velocity_states
-from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
 
 
@@ -65,7 +64,7 @@ def _positions(equations: Equations) -> dict[Expr, Expr]:
     defined: dict[Expr, Expr] = {}
     model = equations.model
     for k, (body, last) in enumerate(zip(model.bodies, model.angle_index, strict=True)):
-        if isinstance(body.joint, Free):
+        if not body.joint.holds:
             defined |= {symbols.x[k]: symbols.q[last - 2], symbols.y[k]: symbols.q[last - 1]}
             defined |= {symbols.xd[k]: symbols.v[last - 2], symbols.yd[k]: symbols.v[last - 1]}
         else:
@@ -91,7 +90,7 @@ def _momentum_form(equations: Equations, *, redundant: bool) -> StateForm:
                 "inertia_com is 0; use form = 'velocity' or give it an inertia"
             )
         m, inertia, name = symbols.mass[k], symbols.inertia[k], body.name
-        free = isinstance(body.joint, Free)
+        free = not body.joint.holds
         if free or redundant:
             words = [c.name for c in body.positions[:2]] if free else [f"x_{name}", f"y_{name}"]
             x, y = (sp.Symbol(word, real=True) for word in words)

@@ -10,7 +10,6 @@ from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
-from eomgen.scene.joints import Free
 
 Wrench = tuple[Vec, Expr]
 """Force in world axes at the centre of mass, and torque about z."""
@@ -63,7 +62,7 @@ def draw_free_bodies(model: Model, symbols: Symbols, kinematics: Kinematics) -> 
     equations = []
     for k, body in enumerate(model.bodies):
         force, torque = add(gravity[k][0], applied[k][0]), gravity[k][1] + applied[k][1]
-        if not isinstance(body.joint, Free):
+        if body.joint.holds:
             reaction = scale(-1, symbols.force[k])
             force = add(force, reaction)
             torque += cross(kinematics.arm_child[k], reaction)

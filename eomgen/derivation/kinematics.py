@@ -6,7 +6,7 @@ import sympy as sp
 
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, rotate, scale
 from eomgen.model.model import Model
-from eomgen.scene.joints import Revolute
+from eomgen.scene.joints import Joint
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def differentiate_joints(model: Model, symbols: Symbols) -> Kinematics:
         q = [functions[s] for s in symbols.q[last + 1 - len(body.positions) : last + 1]]
         base = angles[body.parent] if body.parent >= 0 else zero
         angle = base + q[-1]
-        if not isinstance(body.joint, Revolute):
+        if not body.joint.holds:
             r_parent, r_child, position = (zero, zero), (zero, zero), (q[0], q[1])
         else:
             parent = (zero, zero)
@@ -92,6 +92,6 @@ def differentiate_joints(model: Model, symbols: Symbols) -> Kinematics:
     )
 
 
-def _vector(symbols: Symbols, joint: Revolute, field: str) -> Vec:
+def _vector(symbols: Symbols, joint: Joint, field: str) -> Vec:
     x, y = getattr(joint, field)
     return (symbols.value(x), symbols.value(y))

@@ -10,7 +10,6 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.elimination import trees
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
-from eomgen.scene.joints import Free
 
 Definition = tuple[Expr, Expr]
 """A symbol and what it stands for."""
@@ -72,7 +71,7 @@ Pairs = list[tuple[Expr, Expr]]
 def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
     """State, free bodies, and the joints as constraints."""
     s, kin, model = equations.symbols, equations.kinematics, equations.model
-    held = [k for k, body in enumerate(model.bodies) if not isinstance(body.joint, Free)]
+    held = [k for k, body in enumerate(model.bodies) if body.joint.holds]
     yield (
         "(1)",
         "State",

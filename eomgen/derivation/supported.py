@@ -1,12 +1,12 @@
 """Which models have a closed form, and by which of the two derivations."""
 
 from collections import Counter
-from typing import TypeGuard
 
 from eomgen.language.formula import ZERO, is_zero
 from eomgen.model.dependence import is_plain
 from eomgen.model.model import Model
-from eomgen.scene.joints import Free, Joint, Revolute
+from eomgen.scene.joints import Joint
+from eomgen.scene.joints.base import WithRotor, kinds_of
 
 MOST_BODIES = 12
 """Bodies of one tree of pins in the plane; twelve take about a minute, one more a third more."""
@@ -78,11 +78,11 @@ def why_not_pins(model: Model) -> str:
         return "it is derived in the plane"
     for body in model.bodies:
         joint = body.joint
-        if not isinstance(joint, Free | Revolute):
+        if joint.holds and kinds_of(joint, 2) != ["revolute"]:
             return f"it is for pins and free bodies, and '{joint.name}' is {joint.type}"
-        if isinstance(joint, Revolute) and joint.motor_inertia != ZERO:
+        if isinstance(joint, WithRotor) and joint.motor_inertia != ZERO:
             return f"it takes no motor_inertia, and '{joint.name}' has one"
-        if isinstance(joint, Revolute) and (joint.orientation_deg or joint.orientation):
+        if joint.orientation_deg or joint.orientation:
             return f"it takes no orientation, and '{joint.name}' has one"
         if model.value(body.mass) == 0.0:
             return f"it divides by masses, and that of '{body.name}' is 0"
@@ -96,8 +96,8 @@ def why_not_pins(model: Model) -> str:
     return ""
 
 
-def off_centre(joint: Joint) -> TypeGuard[Revolute]:
+def off_centre(joint: Joint) -> bool:
     """Whether a revolute joint's axis passes beside its child's centre of mass: `r_child` is not
     the bare number 0.
     """
-    return isinstance(joint, Revolute) and not all(is_zero(r) for r in joint.r_child)
+    return joint.holds and not all(is_zero(r) for r in joint.r_child)

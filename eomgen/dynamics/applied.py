@@ -8,7 +8,6 @@ from eomgen.dynamics.loads import power_of
 from eomgen.dynamics.mechanism_state import MechanismState
 from eomgen.dynamics.vectors import Vec, torque_in_space
 from eomgen.scalars.protocol import Scalar
-from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import Contact, JointLoad, Load, Vector
 from eomgen.scene.joints.base import WORLD
 
@@ -23,7 +22,7 @@ class AppliedLoads(MechanismState):
         """
         points, joints = [], []
         for effect in self.model.effects:
-            if not isinstance(effect, Gravity) or effect.except_bodies:
+            if not effect.uniform:
                 for load in effect.loads(self):
                     if isinstance(load, JointLoad):
                         joints.append(load)

@@ -27,8 +27,8 @@ from eomgen.model.groups import Group
 from eomgen.model.model import Model
 from eomgen.scalars import exact
 from eomgen.scalars.protocol import Scalar
-from eomgen.scene.constraints import Constraint, Coupling, Distance, LoopJoint
-from eomgen.scene.joints import Prismatic, Revolute
+from eomgen.scene.constraints import Constraint
+from eomgen.scene.constraints.base import Bar, Closing, Given, Pair
 from eomgen.scene.joints.base import WORLD
 
 SAME = 1e-4
@@ -119,7 +119,7 @@ def _choices(model: Model, d: Dynamics) -> Iterator[frozenset[int]]:
     outer = set[int]()
     seen = set[int]()
     for constraint in model.constraints:
-        if (found := _loop(d, constraint)) is not None:
+        if (found := _loop(d, constraint.closed_by())) is not None:
             new = [i for i in found[0] if i not in seen]
             outer |= set(new[-found[1] :])
             seen |= set(found[0])
@@ -217,36 +217,35 @@ def _group(d: Dynamics, constraint: Constraint, unknown: set[int]) -> Group | No
     if any(name in d.model.dropped for name in rows):
         return None
     names = [c.name for c in d.model.coordinates]
-    if isinstance(constraint, Coupling):
-        own = names.index(constraint.coordinate) if constraint.coordinate in names else -1
-        used = {names.index(name) for name in names_in(constraint.equals) if name in names}
+    closing = constraint.closed_by()
+    if isinstance(closing, Given):
+        own = names.index(closing.coordinate) if closing.coordinate in names else -1
+        used = {names.index(name) for name in names_in(closing.equals) if name in names}
         if own in unknown and not used & unknown:
             return Group(constraint.name, (own,), cuts=(None,))
         return None
-    loop = _loop(d, constraint)
+    loop = _loop(d, closing)
     if loop is None:
         return None
     within, count, before = loop
     moving = [i for i in within if i in unknown]
     kinds = [frame.kind for frame in d.linkage.frames if {*frame.q} & {*moving}]
-    slider = isinstance(constraint, LoopJoint) and isinstance(constraint.joint, Prismatic)
+    slider = isinstance(closing, Pair) and closing.slides
     if before & unknown or len(moving) != count or (slider and "revolute" not in kinds):
         return None
     return Group(constraint.name, tuple(moving), 1, (None,) * count)
 
 
-def _loop(d: Dynamics, constraint: Constraint) -> tuple[list[int], int, set[int]] | None:
+def _loop(d: Dynamics, closing: Closing | None) -> tuple[list[int], int, set[int]] | None:
     """The coordinates in a planar loop, in the order of its frames, how many it determines, and
     those that carry it; None if it is none.
     """
-    if d.dimensions == 3:
+    if d.dimensions == 3 or closing is None or isinstance(closing, Given):
         return None
-    if isinstance(constraint, Distance):
-        bodies, count = (constraint.body_1, constraint.body_2), 1
-    elif isinstance(constraint, LoopJoint) and isinstance(constraint.joint, Prismatic | Revolute):
-        bodies, count = (constraint.joint.parent, constraint.joint.child), 2
+    if isinstance(closing, Bar):
+        bodies, count = [body for body, _ in closing.ends], 1
     else:
-        return None
+        bodies, count = [closing.joint.parent, closing.joint.child], 2
     first, second = (set(_path(d, body)) for body in bodies)
     of = {k: frame.q[0] for k, frame in enumerate(d.linkage.frames) if frame.q}
     within = [of[k] for k in sorted(first ^ second) if k in of]

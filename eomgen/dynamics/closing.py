@@ -18,7 +18,7 @@ from eomgen.dynamics.vectors import Vec, add, constant, in_space, times, unit, z
 from eomgen.model.groups import Group
 from eomgen.scalars import exact
 from eomgen.scalars.protocol import Scalar
-from eomgen.scene.constraints import Coupling, Distance, LoopJoint
+from eomgen.scene.constraints.base import Bar, Given, Pair
 from eomgen.scene.joints import Prismatic, Revolute
 from eomgen.scene.joints.base import WORLD
 
@@ -71,9 +71,11 @@ def solved(d: MechanismState, group: Group) -> list[Turn | Scalar]:
     its coordinates the direction of its frame, or its value.
     """
     constraint = next(c for c in d.model.constraints if c.name == group.constraint)
-    if isinstance(constraint, Coupling):
-        return [d.value(constraint.equals)]
-    return _Polygon(d, group).solved(constraint)
+    closing = constraint.closed_by()
+    if isinstance(closing, Given):
+        return [d.value(closing.equals)]
+    assert closing is not None
+    return _Polygon(d, group).solved(closing)
 
 
 def angle_of(d: MechanismState, turn: Turn, cut: tuple[int, int]) -> Scalar:
@@ -113,15 +115,12 @@ class _Polygon:
             k for i in group.coordinates for k, f in enumerate(self._frames) if i in f.q
         ]
 
-    def solved(self, constraint: object) -> list[Turn | Scalar]:
+    def solved(self, closing: Bar | Pair) -> list[Turn | Scalar]:
         """What the group determines, in the order of its coordinates."""
-        if isinstance(constraint, Distance):
-            found = self._rod(constraint)
+        if isinstance(closing, Bar):
+            found = self._rod(closing)
         else:
-            assert isinstance(constraint, LoopJoint)
-            joint = constraint.joint
-            assert isinstance(joint, Prismatic | Revolute)
-            found = self._slider(joint) if isinstance(joint, Prismatic) else self._pin(joint)
+            found = (self._slider if closing.slides else self._pin)(closing.joint)
         return [found[k] for k in self._unknown]
 
     # Polygons.
@@ -148,10 +147,9 @@ class _Polygon:
                 return {guide: s, frame: self._turn(frame, u)}
         raise AssertionError(f"no polygon: {terms}")
 
-    def _rod(self, rod: Distance) -> dict[int, Turn | Scalar]:
+    def _rod(self, rod: Bar) -> dict[int, Turn | Scalar]:
         """Two ends keep their distance."""
-        ends = ((rod.body_1, rod.at_1), (rod.body_2, rod.at_2))
-        first, second = (self._at(body, [self._d.value(x) for x in at]) for body, at in ends)
+        first, second = (self._at(body, [self._d.value(x) for x in at]) for body, at in rod.ends)
         d, terms = self._gap(first, second)
         length = self._d.value(rod.length)
         square = length * length

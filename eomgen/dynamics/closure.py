@@ -16,7 +16,6 @@ from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import Coordinate
 
 Array = NDArray[np.float64]
@@ -144,12 +143,7 @@ class Closure:
 def _size(model: Model) -> float:
     """A typical length of the mechanism, m."""
     joints = [*(body.joint for body in model.bodies), *(loop.joint for loop in model.loops)]
-    parts = [
-        part
-        for joint in joints
-        if not isinstance(joint, Free)
-        for part in (*joint.r_parent, *joint.r_child)
-    ]
+    parts = [part for joint in joints for part in (*joint.r_parent, *joint.r_child)]
     return max((abs(model.value(part)) for part in parts), default=0.0) or 1.0
 
 

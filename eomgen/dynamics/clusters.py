@@ -21,8 +21,7 @@ from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.constraints import LoopJoint, Row
 from eomgen.scene.effects.base import JointLoad
-from eomgen.scene.joints import Revolute
-from eomgen.scene.joints.base import WORLD
+from eomgen.scene.joints.base import WORLD, kinds_of
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ def _of_pins(d: MechanismState) -> dict[str, Scalar]:
     frames = accelerations(d.in_world, _in_world(d), d.v, None, zeros(d.scalars), d.scalars)
     for loop in d.model.loops:
         own = [name for name, _ in loop.row_names(2)]
-        if isinstance(loop.joint, Revolute) and all(
+        if kinds_of(loop.joint, 2) == ["revolute"] and all(
             span(d, rows[name])[0] < 0 for name in own if name in rows
         ):
             found.update(zip(own, _apart(d, loop, frames), strict=True))

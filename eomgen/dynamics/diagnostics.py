@@ -13,7 +13,7 @@ from eomgen.dynamics.closure import INDEPENDENT, Closure
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.effects import Driven, Effect
+from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import JointLoad
 
 
@@ -114,7 +114,7 @@ def is_singular(model: Model, values: Values) -> bool:
     """Whether the mass matrix is singular: v̇ from rest without effects is not finite then."""
     still = replace(values, v=[0.0] * len(values.v))
     # Drives stay: without them their coordinates would be states.
-    bare = replace(model, effects=tuple(e for e in model.effects if isinstance(e, Driven)))
+    bare = replace(model, effects=tuple(e for e in model.effects if e.prescribes()))
     try:
         found = Dynamics(bare, still, FloatScalars()).articulated_forward()
     except (ArithmeticError, ValueError):

@@ -24,7 +24,6 @@ from eomgen.dynamics.perturbed import perturbed
 from eomgen.model.model import Model
 from eomgen.scalars.extended import Bits, out_of_bits, sixty_digits
 from eomgen.scalars.floats import ArrayScalars
-from eomgen.scene.effects import Driven, Gravity
 
 Array = NDArray[np.float64]
 
@@ -111,7 +110,7 @@ def digits_lost_by_kind(
     pushes = [{i.name: rng.uniform(-PUSH, PUSH) for i in model.inputs} for _ in q]
     still = model
     if all(route.axes for route in routes.values()):
-        kept = tuple(e for e in model.effects if isinstance(e, Gravity | Driven))
+        kept = tuple(e for e in model.effects if e.uniform or e.prescribes())
         still = replace(model, effects=kept)
     nothing = {i.name: 0.0 for i in model.inputs}
     states = {x.name: x.initial for x in model.extra}

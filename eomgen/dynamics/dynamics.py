@@ -50,8 +50,7 @@ from eomgen.dynamics.vectors import no_matrix, sub, zeros
 from eomgen.routes import ROUTES
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar
-from eomgen.scene.effects import Driven, Effect
-from eomgen.scene.joints import Free
+from eomgen.scene.effects import Effect
 
 __all__ = ["Dynamics", "Forward", "Values"]
 
@@ -182,7 +181,7 @@ class Dynamics(AppliedLoads):
             c.by: (force - other) * rate
             for c, (force, other, rate) in zip(self.model.driven, taken, strict=True)
         }
-        return [powers[e.name] for e in self.model.effects if isinstance(e, Driven)]
+        return [powers[e.name] for e in self.model.effects if e.name in powers]
 
     # Forward dynamics.
 
@@ -346,7 +345,7 @@ class Dynamics(AppliedLoads):
         return [
             index.v[0]
             for index in self.model.joint_indices
-            if isinstance(index.body.joint, Free) and max(index.v[: self.dimensions]) < self.nv
+            if not index.body.joint.holds and max(index.v[: self.dimensions]) < self.nv
         ]
 
     @cached_property
@@ -411,7 +410,7 @@ class Dynamics(AppliedLoads):
 
     def power(self, effect: Effect) -> Scalar:
         """The power of an effect's loads, W, of gravity and springs too."""
-        if isinstance(effect, Driven):
+        if drive := effect.prescribes():
             i = [c.by for c in self.model.driven].index(effect.name)
-            return self.driving_forces[i] * self.rate(effect.joint)
+            return self.driving_forces[i] * self.rate(drive[0])
         return self.power_of(effect.loads(self))

@@ -40,8 +40,6 @@ from eomgen.scalars import exact
 from eomgen.scalars.exact import EYE, ZERO, Matrix, Real
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar, Scalars
-from eomgen.scene.effects import Gravity
-from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import Primitive, WithRotor
 
 
@@ -67,8 +65,8 @@ def _is_graded(model: Model) -> bool:
     """Whether the geometry, or a direction of gravity, has slight components (see `axes`)."""
     floats = FloatScalars()
     frames, mounts = _drafted(model, model.defaults, floats)
-    directions = (e.direction for e in model.effects if isinstance(e, Gravity) and e.direction)
-    return is_graded(frames, mounts, [in_space(direction, floats) for direction in directions])
+    directions = (getattr(e, key) for e in model.effects for key in e.direction_fields)
+    return is_graded(frames, mounts, [in_space(d, floats) for d in directions if d])
 
 
 def _drafted(
@@ -93,7 +91,7 @@ def _drafted(
             parent = mounts[body.parent]
             frame, axes, angle, at = parent.frame, parent.axes, parent.angle, parent.at
         joint, point, armature = body.joint, zeros(scalars), scalars.number(0.0)
-        if not isinstance(joint, Free):
+        if joint.holds:
             at = add(at, times(constant(axes, scalars), vector(joint.r_parent)))
             axes = exact.product(axes, exact.orientation(joint.orientation_deg))
             if model.dimensions == 2:

@@ -24,7 +24,6 @@ from eomgen.model.partials import gradient_of, partials_of
 from eomgen.scalars.exact import Real
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.constraints.base import Partials, Row
-from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
 
@@ -294,6 +293,6 @@ class MechanismState:
         """The acceleration of uniform gravity, in world axes, m/s²."""
         g = list(zeros(self.scalars))
         for effect in self.model.effects:
-            if isinstance(effect, Gravity) and not effect.except_bodies:
+            if effect.uniform:
                 g[: self.dimensions] = effect.acceleration(self)
         return (g[0], g[1], g[2])

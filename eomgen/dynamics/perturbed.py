@@ -8,8 +8,8 @@ import random
 from dataclasses import replace
 
 from eomgen.model.model import Model
-from eomgen.scene.effects import Effect, Gravity
-from eomgen.scene.joints import Free, Joint
+from eomgen.scene.effects import Effect
+from eomgen.scene.joints import Joint
 
 
 def perturbed(model: Model, seed: int = 9) -> Model:
@@ -23,7 +23,7 @@ def perturbed(model: Model, seed: int = 9) -> Model:
         return near(degrees) if math.fmod(degrees, 90.0) else degrees
 
     def joint(given: Joint) -> Joint:
-        if isinstance(given, Free):
+        if not given.holds:
             return given
         angles = given.orientation_deg
         fields: dict[str, object] = {
@@ -38,9 +38,8 @@ def perturbed(model: Model, seed: int = 9) -> Model:
         return given.replaced(**fields)
 
     def effect(given: Effect) -> Effect:
-        if isinstance(given, Gravity) and given.direction is not None:
-            return given.replaced(direction=tuple(map(near, given.direction)))
-        return given
+        found = {key: getattr(given, key) for key in given.direction_fields}
+        return given.replaced(**{k: tuple(map(near, d)) for k, d in found.items() if d})
 
     return replace(
         model,

@@ -16,7 +16,7 @@ from eomgen.exposition.mechanism import AXES, NamingMechanism, Notes
 from eomgen.language.formula import Name
 from eomgen.model.dependence import is_plain
 from eomgen.model.model import Model
-from eomgen.scene.effects import Driven, Effect
+from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import (
     Contact,
     EffectTable,
@@ -60,9 +60,7 @@ class DerivedEffect:
 
 def derived_effects(model: Model) -> tuple[DerivedEffect, ...]:
     """All effects of a model, in order; drives are constraints and have no formula of their own."""
-    return tuple(
-        _derived(model, effect) for effect in model.effects if not isinstance(effect, Driven)
-    )
+    return tuple(_derived(model, effect) for effect in model.effects if not effect.prescribes())
 
 
 def _derived(model: Model, effect: Effect) -> DerivedEffect:

@@ -18,7 +18,6 @@ from eomgen.language.formula import Formula
 from eomgen.model.model import Body, JointIndex, Model
 from eomgen.model.orientation import rows_of
 from eomgen.scalars.exact import direction, quarters, radians
-from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import Primitive, WithRotor
 
 ORIGIN = sp.zeros(3, 1)
@@ -93,7 +92,7 @@ def _add(
     parent = last[body.parent] if body.parent >= 0 else -1
     rotation, offset, centre = sp.eye(3), ORIGIN, ORIGIN
     armature = angle = sp.Integer(0)
-    if not isinstance(joint, Free):
+    if joint.holds:
         rotation = fixed_axes(joint, symbols)
         if model.dimensions == 2 and joint.orientation is not None:
             angle = symbols.value(rows_of(joint.orientation)[0][0])

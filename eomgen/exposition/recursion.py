@@ -29,7 +29,6 @@ from eomgen.exposition.spatial import (
     rigid_inertia,
 )
 from eomgen.model.model import Model
-from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD
 
@@ -292,7 +291,7 @@ def _wrench(r: Recursion, frame: Frame, kinds: Sequence[str] = KINDS) -> list[Ex
     name, size = frame_name(r.model, frame), r.model.dimensions
     found: list[Expr] = []
     for derived in r.effects:
-        if isinstance(derived.effect, Gravity) and derived.kept:
+        if derived.effect.uniform and derived.kept:
             continue
         for load in derived.loads:
             if isinstance(load, Load) and load.body == name and load.kind in kinds:
@@ -392,6 +391,6 @@ def _falling(r: Recursion) -> Expr:
     mechanism: Any = NamingMechanism(r.model, Notes())
     total = sp.zeros(r.model.dimensions, 1)
     for derived in r.effects:
-        if isinstance(derived.effect, Gravity) and derived.kept:
+        if derived.effect.uniform and derived.kept:
             total -= sp.Matrix(derived.effect.acceleration(mechanism))
     return sp.Matrix([0] * (r.size - r.model.dimensions) + list(total))

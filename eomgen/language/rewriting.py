@@ -5,7 +5,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from eomgen.language.base import Table
-from eomgen.language.formula import Apply, Constant, Formula, Name
+from eomgen.language.formula import ZERO, Apply, Constant, Formula, Name
 
 Value = TypeVar("Value")
 
@@ -90,3 +90,12 @@ def sum_of(a: tuple[Formula, ...], b: tuple[Formula, ...]) -> tuple[Formula, ...
 def constant(*values: float) -> tuple[Formula, ...]:
     """A vector of numbers."""
     return tuple(Constant(float(value)) for value in values)
+
+
+def difference(a: Formula, b: Formula) -> Formula:
+    """a - b, without terms that are 0."""
+    if b == ZERO:
+        return a
+    if a == b:
+        return ZERO
+    return Apply("neg", (b,)) if a == ZERO else Apply("-", (a, b))

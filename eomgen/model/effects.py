@@ -13,10 +13,9 @@ from eomgen.model.inputs import own_inputs
 from eomgen.model.model import Body, dofs_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.prescribed import check_drive
-from eomgen.scene.constraints import ConstraintTable, Coupling
-from eomgen.scene.effects import Driven, Effect, Gravity
+from eomgen.scene.constraints import ConstraintTable
+from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import EffectTable, ExtraState, Input
-from eomgen.scene.joints import Prismatic, Revolute
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import Scene
 
@@ -71,8 +70,8 @@ def effects_in_force(
     found: list[Bindings] = []
     for i, given in enumerate(scene.effects):
         location = f"effects[{i}]"
-        if isinstance(given, Gravity) and any(isinstance(other, Gravity) for other in effects):
-            raise SceneError(f"{location}.type: a second 'gravity'; give only one")
+        if given.single and any(other.type == given.type for other in effects):
+            raise SceneError(f"{location}.type: a second '{given.type}'; give only one")
         effect, bindings = resolver.resolved(given, location, effects)
         found.append(bindings)
         effects.append(effect)
@@ -98,8 +97,8 @@ def _check_formulas(
     """Check that the formulas of a constraint are of what they restrict, t and parameters."""
     coordinates = [c.name for body in bodies for c in body.positions]
     velocities = [c.name for body in bodies for c in body.velocities]
-    if isinstance(constraint, Coupling):
-        check_known(constraint.coordinate, f"{location}.coordinate", coordinates, "coordinate")
+    for key in constraint.coordinate_fields:
+        check_known(getattr(constraint, key), f"{location}.{key}", coordinates, "coordinate")
     for key, also in (("equals", []), ("position", []), ("velocity", velocities)):
         formula = getattr(constraint, key, None)
         for name in [] if formula is None else names_in(formula):
@@ -138,8 +137,8 @@ class _Resolver:
             if isinstance(value := getattr(effect, field), tuple)
         }
         effect = effect.replaced(**vectors).checked(dimensions, location)
-        if isinstance(effect, Driven):
-            check_drive(effect, location, self._bodies, before, self._scope)
+        if drive := effect.prescribes():
+            check_drive(drive, location, self._bodies, before, self._scope)
         effect, bindings = bind(effect, effect.name, location, self._scope)
         effect = effect_from_centres(effect, given, self._names, self._centres, location)
         conditions = tuple(effect.conditions(location))
@@ -164,7 +163,7 @@ def _known_names(
     scene: Scene, bodies: Sequence[Body], dofs: Mapping[str, object]
 ) -> dict[str, tuple[str, Collection[str]]]:
     """For each kind of `EffectTable.…_fields` what its fields name, and the names that exist."""
-    single = [b.joint.name for b in bodies if isinstance(b.joint, Revolute | Prismatic)]
+    single = [b.joint.name for b in bodies if len(b.positions) == 1]
     names = [body.name for body in bodies]
     return {
         "body_fields": ("body", dict.fromkeys(names)),

@@ -30,7 +30,6 @@ from eomgen.scene.appearance import appearance_of
 from eomgen.scene.chains import written_out
 from eomgen.scene.constraints import Constraint, closing
 from eomgen.scene.effects import Effect
-from eomgen.scene.joints import Particle
 from eomgen.scene.schema import BodyTable, Scene
 
 
@@ -193,7 +192,7 @@ def _body(link: Link, scope: Scope, dimensions: int, centres: Centres) -> tuple[
     turned, kept = oriented(link.joint, link.joint_location, dimensions, scope)
     joint = normalised_joint(turned, link.joint_location, dimensions)
     given = link.body
-    if "inertia_com" not in given.model_fields_set and not isinstance(joint, Particle):
+    if "inertia_com" not in given.model_fields_set and joint.needs_inertia:
         raise SceneError(
             f"{link.location}.inertia_com: missing; a body needs it unless it is on a joint of "
             "type 'particle'"

@@ -1,14 +1,13 @@
 """Points given in a body's own frame, as points from its centre of mass."""
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeVar
 
 from eomgen.errors import SceneError
-from eomgen.language.formula import ZERO, Apply, Constant, Formula
-from eomgen.scene.effects import BodyContact
+from eomgen.language.formula import Formula
+from eomgen.language.rewriting import difference
 from eomgen.scene.effects.base import EffectTable
-from eomgen.scene.joints import Free, Joint
+from eomgen.scene.joints import Joint
 
 AnyEffect = TypeVar("AnyEffect", bound=EffectTable)
 Vector = tuple[Formula, ...]
@@ -20,12 +19,12 @@ def from_centre(point: Vector, centre: Vector | None) -> Vector:
     """A point in a body's frame, from its centre of mass; `centre` is None if it is the origin."""
     if not centre:
         return point
-    return tuple(_difference(r, c) for r, c in zip(point, centre, strict=True))
+    return tuple(difference(r, c) for r, c in zip(point, centre, strict=True))
 
 
 def joint_from_centres(joint: Joint, centres: Centres) -> Joint:
     """A joint with its points from the centres of mass of its bodies."""
-    if isinstance(joint, Free):
+    if not joint.holds:
         return joint
     return joint.replaced(
         r_parent=from_centre(joint.r_parent, centres.get(joint.parent)),
@@ -57,28 +56,5 @@ def effect_from_centres(
                 "its own; name one body, or points"
             )
         fields[field] = from_centre(getattr(effect, field), centres[own[0]])
-    if isinstance(effect, BodyContact) and effect.against == "plane" and effect.other in centres:
-        fields["offset"] = _offset(effect, centres[effect.other])
+    fields |= effect.from_centres(centres)
     return effect.replaced(**fields) if fields else effect
-
-
-def _offset(contact: BodyContact, centre: Vector) -> Formula:
-    """The offset of a plane, which its own frame gives, from the centre of mass."""
-    normal = contact.normal or tuple(float(i == len(centre) - 1) for i in range(len(centre)))
-    length = math.hypot(*normal)
-    offset = contact.offset
-    for n, c in zip(normal, centre, strict=True):
-        if n:
-            offset = _difference(
-                offset, c if n == length else Apply("*", (Constant(n / length), c))
-            )
-    return offset
-
-
-def _difference(a: Formula, b: Formula) -> Formula:
-    """a - b, without terms that are 0."""
-    if b == ZERO:
-        return a
-    if a == b:
-        return ZERO
-    return Apply("neg", (b,)) if a == ZERO else Apply("-", (a, b))

@@ -8,7 +8,7 @@ from eomgen.language.conditions import ROUNDING
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components
 from eomgen.scalars.exact import sine_between
-from eomgen.scene.joints import Free, Joint, Particle
+from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import Geared
 from eomgen.scene.schema import BodyTable
 
@@ -29,7 +29,7 @@ def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
         raise SceneError(
             f"{location}.type: a '{joint.type}' joint exists only in space; give dimensions = 3"
         )
-    if isinstance(joint, Free):
+    if not joint.holds:
         return joint
     fields: dict[str, object] = {
         name: with_components(getattr(joint, name), ZERO, dimensions, f"{location}.{name}")
@@ -42,10 +42,9 @@ def normalised_joint(joint: Joint, location: str, dimensions: int) -> Joint:
         raise SceneError(
             f"{location}.orientation_deg: is one angle; space takes 3, about x, y and z"
         )
-    if isinstance(joint, Particle) and len(joint.coordinates or "xyz"[:dimensions]) != dimensions:
-        raise SceneError(
-            f"{location}.coordinates: has {len(joint.coordinates or ())} names; give {dimensions}"
-        )
+    names, count = getattr(joint, "coordinates", None), len(joint.primitives(dimensions))
+    if names is not None and len(names) != count:
+        raise SceneError(f"{location}.coordinates: has {len(names)} names; give {count}")
     axis = getattr(joint, "axis", None)
     if axis is not None:
         if joint.type == "revolute" and dimensions == 2:

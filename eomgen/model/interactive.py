@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, cast
 
-from eomgen.language.formula import ZERO, Apply, Name
+from eomgen.language.formula import ZERO, Name
 from eomgen.language.quantity import Parameter
 from eomgen.model.model import Model
-from eomgen.scene.effects import Driven, Effect, Gravity
+from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import (
     Contact,
     EffectTable,
@@ -124,16 +124,15 @@ def switches_of(model: Model) -> Mapping[str, str]:
     """The switch of each effect that has one, by the name of the effect. Joints that an effect
     drives have no coordinates of their own, so it has none.
     """
-    return {e.name: f"switch__{e.name}" for e in model.effects if not isinstance(e, Driven)}
+    return {e.name: f"switch__{e.name}" for e in model.effects if not e.prescribes()}
 
 
 def _switched(effect: Effect, switch: str | None) -> EffectTable:
     """An effect that the parameter `switch` switches; the effect itself for None."""
     if switch is None:
         return effect
-    if isinstance(effect, Gravity):  # uniform gravity is no load: see `Dynamics.loads`
-        return effect.replaced(g=Apply("*", (Name(switch), effect.g)))
-    return Switched(name=effect.name, effect=effect, switch=switch)
+    own = effect.switched(Name(switch))
+    return own or Switched(name=effect.name, effect=effect, switch=switch)
 
 
 def scaled(load: Load | JointLoad, factor: Scalar) -> Load | JointLoad:

@@ -16,9 +16,9 @@ from eomgen.model.groups import Group
 from eomgen.scalars.exact import Real, radians
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.constraints import Constraint, ConstraintTable, LoopJoint
-from eomgen.scene.effects import Driven, Effect
+from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import ExtraState, Input
-from eomgen.scene.joints import Free, Joint
+from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import Coordinate
 from eomgen.scene.schema import Closing, Form, LeftOut, Route
 
@@ -101,12 +101,12 @@ def prescribed_of(
 
     `locked` maps the names of locked coordinates to their values.
     """
-    drives = {e.joint: e for e in effects if isinstance(e, Driven)}
+    drives = {drive[0]: (drive[1], e.name) for e in effects if (drive := e.prescribes())}
     driven, constant = [], []
     for body in bodies if drives or locked else ():
         for x, v in zip(body.positions, body.velocities, strict=False):
-            if drive := drives.get(body.joint.name):
-                driven.append(Prescribed(x, v, drive.coordinate, drive.name))
+            if body.joint.name in drives:
+                driven.append(Prescribed(x, v, *drives[body.joint.name]))
             elif x.name in locked:
                 constant.append(Prescribed(x, v, Constant(locked[x.name]), None))
     return (*driven, *constant)
@@ -133,7 +133,7 @@ def dofs_of(bodies: Iterable[Body], dimensions: int) -> dict[str, tuple[str, ...
     return {
         body.joint.name: tuple(primitive.kind for primitive in body.joint.primitives(dimensions))
         for body in bodies
-        if body.positions and not isinstance(body.joint, Free)
+        if body.positions and body.joint.holds
     }
 
 
@@ -388,7 +388,7 @@ class Model(Displayed):
         return tuple(
             body
             for body in self.bodies
-            if not isinstance(body.joint, Free) or any(c.name in given for c in body.positions)
+            if body.joint.holds or any(c.name in given for c in body.positions)
         )
 
     @cached_property

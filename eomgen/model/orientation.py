@@ -10,7 +10,7 @@ from eomgen.language.conditions import Condition, require, value_of
 from eomgen.language.formula import Apply, Constant, Formula, meant, names_in
 from eomgen.model.names import Scope
 from eomgen.scalars.exact import Matrix, radians, rotation_about
-from eomgen.scene.joints import Free, Joint
+from eomgen.scene.joints import Joint
 
 NO_ROTATION = 1e-6
 """Deviation of a matrix from a rotation, in its entries, that is accepted as rounding."""
@@ -27,7 +27,7 @@ def oriented(
 
     Raises `SceneError` for an unknown name, or for what is not a rotation.
     """
-    if isinstance(joint, Free) or joint.orientation is None:
+    if joint.orientation is None:
         return joint, ()
     at = f"{location}.orientation"
     if "orientation_deg" in joint.model_fields_set:

@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence
 
 from eomgen.errors import SceneError, listed, nearest
-from eomgen.language.formula import names_in
+from eomgen.language.formula import Formula, names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import Body
 from eomgen.model.names import Scope
 from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.effects import Driven, Effect
+from eomgen.scene.effects import Effect
 from eomgen.scene.joints.base import Coordinate
 
 
@@ -46,7 +46,7 @@ def locked_values(
     Raises `SceneError` for one that is unknown, is part of a quaternion, or is driven.
     """
     values = values_by_name(given, [c for body in bodies for c in body.positions], "locked")
-    driven = {effect.joint: effect.name for effect in effects if isinstance(effect, Driven)}
+    driven = {drive[0]: e.name for e in effects if (drive := e.prescribes())}
     for body in bodies:
         for i, c in enumerate(body.positions):
             if c.name in values and i >= body.plain:
@@ -63,7 +63,7 @@ def locked_values(
 
 
 def check_drive(
-    drive: Driven,
+    drive: tuple[str, Formula],
     location: str,
     bodies: Sequence[Body],
     before: Sequence[Effect],
@@ -74,15 +74,15 @@ def check_drive(
 
     `before` are the effects that the scene lists before it.
     """
+    joint, coordinate = drive
     for other in before:
-        if isinstance(other, Driven) and other.joint == drive.joint:
+        if (another := other.prescribes()) and another[0] == joint:
             raise SceneError(
-                f"{location}.joint: '{drive.joint}' is driven by '{other.name}', too; give only "
-                "one of "
+                f"{location}.joint: '{joint}' is driven by '{other.name}', too; give only one of "
                 "them"
             )
-    own = next(b.positions[0].name for b in bodies if b.joint.name == drive.joint)
-    for name in names_in(drive.coordinate):
+    own = next(b.positions[0].name for b in bodies if b.joint.name == joint)
+    for name in names_in(coordinate):
         if name in (own, f"{own}_dot"):
             raise SceneError(
                 f"{location}.coordinate: '{name}' is the motion that the formula prescribes, "
@@ -96,7 +96,7 @@ def check_drive(
         if name not in scope.values and name != "t":
             return  # an unknown name, which `bind` reports
     try:
-        start = with_rates(drive.coordinate, scope.values, 0.0, FloatScalars())
+        start = with_rates(coordinate, scope.values, 0.0, FloatScalars())
     except (ArithmeticError, ValueError):
         start = (math.nan, math.nan, math.nan)
     if not all(map(math.isfinite, start)):

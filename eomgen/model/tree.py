@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from eomgen.errors import SceneError, check_known
 from eomgen.model.names import check_names
 from eomgen.scene.chains import written_out
-from eomgen.scene.joints import Free, Joint
+from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import BodyTable, Scene
 
@@ -51,7 +51,7 @@ def links_of(scene: Scene) -> tuple[Link, ...]:
 
 def closes(joint: Joint) -> bool:
     """Whether a joint closes a loop instead of carrying its child."""
-    return not isinstance(joint, Free) and joint.loop
+    return joint.loop
 
 
 def closing_joints(scene: Scene) -> list[tuple[Joint, str]]:
@@ -63,7 +63,7 @@ def closing_joints(scene: Scene) -> list[tuple[Joint, str]]:
     anchors = dict.fromkeys([WORLD, *(body.name for body, _ in bodies)])
     found = list[tuple[Joint, str]]()
     for joint, location in joints:
-        if isinstance(joint, Free) or not joint.loop:
+        if not joint.loop:
             continue
         for key, name in (("parent", joint.parent), ("child", joint.child)):
             check_known(name, f"{location}.{key}", anchors, "body")

@@ -9,9 +9,7 @@ import sympy as sp
 from eomgen.exposition.effects import DerivedEffect
 from eomgen.exposition.reading import read, reading_names
 from eomgen.model.model import Model
-from eomgen.scene.effects import Gravity
 from eomgen.scene.effects.base import JointLoad, Load
-from eomgen.scene.joints.planar import Planar
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
 from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, numbers, skeleton
 
@@ -157,7 +155,7 @@ def _loads_on(
 ) -> Iterator[tuple[Point, Point | None, Expr, str]]:
     """Start, direction (None for a torque), name and style of each load of an effect on a body."""
     model, body = pose.model, shape.body
-    if isinstance(derived.effect, Gravity) and derived.kept:
+    if derived.effect.uniform and derived.kept:
         weight = next(
             (x for x in derived.loads if isinstance(x, Load) and x.body == body.name), None
         )
@@ -192,12 +190,12 @@ def _slide(pose: Pose, load: JointLoad) -> Point | None:
     """Where the child goes when the coordinate of a load grows; None if it turns."""
     model = pose.model
     body = next(body for body in model.bodies if body.joint.name == load.joint)
-    found = body.joint.primitives(model.dimensions)[load.coordinate : load.coordinate + 1]
+    found = body.joint.primitives(model.dimensions)[load.coordinate :]
     if not found or found[0].kind != "prismatic":  # a ball has three coordinates, one primitive
         return None
     x, y, z = found[0].axis
-    if isinstance(body.joint, Planar):  # its axes are those before it turns
-        angle = float(pose.state.coordinate(load.joint, 2))
+    if found[-1].kind == "revolute" and not any(found[-1].axis[:2]):  # it turns in its plane after
+        angle = float(pose.state.coordinate(load.joint, load.coordinate + len(found) - 1))
         c, s = math.cos(angle), math.sin(angle)
         x, y = c * x + s * y, c * y - s * x
     return pose.flat(pose.state.outward(body.name, (x, y, z)[: model.dimensions]))

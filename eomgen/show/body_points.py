@@ -9,7 +9,6 @@ from eomgen.language.formula import Formula
 from eomgen.model.model import Body, Model
 from eomgen.scene.effects.base import EffectTable
 from eomgen.scene.effects.elements import Link
-from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD
 from eomgen.show.effect_elements import elements_of_constraints
 
@@ -50,11 +49,10 @@ def points_of(model: Model) -> list[BodyPoints]:
             getattr(found[index[body]], kind).append(r)
 
     for body in model.bodies:
-        if not isinstance(body.joint, Free):
-            add(body.name, body.joint.r_child, "joints")
-            add(body.joint.parent, body.joint.r_parent, "joints")
-            if body.parent >= 0 and not length_of(model, body.joint.r_parent):
-                found[body.parent].carries = True
+        add(body.name, body.joint.r_child, "joints")
+        add(body.joint.parent, body.joint.r_parent, "joints")
+        if body.parent >= 0 and not length_of(model, body.joint.r_parent):
+            found[body.parent].carries = True
     for loop in model.loops:
         add(loop.joint.child, loop.joint.r_child, "joints")
         add(loop.joint.parent, loop.joint.r_parent, "joints")

@@ -11,7 +11,6 @@ import numpy as np
 from eomgen.language.formula import Constant, Formula, names_in
 from eomgen.language.rewriting import constant, valued
 from eomgen.model.model import Model
-from eomgen.scene.joints import Free
 from eomgen.scene.look import Rod, Shape
 from eomgen.show.body_points import Vector, is_drawn, length_of
 from eomgen.show.outlines import extent_points
@@ -36,7 +35,7 @@ def hidden_rods(
     n = model.dimensions
     corners = extent_points([valued(shape, model.value) for shape in shapes], n)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    held = [body.joint for body in model.bodies if not isinstance(body.joint, Free)]
+    held = [body.joint for body in model.bodies if body.joint.holds]
     pins = {r for joint in held if joint.type in PINS for r in (joint.r_parent, joint.r_child)}
     ends = {getattr(shape, key, None) for shape in shapes for key in ("start", "end", "center")}
     for joint in joints:

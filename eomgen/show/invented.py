@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from eomgen.language.formula import Constant
 from eomgen.language.rewriting import constant, scaled, sum_of, times, total
 from eomgen.model.model import Body, Model
-from eomgen.scene.joints import Cylindrical, Free, Prismatic, Revolute
-from eomgen.scene.joints.base import spatial
+from eomgen.scene.joints.base import kinds_of, spatial
 from eomgen.scene.look import Box, Cylinder, Disc, Polygon, Rod, Shape, Sphere
 from eomgen.show.body_points import BodyPoints, Vector, gyration, is_drawn, length_of
 from eomgen.show.colours import shade
+from eomgen.show.joint_axes import slides
 from eomgen.show.outlines import hull
 from eomgen.show.solid import angles_of, rotation_to
 
@@ -93,7 +93,7 @@ def invented_shapes(
     touching = [] if arms else [*_touching(inventor, body, points, color)]
     if touching:
         shapes = touching
-    elif isinstance(body.joint, Prismatic | Cylindrical):
+    elif slides(body.joint, model.dimensions):
         shapes = [*_rods(inventor, body, arms, color), *_slider(inventor, body, color)]
     elif not arms:
         shapes = [*_alone(inventor, body, points, color)]
@@ -258,7 +258,7 @@ def _solid(
         yield from _spatial_solid(model, body, color, least, most)
         return
     moment = model.value(body.moment)
-    if isinstance(body.joint, Revolute):
+    if kinds_of(body.joint, 2) == ["revolute"]:
         radius = _within(math.sqrt(2 * moment / mass), least, most)
         yield _ball(model, radius, color)
         # So that its rotation can be seen.
@@ -321,7 +321,6 @@ def _inertia(model: Model, body: Body) -> Array:
 def _slider(inventor: Inventor, body: Body, color: str) -> Iterator[Shape]:
     """A carriage at a prismatic joint, or a sleeve at a cylindrical one, along its axis."""
     joint, model = body.joint, inventor.model
-    assert not isinstance(joint, Free)
     primitive = joint.primitives(model.dimensions)[0]
     axis = np.array(primitive.axis) / np.linalg.norm(primitive.axis)
     scale = inventor.size * inventor.number(body)
@@ -335,7 +334,7 @@ def _slider(inventor: Inventor, body: Body, color: str) -> Iterator[Shape]:
             angle=math.atan2(axis[1], axis[0]),
             color=color,
         )
-    elif isinstance(joint, Prismatic):
+    elif len(joint.primitives(3)) == 1:
         yield Box(
             type="box",
             size=constant(length, depth, width),
@@ -350,7 +349,7 @@ def _slider(inventor: Inventor, body: Body, color: str) -> Iterator[Shape]:
 def _barrel(inventor: Inventor, body: Body, arms: Sequence[Vector], color: str) -> Iterator[Shape]:
     """A short cylinder along the axis of a revolute joint in space."""
     joint, model = body.joint, inventor.model
-    if model.dimensions == 3 and isinstance(joint, Revolute) and arms:
+    if model.dimensions == 3 and kinds_of(joint, 3) == ["revolute"] and arms:
         axis = np.array(spatial(joint.primitives(3)[0].axis))
         width = WIDTH * inventor.size * inventor.number(body)
         half = 0.75 * width * axis / np.linalg.norm(axis)

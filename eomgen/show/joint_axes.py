@@ -7,8 +7,13 @@ from eomgen.language.formula import Formula
 from eomgen.language.rewriting import constant
 from eomgen.model.model import Body, Model
 from eomgen.scalars.exact import orientation
-from eomgen.scene.joints import Free, Revolute
-from eomgen.scene.joints.base import spatial
+from eomgen.scene.joints import Joint
+from eomgen.scene.joints.base import kinds_of, spatial
+
+
+def slides(joint: Joint, dimensions: int) -> bool:
+    """Whether a joint slides along one axis."""
+    return kinds_of(joint, dimensions).count("prismatic") == 1
 
 
 def joint_axis(model: Model, body: Body) -> tuple[Formula, ...] | None:
@@ -17,7 +22,7 @@ def joint_axis(model: Model, body: Body) -> tuple[Formula, ...] | None:
     """
     joint = body.joint
     primitives = joint.primitives(model.dimensions)
-    if isinstance(joint, Free) or joint.type in ("planar", "particle") or not primitives:
+    if not primitives or kinds_of(joint, model.dimensions).count("prismatic") > 1:
         return None
     first = primitives[0]
     if first.kind == "spherical" or (model.dimensions == 2 and first.kind == "revolute"):
@@ -32,7 +37,7 @@ def zero_direction(model: Model, body: Body) -> tuple[Formula, ...] | None:
     It points to the child's centre of mass, if that is beside the axis.
     """
     joint = body.joint
-    if not isinstance(joint, Revolute):
+    if kinds_of(joint, model.dimensions) != ["revolute"]:
         return None
     arm = np.array(spatial(tuple(-model.value(r) for r in joint.r_child)))
     axis = np.array(spatial(joint.primitives(model.dimensions)[0].axis))
@@ -47,6 +52,5 @@ def zero_direction(model: Model, body: Body) -> tuple[Formula, ...] | None:
 
 def _fixed_rotation(body: Body) -> NDArray[np.float64]:
     """From the child's axes to the parent's at coordinate 0."""
-    assert not isinstance(body.joint, Free)
     rows = orientation(body.joint.orientation_deg)
     return np.array([[float(entry) for entry in row] for row in rows])

@@ -20,15 +20,14 @@ from eomgen.scene.effects.elements import (
     Vector,
     without_formula,
 )
-from eomgen.scene.joints import Free
-from eomgen.scene.joints.base import WORLD
+from eomgen.scene.joints.base import WORLD, kinds_of
 from eomgen.scene.look import Polygon, Rod, Shape, is_drawable
 from eomgen.show.body_points import BodyPoints, points_of, typical_length
 from eomgen.show.colours import body_colours
 from eomgen.show.connections import hidden_rods
 from eomgen.show.effect_elements import SYMBOL, elements_of, elements_of_constraints
 from eomgen.show.invented import invented_shapes, inventor_of
-from eomgen.show.joint_axes import joint_axis
+from eomgen.show.joint_axes import joint_axis, slides
 
 MOST_TRACES = 12
 """Greatest number of points whose paths are drawn: more paths would hide everything else."""
@@ -168,7 +167,7 @@ def _holders(model: Model) -> list[tuple[int, Body]]:
 
 def _joint(model: Model, k: int, body: Body) -> DrawnJoint:
     joint, zero = body.joint, (ZERO,) * model.dimensions
-    if isinstance(joint, Free):
+    if not joint.holds:
         return DrawnJoint(joint.name, joint.type, WORLD_INDEX, zero, k, zero, None)
     return DrawnJoint(
         joint.name,
@@ -186,10 +185,10 @@ def _supports(model: Model, size: float) -> list[Support]:
     found = []
     for k, (_, body) in enumerate(_holders(model)):
         joint = body.joint
-        if isinstance(joint, Free) or joint.type in ("planar", "particle"):
+        if kinds_of(joint, model.dimensions).count("prismatic") > 1:
             continue
         radius = Constant(SYMBOL * size)
-        if joint.type in ("prismatic", "cylindrical"):
+        if slides(joint, model.dimensions):
             axis = joint_axis(model, body)
             assert axis is not None
             found.append(

@@ -15,7 +15,6 @@ from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Body, Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import Load
-from eomgen.scene.joints import Free
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point
 
 Expr = Any
@@ -82,12 +81,12 @@ class Pose:
         found = []
         for k, body in enumerate(model.bodies):
             own = None
-            if not isinstance(body.joint, Free):
+            if body.joint.holds:
                 own = self.point(body.name, self._vector(body.joint.r_child))
             others = tuple(
                 (child.joint.name, self.point(body.name, self._vector(child.joint.r_parent)))
                 for child in model.bodies
-                if child.parent == k and not isinstance(child.joint, Free)
+                if child.parent == k and child.joint.holds
             )
             axes = tuple(
                 self.flat(self.state.outward(body.name, tuple(float(i == j) for j in range(n))))

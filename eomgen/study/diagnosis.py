@@ -15,7 +15,6 @@ from eomgen.run.module import GeneratedModule, as_problem, given_values
 from eomgen.run.origin import START, UNITS, Origin
 from eomgen.run.problem import Explain, Explanation, FloatArray, Problem, unexplained
 from eomgen.run.trajectory import Trajectory
-from eomgen.scene.effects import JointStop
 from eomgen.scene.joints.base import Geared
 from eomgen.study.closing import closed
 from eomgen.study.whole import has_all, initial_of, names_of, on_branch, whole_of
@@ -94,8 +93,7 @@ def origin_of(model: Model, parameters: Mapping[str, float], inputs: Mapping[str
 def joint_limits(model: Model) -> dict[str, tuple[float, float]]:
     """The limits of each coordinate that has some which no stop enforces, by name."""
     joints = dofs_of(model.bodies, model.dimensions)
-    stops = [effect for effect in model.effects if isinstance(effect, JointStop)]
-    stopped = {joint for stop in stops for joint in stop.acted_on(joints)}
+    stopped = {joint for effect in model.effects for joint in effect.limited(joints)}
     return {
         body.positions[0].name: body.joint.limits
         for body in model.bodies

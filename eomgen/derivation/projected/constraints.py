@@ -20,8 +20,8 @@ from eomgen.language.formula import Formula
 from eomgen.model.model import Body, Model
 from eomgen.model.orientation import rows_of, turns_of
 from eomgen.scalars.exact import Real, direction, orientation, quarters, radians
-from eomgen.scene.joints import Free, Joint
-from eomgen.scene.joints.base import JointTable, Primitive
+from eomgen.scene.joints import Joint
+from eomgen.scene.joints.base import Primitive
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def _differentiated(
 ) -> Constraint:
     joint = body.joint
     axes, r_parent, arm = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
-    if not isinstance(joint, Free):
+    if joint.holds:
         axes = fixed_axes(joint, symbols)
         r_parent, arm = symbols.vector(joint.r_parent), symbols.vector(joint.r_child)
     primitives = joint.primitives(model.dimensions)
@@ -139,7 +139,7 @@ class Quantities(Protocol):
         """A number."""
 
 
-def fixed_axes(joint: JointTable, symbols: Quantities) -> Expr:
+def fixed_axes(joint: Joint, symbols: Quantities) -> Expr:
     """The axes of a joint at q = 0 in its parent's, by numbers or by formulas of parameters."""
     if joint.orientation is None:
         fixed = orientation(joint.orientation_deg)
@@ -213,8 +213,8 @@ def _axis_angle_of(
     Angles about one axis add, also over several joints.
     """
     axis, angle = sp.zeros(3, 1), sp.Integer(0)
-    degrees = 0.0 if isinstance(joint, Free) else joint.orientation_deg
-    if not isinstance(joint, Free) and joint.orientation is not None:
+    degrees = joint.orientation_deg
+    if joint.orientation is not None:
         if dimensions == 3:
             return None
         axis, angle = sp.Matrix([0, 0, 1]), symbols.value(rows_of(joint.orientation)[0][0])

@@ -33,7 +33,6 @@ from eomgen.derivation.projected.symbols import Ledger, Symbols
 from eomgen.derivation.solution import is_sum_of_positive_terms
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
-from eomgen.scene.joints import Free
 
 
 @dataclass
@@ -124,7 +123,7 @@ def solve(
     roots = model.roots
     translations = []
     for k, (body, motion) in enumerate(zip(bodies, motions, strict=True)):
-        floats = isinstance(model.bodies[roots[k]].joint, Free)
+        floats = not model.bodies[roots[k]].joint.holds
         work.rows += _angular_rows(model, k, body, motion, work)
         if not floats:
             work.rows += _linear_rows(body, motion, work)

@@ -11,7 +11,6 @@ from eomgen.language.formula import Formula, Name, evaluate
 from eomgen.model.model import Model
 from eomgen.model.orientation import rows_of, turns_of
 from eomgen.scalars.exact import Real, direction, opposite, orientation, quarters, radians
-from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WithRotor
 
 
@@ -98,13 +97,12 @@ def _sizes(model: Model) -> dict[Real, None]:
     found: dict[Real, None] = {}
     for body in model.bodies:
         joint, parts = body.joint, list[Real]()
-        if not isinstance(joint, Free):
-            parts += [x for row in orientation(joint.orientation_deg) for x in row]
-            if not isinstance(joint.orientation_deg, tuple):
-                parts.append(quarters(radians(joint.orientation_deg))[1])
-            if joint.orientation is not None and len(rows := rows_of(joint.orientation)) == 1:
-                turns = [turn for _, turn in turns_of(rows[0])] if len(rows[0]) != 4 else []
-                parts += [x for m in turns if isinstance(m, tuple) for row in m for x in row]
+        parts += [x for row in orientation(joint.orientation_deg) for x in row]
+        if not isinstance(joint.orientation_deg, tuple):
+            parts.append(quarters(radians(joint.orientation_deg))[1])
+        if joint.orientation is not None and len(rows := rows_of(joint.orientation)) == 1:
+            turns = [turn for _, turn in turns_of(rows[0])] if len(rows[0]) != 4 else []
+            parts += [x for m in turns if isinstance(m, tuple) for row in m for x in row]
         for primitive in joint.primitives(model.dimensions):
             if primitive.kind != "spherical":
                 parts += direction(primitive.axis)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Load, Mechanism, Scalar, Vector
@@ -57,6 +57,33 @@ class Linkage(Mechanism, Protocol):
         """
 
 
+@dataclass(frozen=True)
+class Given:
+    """A coordinate is a formula."""
+
+    coordinate: str
+    equals: Formula
+
+
+@dataclass(frozen=True)
+class Bar:
+    """Two points of bodies keep a distance."""
+
+    ends: tuple[tuple[str, tuple[Formula, ...]], tuple[str, tuple[Formula, ...]]]
+    length: Formula
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A joint that lets its bodies turn about a point, or slide along a line."""
+
+    joint: Any
+    slides: bool
+
+
+Closing = Given | Bar | Pair
+
+
 class Constraint(Protocol):
     """What closes a loop or restricts a motion."""
 
@@ -69,6 +96,13 @@ class Constraint(Protocol):
 
     def velocity_rows(self, dimensions: int) -> Sequence[str]:
         """The names of its rows that restrict velocities alone and have no residual."""
+
+    @property
+    def internal(self) -> bool:
+        """Whether its forces change neither the momentum nor the moment of momentum of all."""
+
+    def closed_by(self) -> Closing | None:
+        """What determines the coordinates of a planar loop in closed form; None for nothing."""
 
     def rows(self, mechanism: Linkage) -> Iterable[Row]:
         """Its scalar constraints, over the mechanism's scalars, in the order of `row_names`."""
@@ -86,6 +120,18 @@ class ConstraintTable(EffectTable):
     def velocity_rows(self, dimensions: int) -> Sequence[str]:
         """The names of its rows that restrict velocities alone; of most constraints none."""
         return ()
+
+    coordinate_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields that name a coordinate."""
+
+    @property
+    def internal(self) -> bool:
+        """Whether its forces change neither the momentum nor the moment of momentum of all."""
+        return False
+
+    def closed_by(self) -> Closing | None:
+        """What determines the coordinates of a planar loop in closed form; None for nothing."""
+        return None
 
     def elements(self, layout: Layout) -> Iterable[Element]:
         """What pictures show of it; of most constraints nothing."""

@@ -7,10 +7,11 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from eomgen.language.base import Identifier
 from eomgen.language.quantity import Quantity, Vector, quantity
-from eomgen.scene.constraints.base import ConstraintTable, Linkage, Row
+from eomgen.scene.constraints.base import Bar, ConstraintTable, Linkage, Row
 from eomgen.scene.effects.base import Load
 from eomgen.scene.effects.elements import Attachment, Layout, Link
 from eomgen.scene.effects.vectors import dot, negative, sub
+from eomgen.scene.joints.base import WORLD
 
 
 class Distance(ConstraintTable):
@@ -50,6 +51,15 @@ length = 0.5
         if name == info.data.get("body_1"):
             raise ValueError("is also body_1, whose points keep their distance; name another body")
         return name
+
+    @property
+    def internal(self) -> bool:
+        """True between two bodies."""
+        return WORLD not in (self.body_1, self.body_2)
+
+    def closed_by(self) -> Bar:
+        """Itself."""
+        return Bar(((self.body_1, self.at_1), (self.body_2, self.at_2)), self.length)
 
     def elements(self, layout: Layout) -> Iterator[Link]:
         """A line, drawn as a rope."""

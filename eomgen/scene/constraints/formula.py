@@ -9,7 +9,7 @@ from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.formula import Apply, Formula, Name
 from eomgen.language.quantity import Quantity, quantity
-from eomgen.scene.constraints.base import ConstraintTable, Linkage, Row
+from eomgen.scene.constraints.base import ConstraintTable, Given, Linkage, Row
 from eomgen.scene.effects.base import JointLoad
 
 
@@ -27,9 +27,15 @@ name = "gears"
 coordinate = "elbow_angle"
 equals = "-2*shoulder_angle + 0.1"
 """
+    coordinate_fields = ("coordinate",)
+
     type: Literal["coupling"]
     coordinate: Identifier = Field(description="coordinate that follows")
     equals: Quantity = quantity("", "its value", sees=("motion",))
+
+    def closed_by(self) -> Given:
+        """Its formula."""
+        return Given(self.coordinate, self.equals)
 
     def row_names(self, dimensions: int) -> list[tuple[str, str]]:
         """One row, of the constraint's name."""

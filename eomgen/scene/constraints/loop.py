@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from eomgen.errors import SceneError
 from eomgen.scalars import exact
-from eomgen.scene.constraints.base import Linkage, Row
+from eomgen.scene.constraints.base import Linkage, Pair, Row
 from eomgen.scene.effects.base import Load, Scalar, Vector
 from eomgen.scene.effects.vectors import add, cross, dot, negative, scale, sub
 from eomgen.scene.joints import (
@@ -20,7 +20,7 @@ from eomgen.scene.joints import (
     Universal,
     Weld,
 )
-from eomgen.scene.joints.base import Orientation, spatial
+from eomgen.scene.joints.base import WORLD, Orientation, spatial
 
 Closing = Ball | Cylindrical | Particle | Planar | Prismatic | Revolute | Universal | Weld
 Direction = tuple[exact.Real, ...]
@@ -70,6 +70,16 @@ class LoopJoint:
     def velocity_rows(self, dimensions: int) -> tuple[str, ...]:
         """None of its rows restricts velocities alone."""
         return ()
+
+    @property
+    def internal(self) -> bool:
+        """True between two bodies."""
+        return WORLD not in (self.joint.parent, self.joint.child)
+
+    def closed_by(self) -> Pair | None:
+        """A pin or a slider."""
+        slides = isinstance(self.joint, Prismatic)
+        return Pair(self.joint, slides) if slides or isinstance(self.joint, Revolute) else None
 
     def rows(self, mechanism: Linkage) -> Sequence[Row]:
         """Positions first, then orientations."""

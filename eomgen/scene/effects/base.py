@@ -229,6 +229,10 @@ class EffectTable(Table):
     """Fields with a vector that has one component for each dimension, or is absent."""
     points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     """For each field with a point of a body the fields that name the body or bodies."""
+    direction_fields: ClassVar[tuple[str, ...]] = ()
+    """Fields with a fixed direction in the world, or None."""
+    single: ClassVar[bool] = False
+    """Whether a scene has at most one of it."""
     input_field: ClassVar[str] = ""
     """The field that may be "input"."""
 
@@ -310,6 +314,33 @@ class EffectTable(Table):
                     yield Pull("force", self.name, layout.bodies[body], at)
         for joint in self.named((*self.joint_fields, *self.dof_fields), tuple(layout.joints)):
             yield AtJoint("motor", self.name, layout.child(joint), 0, layout.symbol)
+
+    def prescribes(self) -> tuple[str, Formula] | None:
+        """The joint whose coordinate it prescribes, and the formula; None if it exerts loads."""
+        return None
+
+    @property
+    def uniform(self) -> bool:
+        """Whether its loads are those of one `acceleration` of all bodies."""
+        return False
+
+    def acceleration(self, mechanism: Mechanism) -> Vector:
+        """The acceleration of free fall that it gives bodies, world axes, m/s²; () for none."""
+        return ()
+
+    def limited(self, joints: Mapping[str, tuple[str, ...]]) -> Sequence[str]:
+        """The joints whose coordinates it keeps within limits, among those of a mechanism."""
+        return ()
+
+    def switched(self, switch: Formula) -> Self | None:
+        """The effect times a parameter; None if its loads and energy are to be multiplied."""
+        return None
+
+    def from_centres(self, centres: Mapping[str, tuple[Formula, ...]]) -> Mapping[str, Any]:
+        """Fields beside points that change with the `centres` of mass of bodies that have frames
+        of their own.
+        """
+        return {}
 
     def named(self, fields: Sequence[str], every: Sequence[str]) -> list[str]:
         """The bodies or joints that some fields name; "all" are `every` one."""

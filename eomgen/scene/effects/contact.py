@@ -1,5 +1,6 @@
 """Soft and rigid contact of bodies with a plane, with a sphere or with each other."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
 from typing import ClassVar, Literal, Self
@@ -9,9 +10,9 @@ from pydantic import Field, model_validator
 from eomgen.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.conditions import Condition, a_part, are_zero, can_meet, not_negative
-from eomgen.language.formula import ZERO, Formula
+from eomgen.language.formula import ZERO, Apply, Constant, Formula
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity, with_components
-from eomgen.language.rewriting import constant, sum_of, times
+from eomgen.language.rewriting import constant, difference, sum_of, times
 from eomgen.scalars.exact import direction
 from eomgen.scene.effects.base import Contact, Load, Mechanism, Scalar
 from eomgen.scene.effects.base import Vector as Components
@@ -272,6 +273,19 @@ dissipation = 0.2
             axis = layout.wheel_axis(k, at)
             kind: Literal["ball", "wheel"] = "ball" if axis is None else "wheel"
             yield Round(kind, self.name, k, at, radius, axis=axis or None)
+
+    def from_centres(self, centres: Mapping[str, Vector]) -> Mapping[str, Formula]:
+        """The offset of a plane, which the frame of `other` gives, from its centre of mass."""
+        if self.against != "plane" or self.other not in centres:
+            return {}
+        centre, offset = centres[self.other], self.offset
+        normal = self.normal or tuple(float(i == len(centre) - 1) for i in range(len(centre)))
+        length = math.hypot(*normal)
+        for n, c in zip(normal, centre, strict=True):
+            if n:
+                part = c if n == length else Apply("*", (Constant(n / length), c))
+                offset = difference(offset, part)
+        return {"offset": offset}
 
     def points_drawn(self, layout: Layout) -> Iterator[tuple[int, Vector]]:
         """The points of bodies that may touch."""

@@ -6,6 +6,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from eomgen.language.base import Identifier
+from eomgen.language.formula import Formula
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import EffectTable
 from eomgen.scene.effects.elements import AtJoint, Layout
@@ -34,6 +35,10 @@ coordinate = "0.5*sin(6*t)"
     type: Literal["driven"]
     joint: Identifier = Field(description="revolute or prismatic joint it drives")
     coordinate: Quantity = quantity("rad | m", "coordinate", sees=("t",))
+
+    def prescribes(self) -> tuple[str, Formula]:
+        """Its joint and its coordinate."""
+        return self.joint, self.coordinate
 
     def elements(self, layout: Layout) -> Iterator[AtJoint]:
         """A drive at the joint."""

@@ -1,12 +1,12 @@
 """Uniform gravity, downwards or in a given direction."""
 
 from collections.abc import Iterator, Mapping
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, field_validator
 
 from eomgen.language.base import Identifier
-from eomgen.language.formula import ZERO, evaluate
+from eomgen.language.formula import ZERO, Apply, Formula, evaluate
 from eomgen.language.quantity import Numbers, Quantity, quantity
 from eomgen.language.rewriting import constant
 from eomgen.scalars.exact import direction
@@ -30,6 +30,8 @@ g = 9.81
 """
     body_fields = ("except_bodies",)
     vector_fields = ("direction",)
+    direction_fields = ("direction",)
+    single = True
 
     type: Literal["gravity"]
     name: Identifier = "gravity"
@@ -86,6 +88,15 @@ g = 9.81
             for part, x in zip(fall, mechanism.position(body, zeros), strict=True):
                 total = total - mechanism.mass(body) * part * x
         return total
+
+    @property
+    def uniform(self) -> bool:
+        """True if it acts on all bodies."""
+        return not self.except_bodies
+
+    def switched(self, switch: Formula) -> Self:
+        """With g times the switch: uniform gravity is no load of a mechanism."""
+        return self.replaced(g=Apply("*", (switch, self.g)))
 
     def elements(self, layout: Layout) -> Iterator[Weight]:
         """An arrow along it."""

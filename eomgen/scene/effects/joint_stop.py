@@ -128,6 +128,10 @@ damping = 1.0
         excesses = (self._beyond(mechanism, dof) for dof in self.dofs(mechanism))
         return spring_energy(mechanism, self.stiffness, excesses)
 
+    def limited(self, joints: Mapping[str, tuple[str, ...]]) -> Sequence[str]:
+        """Those that it acts on."""
+        return self.acted_on(joints)
+
     def drawn(self, at: AtJoint, zero: Vector | None) -> AtJoint:
         """Its limits."""
         return replace(at, kind="stop", low=self.low, high=self.high, zero=zero)

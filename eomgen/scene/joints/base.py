@@ -73,6 +73,10 @@ Orientation = (
 class JointTable(Table):
     """The keys of all joints except the free one: two bodies, a point on each, a fixed rotation."""
 
+    holds: ClassVar[bool] = True
+    """Whether it restricts the motion of its child: a free joint does not."""
+    needs_inertia: ClassVar[bool] = True
+    """Whether its child needs an `inertia_com`."""
     spaces: ClassVar[tuple[int, ...]] = (2, 3)
     """Dimensions of scenes that this joint type exists in."""
 
@@ -146,6 +150,11 @@ class Geared(WithRotor):
         if self.gear_ratio is None:
             return inertia
         return value(self.gear_ratio) * value(self.gear_ratio) * inertia
+
+
+def kinds_of(joint: Any, dimensions: int) -> list[str]:
+    """The kinds of a joint's primitives, in order."""
+    return [primitive.kind for primitive in joint.primitives(dimensions)]
 
 
 def spatial(vector: tuple[float, ...]) -> tuple[float, float, float]:

@@ -6,8 +6,9 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from eomgen.language.base import Identifier, Table
+from eomgen.language.formula import Formula
 from eomgen.scene.joints.ball import angular_velocity, quaternion
-from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Primitive
+from eomgen.scene.joints.base import WORLD, Z_AXIS, Coordinate, Orientation, Primitive
 
 PLANE, SPACE = 2, 3
 
@@ -27,6 +28,13 @@ type = "free"
 child = "hand"
 """
     spaces: ClassVar[tuple[int, ...]] = (PLANE, SPACE)
+    holds: ClassVar[bool] = False
+    needs_inertia: ClassVar[bool] = True
+    r_parent: ClassVar[tuple[Formula, ...]] = ()
+    r_child: ClassVar[tuple[Formula, ...]] = ()
+    orientation_deg: ClassVar[float | tuple[float, float, float]] = 0.0
+    orientation: ClassVar[Orientation | None] = None
+    loop: ClassVar[bool] = False
     misplaced: ClassVar[Mapping[str, str]] = {
         "loop": "a free joint holds nothing, so it closes no loop; leave the joint out"
     }

@@ -22,6 +22,8 @@ type = "particle"
 parent = "world"
 child = "hand"
 """
+    needs_inertia = False
+
     type: Literal["particle"]
     coordinates: tuple[Identifier, ...] | None = Field(
         default=None,

@@ -11,7 +11,7 @@ from eomgen.language.rates import with_rates
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.effects import Driven, Effect
+from eomgen.scene.effects import Effect
 from eomgen.scene.schema import Scene
 
 Kind = Literal["effect", "mechanism", "left out"]
@@ -95,7 +95,7 @@ def bare(scene: Scene) -> Model:
 
 def removed(scene: Scene, effects: Sequence[Effect]) -> Scene:
     """The scene without some effects; joints that they drove keep their initial values."""
-    drives = [effect.name for effect in effects if isinstance(effect, Driven)]
+    drives = [effect.name for effect in effects if effect.prescribes()]
     if drives:
         scene = _started(scene, drives)
     return scene.replaced(effects=tuple(e for e in scene.effects if e not in effects))

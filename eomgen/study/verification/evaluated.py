@@ -18,7 +18,6 @@ from eomgen.precision.precise import Extended
 from eomgen.scalars.extended import Bits
 from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects.base import Vector
-from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD, Primitive
 from eomgen.study.verification.poses import (
     Pose,
@@ -277,7 +276,7 @@ class EvaluatedModel:
 
     def _child(self, pose: Pose, index: JointIndex) -> Pose:
         joint = index.body.joint
-        if not isinstance(joint, Free):
+        if joint.holds:
             pose = pose.moved(self.in_space([self.value(r) for r in joint.r_parent]))
             if joint.orientation is None:
                 pose = pose.fixed(orientation(joint.orientation_deg))
@@ -285,7 +284,7 @@ class EvaluatedModel:
                 pose = pose.fixed(held(rows_of(joint.orientation), self.value))
         for i, primitive in enumerate(joint.primitives(self.dimensions)):
             pose = self._made(pose, primitive, index, i)
-        if not isinstance(joint, Free):
+        if joint.holds:
             pose = pose.moved(-self.in_space([self.value(r) for r in joint.r_child]))
         return pose
 

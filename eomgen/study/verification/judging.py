@@ -26,7 +26,6 @@ from eomgen.precision.extended import (
 )
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
-from eomgen.scene.effects import Gravity
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
 from eomgen.study.verification.truth import Truth
@@ -319,8 +318,8 @@ def _quantities(
     mass = sum((free.mass(name) for name in free.bodies), mpfr(0))
     potential = np.sum(abs(free.potential_energies), initial=mpfr(0))
     for effect in free.model.effects:
-        if isinstance(effect, Gravity):
-            potential += mass * max(map(abs, effect.acceleration(free))) * free.reach
+        fall = effect.acceleration(free)
+        potential += mass * max(map(abs, fall), default=mpfr(0)) * free.reach
     speeds = abs(free.rates[: free.nv])
     one = np.ones((len(free.bodies), 3, 3))
     scales = {

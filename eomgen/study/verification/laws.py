@@ -26,10 +26,7 @@ from eomgen.precision.extended import (
 from eomgen.precision.precise import Extended
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
-from eomgen.scene.constraints import Constraint, Distance, LoopJoint
-from eomgen.scene.effects import Driven
 from eomgen.scene.effects.base import JointLoad
-from eomgen.scene.joints import Free
 from eomgen.scene.joints.base import WORLD, Coordinate
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.judging import rest_of, ulps
@@ -73,22 +70,15 @@ def why_no_momentum_law(model: Model) -> str:
     """Why the momentum law does not apply to a model; "" if it does."""
     if model.leave_out:
         return "velocity forces are left out on purpose"
-    held = [b.joint.name for b in model.bodies if b.parent < 0 and not isinstance(b.joint, Free)]
+    held = [b.joint.name for b in model.bodies if b.parent < 0 and b.joint.holds]
     given = {c.position.name for c in model.prescribed}
     held += [
         b.joint.name
         for b in model.bodies
         if b.parent < 0 and any(c.name in given for c in b.positions)
     ]
-    held += [c.name for c in model.constraints if not _between_bodies(c)]
+    held += [c.name for c in model.constraints if not c.internal]
     return f"the world holds {', '.join(dict.fromkeys(held))}" if held else ""
-
-
-def _between_bodies(constraint: Constraint) -> bool:
-    """Whether a constraint acts between two bodies, whose momenta it leaves unchanged in sum."""
-    if isinstance(constraint, LoopJoint):
-        return WORLD not in (constraint.joint.parent, constraint.joint.child)
-    return isinstance(constraint, Distance) and WORLD not in (constraint.body_1, constraint.body_2)
 
 
 def broken(model: Model, module: GeneratedModule, roundings: Roundings, state: State) -> Broken:
@@ -335,8 +325,6 @@ def _outside(free: FreeBodies) -> tuple[Array, Array]:
     """
     total, sizes = zeros(6), zeros(6)
     for effect in free.model.effects:
-        if isinstance(effect, Driven):
-            continue
         for load in effect.loads(free):
             if isinstance(load, JointLoad) or load.body == WORLD:
                 continue
@@ -382,7 +370,7 @@ def kept(model: Model, states: Sequence[State]) -> Kept:
             powers, sizes = free.powers
             stored = (ahead.potential_energies - behind.potential_energies) / step
             for effect, power, gone, size in zip(model.effects, powers, stored, sizes, strict=True):
-                if isinstance(effect, Driven) or not _is_nothing(power + gone, size + abs(gone)):
+                if effect.prescribes() or not _is_nothing(power + gone, size + abs(gone)):
                     takers[effect.name] = None
             change = (ahead.kinetic_energy - behind.kinetic_energy) / step
             scale = np.sum(sizes, initial=mpfr(0)) + abs(free.rates[: free.nv]) @ free.bias_sizes
