@@ -5,6 +5,8 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.codegen.from_recursion import output
+from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
 from eomgen.derivation.closed import Equations, conditions, written_out_forces
 from eomgen.derivation.forms import state_form
@@ -72,6 +74,10 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
         "derivative": ((len(rates),), rates),
     }
     recipes = _recipes(equations)
+    extra = {
+        "forward_dynamics": names_of_inputs(tau.values()),
+        "inverse_dynamics": names_of_inputs(vd.values()),
+    }
     lowerings = {"forward_dynamics": forced, "inverse_dynamics": inverse}
     for name in (*["jacobian"] * jacobian, *model.outputs):
         if name in by:
@@ -82,13 +88,12 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
                 rows(unforced, recipes["point_velocities"]), [states[s] for s in symbols.v]
             )
             nodes[name] = (output_shape(name, model), [node for row in slopes for node in row])
-        elif model.form == "velocity" or OUTPUTS[name].forms:
+        elif name not in recipes and model.form == "velocity":
+            entries = output(Recording(model, "aba", tape=tape), name, extra)
+            nodes[name] = (output_shape(name, model), entries)
+        elif name in recipes and (model.form == "velocity" or OUTPUTS[name].forms):
             entries = rows(lowerings.get(name, unforced), recipes[name])
             nodes[name] = (output_shape(name, model), entries)
-    extra = {
-        "forward_dynamics": names_of_inputs(tau.values()),
-        "inverse_dynamics": names_of_inputs(vd.values()),
-    }
     checks = [
         Check(what, starting.lower(value).index, may_vanish)
         for what, value, may_vanish in conditions(equations)
