@@ -129,6 +129,13 @@ def factored(
     return eliminated(factors)
 
 
+def factorised(factors: Factors, matrix: Annotated[Matrix, "factors.n", "factors.n"]) -> bool:
+    """Factorise a matrix; False if it is singular."""
+    factors.first = 0
+    factors.columns[:, :] = transposed(matrix)
+    return eliminated(factors)
+
+
 @with_lists("eliminated")
 def eliminated(factors: Factors) -> bool:
     """Factorise the matrix whose rows are in `right` and `columns`; False if it is singular."""
@@ -189,3 +196,15 @@ def solve_by(factors: Factors, x: Annotated[Vector, "factors.n"]) -> None:
             value -= factors.right[i, k] * x[k]
             e += 1
         x[i] = value / factors.diagonal
+
+
+def solve_rows(
+    many: int,
+    factors: Factors,
+    right: Annotated[Matrix, "many", "factors.n"],
+    solutions: Annotated[Matrix, "many", "factors.n"],
+) -> None:
+    """The solutions for the rows of a matrix as right sides."""
+    for i in range(many):
+        solutions[i, :] = right[i]
+        solve_by(factors, solutions[i])

@@ -19,9 +19,17 @@ def factors_of(n: int, positions: int = 0) -> Factors:
     """Room for the factors of n unknowns, of which as many as there are positions may be eliminated
     first.
     """
-    made = _Few if n - positions <= FEW else Factors
+    return _empty(_Few, n) if n - positions <= FEW else plain_factors(n)
+
+
+def plain_factors(n: int) -> Factors:
+    """The same, of arrays alone."""
+    return _empty(Factors, n)
+
+
+def _empty(kind: type[Factors], n: int) -> Factors:
     wholes = (np.zeros(size, np.int64) for size in (n * n, n, n))
-    return made(n, 0, 0.0, np.zeros((n, n)), np.zeros((n, n)), *wholes)
+    return kind(n, 0, 0.0, np.zeros((n, n)), np.zeros((n, n)), *wholes)
 
 
 @dataclass(slots=True)

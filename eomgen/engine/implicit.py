@@ -20,8 +20,9 @@ from eomgen.engine.system import StiffSystem
 from eomgen.subset.words import Known, Matrix, Vector, added, unrolled, with_arrays, zeros
 
 MAX_ITERATIONS = 20
-SINGULAR, DIVERGES, UNSOLVED = 0, -1, -2
-"""What is returned in place of the number of iterations."""
+SINGULAR, DIVERGES, UNSOLVED, INVALID = 0, -1, -2, -3
+"""What is returned in place of the number of iterations: a matrix is singular; updates grow; too
+many iterations; a function has no valid result."""
 ROUNDOFF = 4 * 2.0**-52
 NOISE = 1e-10
 """If updates stop shrinking below this fraction of the state, they are rounding errors of the

@@ -17,9 +17,11 @@ from eomgen.engine import (
     least_squares,
     projection,
     quaternions,
+    rattle,
     roots,
     rosenbrock,
     sums,
+    symmetric,
     system,
     taylor,
 )
@@ -81,7 +83,8 @@ def text() -> Text:
     """The text of the whole engine."""
     steps = (adaptive, differences, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
     solved = (elimination, least_squares, complementarity, roots)
-    return Text.of(*steps, *solved, contacts, contact_times, projection, taylor, system)
+    held = (projection, rattle, symmetric)
+    return Text.of(*steps, *solved, contacts, contact_times, *held, taylor, system)
 
 
 def c_source(functions: Roots, language: Language = C) -> str:

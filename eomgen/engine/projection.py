@@ -10,7 +10,7 @@ from typing import Annotated, Protocol
 
 import numpy as np
 
-from eomgen.subset.words import Vector, with_arrays
+from eomgen.subset.words import Matrix, Vector, with_arrays
 
 MOST = 12
 """Most steps of Newton's method after a step; two suffice where steps are accurate."""
@@ -44,6 +44,49 @@ class Constraints(Protocol):
 
     def hold_velocities(self, t: float, y: Annotated[Vector, "n"]) -> bool:
         """Give y the velocities that meet the constraints."""
+        ...
+
+
+class Linkage(Protocol):
+    """A mechanism with constraints in rows, for steps that solve for them: nv velocities, and as
+    many coordinates or, with quaternions, more. Residuals are in sizes. Each function returns
+    whether its result is valid.
+    """
+
+    def off_by(
+        self, t: float, y: Annotated[Vector, "STATES"], out: Annotated[Vector, "rows"]
+    ) -> bool:
+        """The residuals."""
+        ...
+
+    def drift_at(
+        self, t: float, y: Annotated[Vector, "STATES"], out: Annotated[Vector, "rows"]
+    ) -> bool:
+        """Their rates."""
+        ...
+
+    def rows_at(
+        self, t: float, y: Annotated[Vector, "STATES"], out: Annotated[Matrix, "rows", "nv"]
+    ) -> bool:
+        """The derivatives J of their rates by the velocities."""
+        ...
+
+    def rates_at(
+        self, t: float, y: Annotated[Vector, "STATES"], out: Annotated[Vector, "STATES"]
+    ) -> bool:
+        """The rates of the states."""
+        ...
+
+    def inertia_at(
+        self, t: float, y: Annotated[Vector, "STATES"], out: Annotated[Matrix, "nv", "nv"]
+    ) -> bool:
+        """The mass matrix."""
+        ...
+
+    def slopes_at(
+        self, t: float, y: Annotated[Vector, "STATES"], out: Annotated[Vector, "nv"]
+    ) -> bool:
+        """The derivatives of the kinetic energy by the coordinates."""
         ...
 
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from eomgen.subset.words import Vector, Whole, sqrt
+from eomgen.subset.words import Matrix, Vector, Whole, sqrt
 
 SHORTEST, LONGEST = 1e-100, 1e100
 """Lengths between these have squares that neither overflow nor underflow."""
@@ -30,3 +30,53 @@ def normalised(
         y[c] /= length
         y[d] /= length
     return True
+
+
+def tangents(
+    n: int,
+    nv: int,
+    many: int,
+    places: Annotated[Whole, "4 * many"],
+    y: Annotated[Vector, "STATES"],
+    plain: float,
+    basis: Annotated[Matrix, "n", "nv"],
+) -> None:
+    """T of δy = T δx, small displacements of n coordinates, the first of y: `plain` for each scalar
+    one, q (0, δr)/2 for each quaternion, whose columns are orthogonal.
+    """
+    basis[:, :] = 0.0
+    column = 0
+    for i in range(n):
+        first = -1
+        inside = False
+        for k in range(many):
+            if places[4 * k] == i:
+                first = 4 * k
+            for j in range(1, 4):
+                if places[4 * k + j] == i:
+                    inside = True
+        if first >= 0:
+            a = places[first]
+            b = places[first + 1]
+            c = places[first + 2]
+            d = places[first + 3]
+            w = 0.5 * y[a]
+            x = 0.5 * y[b]
+            u = 0.5 * y[c]
+            v = 0.5 * y[d]
+            basis[a, column] = -x
+            basis[a, column + 1] = -u
+            basis[a, column + 2] = -v
+            basis[b, column] = w
+            basis[b, column + 1] = -v
+            basis[b, column + 2] = u
+            basis[c, column] = v
+            basis[c, column + 1] = w
+            basis[c, column + 2] = -x
+            basis[d, column] = -u
+            basis[d, column + 1] = x
+            basis[d, column + 2] = w
+            column += 3
+        elif not inside:
+            basis[i, column] = plain
+            column += 1

@@ -6,7 +6,7 @@ scene, which are libraries of their own.
 
 import ctypes
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,8 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
-from eomgen.engine.implicit import GAUSS_4, GAUSS_6, IMPLICIT_MIDPOINT
+from eomgen.engine.elimination import Factors
+from eomgen.engine.few import plain_factors
+from eomgen.engine.implicit import GAUSS_4, GAUSS_6, IMPLICIT_MIDPOINT, Stages
+from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import MANY_SUMS
+from eomgen.engine.symmetric import Projected
 from eomgen.native import checked, equal_steps
 from eomgen.native.checked import Function, FunctionStructure
 from eomgen.native.constrained import address, constraints, made_margins
@@ -23,9 +27,10 @@ from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import constants_of
 from eomgen.native.module import Kernels
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
-from eomgen.run.integrators import implicit_stages, rattle
+from eomgen.run.integrators.implicit_stages import projected_of, stages_of
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
+from eomgen.subset.structures import filled
 from eomgen.templating import render
 
 MAIN = "implicit.c"
@@ -35,11 +40,21 @@ EQUAL_STEPS = (*equal_steps.COMPOSED, ("equal_steps", {}))
 """What of the engine's text this library has."""
 SYMMETRIC = ("constraint_jacobian", "constraint_rates")
 """Further functions for symmetric projection."""
+LINKED = {
+    "rates": "derivative",
+    "inertia": "mass_matrix",
+    "slopes": "kinetic_slopes",
+    "gradients": "constraint_jacobian",
+    "drift": "constraint_rates",
+}
+"""The functions of `Linkage` in C, and those of a module that they are."""
 METHODS = ("rodas_5p",)
+CHANGES = ("implicit_change", "projected_change")
 GAUSS = {method.name: method for method in (IMPLICIT_MIDPOINT, GAUSS_4, GAUSS_6)}
 """The methods of adaptive and of equal steps, by the names of their compiled steps."""
 ROOTS = [
-    *(("implicit_change", {"method": method}) for method in GAUSS.values()),
+    *((name, {"method": method}) for name in CHANGES for method in GAUSS.values()),
+    ("rattle", {}),
     ("rodas_step", {}),
     ("rodas_within", {}),
 ]
@@ -61,15 +76,11 @@ def sources() -> Mapping[str, str]:
 
     context = {
         **of_constraints(),
-        "engine": C.prelude + c_source(EQUAL_STEPS),
-        "newton": c_source(ROOTS),
+        "engine": C.prelude + c_source([*EQUAL_STEPS, *ROOTS]),
         "compositions": [each.name for each in equal_steps.COMPOSITIONS],
         "many_sums": MANY_SUMS,
-        "most_of_rattle": rattle.MOST,
-        "rattle_roundoff": repr(rattle.ROUNDOFF),
-        "rattle_noise": repr(rattle.NOISE),
-        "max_projected": implicit_stages.MAX_PROJECTED,
-        "gauss": [(name, len(of.b)) for name, of in GAUSS.items()],
+        "linked": [*LINKED],
+        "gauss": [*GAUSS],
     }
     return {MAIN: render(c.TEMPLATES, "implicit.c.jinja", context)}
 
@@ -103,14 +114,41 @@ class _Records(ctypes.Structure):
     )
 
 
-class Iteration(ctypes.Structure):
-    """`iteration` of `templates/c/implicit.c.jinja`."""
+class Solver(ctypes.Structure):
+    """`Solver` of `templates/c/linkage.c.jinja`."""
 
     _fields_ = (
-        *((name, _POINTER) for name in ("system", "reals", "wholes")),
-        *((name, FunctionStructure) for name in ("rows", "rates")),
+        *((name, _POINTER) for name in ("system", "held")),
+        *((name, FunctionStructure) for name in LINKED),
+        *((name, _WHOLE) for name in ("states", "coordinates", "velocities", "rows")),
+        *((name, _POINTER) for name in ("stages", "newton", "room", "first", "second", "third")),
     )
     kept: Any
+
+
+def solver(
+    system: System,
+    functions: Mapping[str, Function],
+    sizes: tuple[int, int, int],
+    stages: Stages | None = None,
+    newton: Factors | None = None,
+    room: Linked | Projected | None = None,
+    factors: Sequence[Factors] = (),
+) -> Solver:
+    """What the steps of a system are made with: the numbers of its coordinates, velocities and
+    constraints; stages and their factors; room and factors for the constraints.
+    """
+    records = [None if x is None else filled(x) for x in (stages, newton, room, *factors)]
+    found = (functions.get(name) for name in LINKED.values())
+    made = Solver(
+        ctypes.addressof(system),
+        None,
+        *(FunctionStructure(*of) if of else FunctionStructure() for of in found),
+        *(system.states, *sizes),
+        *(None if x is None else ctypes.addressof(x) for x in records),
+    )
+    made.kept = system, functions, stages, newton, room, factors, records
+    return made
 
 
 class CompiledImplicit:
@@ -133,6 +171,7 @@ class CompiledImplicit:
         constants = constants_of(kernels, "derivative", p, origin)
         others = constants_of(Kernels(module, libraries["jacobian"]), "jacobian", p, origin)
         inputs = kernels.given(u)
+        self._problem = problem
         self._methods, self._system = libraries[METHODS_LIBRARY], None
         beside = {name: libraries[name] for name in libraries.keys() & {*PROJECTS, *SYMMETRIC}}
         self._functions, self._inputs = checked.functions(module, beside, p), inputs
@@ -168,27 +207,24 @@ class CompiledImplicit:
         """The same for methods with equal steps."""
         if self._system is None or name not in GAUSS:
             return None
-        stages = len(GAUSS[name].b)
-        reals, wholes = _space(stages * self._system.states)
-        functions = self._functions
-        with_them = Iteration(
-            ctypes.addressof(self._system),
-            reals.ctypes.data,
-            wholes.ctypes.data,
-            *(FunctionStructure(*functions[name]) for name in SYMMETRIC if name in functions),
-        )
-        with_them.kept = self, reals, wholes
+        many, problem, system = len(GAUSS[name].b), self._problem, self._system
+        n, positions = system.states, system.positions
+        stages, newton = stages_of(many, n, positions), plain_factors(many * n)
+        room, factors, sizes = None, list[Factors](), (0, 0, 0)
+        if problem.projection:
+            room = projected_of(many, problem)
+            sizes = room.n, room.nv, room.rows
+            factors = [plain_factors(k) for k in (n, 2 * room.rows)]
+        given = solver(system, self._functions, sizes, stages, newton, room, factors)
         call = self._methods[f"steps_{name}"]
-        held = with_them, self._inputs, functions, self._quaternions
-        return EqualSteps(partial(equal_steps.made, call, *held), stages, iterates=True)
+        held = given, self._inputs, self._functions, self._quaternions
+        return EqualSteps(partial(equal_steps.made, call, *held), many, iterates=True)
 
 
 def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:
-    """Space for numbers and for whole numbers in which methods solve for `unknowns` unknowns, with
-    symmetric projection or without.
-    """
+    """Space for numbers and for whole numbers in which Rodas5P solves for `unknowns` unknowns."""
     square = unknowns * unknowns
-    return np.empty(18 * square + 24 * unknowns), np.empty(2 * square + 4 * unknowns, np.int64)
+    return np.empty(2 * square + 24 * unknowns), np.empty(square + 2 * unknowns, np.int64)
 
 
 def _rodas_5p(

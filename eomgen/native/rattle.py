@@ -8,13 +8,12 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-import numpy as np
-
+from eomgen.engine.few import plain_factors
 from eomgen.native import checked, equal_steps
-from eomgen.native.checked import FunctionStructure
-from eomgen.native.implicit import METHODS_LIBRARY, Iteration, System
+from eomgen.native.implicit import METHODS_LIBRARY, System, solver
 from eomgen.native.module import Kernels
 from eomgen.run.compiled import EqualSteps
+from eomgen.run.integrators.rattle import linked, sizes_of
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 
@@ -22,16 +21,6 @@ NEEDED = ("derivative", "mass_matrix", "kinetic_slopes", "constraint_jacobian", 
 """The functions that a step calls."""
 DERIVATIVES = 2
 """Derivatives in a step of RATTLE."""
-
-
-class _Iteration(ctypes.Structure):
-    """`constrained_iteration` of `templates/c/rattle.c.jinja`."""
-
-    _fields_ = (
-        ("iteration", Iteration),
-        *((name, FunctionStructure) for name in ("derivative", "mass", "slopes")),
-    )
-    kept: Any
 
 
 def steps(
@@ -49,15 +38,11 @@ def steps(
     inputs = Kernels(module, libraries["derivative"]).given(u)
     if len(functions) < len(NEEDED) or inputs is None:
         return None
-    states, coordinates = len(problem.states), len(problem.positions)
-    system = System(inputs=inputs.ctypes.data, states=states, positions=coordinates)
-    square = coordinates * coordinates
-    reals = np.empty(13 * square + 11 * coordinates)
-    wholes = np.empty(2 * square + 4 * coordinates, np.int64)
-    *called, rows = (FunctionStructure(*functions[name]) for name in NEEDED[:4])
-    iteration = Iteration(ctypes.addressof(system), reals.ctypes.data, wholes.ctypes.data, rows)
-    more = _Iteration(iteration, *called)
-    more.kept = system, reals, wholes, inputs, libraries
+    n, rows = sizes_of(problem)
+    system = System(inputs=inputs.ctypes.data, states=len(problem.states), positions=n)
+    room, factors = linked(n, rows), [plain_factors(k) for k in (n, n, rows)]
+    given = solver(system, functions, (n, n, rows), room=room, factors=factors)
+    given.libraries = libraries, inputs
     call = libraries[METHODS_LIBRARY][f"steps_{name}"]
     count = DERIVATIVES * equal_steps.LEAPFROGS[name]
-    return EqualSteps(partial(equal_steps.made, call, more, inputs, functions, ()), count)
+    return EqualSteps(partial(equal_steps.made, call, given, inputs, functions, ()), count)

@@ -125,6 +125,44 @@ class _Held:
         return True
 
 
+@dataclass(frozen=True, eq=False)
+class Linkage:
+    """Constraints as steps that solve for them are given them; `rates` are those of the states."""
+
+    of: Projection
+    rates: Value
+
+    def off_by(self, t: float, y: FloatArray, out: FloatArray) -> bool:
+        """The residuals, in sizes."""
+        out[:] = self.of.residuals(t, y) / self.of.sizes
+        return True
+
+    def drift_at(self, t: float, y: FloatArray, out: FloatArray) -> bool:
+        """Their rates."""
+        out[:] = self.of.rates(t, y) / self.of.sizes
+        return True
+
+    def rows_at(self, t: float, y: FloatArray, out: FloatArray) -> bool:
+        """The derivatives of their rates by the velocities."""
+        out[:] = self.of.scaled_jacobian(t, y)
+        return True
+
+    def rates_at(self, t: float, y: FloatArray, out: FloatArray) -> bool:
+        """The rates of the states."""
+        out[:] = self.rates(t, y)
+        return True
+
+    def inertia_at(self, t: float, y: FloatArray, out: FloatArray) -> bool:
+        """The mass matrix."""
+        out[:] = self.of.inertia(t, y)
+        return True
+
+    def slopes_at(self, t: float, y: FloatArray, out: FloatArray) -> bool:
+        """The derivatives of the kinetic energy by the coordinates."""
+        out[:] = self.of.kinetic_slopes(t, y)
+        return True
+
+
 def constrained_by(projection: Projection | None) -> Constrained | None:
     """What compiled steps of a run are given of its constraints."""
     if projection is None:

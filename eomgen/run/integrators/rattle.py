@@ -1,37 +1,27 @@
-"""RATTLE: the leapfrog of mechanisms with constraints. Order 2, symplectic, symmetric.
-
-For a Hamiltonian system with a mass matrix that depends on positions (Hairer, Lubich, Wanner,
-Geometric Numerical Integration, VII.1.4; H. C. Andersen, J. Comput. Phys. 52 (1983) 24-34, for
-particles). With p = M v and the gradients of the kinetic energy T by q at fixed v,
-
-    p' = p + h/2 (∂T/∂q(q, a) + F(q)) + J(q)ᵀ λ,    M(q) a = M(r) b = p'
-    r = q + h/2 (a + b),    g(r) = 0
-    s = p' + h/2 (∂T/∂q(r, b) + F(r)) + J(r)ᵀ μ,    M(r) w = s,    J(r) w = 0
-
-leads from q and v to r and w. F are the forces, up to those along Jᵀ, which λ and μ make up for:
-M v̇ at rest.
-"""
+"""RATTLE, the leapfrog of mechanisms with constraints: see `eomgen.engine.rattle`."""
 
 from typing import cast
 
 import numpy as np
 
+from eomgen.engine import few
+from eomgen.engine.explicit import Step
+from eomgen.engine.implicit import DIVERGES, SINGULAR, UNSOLVED
+from eomgen.engine.rattle import MOST, Linked, rattle
 from eomgen.errors import RunError
 from eomgen.run.failure import StepFailure
-from eomgen.run.integrators.elimination import Factors, factored, product
 from eomgen.run.integrators.interface import Change
 from eomgen.run.problem import FloatArray, Problem
-from eomgen.run.projection import Projection, without
+from eomgen.run.projection import Linkage, Projection, without
 
-MOST = 60
-"""Most iterations of a step; they converge linearly, by about h times the fastest rate."""
-ROUNDOFF = 4 * float(np.finfo(np.float64).eps)
-NOISE = 1e-12
-"""A change below this fraction of the coordinates is rounding if it is not smaller than that of two
-iterations before. From one to the next it may grow while the iteration converges."""
 CHECKS, STEP, SAME = 3, 1e-5, 1e-6
 """States at which forces are checked, the step of differences, and what counts as equal."""
 REMEDY = "take a smaller --dt or an adaptive method (--integrator DOP853)"
+WHY = {
+    SINGULAR: "the mass matrix, or that of the constraints, is singular",
+    DIVERGES: "the iteration of a step diverges",
+    UNSOLVED: f"the step did not converge in {MOST} iterations",
+}
 
 
 def prepare(problem: Problem) -> Change:
@@ -45,69 +35,36 @@ def prepare(problem: Problem) -> Change:
             f"integrator: leapfrog takes mechanisms with constraints whose forces depend on "
             f"positions alone, and {why}; take --integrator implicit_midpoint or gauss_4"
         )
+    n, rows = sizes_of(problem)
+    room, step = linked(n, rows), Step()
+    first, second, third = (few.factors_of(k) for k in (n, n, rows))
+
+    def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
+        linkage = linkage_of(problem)
+        made = rattle(linkage, n, rows, t, y, h, room, first, second, third, step)
+        if made in WHY:
+            raise StepFailure(WHY[made], REMEDY)
+        return step.change
+
     return change
 
 
-def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
-    """A step. Raises `StepFailure` if the iteration does not converge."""
+def sizes_of(problem: Problem) -> tuple[int, int]:
+    """The number of coordinates, and that of constraints."""
     held = cast(Projection, problem.projection)
-    nq, half = held.coordinates, h / 2
-    q, v = y[:nq], y[nq:]
-
-    def force(mass: FloatArray, at: FloatArray) -> FloatArray:
-        still = np.concatenate((at, np.zeros(nq)))
-        return product(mass, problem.derivative(t, still)[nq:])
-
-    def slopes(at: FloatArray, speed: FloatArray) -> FloatArray:
-        return held.kinetic_slopes(t, np.concatenate((at, speed)))
-
-    here, columns = held.inertia(t, y), held.scaled_jacobian(t, y).T
-    mass = _factored(here)
-    ways = _solved(mass, columns)
-    begun = product(here, v) + half * force(here, q)
-    a = b = v
-    multipliers, step, before = np.zeros(columns.shape[1]), h * v, [np.inf, np.inf]
-    for _ in range(MOST):
-        there = np.concatenate((q + step, b))
-        middle = begun + half * slopes(q, a) + product(columns, multipliers)
-        after, last_mass = held.scaled_jacobian(t, there), held.inertia(t, there)
-        a, b = mass.solve(middle), _factored(last_mass).solve(middle)
-        new = half * (a + b)
-        off = held.residuals(t, np.concatenate((q + new, b))) / held.sizes
-        more = _factored(h * product(after, ways)).solve(off)
-        multipliers = multipliers - more
-        moved = max(_largest(new - step), _largest(h * product(ways, more)))
-        step, size = new, _largest(new)
-        stalls = before[-2] <= moved <= NOISE * (_largest(q) + size)
-        if moved <= ROUNDOFF * size or stalls:
-            break
-        before.append(moved)
-    else:
-        raise StepFailure(f"the step did not converge in {MOST} iterations", REMEDY)
-    r = q + step
-    there = np.concatenate((r, b))
-    last_mass = held.inertia(t, there)
-    last = middle + half * (force(last_mass, r) + slopes(r, b))
-    mass = _factored(last_mass)
-    w, ways = mass.solve(last), _solved(mass, after.T)
-    w = w - product(ways, _factored(product(after, ways)).solve(product(after, w)))
-    return np.concatenate((step, w - v))
+    return held.coordinates, len(held.names)
 
 
-def _factored(matrix: FloatArray) -> Factors:
-    factors = factored(-matrix, 0.0, 0)
-    if factors is None:
-        raise StepFailure("the mass matrix, or that of the constraints, is singular", REMEDY)
-    return factors
+def linkage_of(problem: Problem) -> Linkage:
+    """The constraints of a problem that has some, as the engine is given them."""
+    return Linkage(cast(Projection, problem.projection), problem.derivative)
 
 
-def _solved(factors: Factors, columns: FloatArray) -> FloatArray:
-    """The solutions for right sides (n, k)."""
-    return np.array([factors.solve(column) for column in columns.T]).T
-
-
-def _largest(values: FloatArray) -> float:
-    return float(np.abs(values).max())
+def linked(n: int, rows: int) -> Linked:
+    """Room for steps of n coordinates with constraints in rows."""
+    here, mass = np.zeros((2, n, n))
+    before, after, ways = np.zeros((3, rows, n))
+    return Linked(n, rows, here, mass, before, after, ways, np.zeros((rows, rows)))
 
 
 def _refused(problem: Problem) -> str:
