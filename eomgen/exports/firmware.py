@@ -13,7 +13,7 @@ from eomgen.codegen.interface import Interface
 from eomgen.engine import implicit, printed, projection
 from eomgen.errors import SceneError
 from eomgen.exports import Number, Options, Written
-from eomgen.exports.steps import method_of, size_of, start_of, step_of
+from eomgen.exports.steps import method_of, model_for, size_of, start_of, step_of
 from eomgen.integrators import INTEGRATORS
 from eomgen.model.model import Model
 from eomgen.program.ordering import ordered
@@ -73,13 +73,15 @@ IN_FLOAT = {
 
 def files(model: Model, options: Options) -> Written:
     """The source, its header, and an example. Raises `SceneError` for a scene without states."""
+    name = options.integrator or METHOD
+    model = model_for(name, model)
     program, interface = interfaced_program_of(model)
     if not interface.states:
         raise SceneError("firmware: the scene has no states, so there is nothing to step")
     values = c.context(ordered(program), interface)
-    name, number = interface.name, options.number
-    method = method_of(options.integrator or METHOD, model, interface)
-    size = size_of(interface, start_of(program, interface))
+    number = options.number
+    method = method_of(name, model, interface)
+    name, size = interface.name, size_of(interface, start_of(program, interface))
     step = step_of(method, interface, size, REALS, _text(number))
     called = {f: name for f, name in values["functions"] if f not in (*CIRCULAR, "abs")}
     called |= {"sqrt": "sqrt"} if "sqrt_(" in step or method.needed else {}
@@ -97,6 +99,7 @@ def files(model: Model, options: Options) -> Written:
         "sine_error": ERRORS[number],
         "step": step,
         "solves": bool(method.needed),
+        "implicit": "jacobian" in method.needed,
     }
     header = {
         **c.header(values, interface),

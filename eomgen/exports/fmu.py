@@ -16,7 +16,7 @@ from eomgen.exports import Options, Written
 from eomgen.exports.fmu_description import description_files
 from eomgen.exports.fmu_source import MAIN, sources_of
 from eomgen.exports.fmu_unit import unit_of
-from eomgen.exports.steps import method_of
+from eomgen.exports.steps import method_of, model_for
 from eomgen.model.model import Model
 from eomgen.native.compiler import find_compiler, suffix
 from eomgen.scene.schema import Simulation
@@ -38,6 +38,7 @@ def files(model: Model, options: Options) -> Written:
     the initial state.
     """
     name = options.integrator or METHOD
+    model = model_for(name, model)
     method = method_of(name, model, interfaced_program_of(model)[1], adaptive=True)
     unit = unit_of(model, options.simulation or Simulation(), method.needed)
     sources, token = sources_of(unit, method)

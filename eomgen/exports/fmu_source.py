@@ -67,7 +67,7 @@ def _main(unit: Unit, token: str, method: Method) -> str:
         "step": step_of(method, interface, unit.size, C, text(), _more(unit, method)),
         "method": method.name,
         "adapts": method.adapts,
-        "solves": bool(method.needed),
+        "solves": "jacobian" in method.needed,
         "dt": repr(unit.simulation.dt),
         "slopes": len(DOP853.nodes),
         "last": DOP853.last,

@@ -14,6 +14,7 @@ from eomgen.exports.steps import size_of, start_of
 from eomgen.exports.units import rate_of
 from eomgen.model.model import Model
 from eomgen.native.functions import restricted
+from eomgen.outputs import OUTPUTS
 from eomgen.program.program import Program, interpret
 from eomgen.program.switching import OF_STATE, OF_TIME
 from eomgen.program.tape import TIME
@@ -105,21 +106,22 @@ def unit_of(model: Model, simulation: Simulation, needed: Sequence[str] = ()) ->
         raise SceneError(
             f"form: an FMU has the state [q, v], not the form '{model.form}'; leave it out"
         )
-    program, interface = interfaced_program_of(replace(model, outputs=(*ENERGIES, POSES)))
+    outputs = (*ENERGIES, POSES, *(name for name in needed if name in OUTPUTS))
+    program, interface = interfaced_program_of(replace(model, outputs=outputs))
     starts = start_of(program, interface)
     names = [name for name in (*KERNELS, *needed) if name in program.outputs]
     program, interface = restricted(program, interface, names)
     size, nominals = _sizes(program, interface, starts)
-    outputs = (*_energies(), *_positions(interface))
+    observed = (*_energies(), *_positions(interface))
     gaps = _gaps(interface)
     switches = tuple(_switches(program))
     rates = range(len(interface.states))
     entries = [
         ("derivative", rates),
-        *((o.function, o.picks) for o in (*outputs, *gaps, *switches)),
+        *((o.function, o.picks) for o in (*observed, *gaps, *switches)),
     ]
     program, interface = with_directions(program, interface, entries)
-    return Unit(program, interface, simulation, starts, nominals, size, outputs, gaps, switches)
+    return Unit(program, interface, simulation, starts, nominals, size, observed, gaps, switches)
 
 
 def _sizes(

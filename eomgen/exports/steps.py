@@ -1,34 +1,58 @@
 """Steps of exported C: those of the engine, onto unit quaternions and the constraints of loops."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine import projection
+from eomgen.engine.elimination import Factors
+from eomgen.engine.implicit import Stages
 from eomgen.engine.printed import METHODS, Root, Roots
+from eomgen.engine.rattle import Linked
+from eomgen.engine.symmetric import Projected
 from eomgen.errors import RunError, nearest
+from eomgen.integrators import INTEGRATORS as SPECS
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
-from eomgen.run.integrators import INTEGRATORS, Adaptive
+from eomgen.run.integrators import INTEGRATORS, Adaptive, rattle
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.module import as_problem, load_module
+from eomgen.run.problem import Problem
 from eomgen.run.sizes import mechanism_size
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import generated_code
 from eomgen.subset.expander import Text
 from eomgen.subset.languages import Language
+from eomgen.subset.words import Whole
 from eomgen.templating import render
 
-_AT = "system, t, y, h, step"
 _CALLS = {
-    "runge_kutta": f"{{}}({_AT})",
-    "semi_implicit_euler": "{}(system, positions, t, y, h, step)",
-    "leapfrog": "{}(system, &split, t, y, h, step)",
-    "composed": f"{{}}({_AT})",
+    "runge_kutta": "system, t, y, h, step",
+    "semi_implicit_euler": "system, positions, t, y, h, step",
+    "leapfrog": "system, &split, t, y, h, step",
+    "implicit_change": "system, t, h, y, &stages, &newton, step->change",
+    "projected_change": "system, system, {n}, {nv}, ROWS, t, h, (real *)y, &stages, &newton, "
+    "&room_of, &first, &second, step->change",
+    "rattle": "system, {n}, ROWS, t, (real *)y, h, &room_of, &first, &second, &third, step",
 }
-"""Calls of what makes an explicit step, by the name of the engine's function."""
+"""What functions of the engine are given that make a step."""
+_LINKAGE = {
+    "off_by": "constraint_residuals",
+    "drift_at": "constraint_rates",
+    "rows_at": "constraint_jacobian",
+    "rates_at": "derivative",
+    "inertia_at": "mass_matrix",
+    "slopes_at": "kinetic_slopes",
+}
+"""Functions of the module by those of the engine's `Linkage`."""
+_GIVEN = {
+    "projected_change": ("off_by", "drift_at", "rows_at"),
+    "rattle": ("off_by", "rows_at", "rates_at", "inertia_at", "slopes_at"),
+}
+_IMPLICIT = ("implicit_change", "projected_change", "rodas_step")
 
 
 @dataclass(frozen=True)
@@ -36,12 +60,16 @@ class Method:
     """A method as exported code makes its steps.
 
     root   the function of the engine that makes a step, with its `Known` values
+    of     if it is composed, the root of what it is composed of
     rates  the matrix by which velocities move positions, which leapfrog takes
+    rows   whether the module has the Jacobian of constraints, as large ones have not
     """
 
     name: str
     root: Root
+    of: Root | None = None
     rates: tuple[float, ...] = ()
+    rows: bool = True
 
     @property
     def adapts(self) -> bool:
@@ -49,29 +77,115 @@ class Method:
         return isinstance(INTEGRATORS[self.name], Adaptive)
 
     @property
+    def linkage(self) -> list[tuple[str, str]]:
+        """The functions of the engine's `Linkage` that it calls, with those of the module."""
+        called = _LINKAGE if self.rows else {**_LINKAGE, "rows_at": _LINKAGE["drift_at"]}
+        return [(name, called[name]) for name in _GIVEN.get(self._one[0], ())]
+
+    @property
     def needed(self) -> tuple[str, ...]:
-        """Functions of the module that it calls, beside the derivative."""
-        return ("jacobian",) if self.root[0] in ("implicit_change", "rodas_step") else ()
+        """Functions of the module that it calls, beside the derivative and those of projection."""
+        jacobian = ("jacobian",) if self._one[0] in _IMPLICIT else ()
+        return (*jacobian, *(name for _, name in self.linkage if name != "derivative"))
 
     @property
     def roots(self) -> Iterator[Root]:
         """What is called of the engine."""
         yield self.root
-        if self.root[0] == "composed":
-            yield "leapfrog", {}
+        if self.of:
+            yield self.of
 
     @property
-    def values(self) -> dict[str, Any]:
+    def _one(self) -> Root:
+        return self.of or self.root
+
+    def parts(self, interface: Interface) -> list["_Part"]:
+        """The records that a step is given, with room for their arrays."""
+        (function, known), n = self._one, len(interface.states)
+        many = len(known["method"].b) if "method" in known and function in _IMPLICIT else 1
+        nq, nv, rows = interface.coordinates, interface.velocities, len(interface.constraints)
+        found = []
+        if function in ("implicit_change", "projected_change"):
+            numbers = {"many": many, "positions": leading(interface), "STATES": n}
+            found.append(_Part("stages", Stages, numbers))
+        factors: dict[str, int] = {"newton": many * n} if function in _IMPLICIT else {}
+        if function == "projected_change":
+            count = len(interface.quaternions)
+            numbers = {"n": nq, "nv": nv, "rows": rows, "many": count, "stages": many + 1}
+            given = {"quaternions": "(int64_t *)quaternions" if count else "0"}
+            found.append(_Part("room_of", Projected, numbers | {"states": n}, given))
+            factors |= {"first": n, "second": 2 * rows}
+        if function == "rattle":
+            found.append(_Part("room_of", Linked, {"n": nv, "rows": rows}))
+            factors = {"first": nv, "second": nv, "third": rows}
+        return [*found, *(_Part(name, Factors, {"n": m}) for name, m in factors.items())]
+
+    def values(self, interface: Interface) -> dict[str, Any]:
         """Values for the template."""
-        function, known = self.root
+        (function, known), composed = self._one, ""
+        if self.of:
+            composed = "_".join([self.root[0], *(each.name for each in self.root[1].values())])
         own = "_".join([function, *(each.name for each in known.values())])
+        sizes = {"n": interface.coordinates, "nv": interface.velocities}
+        call = f"{own}({_CALLS[function].format(**sizes)})" if function in _CALLS else ""
         return {
-            "function": own,
-            "call": _CALLS.get(function, "").format(own),
-            "composed": function == "composed",
-            "stages": len(known["method"].b) if function == "implicit_change" else 0,
-            "jacobian": bool(self.needed),
+            "call": call,
+            "composed": composed,
+            "counts": function in (*_IMPLICIT, "rattle"),
+            "stepped": function not in _IMPLICIT,
+            "jacobian": function in _IMPLICIT,
+            "linkage": self.linkage,
         }
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A record of the engine for a step.
+
+    numbers  of its fields, and those of which its arrays' sizes are made
+    given    C of the arrays for which it has no room
+    """
+
+    name: str
+    of: type
+    numbers: Mapping[str, int]
+    given: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def record(self) -> str:
+        """Its type."""
+        return self.of.__name__
+
+    @property
+    def arrays(self) -> Iterator[tuple[str, str, str]]:
+        """Type, name and size of the arrays that it has room for."""
+        for name, hint in get_type_hints(self.of, include_extras=True).items():
+            if get_origin(hint) is Annotated and name not in self.given:
+                kind, *sizes = get_args(hint)
+                number = "int64_t" if kind == Whole else "real"
+                texts = (_NAME.sub(lambda m: str(self.numbers[m[0]]), size) for size in sizes)
+                yield number, f"{self.name}_{name}", " * ".join(texts)
+
+    @property
+    def values(self) -> str:
+        """C of its fields."""
+        fields = get_type_hints(self.of)
+        prefix = f"{self.name}_"
+        found = {name: str(x) for name, x in self.numbers.items() if name in fields}
+        found |= {name.removeprefix(prefix): f"room->{name}" for _, name, _ in self.arrays}
+        return ", ".join(f".{name} = {value}" for name, value in {**found, **self.given}.items())
+
+
+_NAME = re.compile(r"[A-Za-z_]\w*")
+
+
+def model_for(name: str, model: Model) -> Model:
+    """The model as steps of a method take it: RATTLE those of all coordinates."""
+    if not (name in INTEGRATORS and SPECS[name].rattle and model.constraints):
+        return model
+    outputs = dict.fromkeys((*model.outputs, "mass_matrix", "kinetic_slopes"))
+    closing = "projected" if model.closing == "auto" else model.closing
+    return replace(model, closing=closing, outputs=tuple(outputs))
 
 
 def method_of(name: str, model: Model, interface: Interface, *, adaptive: bool = False) -> Method:
@@ -86,17 +200,32 @@ def method_of(name: str, model: Model, interface: Interface, *, adaptive: bool =
             f"these do: {', '.join(taken)}"
         )
     root = METHODS[name]
-    splits = root[0] in ("leapfrog", "composed")
-    if interface.projected and (splits or root[0] == "implicit_change"):
-        raise RunError(f"integrator: {name} of exported code makes no steps of loops; take rk4")
-    return Method(name, root, _rates(model) if splits else ())
+    of: Root | None = ("leapfrog", {}) if root[0] == "composed" else None
+    splits = (of or root)[0] == "leapfrog"
+    rows = any(f.name == _LINKAGE["rows_at"] for f in interface.functions)
+    if interface.projected and root[0] == "implicit_change":
+        return Method(name, ("projected_change", root[1]), rows=rows)
+    if interface.projected and splits:
+        problem = _problem(model)
+        try:
+            rattle.prepare(problem)
+        except RunError as error:
+            raise RunError(f"{str(error).partition(';')[0]}; take gauss_4") from None
+        steps: Root = ("rattle", {})
+        return Method(name, root if of else steps, steps if of else None, rows=rows)
+    return Method(name, root, of, _rates(model) if splits else ())
+
+
+def _problem(model: Model) -> Problem:
+    """The motion of a model, for methods that do not take all."""
+    return as_problem(load_module(generated_code(model).module))
 
 
 def _rates(model: Model) -> tuple[float, ...]:
     """The constant matrix by which velocities move positions."""
     if model.form != "velocity":
         raise RunError("integrator: leapfrog of exported code needs form = 'velocity'; take rk4")
-    problem = as_problem(load_module(generated_code(model).module))
+    problem = _problem(model)
     try:
         return tuple(split_of(problem).rates.ravel().tolist())
     except RunError as error:
@@ -152,8 +281,8 @@ def step_of(
         "velocities": interface.velocities,
         "positions": places,
         "others": [i for i in range(len(interface.states)) if i not in places],
-        "leading": leading(interface),
         "rates": [language.literal.format(repr(x)) for x in method.rates] if method else [],
-        "method": method and method.values,
+        "method": method and method.values(interface),
+        "parts": method.parts(interface) if method else [],
     }
     return render(c.TEMPLATES, "step.c.jinja", values)
