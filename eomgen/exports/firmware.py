@@ -9,11 +9,10 @@ from dataclasses import replace
 from typing import Any
 
 from eomgen.codegen.backends import c
-from eomgen.codegen.interface import Interface
 from eomgen.engine import implicit, printed, projection
 from eomgen.errors import SceneError
 from eomgen.exports import Number, Options, Written
-from eomgen.exports.steps import method_of, model_for, size_of, start_of, step_of
+from eomgen.exports.steps import contacts_left_out, method_of, model_for, size_of, start_of, step_of
 from eomgen.integrators import INTEGRATORS
 from eomgen.model.model import Model
 from eomgen.program.ordering import ordered
@@ -124,7 +123,7 @@ def files(model: Model, options: Options) -> Written:
             f"{name}.h": render(c.TEMPLATES, "firmware.h.jinja", header),
             f"{name}_observer.c": render(c.TEMPLATES, "firmware_example.c.jinja", example),
         },
-        _remarks(interface),
+        contacts_left_out(interface),
     )
 
 
@@ -138,10 +137,3 @@ def _text(number: Number) -> Text:
         for name, each in text.constants.items()
     }
     return replace(text, constants=constants)
-
-
-def _remarks(interface: Interface) -> tuple[str, ...]:
-    found = []
-    if interface.contacts:
-        found.append("steps of firmware know no impacts: rigid contacts are left out of them")
-    return tuple(found)

@@ -99,7 +99,7 @@ class Method:
     def _one(self) -> Root:
         return self.of or self.root
 
-    def parts(self, interface: Interface) -> list["_Part"]:
+    def parts(self, interface: Interface) -> list["Part"]:
         """The records that a step is given, with room for their arrays."""
         (function, known), n = self._one, len(interface.states)
         many = len(known["method"].b) if "method" in known and function in _IMPLICIT else 1
@@ -107,18 +107,18 @@ class Method:
         found = []
         if function in ("implicit_change", "projected_change"):
             numbers = {"many": many, "positions": leading(interface), "STATES": n}
-            found.append(_Part("stages", Stages, numbers))
+            found.append(Part("stages", Stages, numbers))
         factors: dict[str, int] = {"newton": many * n} if function in _IMPLICIT else {}
         if function == "projected_change":
             count = len(interface.quaternions)
             numbers = {"n": nq, "nv": nv, "rows": rows, "many": count, "stages": many + 1}
             given = {"quaternions": "(int64_t *)quaternions" if count else "0"}
-            found.append(_Part("room_of", Projected, numbers | {"states": n}, given))
+            found.append(Part("room_of", Projected, numbers | {"states": n}, given))
             factors |= {"first": n, "second": 2 * rows}
         if function == "rattle":
-            found.append(_Part("room_of", Linked, {"n": nv, "rows": rows}))
+            found.append(Part("room_of", Linked, {"n": nv, "rows": rows}))
             factors = {"first": nv, "second": nv, "third": rows}
-        return [*found, *(_Part(name, Factors, {"n": m}) for name, m in factors.items())]
+        return [*found, *(Part(name, Factors, {"n": m}) for name, m in factors.items())]
 
     def values(self, interface: Interface) -> dict[str, Any]:
         """Values for the template."""
@@ -139,7 +139,7 @@ class Method:
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """A record of the engine for a step.
 
     numbers  of its fields, and those of which its arrays' sizes are made
@@ -167,11 +167,17 @@ class _Part:
                 yield number, f"{self.name}_{name}", " * ".join(texts)
 
     @property
+    def own(self) -> Mapping[str, int]:
+        """Its fields that are numbers, 0 if they are not given."""
+        hints = get_type_hints(self.of)
+        plain = [name for name, hint in hints.items() if hint in (int, float, bool)]
+        return {name: self.numbers.get(name, 0) for name in plain}
+
+    @property
     def values(self) -> str:
         """C of its fields."""
-        fields = get_type_hints(self.of)
         prefix = f"{self.name}_"
-        found = {name: str(x) for name, x in self.numbers.items() if name in fields}
+        found = {name: str(x) for name, x in self.own.items()}
         found |= {name.removeprefix(prefix): f"room->{name}" for _, name, _ in self.arrays}
         return ", ".join(f".{name} = {value}" for name, value in {**found, **self.given}.items())
 
@@ -252,37 +258,57 @@ def leading(interface: Interface) -> int:
     return len(places) if places == list(range(len(places))) else 0
 
 
+def roots_of(method: Method, interface: Interface) -> Iterator[Root]:
+    """What a step calls of the engine, onto unit quaternions and constraints."""
+    yield from method.roots
+    if interface.quaternions:
+        yield "normalised", {}
+    if interface.projected:
+        yield "moved_onto", {}
+
+
+def sizes_of(method: Method, interface: Interface, size: float) -> dict[str, Any]:
+    """Values for templates: which states are positions, quaternions, the sizes of constraints."""
+    states = list(enumerate(interface.states))
+    rows = interface.constraints if interface.projected else ()
+    return {
+        "positions": [i for i, state in states if state.position],
+        "others": [i for i, state in states if not state.position],
+        "quaternions": sum(interface.quaternions, ()),
+        "row_sizes": [repr(size if force == "N" else 1.0) for _, force in rows],
+        "on_constraints": projection.PROJECTED,
+        "coordinates": interface.coordinates,
+    }
+
+
+def contacts_left_out(interface: Interface) -> tuple[str, ...]:
+    """A remark on rigid contacts, which steps alone do not have."""
+    return ("steps know no impacts: rigid contacts are left out of them",) * bool(
+        interface.contacts
+    )
+
+
 def step_of(
-    method: Method | None,
+    method: Method,
     interface: Interface,
     size: float,
     language: Language,
     text: Text,
     more: Roots = (),
 ) -> str:
-    """C that puts states of a mechanism of this size, m, on its constraints, and makes steps by a
-    method, if one is given. It has what the engine's `text` prints of the roots `more`, too.
+    """C that makes steps of a mechanism of this size, m, by a method, and puts states on its
+    constraints. It has what the engine's `text` prints of the roots `more`, too.
     """
     # Imported here because the printer takes a while.
     from eomgen.subset.braces import printed
 
-    places = [i for i, state in enumerate(interface.states) if state.position]
-    rows = interface.constraints if interface.projected else ()
-    roots: list[Any] = [*(method.roots if method else ()), *more]
-    roots += [("normalised", {})] if interface.quaternions else []
-    roots += [("moved_onto", {})] if rows else []
     values = {
+        **sizes_of(method, interface, size),
         "prefix": interface.name,
-        "engine": printed(text, roots, language),
-        "quaternions": sum(interface.quaternions, ()),
-        "row_sizes": [repr(size if force == "N" else 1.0) for _, force in rows],
-        "on_constraints": projection.PROJECTED,
-        "coordinates": interface.coordinates,
+        "engine": printed(text, [*roots_of(method, interface), *more], language),
         "velocities": interface.velocities,
-        "positions": places,
-        "others": [i for i in range(len(interface.states)) if i not in places],
-        "rates": [language.literal.format(repr(x)) for x in method.rates] if method else [],
-        "method": method and method.values(interface),
-        "parts": method.parts(interface) if method else [],
+        "rates": [language.literal.format(repr(x)) for x in method.rates],
+        "method": method.values(interface),
+        "parts": method.parts(interface),
     }
     return render(c.TEMPLATES, "step.c.jinja", values)

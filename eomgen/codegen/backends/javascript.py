@@ -60,7 +60,7 @@ def files(program: Program, interface: Interface) -> Mapping[str, str]:
         "title": " ".join(interface.title.split()).replace("*/", "* /"),
         "form": interface.form,
         "states": [(s.name, s.unit) for s in interface.states],
-        "rest": _rest([i.default for i in interface.inputs]),
+        "rest": rest_of(interface),
         "inputs": [(i.name, i.unit) for i in interface.inputs],
         "parameters": [(p.name, repr(p.default), p.unit) for p in interface.parameters],
         "shapes": [(k.function.name, list(k.function.shape)) for k in kernels],
@@ -211,6 +211,7 @@ def _divided(kernel: Kernel, place: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _rest(defaults: Sequence[float]) -> str:
+def rest_of(interface: Interface) -> str:
     """The source of the inputs that are not given."""
+    defaults = [i.default for i in interface.inputs]
     return repr(list(defaults)) if any(defaults) else "INPUTS.map(() => 0)"

@@ -1,0 +1,78 @@
+"""An ES module of a scene: the functions of the JavaScript backend, and a step of the engine."""
+
+import re
+from typing import Any
+
+from eomgen.codegen.backends import javascript
+from eomgen.codegen.interface import Interface
+from eomgen.engine.printed import text
+from eomgen.errors import SceneError
+from eomgen.exports import Options, Written
+from eomgen.exports.steps import (
+    Method,
+    Part,
+    contacts_left_out,
+    method_of,
+    model_for,
+    roots_of,
+    size_of,
+    sizes_of,
+    start_of,
+)
+from eomgen.integrators import INTEGRATORS
+from eomgen.model.model import Model
+from eomgen.store import interfaced_program_of
+from eomgen.subset.languages import JAVASCRIPT
+from eomgen.templating import render
+
+METHOD = "rk4"
+"""The method of steps, if no other one is wanted."""
+
+
+def files(model: Model, options: Options) -> Written:
+    """The module. Raises `SceneError` for a scene without states, `RunError` as `method_of`."""
+    name = options.integrator or METHOD
+    model = model_for(name, model)
+    program, interface = interfaced_program_of(model)
+    if not interface.states:
+        raise SceneError("javascript: the scene has no states, so there is nothing to step")
+    method = method_of(name, model, interface)
+    size = size_of(interface, start_of(program, interface))
+    ((file, module),) = javascript.files(program, interface).items()
+    return Written({file: module + _step(method, interface, size)}, contacts_left_out(interface))
+
+
+def _step(method: Method, interface: Interface, size: float) -> str:
+    """The source of `step`."""
+    # Imported here because the printer takes a while.
+    from eomgen.subset.braces import printed
+
+    values = method.values(interface)
+    call = _CASTS.sub("", values["call"]).replace("->", ".")
+    context: dict[str, Any] = {
+        **sizes_of(method, interface, size),
+        "states": len(interface.states),
+        "engine": JAVASCRIPT.prelude + printed(text(), roots_of(method, interface), JAVASCRIPT),
+        "method": {**values, "call": call},
+        "parts": [{"name": p.name, "fields": _fields(p)} for p in method.parts(interface)],
+        "rates": list(map(repr, method.rates)),
+        "tangent": any(f.name == "jacobian" and f.tangent for f in interface.functions),
+        "about": INTEGRATORS[method.name].about,
+        "rest": javascript.rest_of(interface),
+    }
+    return render(javascript.TEMPLATES, "step.js.jinja", context)
+
+
+_CASTS = re.compile(r"&|\(real \*\)")
+
+
+def _fields(part: Part) -> str:
+    """JavaScript of a record."""
+    kinds = {"int64_t": "Int32Array", "real": "Float64Array"}
+    arrays = {
+        name.removeprefix(f"{part.name}_"): f"new {kinds[kind]}({size})"
+        for kind, name, size in part.arrays
+    }
+    numbers = {name: str(x) for name, x in part.own.items()}
+    given = dict.fromkeys(part.given, "quaternions")
+    return ", ".join(f"{name}: {value}" for name, value in {**numbers, **arrays, **given}.items())
