@@ -7,9 +7,8 @@ from eomgen.codegen.backends import c
 from eomgen.engine import contacts
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import CONTACTS, Root, text
-from eomgen.engine.rosenbrock import MANY_SUMS
 from eomgen.exports.fmu_unit import Observed, Unit
-from eomgen.exports.steps import Method, leading, step_of
+from eomgen.exports.steps import Method, step_of
 from eomgen.native.functions import restricted
 from eomgen.program.ordering import ordered
 from eomgen.program.tape import TIME
@@ -71,8 +70,7 @@ def _main(unit: Unit, token: str, method: Method) -> str:
         "dt": repr(unit.simulation.dt),
         "slopes": len(DOP853.nodes),
         "last": DOP853.last,
-        "sums": MANY_SUMS,
-        "leading": leading(interface),
+        "parts": method.parts(interface),
         "timed": _timed(unit),
     }
     return render("fmu", "unit.c.jinja", context)

@@ -1,6 +1,7 @@
 """Steps of exported C: those of the engine, onto unit quaternions and the constraints of loops."""
 
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -12,6 +13,7 @@ from eomgen.engine.elimination import Factors
 from eomgen.engine.implicit import Stages
 from eomgen.engine.printed import METHODS, Root, Roots
 from eomgen.engine.rattle import Linked
+from eomgen.engine.rosenbrock import Rodas
 from eomgen.engine.symmetric import Projected
 from eomgen.errors import RunError, nearest
 from eomgen.integrators import INTEGRATORS as SPECS
@@ -115,6 +117,8 @@ class Method:
             given = {"quaternions": "(int64_t *)quaternions" if count else "0"}
             found.append(Part("room_of", Projected, numbers | {"states": n}, given))
             factors |= {"first": n, "second": 2 * rows}
+        if function == "rodas_step":
+            found.append(Part("rodas", Rodas, {"positions": leading(interface), "STATES": n}))
         if function == "rattle":
             found.append(Part("room_of", Linked, {"n": nv, "rows": rows}))
             factors = {"first": nv, "second": nv, "third": rows}
@@ -163,8 +167,12 @@ class Part:
             if get_origin(hint) is Annotated and name not in self.given:
                 kind, *sizes = get_args(hint)
                 number = "int64_t" if kind == Whole else "real"
-                texts = (_NAME.sub(lambda m: str(self.numbers[m[0]]), size) for size in sizes)
+                texts = (_NAME.sub(self._size, size) for size in sizes)
                 yield number, f"{self.name}_{name}", " * ".join(texts)
+
+    def _size(self, name: re.Match[str]) -> str:
+        """The number of a name in a size; others are constants of the record's module."""
+        return str({**vars(sys.modules[self.of.__module__]), **self.numbers}[name[0]])
 
     @property
     def own(self) -> Mapping[str, int]:
