@@ -78,11 +78,20 @@ def built_in(request: pytest.FixtureRequest) -> Compiled:
     return compiled(request.param)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _blank_motions(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Figures of runs are written, but blank: of a short run they take nine tenths of the time, and
+    what they show is tested in `show`, where they are not.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.parent.name != "show":
+            patch.setattr("eomgen.show.figure.draw_motion", lambda motion: Figure((1, 1)))
+        yield
+
+
 @pytest.fixture
 def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures of commands are written, but blank: of a short run they take most of the time, and
-    what they show has tests of its own.
-    """
+    """The same of studies, and in `show`."""
     monkeypatch.setattr("eomgen.show.figure.draw_motion", lambda motion: Figure((1, 1)))
     monkeypatch.setattr("eomgen.show.work_precision.draw", lambda about, works: Figure((1, 1)))
 

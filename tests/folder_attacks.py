@@ -215,7 +215,7 @@ def _run(out: Path) -> tuple[int, str]:
         redirect_stdout(io.StringIO()),
         warnings.catch_warnings(),
         patch("eomgen.show.sweep.save_sweep_figure"),
-        patch("eomgen.cli._parser", _parser),  # these two take most of the time
+        patch("eomgen.cli.parsers", _parsers),  # these two take most of the time
         patch("eomgen.run.module.load_source", _load_source),
     ):
         warnings.simplefilter("error")
@@ -228,7 +228,7 @@ def _run(out: Path) -> tuple[int, str]:
     return code, stderr.getvalue()
 
 
-_parser, _load_source = cache(eomgen.cli._parser), cache(eomgen.run.module.load_source)
+_parsers, _load_source = cache(eomgen.cli.parsers), cache(eomgen.run.module.load_source)
 
 
 def _hangs(*_: object) -> None:

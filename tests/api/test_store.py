@@ -163,7 +163,7 @@ def test_a_folder_that_others_may_have_written_to_is_done_without(
     held = sorted(folder.iterdir()) if folder.is_dir() else []
     out = str(tmp_path / "made")
     capsys.readouterr()
-    assert main(["generate", "pendulum", "two_body", "-o", out]) == 0
+    assert main(["generate", "pendulum", "-o", out]) == 0
     words = said.format(folder=folder)
     assert capsys.readouterr().err == f"eomgen: note: the store {folder} is not used: {words}\n"
     assert (tmp_path / "made" / "pendulum.py").read_bytes() == RIGHT

@@ -19,7 +19,7 @@ import pytest
 from campaign import some
 
 import eomgen.files
-from eomgen.cli import _parser, main
+from eomgen.cli import main, parsers
 from eomgen.files import write_whole
 from eomgen.streams import Steady, steady_streams
 from eomgen.text import spelled
@@ -112,8 +112,7 @@ def quiet(done: subprocess.CompletedProcess[str]) -> bool:
 
 def test_every_command_is_tried() -> None:
     """A new command is to join the table."""
-    (commands,) = (a for a in _parser()._actions if isinstance(a.choices, dict))
-    assert set(COMMANDS) == set(commands.choices or ())
+    assert set(COMMANDS) == set(parsers()[1])
 
 
 @pytest.mark.parametrize(
@@ -160,7 +159,7 @@ def test_a_terminal_of_ascii(tmp_path: Path, name: str, how: str) -> None:
 
 
 @pytest.mark.parametrize("name", some(QUICKER[::2], list(COMMANDS)))
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_a_full_output_ends_no_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
@@ -173,6 +172,7 @@ def test_a_full_output_ends_no_command(
     assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", some(QUICKER[1::2], list(COMMANDS)))
 def test_ascii_and_a_closed_error_stream(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
@@ -364,7 +364,7 @@ def test_a_stop_at_any_call(tmp_path: Path, name: str, number: str) -> None:
         counted = injected(number, 0, command, tmp_path)
     assert counted.returncode == 0
     calls = int(counted.stderr.split()[-1])
-    parts = some(3, 100)
+    parts = some(2, 100)
     for k in range(parts):
         done = injected(number, first + (calls - first) * k // parts, command, tmp_path)
         assert done.returncode == STOPS[signal.Signals[number]], (k, done.stderr)

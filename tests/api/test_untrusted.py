@@ -127,10 +127,10 @@ def test_a_small_archive_does_not_become_large(
     """
     path = tmp_path / "run.npz"
     if attack == "packed":
-        zeros = np.zeros((5_000_000, 2))
-        np.savez_compressed(path, **{**members, "t": np.arange(5_000_000.0) * 0, "y": zeros})
+        zeros = np.zeros((1_000_000, 2))
+        np.savez_compressed(path, **{**members, "t": np.arange(1_000_000.0) * 0, "y": zeros})
     else:
-        states = np.ndarray(20_000_000, np.dtype("<U0"))
+        states = np.ndarray(5_000_000, np.dtype("<U0"))
         with zipfile.ZipFile(path, "w") as archive:
             for name, array in {**members, "states": states}.items():
                 with archive.open(f"{name}.npy", "w") as file:

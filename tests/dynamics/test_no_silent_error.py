@@ -100,6 +100,7 @@ ONCE_SILENT = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("number", thinned(ONCE_SILENT, 4))
 def test_not_silent_again(number: int) -> None:
     """What the campaign found. No route keeps its digits for those that are refused, or
@@ -124,6 +125,7 @@ ONCE_REFUSED = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("number", thinned(ONCE_REFUSED, 4))
 def test_not_refused(number: int) -> None:
     """Pushed about as if it were alone, a body that is slight beside others costs digits."""

@@ -575,7 +575,7 @@ def test_the_rattleback_turns_round() -> None:
 # The bicycle: see whipple.py.
 
 
-@pytest.mark.every(5)
+@pytest.mark.every(10)
 @pytest.mark.parametrize("speed", SPEEDS)
 def test_the_linearised_bicycle(speed: int) -> None:
     """The Jacobian of the generated module on the manifold of the constraints, at every speed of

@@ -32,7 +32,7 @@ def without(base: str) -> Engine:
     return compiled_light(parse_scene(BASES[base].format(outputs="")))
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(8)
 @pytest.mark.parametrize("case", TRIED, ids=lambda case: case.name)
 def test_absence_is_free(case: Case) -> None:
     """With the effect the module is another, full of what it brings; without it, all that a module

@@ -297,7 +297,7 @@ def loads_by_hand(tree: SpatialTree, motion: SpatialMotion, law: tuple[str, ...]
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 @pytest.mark.parametrize("law", [DAMPED, HUNT])
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 def test_random_trees_move_as_under_loads_put_in_by_hand(
     law: tuple[str, ...], dimensions: int, route: str
 ) -> None:

@@ -132,6 +132,7 @@ def force_by_hand(u: np.ndarray, place: np.ndarray, t: float) -> np.ndarray:
     return -(0.3 + 0.8 * np.linalg.norm(w)) * w
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 def test_drag_on_any_tree(dimensions: int) -> None:
     """Random trees against a solver that shares nothing, the drag put in as its external force."""

@@ -450,8 +450,8 @@ def test_several_at_once_and_one_killed(fresh: Path) -> None:
     killed.wait()
     python = eomgen.load(eomgen.generate("pendulum", route="aba"))
     assert said == {python.derivative(0.0, np.ones(2)).tobytes().hex() + "\n"}
-    again = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert again.stdout in said
+    again = eomgen.load(eomgen.generate("pendulum", route="aba", backend="c"))
+    assert again.derivative(0.0, np.ones(2)).tobytes().hex() + "\n" in said
 
 
 def test_a_library_says_what_it_holds() -> None:

@@ -197,7 +197,7 @@ def some_inputs(program: Program, rng: np.random.Generator) -> dict[str, Any]:
     return {name: MP.mpf(float(rng.uniform(0.3, 2.0))) for name in names}
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(8)
 @pytest.mark.parametrize("case", [*BUILT_IN, *TREES])
 def test_passes_keep_values_and_save_work(case: str | int) -> None:
     """After each pass every output has its value to 45 digits, and no more to do than before."""
@@ -359,6 +359,7 @@ def test_jacobian_knows_every_operation() -> None:
 # Printing.
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("case", [*BUILT_IN, *TREES])
 def test_printed_code_is_the_program(case: str | int) -> None:
     """Scalar code does the program's operations in the program's order: equal to the last bit."""
@@ -479,7 +480,7 @@ AWKWARD = {
 
 
 @pytest.mark.parametrize("kind", AWKWARD)
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_awkward_names(kind: str) -> None:
     """A scene may call its quantities as it likes: the module means what the scene says."""
     words, joints = (text.split() for text in AWKWARD[kind])
@@ -495,7 +496,7 @@ def test_awkward_names(kind: str) -> None:
 @pytest.mark.parametrize(
     "bodies", ["A A_dot A_ddot", "B_A A A_B", "derivative np", "x y", "A_0 A_0_1 A"]
 )
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_awkward_bodies(bodies: str) -> None:
     """Bodies whose names read like one another's symbols put together are kept apart."""
     names = bodies.split()

@@ -171,7 +171,7 @@ def test_every_flipped_bit_of_the_names_is_refused_or_harmless(tmp_path):
     with zipfile.ZipFile(io.BytesIO(whole)) as archive:
         begin = archive.start_dir
     refused = 0
-    for bit in range(8 * begin, 8 * len(whole), 1 if os.environ.get("FULL") else 11):
+    for bit in range(8 * begin, 8 * len(whole), 1 if os.environ.get("FULL") else 23):
         damaged = bytearray(whole)
         damaged[bit // 8] ^= 1 << bit % 8
         path.write_bytes(damaged)
@@ -180,7 +180,7 @@ def test_every_flipped_bit_of_the_names_is_refused_or_harmless(tmp_path):
         except RunError as error:
             refused += 1
             assert str(error) == f"{path}: is damaged; simulate again"
-    assert refused > 300
+    assert refused > 150
 
 
 def members_of(path):

@@ -394,7 +394,6 @@ def test_no_false_alarm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     quiet = [
         [str(scene), "--t-end", "0.3"],
         [str(scene), "--t-end", "0.3", "--works"],
-        ["two_body_forced", "--input", "tau=3", "--t-end", "0.5"],
         ["two_body_forced", "--input", "tau=3", "--t-end", "0.5", "--works"],
         ["pendulum", "--estimate"],
         ["tumbling_body", "--t-end", "1"],

@@ -128,6 +128,7 @@ def test_the_nearest_equilibrium_is_near() -> None:
             np.testing.assert_allclose(y, [upright, 0.0, 0.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.full
 def test_the_hanging_figure_comes_to_rest() -> None:
     """38 degrees of freedom, 6 quaternions: a minimum of potential energy without growing modes."""
     module = module_of("hanging_figure")

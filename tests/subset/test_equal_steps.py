@@ -139,6 +139,7 @@ STEPS: dict[str, tuple[dict[str, Any], list[list[Any]]]] = {
 }
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", STEPS)
 def test_steps(name: str) -> None:
     """A step from random states."""

@@ -32,6 +32,7 @@ def same(name: str, cases: list[list[Any]], given: Given = NONE, **known: Any) -
     assert python == javascript
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("n", "positions"), [(1, 0), (2, 1), (7, 3), (24, 10)])
 def test_elimination(n: int, positions: int) -> None:
     """Factors of g I - J with positions first or not, of which some are singular, and solutions; in
@@ -98,6 +99,7 @@ const system = {
 )
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", [IMPLICIT_MIDPOINT, GAUSS_4, GAUSS_6], ids=lambda m: m.name)
 @pytest.mark.parametrize(("positions", "simplified"), [(0, False), (2, False), (2, True)])
 def test_implicit_steps(method: Collocation, positions: int, simplified: bool) -> None:
