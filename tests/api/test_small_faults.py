@@ -73,6 +73,7 @@ def test_times_within_their_spread_are_no_times() -> None:
     assert difference(0.0, 0.0) == difference(-1e-8, 0.0) == "< 0.1"
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("name", ["tumbling_body", "pendulum", "furuta_pendulum"])
 def test_routes_are_counted_alike(name: str) -> None:
     """The operations reported for a route are those that its module takes, where closed is

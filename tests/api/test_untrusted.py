@@ -189,6 +189,7 @@ def test_text_of_a_scene_is_never_shown_as_it_is(
     assert refused > 30
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     "command",
     [

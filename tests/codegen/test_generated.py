@@ -67,7 +67,7 @@ def pin_wrenches(
     return np.column_stack((motion.pin_forces, moments))[c.scene.pin_rows(c.module)]
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_random_states(built_in: Compiled) -> None:
     """At many states, with forces and torques if there are any, one by one and as columns.
 

@@ -613,6 +613,7 @@ def test_closed_form_with_contacts() -> None:
         np.testing.assert_allclose(found, right, rtol=1e-12, atol=1e-12, err_msg=name)
 
 
+@pytest.mark.full
 def test_kernels_grow_with_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
     """A link with its contact costs no more where there are many."""
     monkeypatch.setattr(jacobians, "LARGEST_JACOBIAN", -1)

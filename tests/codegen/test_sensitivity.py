@@ -245,6 +245,7 @@ def test_both_forms_for_columns_of_states(name: str, route: str) -> None:
                 assert apart(function(0.0, y, p, u), wanted) < ROUNDING
 
 
+@pytest.mark.full
 @pytest.mark.every(2)
 @pytest.mark.parametrize(("name", "route"), [("machine", "aba"), ("chain", "ldl"), ("space_3", "")])
 def test_routes_have_one_derivative(name: str, route: str) -> None:
@@ -362,6 +363,7 @@ def test_weights_that_vanish_refuse_nothing() -> None:
         assert apart(getattr(one, name)(0.4, y), getattr(other, name)(0.4, y)) < 1e-9
 
 
+@pytest.mark.full
 def test_the_jacobian_of_light_limbs_on_a_heavy_body_keeps_its_digits() -> None:
     """That of the hanging figure, whose M has a condition of 5e5, along a direction against the
     same program in 60 digits, at a state at random.

@@ -256,7 +256,7 @@ def test_m_v_g_do_not_depend_on_effects(by: str) -> None:
     assert_close(M @ np.array(want) + (V + G - F).ravel(), np.zeros(len(want)))
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(6)
 @pytest.mark.parametrize("form", ["redundant", "momentum", "velocity"])
 @pytest.mark.parametrize("scene", ["two_body", "two_body_forced"])
 def test_the_derivative_of_a_state_form(scene: str, form: Any) -> None:

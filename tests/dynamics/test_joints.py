@@ -702,6 +702,7 @@ def test_the_plane_does_not_pay_for_space(route: str, name: str) -> None:
     assert any(OUT_OF_PLANE.fullmatch(word) for word in top)
 
 
+@pytest.mark.full
 @pytest.mark.every(2)
 def test_the_plane_is_cheaper_than_space(route: str) -> None:
     """Pins and free bodies take fewer operations in the plane than upright in space."""

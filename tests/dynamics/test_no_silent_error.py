@@ -167,7 +167,7 @@ def test_in_many_digits_all_recursions_are_the_same(number: int) -> None:
             assert max(abs(a - b) for a, b in zip(one, other, strict=True)) < 1e-30 * size
 
 
-COUNT = some(5, 20)
+COUNT = some(3, 20)
 
 
 def test_most_are_right() -> None:

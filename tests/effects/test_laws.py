@@ -45,7 +45,8 @@ TREES = {  # of up to 5 bodies; together they have everything
     "space_293": (293, 3),
     "space_377": (377, 3),
 }
-LIKE_OTHERS = some(("hanging_figure", "quadruped", "ragdoll", "stiff_beam", "walker_motors"), ())
+ALIKE = "chain_in_wind hanging_figure quadruped ragdoll stiff_beam walker_motors".split()
+LIKE_OTHERS = some(ALIKE, [])
 LOOPS = [
     name
     for name in built_in_names()
@@ -57,7 +58,7 @@ CASES = [(name, "") for name in OWN]
 CASES += [(name, ("aba", "ldl")[i % 2]) for i, name in enumerate(TREES)]
 SMALL = [name for name in OWN if name not in LARGE]
 CASES += some([], [(name, route) for name in SMALL for route in ("aba", "ldl")])
-CASES += [("puma560", "ldl")]
+CASES += some([], [("puma560", "ldl")])
 EXACT = 1e-13
 """For 60 digits: the directions and orientations of a scene are doubles, and so are its sines."""
 ROUNDING = 1e-11

@@ -69,6 +69,7 @@ def checked(module: Any, name: str) -> str:
     return output if hasattr(module, output) else ""
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("source", SCENES, ids=lambda s: s if isinstance(s, str) else s["name"])
 def test_the_lines_are_those_of_the_module(source: Any) -> None:
     """The same bits, of the derivative and of each other output."""

@@ -32,7 +32,7 @@ SCENES = some(("bouncing_two_body", "tumbling_body"), built_in_names())
 """With rigid contacts; with quaternions."""
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("method", ["RK45", "BDF", "gauss_4"])
 def test_the_bits_are_those_of_python(scene: str, method: str) -> None:

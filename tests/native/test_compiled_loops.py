@@ -92,7 +92,7 @@ def assert_all_same(compiled: Any, python: Any) -> None:
     assert compiled.trajectory.violations == python.trajectory.violations
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("scene", "options"),
     [
@@ -180,6 +180,7 @@ def test_rattle_keeps_constraints_and_energy() -> None:
     assert 1e-4 < np.ptp(energy) < 1.01 * early and abs(trend) < 0.02 * early
 
 
+@pytest.mark.full
 def test_energy_does_not_rise_with_the_turns_of_a_crank() -> None:
     """The energy of a crank that has gone round a hundred times is that of the same motion from the
     first turn on: what is rounding does not grow with the angle.

@@ -144,6 +144,7 @@ def test_sines_of_columns_have_the_bits_of_the_library(width: int) -> None:
         assert found.tobytes() == true.tobytes()
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("more", [(), ("-DPLAIN",)], ids=["fused", "plain"])
 def test_sine_and_cosine_are_within_an_ulp(more: tuple[str, ...]) -> None:
     """Against 1,200 bits, over the whole range of doubles."""

@@ -63,7 +63,7 @@ def states(module: Any, rng: np.random.Generator) -> np.ndarray:
 @pytest.mark.parametrize(
     ("scene", "method"),
     [
-        *(pytest.param(name, "rk4", marks=pytest.mark.every(4)) for name in SOME),
+        *(pytest.param(name, "rk4", marks=pytest.mark.every(8)) for name in SOME),
         (FUNCTIONS, "rk4"),
         (LOOP, "rk4"),
         *(("cart_pole", method) for method in ("euler", "semi_implicit_euler")),

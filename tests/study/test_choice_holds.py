@@ -85,6 +85,7 @@ def spin_after(inertia: Sequence[float], spin: Sequence[float], t_end: float) ->
         return np.array([float(x) for x in w])
 
 
+@pytest.mark.full
 def test_near_a_separatrix(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Rotation about the middle axis turns what rounding does to a constant, 1/3 here, into 1e-8:
     no run of that module is better than that, and two of them do not show it.

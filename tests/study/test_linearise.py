@@ -215,11 +215,11 @@ def test_inputs_are_trimmed_and_coordinates_held() -> None:
 def test_messages() -> None:
     """Each says what is wrong and what to do."""
     cart, top = module_of("cart_pole"), module_of("spinning_top")
-    falling = module_of("quadruped")
+    falling = module_of("two_body")
     cases = [
         (
             lambda: equilibrium(falling, falling.initial_state()),
-            "trunk_z_dot still changes by -9.8",
+            "y_A_dot still changes by -9.8",
         ),
         (lambda: equilibrium(cart, cart.initial_state(), hold=("thta",)), "did you mean 'theta'"),
         (lambda: equilibrium(cart, cart.initial_state(), trim=("pus",)), "did you mean 'push'"),
@@ -349,7 +349,7 @@ def test_a_figure_is_reported_in_short(capsys: pytest.CaptureFixture[str]) -> No
 def test_faults_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 1, one line, what to do."""
     for words, text in (
-        ("quadruped", "eomgen: quadruped.toml: no equilibrium"),
+        ("two_body", "eomgen: two_body.toml: no equilibrium"),
         ("cart_pole --state thta=3", "--state: no state 'thta' (did you mean 'theta'?)"),
         ("cart_pole --state x_dot=3", "an equilibrium is at rest"),
         ("cart_pole --state theta=up", "gives no finite number"),

@@ -272,6 +272,7 @@ def test_a_good_module_passes_by_every_route() -> None:
     assert check(found, "drift of momentum x").value < 1e-9  # a rail without friction
 
 
+@pytest.mark.full
 def test_a_floating_tree_keeps_what_it_should() -> None:
     """Thrown upwards: x of momentum, not y, and the momentum law holds."""
     found = verify(*scene_of("two_body"), states=some(1, 2))

@@ -90,6 +90,7 @@ def same(name: str, cases: list[list[Any]], **options: Any) -> list[list[str]]:
     return python
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("n", some([1, 20], [1, 2, 5, 20]))
 def test_a_step(n: int) -> None:
     """Steps that are accepted or rejected once or twice, and states within them."""

@@ -115,6 +115,7 @@ def test_implicit_steps(method: Collocation, positions: int, simplified: bool) -
     same("implicit_change", cases, SYSTEM, method=method)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("timed", [False, True])
 def test_rosenbrock_steps(timed: bool) -> None:
     """Attempts at steps, with their sums and errors; then whole steps, some of them shortened. In

@@ -41,6 +41,7 @@ def same(one: Ensemble, other: Ensemble) -> bool:
     return alike and rows[0] == rows[1] and outputs[0] == outputs[1]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("integrator", ["DOP853", "rk4"])
 def test_members_are_single_runs(integrator: str) -> None:
     """To the bit, with rows and outputs."""
