@@ -32,6 +32,7 @@ __all__ = [
     "apart",
     "engine",
     "exact",
+    "plain",
     "quick",
     "read",
     "varied",
@@ -121,6 +122,11 @@ def quick(scene: str, route: str = "", *, tangents: bool = False) -> Engine:
     """The same without derivatives by inputs and parameters, which take longest to make."""
     left = ("input_jacobian", "parameter_jacobian")
     return engine(scene, route, leave_out=left, tangents=tangents)
+
+
+def plain(scene: str, route: str = "") -> Engine:
+    """The same without any matrix of derivatives, in half the time."""
+    return engine(scene, route, leave_out=DERIVATIVES)
 
 
 @cache

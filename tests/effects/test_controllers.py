@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from engine import engine, quick
+from engine import engine, plain, quick
 from scipy.integrate import solve_ivp
 
 from eomgen.errors import SceneError
@@ -131,7 +131,7 @@ SCENES = {
 
 def response(scene: str, t: float) -> dict[str, float]:
     """The state after t seconds from the start."""
-    module = quick(scene).module
+    module = plain(scene).module
     run = solve_ivp(module.derivative, (0, t), module.initial_state(), **TIGHT)
     return dict(zip(module.STATES, run.y[:, -1], strict=True))
 
@@ -158,7 +158,7 @@ def test_targets_are_formulas() -> None:
     """With both targets from one motion the wheel, started on it, lacks its inertia alone."""
     target = 'target_rate = "-2*sin(2*t)"\n'
     scene = WHEEL + servo("pd", target).replace("target = 0.5", 'target = "cos(2*t)"')
-    module = quick(scene).module
+    module = plain(scene).module
     for t in (0.0, 0.7):
         y = [np.cos(2 * t), -2 * np.sin(2 * t)]
         assert np.allclose(module.derivative(t, np.array(y)), [y[1], 0.0], atol=1e-14)
@@ -176,7 +176,7 @@ def test_saturation() -> None:
     """Away from the target the torque is the limit: the wheel gains speed evenly."""
     found = response(WHEEL + servo("pd", "limit = 0.6"), 0.4)
     assert np.isclose(found["q_dot"], 0.6 / INERTIA * 0.4, rtol=1e-10)
-    module = quick(WHEEL + servo("pd", "limit = 0.6")).module
+    module = plain(WHEEL + servo("pd", "limit = 0.6")).module
     force = [module.applied_force(0.0, np.array([q, 0.0]))[0] for q in (-9.0, 0.48, 9.0)]
     assert np.allclose(force, [0.6, 0.2, -0.6])
 
@@ -201,7 +201,7 @@ def test_saturated_pid() -> None:
         rate = 0.5 - q + (cut - wanted) / 10
         return [v, (torque - 1.5) / INERTIA, rate, (cut - torque) / 0.02]
 
-    module = quick(scene).module
+    module = plain(scene).module
     assert module.STATES == ("q", "q_dot", "hold_integral", "hold_torque")
     for seed in range(5):
         y = random_state(module, seed)
@@ -221,12 +221,12 @@ def test_lag() -> None:
 def test_negative_gains_on_purpose() -> None:
     """Taken where the scene says so."""
     scene = WHEEL + servo("pd", "allow_active = true").replace("10.0", "-10.0")
-    assert np.isclose(quick(scene).module.applied_force(0.0, np.zeros(2))[0], -5.0)
+    assert np.isclose(plain(scene).module.applied_force(0.0, np.zeros(2))[0], -5.0)
 
 
 def test_a_sliding_joint() -> None:
     """There the command is a force, along the slide and back on the parent."""
-    module = quick(CART + servo("pd", joint="rail")).module
+    module = plain(CART + servo("pd", joint="rail")).module
     y = np.array([0.1, 0.0, 0.3, 0.0])
     assert list(module.STATES)[:3:2] == ["s", "s_dot"]
     assert np.allclose(module.applied_force(0.0, y), [10 * 0.4 - 1.2 * 0.3, 0.0])
@@ -245,7 +245,7 @@ def test_user_defined() -> None:
         torque = -3 * z - 0.2 * v + max(w, -0.1)
         return [v, torque / INERTIA, q - 2 * z, z * np.cos(t) - 0.5 * w]
 
-    module = quick(scene).module
+    module = plain(scene).module
     assert module.initial_state().tolist() == [0.0, 0.0, 0.3, 0.0]
     exact = solve_ivp(by_hand, (0, 3), [0, 0, 0.3, 0], **TIGHT).y[:, -1]
     assert np.allclose(list(response(scene, 3.0).values()), exact, atol=1e-9)
@@ -257,11 +257,11 @@ def test_numbers_are_parameters() -> None:
         '[[effects]]\ntype = "controller"\nname = "own"\n'
         "states = { z = { rate = 0.25 } }\ntorques = { axle = 0.8 }\n"
     )
-    module = quick(scene).module
+    module = plain(scene).module
     assert module.PARAMETERS["own_z_rate"] == 0.25 and module.PARAMETERS["own_torques_axle"] == 0.8
     rates = module.derivative(0.0, np.zeros(3), {"own_torques_axle": 4.0, "own_z_rate": 5.0})
     assert np.allclose(rates, [0.0, 10.0, 5.0])
-    module = quick(WHEEL + servo("pid", "limit = 3.0\nlag = 0.02")).module
+    module = plain(WHEEL + servo("pid", "limit = 3.0\nlag = 0.02")).module
     names = ("target", "stiffness", "damping", "integral_gain", "limit", "lag")
     assert all(f"hold_{name}" in module.PARAMETERS for name in names)
 
@@ -337,7 +337,7 @@ def test_integrators(integrator: str) -> None:
 
 def test_power() -> None:
     """Kinetic energy grows by what the effects do."""
-    module = quick(SCENES["own"]).module
+    module = plain(SCENES["own"]).module
     y, h = random_state(module, 4), 1e-6
     f = module.derivative(0.0, y)
     after, before = (module.kinetic_energy(0.0, x) for x in (y + h * f, y - h * f))
@@ -347,13 +347,13 @@ def test_power() -> None:
 
 def test_absence_is_free() -> None:
     """No states, functions or names of controllers where there are none."""
-    bare = quick(WHEEL)
+    bare = plain(WHEEL)
     bounded = re.compile(r"\bm(ax|in)\([a-z_]\w*, ")  # of a value, by a limit
     assert not bounded.search(bare.source) and ", x=None" not in bare.source
-    assert bounded.search(quick(WHEEL + servo("pd", "limit = 1")).source)
-    straight = quick(WHEEL + servo("pd"))
+    assert bounded.search(plain(WHEEL + servo("pd", "limit = 1")).source)
+    straight = plain(WHEEL + servo("pd"))
     assert straight.model.extra == () and not bounded.search(straight.source)
-    assert quick(WHEEL + servo("pd", "target_rate = 0")).source == straight.source
+    assert plain(WHEEL + servo("pd", "target_rate = 0")).source == straight.source
 
 
 CONTROLLER = '[[effects]]\ntype = "controller"\nname = "own"\n{}\n'

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from engine import engine, quick
+from engine import engine, plain, quick
 from scipy.integrate import solve_ivp
 
 from eomgen.errors import SceneError
@@ -87,8 +87,8 @@ def random_state(module, seed: int) -> np.ndarray:
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 def test_any_direction_is_a_turned_scene(route: str) -> None:
     """Pulled along +x in the plane as downwards with the whole scene turned by 90 degrees."""
-    down = quick(PLANE + effect(""), route).module
-    sideways = quick(PLANE + effect("direction = [2.0, 0.0]"), route).module
+    down = plain(PLANE + effect(""), route).module
+    sideways = plain(PLANE + effect("direction = [2.0, 0.0]"), route).module
     for seed in range(3):
         y = random_state(down, seed)
         turned = y.copy()
@@ -143,7 +143,7 @@ def test_except_bodies(scene: str) -> None:
 
 def test_free_bodies_and_except() -> None:
     """The one falls, the other flies straight on."""
-    module = quick(SHIP + effect('except_bodies = ["moon"]')).module
+    module = plain(SHIP + effect('except_bodies = ["moon"]')).module
     rates = dict(zip(module.STATES, module.derivative(0.0, random_state(module, 1)), strict=True))
     assert np.isclose(rates["ship_y_dot"], -9.81) and rates["ship_x_dot"] == 0.0
     assert rates["moon_x_dot"] == rates["moon_y_dot"] == 0.0
@@ -155,7 +155,7 @@ def test_kepler_ellipse(dimensions: int) -> None:
     mu, a, e = 2.0, 1.5, 0.6
     point = [0.3, -0.2, 0.1][:dimensions]
     scene = SHIP if dimensions == 2 else SPINNER
-    module = quick(scene + PULL.format(f'at = {point}\nexcept_bodies = ["moon"]')).module
+    module = plain(scene + PULL.format(f'at = {point}\nexcept_bodies = ["moon"]')).module
     period = 2 * np.pi * np.sqrt(a**3 / mu)
     y = np.array(module.initial_state())
     names = list(module.STATES)
@@ -186,7 +186,7 @@ def test_where_it_is_infinite() -> None:
     """A body that starts at the point itself is refused."""
     text = SHIP + PULL.format('except_bodies = ["moon"]') + "[initial]\nq = { ship_x = 0.0 }\n"
     with pytest.raises(Exception, match=r"singular|not finite|division"):
-        as_problem(quick(text).module)
+        as_problem(plain(text).module)
 
 
 def _torque(text: str, body: str = "ship") -> str:
@@ -194,7 +194,7 @@ def _torque(text: str, body: str = "ship") -> str:
 
 
 def _spun(text: str) -> tuple[object, np.ndarray, list[int], list[int]]:
-    module = quick(SPINNER + _torque(text)).module
+    module = plain(SPINNER + _torque(text)).module
     names = list(module.STATES)
     spin = [names.index(f"ship_w{axis}") for axis in "xyz"]
     turn = list(module.QUATERNIONS[0])
@@ -233,10 +233,10 @@ def test_torque_in_world_axes() -> None:
 
 def test_torque_in_the_plane() -> None:
     """One number: torque over moment of inertia."""
-    module = quick(SHIP + _torque("torque = 0.6")).module
+    module = plain(SHIP + _torque("torque = 0.6")).module
     rates = dict(zip(module.STATES, module.derivative(0.0, module.initial_state()), strict=True))
     assert np.isclose(rates["ship_angle_dot"], 6.0)
-    module = quick(SHIP + _torque('torque = "input"')).module
+    module = plain(SHIP + _torque('torque = "input"')).module
     assert list(module.INPUTS) == ["twist"]
 
 
@@ -247,10 +247,10 @@ def test_force_in_body_axes(scene: str) -> None:
     dims = 2 if scene is SHIP else 3
     push = '[[effects]]\ntype = "external_force"\nname = "jet"\nbody = "ship"\nforce = "input"\n'
     place = f"at = {[0.1, 0.2, -0.3][:dims]}\n"
-    own = quick(scene + push + place + 'axes = "body"').module
-    world = quick(scene + push + place).module
-    named = quick(scene + push + place + 'axes = "world"')
-    assert named.source == quick(scene + push + place).source
+    own = plain(scene + push + place + 'axes = "body"').module
+    world = plain(scene + push + place).module
+    named = plain(scene + push + place + 'axes = "world"')
+    assert named.source == plain(scene + push + place).source
     for seed in range(3):
         y = random_state(own, seed)
         force = np.array([0.4, -1.0, 0.7][:dims])
@@ -300,7 +300,7 @@ def test_jacobian_and_energy(scene: str, more: str) -> None:
 
 def test_columns_and_a_run() -> None:
     """Many states at once, and a run of the whole program."""
-    module = quick(SPACE + PULL.format("at = [2.0, 1.0, 3.0]")).module
+    module = plain(SPACE + PULL.format("at = [2.0, 1.0, 3.0]")).module
     states = np.stack([random_state(module, seed) for seed in range(4)], axis=1)
     one = np.stack([module.derivative(0.0, y) for y in states.T], axis=1)
     assert np.allclose(module.derivative(0.0, states), one, rtol=1e-13)
@@ -314,12 +314,12 @@ def test_plain_gravity_is_as_it_was() -> None:
     """Downwards for all bodies needs no other key. The closed form takes every kind, aslant in as
     few operations; a form with momenta takes this one only.
     """
-    down = quick(PLANE + effect(""), "closed").system
-    assert quick(PLANE + effect("except_bodies = []")).source == quick(PLANE + effect("")).source
-    aslant = quick(PLANE + effect("direction = [3, -4]"), "closed").system
+    down = plain(PLANE + effect(""), "closed").system
+    assert plain(PLANE + effect("except_bodies = []")).source == plain(PLANE + effect("")).source
+    aslant = plain(PLANE + effect("direction = [3, -4]"), "closed").system
     assert aslant.program.operations["derivative"] <= down.program.operations["derivative"] + 4
     for more in ("direction = [3, -4]", 'except_bodies = ["upper"]'):
-        closed, aba = (quick(PLANE + effect(more), route).module for route in ("closed", "aba"))
+        closed, aba = (plain(PLANE + effect(more), route).module for route in ("closed", "aba"))
         y = closed.initial_state() + 0.3
         for name in ("derivative", "potential_energy", "gravity_force", "applied_force"):
             found, right = getattr(closed, name)(0.0, y), getattr(aba, name)(0.0, y)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from engine import MP, STEP, apart, engine, exact
+from engine import MP, STEP, apart, engine, exact, plain
 from scipy.optimize import brentq
 
 from eomgen.run.integrate import integrate
@@ -90,7 +90,7 @@ def test_a_ball_bounces_on_a_shaken_floor(name: str) -> None:
     """Between bounces steps are long, as a parabola has no error, and the floor's drive is fast:
     its work is to be right all the same.
     """
-    module = engine(SHAKEN).module
+    module = plain(SHAKEN).module
     start = replace(as_problem(module), initial=np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
     run = integrate(start, name, 1.2, powers=as_powers(module), **METHODS[name])
     assert run.finished and run.works is not None
@@ -108,7 +108,7 @@ def test_a_ball_bounces_on_a_shaken_floor(name: str) -> None:
 @pytest.mark.parametrize("name", ["DOP853", "rk4"])
 def test_a_drive_bears_what_rests_on_its_floor(name: str) -> None:
     """Its work is what both bodies' energy grows by; the contact does none."""
-    module, p = engine(SHAKEN).module, {"a": 0.02, "w": 15.0, "e": 0.0}
+    module, p = plain(SHAKEN).module, {"a": 0.02, "w": 15.0, "e": 0.0}
     start = replace(as_problem(module, p), initial=np.array([0.0, 0.3, 0.0, 0.0, 0.3, 0.0]))
     given = {"dt": 5e-4} if name == "rk4" else METHODS[name]
     run = integrate(start, name, 0.5, powers=as_powers(module, p), **given)

@@ -10,7 +10,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 from campaign import some
-from engine import engine
+from engine import plain
 
 from eomgen.codegen.backends.javascript import DIALECT
 from eomgen.errors import SceneError
@@ -345,7 +345,7 @@ LONGEST = [
 def test_the_longest_formulas_stay_small(formula: str) -> None:
     """500 characters make some hundred operations, which Python's parser takes, in no time."""
     start = time.process_time()
-    module = engine(SCENE.format(formula)).module
+    module = plain(SCENE.format(formula)).module
     assert time.process_time() - start < 60.0
     assert module.COST["derivative"]["total"] <= 16 * len(formula)
     y = np.array([0.4, 0.0])
@@ -358,7 +358,7 @@ def test_the_longest_formulas_stay_small(formula: str) -> None:
 def test_functions_of_parameters_alone(name: str) -> None:
     """Each is there where it is called once for all states, and only there."""
     call = f"{name}({', '.join(['a/4', 'a/5', 'a'][: FUNCTIONS[name]])})"
-    module = engine(SCENE.format(f"x*{call}")).module
+    module = plain(SCENE.format(f"x*{call}")).module
     value = BY_MATH[name](*[0.5, 0.4, 2.0][: FUNCTIONS[name]])
     wanted = pytest.approx(0.4 * value, rel=1e-14)
     assert module.derivative(0.0, np.array([0.4, 0.0]))[1] == wanted
@@ -411,7 +411,7 @@ def test_a_parameter_may_have_a_function_s_name() -> None:
     text = SCENE.replace("a = 2.0", "step = 3.0\nmax = 5.0").format(
         "step*x + step(x) + max(max, 1)"
     )
-    assert engine(text).module.derivative(0.0, np.array([0.4, 0.0]))[1] == pytest.approx(7.2)
+    assert plain(text).module.derivative(0.0, np.array([0.4, 0.0]))[1] == pytest.approx(7.2)
 
 
 def test_numbers_too_large_fold_to_no_name() -> None:

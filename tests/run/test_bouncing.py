@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from campaign import some
-from engine import Engine, apart, engine
+from engine import Engine, apart, plain
 from scipy.special import ellipk
 
 from eomgen.run.integrate import integrate
@@ -49,7 +49,7 @@ def test_a_ball_bounces_and_rests(dimensions: int) -> None:
     """After the first fall in √(2h/g) each flight takes e times the one before; then it lies."""
     e, h, r = 0.6, 0.8, 0.1
     up = "yz"[dimensions - 2]
-    made = engine(f"""
+    made = plain(f"""
 name = "ball"
 outputs = "all"
 dimensions = {dimensions}
@@ -103,7 +103,7 @@ coordinate = "q{i}"
 def test_newtons_cradle(moving: int) -> None:
     """As many swing out as swung in, as far, half a period later; the others hang still."""
     start = -0.4
-    made = engine(
+    made = plain(
         PENDULA
         + GRAVITY
         + '[[effects]]\ntype = "contact"\nname = "hit"\nlaw = "impact"\nagainst = "each_other"\n'
@@ -122,7 +122,7 @@ def test_newtons_cradle(moving: int) -> None:
 def test_a_pendulum_bounces_off_its_stop(integrator: str) -> None:
     """Halves of its swing: each rebound rises to e² of the energy before."""
     e = 0.8
-    made = engine(f"""
+    made = plain(f"""
 name = "gate"
 outputs = "all"
 bodies = [{{ name = "b", mass = 0.4, inertia_com = 0 }}]
@@ -153,7 +153,7 @@ def test_a_block_slides_down_a_slope() -> None:
     creeps no faster than that says.
     """
     made = {
-        angle: engine(f"""
+        angle: plain(f"""
 name = "slope"
 outputs = "all"
 bodies = [{{ name = "b", mass = 1.5, inertia_com = 0.01 }}]
@@ -190,7 +190,7 @@ b_angle = {angle!r}
 def test_a_ball_leaves_a_driven_table() -> None:
     """It lies on the table until that falls faster than g, and then flies."""
     a, w = 0.05, 20.0
-    made = engine(f"""
+    made = plain(f"""
 name = "shaker"
 outputs = "all"
 parameters = {{ a = {a}, w = {w} }}
@@ -230,7 +230,7 @@ restitution = 0.5
 
 def test_two_bodies_bounce_until_they_lie_still() -> None:
     """The built-in scene: all energy is accounted for, nothing sinks in, and it ends at rest."""
-    made = engine("bouncing_two_body")
+    made = plain("bouncing_two_body")
     run = ran(made, 5.5)
     assert run.finished
     assert unaccounted(made, run) < 1e-7
@@ -252,7 +252,7 @@ def test_no_step_leaps_over_what_is_short(integrator: str) -> None:
     The walls give back its speed, and the pulse, 100 N for 20 ms on 1 kg, adds 2 m/s.
     """
     wall = '[[effects]]\ntype = "contact"\nlaw = "hunt_crossley"\nbody = "b"\nstiffness = 1e8\n'
-    made = engine(
+    made = plain(
         'name = "court"\noutputs = "all"\n'
         'bodies = [{ name = "b", mass = 1.0, inertia_com = 0 }]\n'
         'joints = [{ name = "p", type = "prismatic", parent = "world", child = "b", '
