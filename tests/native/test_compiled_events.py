@@ -128,6 +128,7 @@ def test_the_bits_are_those_of_python(scene: str, rtol: float, made: list[int]) 
     assert sum(made) > 0.3 * run.trajectory.counts["steps"]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(("scene", "share"), [(WHEEL, 0.7), (TURNING, 0.4)])
 def test_stops_and_pulses_are_seen(scene: str, share: float, made: list[int]) -> None:
     """Wherever they lie, at loose and tight tolerances. Most steps are made in C."""

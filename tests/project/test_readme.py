@@ -20,12 +20,11 @@ def blocks(language: str, text: str = README) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.parametrize(
-    "text", [README, pytest.param(API + SWEEPS, marks=pytest.mark.full)], ids=["README", "docs"]
-)
+@pytest.mark.full
+@pytest.mark.parametrize("text", [README, API + SWEEPS], ids=["README", "docs"])
 def test_python_examples_run_and_print_what_they_say(text: str) -> None:
     """The Python blocks run from the checkout, one after another; a `# prints` comment holds what
-    each prints; those of the docs in a full run. One process runs them all: to load what they
+    each prints, as `.ci/run` has them. One process runs them all: to load what they
     import takes longer than most of them.
     """
     examples = blocks("python", text)
