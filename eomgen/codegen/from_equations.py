@@ -105,7 +105,7 @@ def _recipes(equations: Equations) -> dict[str, list[Any]]:
     """The entries of each output as expressions in the symbols of bodies and coordinates."""
     s, symmetric, bodies = equations.symbols, equations.symmetric, equations.model.bodies
     balance = symmetric.M * sp.Matrix(s.a) + symmetric.V + symmetric.G - symmetric.F
-    jointed = [k for k, body in enumerate(bodies) if body.joint.type != "free"]
+    jointed = [k for k, body in enumerate(bodies) if body.joint.holds]
     wrenches = [(*s.force[k], -equations.free_bodies.motor[k]) for k in jointed]
     points = [_point(equations, point) for point in equations.model.points]
     each = range(len(bodies))

@@ -263,8 +263,7 @@ def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterato
 def used_bodies(derived: DerivedEffect) -> Iterator[str]:
     """The bodies whose pose or motion the formulas of an effect, or its use, need."""
     yield from derived.bodies
-    weight = derived.kept and derived.effect.type == "gravity"
-    loads = [*(() if weight else derived.loads)]
+    loads = [*(() if derived.falls else derived.loads)]
     for contact in derived.contacts:
         loads += [*contact.normal, *(load for tangent in contact.tangents for load in tangent)]
     yield from (load.body for load in loads if isinstance(load, Load) and load.body != WORLD)

@@ -53,6 +53,11 @@ class DerivedEffect:
     bodies: tuple[str, ...]
 
     @property
+    def falls(self) -> bool:
+        """Whether its loads are one acceleration of all bodies; those of constraints are not."""
+        return self.kept and self.effect.uniform
+
+    @property
     def words(self) -> str:
         """What the effect is: the description of its type."""
         return inspect.cleandoc(type(self.effect).__doc__ or "")

@@ -291,7 +291,7 @@ def _wrench(r: Recursion, frame: Frame, kinds: Sequence[str] = KINDS) -> list[Ex
     name, size = frame_name(r.model, frame), r.model.dimensions
     found: list[Expr] = []
     for derived in r.effects:
-        if derived.effect.uniform and derived.kept:
+        if derived.falls:
             continue
         for load in derived.loads:
             if isinstance(load, Load) and load.body == name and load.kind in kinds:
@@ -391,6 +391,6 @@ def _falling(r: Recursion) -> Expr:
     mechanism: Any = NamingMechanism(r.model, Notes())
     total = sp.zeros(r.model.dimensions, 1)
     for derived in r.effects:
-        if derived.effect.uniform and derived.kept:
+        if derived.falls:
             total -= sp.Matrix(derived.effect.acceleration(mechanism))
     return sp.Matrix([0] * (r.size - r.model.dimensions) + list(total))

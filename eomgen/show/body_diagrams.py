@@ -155,7 +155,7 @@ def _loads_on(
 ) -> Iterator[tuple[Point, Point | None, Expr, str]]:
     """Start, direction (None for a torque), name and style of each load of an effect on a body."""
     model, body = pose.model, shape.body
-    if derived.effect.uniform and derived.kept:
+    if derived.falls:
         weight = next(
             (x for x in derived.loads if isinstance(x, Load) and x.body == body.name), None
         )

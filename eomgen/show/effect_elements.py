@@ -10,7 +10,7 @@ from eomgen.language.rewriting import constant
 from eomgen.model.model import Model, dofs_of
 from eomgen.scene.constraints.base import ConstraintTable
 from eomgen.scene.effects.elements import WORLD_INDEX, Element, Vector, Wind
-from eomgen.scene.joints.base import WORLD, spatial
+from eomgen.scene.joints.base import WORLD, kinds_of, spatial
 from eomgen.show.arrows import wind_at
 from eomgen.show.joint_axes import zero_direction
 
@@ -66,7 +66,8 @@ class _Layout:
 
     def wheel_axis(self, body: int, at: Vector) -> Vector | None:
         joint, value = self._model.bodies[body].joint, self._model.value
-        if joint.type != "revolute" or [*map(value, at)] != [*map(value, joint.r_child)]:
+        at_pin = [*map(value, at)] == [*map(value, joint.r_child)]
+        if kinds_of(joint, self.dimensions) != ["revolute"] or not at_pin:
             return None
         (primitive,) = joint.primitives(self.dimensions)
         return () if self.dimensions == 2 else constant(*spatial(primitive.axis))

@@ -361,6 +361,6 @@ def translational_velocities(model: Model) -> dict[int, int]:
     return {
         first + i: i
         for body, first in zip(model.bodies, model.first_velocity, strict=True)
-        if body.joint.type == "free"
+        if not body.joint.holds
         for i in range(model.dimensions)
     }
