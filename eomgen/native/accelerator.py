@@ -1,9 +1,10 @@
-"""When a run takes compiled steps and functions: at once if their library is in the store; else if
-it is long.
+"""Where the steps and functions of a run are computed: in Python or in compiled code.
 
-They have the bits of Python's, so a run may change to them at any time. A library is compiled once
-Python has taken as long for what it computes as compiling will take: so that never takes more than
-about twice as long as with the better of the two from the start on.
+The rule: in compiled code if its libraries are in the store, or once the run has taken as long as
+compiling them will. Then they are compiled, all that it needs together. So a run never takes more
+than about twice as long as it would with the better of the two from the start on. `_found` is
+the rule for steps, which runs ask before each portion of these; both places make the same steps.
+For a single function, `_Library.beyond` compares the time that Python has spent on it.
 """
 
 import ctypes
@@ -37,6 +38,8 @@ STARTING, AN_OPERATION = 0.2, 0.25e-3
 operations, within a factor of 3."""
 
 Sources = Callable[[], Mapping[str, str]]
+Libraries = Mapping[str, ctypes.CDLL]
+"""Libraries by the names of their functions."""
 
 
 class _Library:
@@ -47,55 +50,49 @@ class _Library:
     price         time to compile, s
     fail          called with the error of a compiler
 
-    `paid` is the time that Python took until it was compiled, and that of compiling, s. Threads may
-    share it.
+    `found` is None until it is there. Threads may share it.
     """
 
     def __init__(
         self, about: str, sources: Sources, main: str, price: float, fail: Callable[[str], None]
     ) -> None:
-        self._about, self._sources, self._main, self._price = about, sources, main, price
-        self._fail = fail
-        self._looked, self._over, self.paid = False, False, 0.0
-        self._found: ctypes.CDLL | None = None
+        self._about, self._sources, self._main = about, sources, main
+        self.price, self._fail = price, fail
+        self._looked, self._over = False, False
+        self.found: ctypes.CDLL | None = None
         self._spent, self._lock = 0.0, RLock()
 
-    def beyond(self, more: float) -> ctypes.CDLL | None:
-        """The same as `after` the time of all runs so far, if Python has taken so much more, s."""
-        self._spent += more
-        return self.after(self._spent)
-
-    def after(self, spent: float) -> ctypes.CDLL | None:
-        """The library, if it is there or Python has taken so long, s, that compiling pays."""
-        if self._over and self._found:
-            return self._found
-        with self._lock:
-            if not self._looked:
-                self._looked = True
-                with suppress(RunError):  # no compiler: said only if the run is a long one
-                    self._found = kept_library(self._about)
-                    self._over = self._found is not None
-            if spent > self._price and not self._over:
-                try:
-                    self.compile()
-                except RunError as error:
-                    self._fail(str(error))
-        return self._found
-
     @property
-    def missing(self) -> float:
-        """Time to compile it, s; 0 if it is there."""
-        self.after(0.0)
-        return 0.0 if self._over else self._price
+    def is_missing(self) -> bool:
+        """Whether it would have to be compiled, and this has not failed."""
+        if not self._looked:
+            with self._lock, suppress(RunError):  # no compiler: said only if the run is a long one
+                self.found = self.found or kept_library(self._about)
+                self._over = self.found is not None
+            self._looked = True
+        return not self._over
+
+    def beyond(self, more: float) -> ctypes.CDLL | None:
+        """The library, if it is there, or if Python has taken so much more, s, that compiling pays;
+        the time of all runs counts.
+        """
+        self._spent += more
+        if self.is_missing and self._spent > self.price:
+            with suppress(RunError):
+                self.compile()
+        return self.found
 
     def compile(self) -> None:
         """Compile it now, unless it is in the store. Raises `RunError`."""
         with self._lock:
-            if self._found is not None:
+            if self.found is not None:
                 return
-            self._over, begun = True, time.perf_counter()
-            self._found = compiled_library(self._about, self._sources, self._main)
-            self.paid = self._price + time.perf_counter() - begun
+            self._over = True
+            try:
+                self.found = compiled_library(self._about, self._sources, self._main)
+            except RunError as error:
+                self._fail(str(error))
+                raise
 
 
 class Accelerator:
@@ -141,39 +138,44 @@ class Accelerator:
         functions.
         """
         origin, module = module and self._module, module or self._module
-        made: dict[tuple[str, ...], runs.CompiledSteps] = {}
-        stiff: dict[tuple[str, ...], implicit.CompiledImplicit] = {}
+        made: dict[Any, Any] = {}
         projects = PROJECTS if problem.projection else ()
         symmetric = implicit.SYMMETRIC if problem.projection else ()
         problem = self._compilable(module, origin).problem(problem)
 
-        def compiled(needed: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
-            if needed not in made:
-                libraries = self._all(("derivative", *needed))
-                if libraries is None:
-                    return None
-                own, beside = libraries["derivative"], {name: libraries[name] for name in needed}
-                made[needed] = runs.CompiledSteps(module, own, *self._values, beside)
-            return made[needed]
+        def once(needed: tuple[str, ...], make: Callable[[Libraries], Any], name: str = "") -> Any:
+            """What is made of libraries, as soon as they are there."""
+            if (name, needed) not in made and (libraries := self._found(needed)):
+                made[name, needed] = make(libraries)
+            return made.get((name, needed))
+
+        def explicit_steps(more: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
+            def make(of: Libraries) -> runs.CompiledSteps:
+                beside = {name: of[name] for name in more}
+                return runs.CompiledSteps(module, of["derivative"], *self._values, beside)
+
+            found: runs.CompiledSteps | None = once(("derivative", *more), make)
+            return found
 
         @cache
         def series() -> taylor.CompiledTaylor | None:
             return self._taylor(module)
 
         def implicit_steps(more: tuple[str, ...] = ()) -> implicit.CompiledImplicit | None:
-            needed = (*implicit.NEEDED, *projects, *more)
-            if needed not in stiff and (libraries := self._implicit(needed)):
-                given = (module, libraries, *self._values, origin)
-                stiff[needed] = implicit.CompiledImplicit(problem, *given)
-            return stiff.get(needed)
+            def make(of: Libraries) -> implicit.CompiledImplicit:
+                return implicit.CompiledImplicit(problem, module, of, *self._values, origin)
 
-        by_rattle: dict[str, EqualSteps | None] = {}
+            needed = (*implicit.NEEDED, *projects, *more, implicit.METHODS_LIBRARY)
+            found: implicit.CompiledImplicit | None = once(needed, make)
+            return found
 
         def rattle_steps(name: str) -> EqualSteps | None:
-            if name not in by_rattle and (libraries := self._implicit(rattle.NEEDED)):
-                given = (problem, module, libraries, *self._values)
-                by_rattle[name] = rattle.steps(name, *given)
-            return by_rattle.get(name)
+            def make(of: Libraries) -> EqualSteps | None:
+                return rattle.steps(name, problem, module, of, *self._values)
+
+            needed = (*rattle.NEEDED, implicit.METHODS_LIBRARY)
+            found: EqualSteps | None = once(needed, make, name)
+            return found
 
         def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
             if name == "taylor":  # its steps are not checked
@@ -182,7 +184,7 @@ class Accelerator:
                 other = None if set(needed) - set(projects) else implicit_steps()
                 found = other.named(name) if other else None
             else:
-                found = held.named(name, needed) if (held := compiled(needed)) else None
+                found = held.named(name, needed) if (held := explicit_steps(needed)) else None
             self.used = self.used or found is not None
             return found
 
@@ -192,7 +194,7 @@ class Accelerator:
             elif name in implicit.GAUSS:
                 found = other.equal(name) if (other := implicit_steps(symmetric)) else None
             else:
-                found = held.equal(name, problem) if (held := compiled(projects)) else None
+                found = held.equal(name, problem) if (held := explicit_steps(projects)) else None
             self.used = self.used or found is not None
             return found
 
@@ -216,8 +218,10 @@ class Accelerator:
         Raises `RunError` if there is no compiler, or if it fails.
         """
         self._at_once = True
-        libraries = [self._library(name) for name in names]
-        if any(library.missing for library in libraries):
+        self._compile([self._library(name) for name in names])
+
+    def _compile(self, libraries: Sequence[_Library]) -> None:
+        if any(library.is_missing for library in libraries):
             self._of_model()  # which all of them need
         with ThreadPoolExecutor(min(len(libraries), os.cpu_count() or 1)) as pool:
             list(pool.map(_Library.compile, libraries))
@@ -234,10 +238,9 @@ class Accelerator:
         try:
             library = self._library("taylor")
             library.compile()
-            found = library.after(0.0)
-        except RunError as error:
-            self._fail(str(error))
+        except RunError:
             return None
+        found = library.found
         assert found is not None
         self.used = True
         return taylor.CompiledTaylor(program, interface, module, found, self._values)
@@ -248,52 +251,27 @@ class Accelerator:
     def _look(self, name: str) -> functions.Look:
         """When the library of a function is there; that of the derivative also makes steps."""
         if name == "derivative":
-            return self._of_steps
+            return lambda spent: (self._found((name,)) or {}).get(name)
         if self._at_once:
-            return lambda spent: self._library(name).after(math.inf)
+            return lambda spent: self._library(name).beyond(math.inf)
         return self._library(name).beyond
 
-    def _of_steps(self, spent: float) -> ctypes.CDLL | None:
-        """The library of the steps; they take as long as the run."""
-        return self._library("derivative").after(self._elapsed())
-
-    def _all(self, names: Sequence[str]) -> dict[str, ctypes.CDLL] | None:
-        """The libraries of steps and of the functions that check them. They are compiled one after
-        another, each once Python has taken as long as that takes.
+    def _found(self, names: Sequence[str]) -> Libraries | None:
+        """The libraries of steps, if they are in the store, or once the run has taken as long as
+        compiling them will; None before that, and if there are none.
         """
-        left, found = math.inf if self._at_once else self._elapsed(), dict[str, ctypes.CDLL]()
-        for name in names:
-            of = self._library(name)
-            library = of.after(left)
-            if library is None:
-                return None
-            found[name] = library
-            left -= of.paid
-        return found
-
-    def _elapsed(self) -> float:
-        """The time since the first call, s."""
-        now = time.perf_counter()
-        if self._begun is None:
-            self._begun = now
-        return now - self._begun
-
-    def _implicit(self, names: Sequence[str]) -> dict[str, ctypes.CDLL] | None:
-        """The libraries of implicit methods and of these functions, together: with fewer, Python
-        makes all steps.
-        """
-        if not all(hasattr(self._module, name) for name in names):
+        begun = self._begun = self._begun or time.perf_counter()
+        of_methods = implicit.METHODS_LIBRARY in names
+        if of_methods and not all(hasattr(self._module, name) for name in names[:-1]):
             return None
-        now = time.perf_counter()
-        if self._begun is None:
-            self._begun = now
         needed = {name: self._library(name) for name in names}
-        needed[implicit.METHODS_LIBRARY] = self._library(implicit.METHODS_LIBRARY)
-        pays = self._at_once or now - self._begun > sum(each.missing for each in needed.values())
-        spent = math.inf if pays else 0.0
-        found = {name: library.after(spent) for name, library in needed.items()}
-        there = {name: library for name, library in found.items() if library is not None}
-        return there if len(there) == len(found) else None
+        missing = [library for library in needed.values() if library.is_missing]
+        price = sum(library.price for library in missing)
+        if missing and (self._at_once or time.perf_counter() - begun > price):
+            with suppress(RunError):
+                self._compile(missing)
+        there = {name: x.found for name, x in needed.items() if x.found is not None}
+        return there if len(there) == len(needed) else None
 
     def _library(self, name: str) -> _Library:
         """That of a function, or that of implicit methods, which is the same for all models."""

@@ -200,7 +200,29 @@ def test_a_library_is_compiled_once_that_pays_for_all_runs(monkeypatch: pytest.M
     monkeypatch.setattr(accelerator, "compiled_library", compiled)
     of = accelerator._Library("jacobian", dict, "main.c", 1.0, pytest.fail)
     assert of.beyond(0.4) is None and of.beyond(0.4) is None and not made
-    assert of.beyond(0.4) is library and of.after(0.0) is library and made == ["jacobian"]
+    assert of.beyond(0.4) is library and of.beyond(0.0) is library and made == ["jacobian"]
+
+
+def test_what_steps_need_is_compiled_together(
+    empty_store: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once the run has taken as long as compiling all of it will, and not one after another."""
+    module: Any = eomgen.load(eomgen.generate("double_pendulum"))
+    made, prices = list[str](), {"derivative": 1.0, "jacobian": 2.0}
+    of = accelerator.Accelerator(eomgen.check("double_pendulum"), module, None, None)
+    for name, price in prices.items():
+        library = accelerator._Library(name, dict, "main.c", price, pytest.fail)
+        of._libraries[name] = library
+    now = [0.0]
+    monkeypatch.setattr(accelerator.time, "perf_counter", lambda: 5.0 + now[0])
+    monkeypatch.setattr(accelerator, "kept_library", lambda about: None)
+    monkeypatch.setattr(
+        accelerator, "compiled_library", lambda about, *_: made.append(about) or object()
+    )
+    for now[0] in (0.0, 2.9):
+        assert of._found(tuple(prices)) is None and not made
+    now[0] = 3.1
+    assert set(of._found(tuple(prices)) or ()) == set(prices) == set(made)
 
 
 def test_an_unknown_backend_is_refused() -> None:
