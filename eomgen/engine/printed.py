@@ -6,9 +6,11 @@ from typing import Any
 
 from eomgen.engine import (
     adaptive,
+    branches,
     complementarity,
     contact_times,
     contacts,
+    crossings,
     differences,
     elimination,
     equal_steps,
@@ -84,7 +86,8 @@ def text() -> Text:
     steps = (adaptive, differences, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, symmetric)
-    return Text.of(*steps, *solved, contacts, contact_times, *held, taylor, system)
+    checks = (branches, contacts, contact_times, crossings)
+    return Text.of(*steps, *solved, *checks, *held, taylor, system)
 
 
 def c_source(functions: Roots, language: Language = C) -> str:

@@ -1,6 +1,7 @@
 """Whole steps of a method in compiled code, with the bits of the same steps made in Python."""
 
 import ctypes
+import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -10,8 +11,10 @@ import numpy as np
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
+from eomgen.engine.crossings import Watch
 from eomgen.engine.embedded import DOP853
 from eomgen.native import checked, equal_steps
+from eomgen.native.checked import FunctionStructure
 from eomgen.native.constrained import address as where
 from eomgen.native.constrained import constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
@@ -19,14 +22,17 @@ from eomgen.native.functions import restricted
 from eomgen.native.memory import address, placed
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
+from eomgen.run import branches
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators.dormand_prince_8 import interpolated
+from eomgen.run.integrators.strides import OF_CONTACTS, OF_STATE
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.subset.structures import filled, structure
 from eomgen.templating import render
 
 MAIN = "runs.c"
+CHECKS: list[equal_steps.Root] = [(name, {}) for name in ("passed_over", "end_at", "stay_apart")]
 METHODS = ("dop853", *equal_steps.METHODS)
 """The methods whose steps this library makes."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -44,9 +50,8 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "engine": C.prelude + c_source([("begun", {}), ("gone_on", {}), *equal_steps.STEPS]),
-        "steps": c_source([("made_many", {"method": DOP853})]),
-        **checked.context(),
+        "engine": C.prelude + c_source(equal_steps.STEPS),
+        "steps": c_source([("made_many", {"method": DOP853}), *CHECKS]),
         **of_constraints(),
         **equal_steps.context(interface),
     }
@@ -55,13 +60,18 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
 
 
 class _Checks(ctypes.Structure):
-    """`Checks` of `templates/c/checks.c.jinja`."""
+    """`Checks` of `templates/c/checks.c.jinja`, without what C begins with."""
 
     _fields_ = (
-        *((name, _POINTER) for name in ("system", "run", "watch", "held")),
-        ("now", _REAL),
+        *((name, _POINTER) for name in ("system", "run", "held", "watch", "found")),
+        *((name, FunctionStructure) for name in ("switching", "gaps", "rates")),
+        ("sizes", _POINTER),
+        ("clear", _REAL),
         *((name, _POINTER) for name in ("margins", "switched", "values")),
         *((name, _POINTER) for name in ("switches", "gap_checks")),
+        *((name, _WHOLE) for name in ("switching_calls", "gap_calls")),
+        *((name, _POINTER) for name in ("at", "y", "raw", "last", "k", "terms")),
+        ("sound", _WHOLE),
     )
 
 
@@ -130,9 +140,11 @@ class CompiledSteps:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
         each, whole = (most,), (most, ny)
-        watch, pointed = checked.watch(self._checks, watched, sizes)
+        watch = _watch(watched, ny)
+        found = branches.switches(ny, last=watched.switched if watched else -math.inf)
+        functions = [self._checks.get(name) for name in (*OF_STATE, *OF_CONTACTS)]
         (ends, lengths, states, slopes, losses, switched, values, terms), at_reals = placed(
-            [each, each, *[whole] * 3, each, (most, watch.switching.count), (dense * most, 7, ny)]
+            [each, each, *[whole] * 3, each, (most, watch.many), (dense * most, 7, ny)]
         )
         (derivatives, sampled, switches, gap_checks), at_wholes = placed([each] * 4, np.int64)
         rows, margins = np.empty((len(times), ny)), made_margins(constrained, most)
@@ -148,16 +160,20 @@ class CompiledSteps:
             *(*at_reals[:2], *at_wholes[:2], *at_reals[2:5], at_reals[7], to_times, to_rows),
             *(len(times), most),
         )
+        given = filled(watch), filled(found)
         checks = _Checks(
-            *(ctypes.addressof(each) for each in (system, run, watch)),
-            *(where(keeps), 0.0, to_margins, *at_reals[5:7], *at_wholes[2:]),
+            *(ctypes.addressof(each) for each in (system, run)),
+            *(where(keeps), *map(ctypes.addressof, given)),
+            *(FunctionStructure(*each) if each else FunctionStructure() for each in functions),
+            *(None if sizes is None else address(sizes), watched.clear if watched else math.inf),
+            *(to_margins, *at_reals[5:7], *at_wholes[2:]),
         )
         why = self._call(
             *(ctypes.addressof(each) for each in (system, checks, run, at)),
             *begun,
             ctypes.addressof(records),
         )
-        del pointed, keeps, records
+        del watch, found, keeps, records
         n: int = at.made
         passed = int(sampled[n - 1]) if n else 0
         return Stride(
@@ -175,6 +191,16 @@ class CompiledSteps:
             within=partial(_within, (t, y), ends, states, terms) if dense else None,
             margins=margins[: n + 1] if constrained else None,
         )
+
+
+def _watch(watched: Watched | None, states: int) -> Watch:
+    """Room for the switching functions along steps, and what is known of them."""
+    if not (watched and watched.ends):
+        return branches.watch(0, states)
+    (earlier, before), (here, first) = watched.ends
+    made = branches.watch(len(first), states, watched.angles, watched.timed)
+    made.earlier, made.before[:], made.here, made.first[:] = earlier, before, here, first
+    return made
 
 
 def _within(

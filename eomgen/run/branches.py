@@ -1,35 +1,98 @@
 """Detection of steps of an adaptive method that pass over a branch of the derivative.
 
-A method evaluates the derivative at a few points of a step. A contact, a stop or a pulse in time
-that begins and ends between them does not show in the error estimate, however long the step. The
-derivative is smooth as long as no switching function g(t, y) of the problem crosses 0. Those of the
-state are followed along the step (`crossings`). Those of time alone are enclosed by interval
-arithmetic, and steps end where they change their sign (`schedule`).
-
-A step passes over a branch if two switches lie in it, and the derivative between them differs from
-that before and after by more than the tolerance allows. Such a step is repeated up to the middle
-between the two, so that the method evaluates the derivative on that branch. If a method's error
-estimate does not depend on the derivative near the ends of a step, its steps are made to end at the
-switches.
+`engine.branches` says what that is. Switching functions of the state are followed along the step
+there. Those of time alone are enclosed by interval arithmetic here, and steps end where they change
+their sign (`schedule`).
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
+from eomgen.engine.adaptive import Bounds
+from eomgen.engine.branches import (
+    PASSED_OVER,
+    PASSES_NOTHING,
+    TOGETHER,
+    Switches,
+    passed_over,
+)
+from eomgen.engine.crossings import MOST_FIRST, MOST_PARTS, Watch, divide, end_at, turned
+from eomgen.engine.roots import Search
 from eomgen.run.compiled import Watched
-from eomgen.run.crossings import TOGETHER, Crossings, Step
 from eomgen.run.localised import FREE, Features, Smooth, slope
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.schedule import Schedule
 from eomgen.run.sliding import Returns
+from eomgen.subset.structures import with_room
 
-INSIDE = 1 / 8
-"""A step that ends at least this fraction of the time between two switches after the first one has
-evaluated the branch between them."""
+MOST_BRACKETS = 32
+"""Most zeros in a step that compiled code finds."""
+States = Callable[[Any], FloatArray]
+"""The states (n, ny) at times (n,) within a step, or the state (ny,) at a single time."""
+
+
+class Tolerances(Protocol):
+    """What the error of steps may be; see `integrators.adaptive.Bounds`."""
+
+    @property
+    def rtol(self) -> float: ...
+    @property
+    def atol(self) -> float | FloatArray: ...
+    @property
+    def unseen(self) -> float: ...
+    def allowed(self, y: FloatArray) -> FloatArray: ...
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of a method: from `start` to `end`, s, the states there, those between and, if they
+    are known, the derivatives at both ends (2, ny).
+    """
+
+    start: float
+    end: float
+    first: FloatArray
+    last: FloatArray
+    states: States
+    slopes: FloatArray | None = None
+
+    @property
+    def length(self) -> float:
+        """Its length, s."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class _Along:
+    """What can be known along a step: see `engine.crossings.Along`."""
+
+    step: Step
+    problem: Problem
+    switching: Switching
+
+    def states_at(self, n: int, times: FloatArray, to: FloatArray) -> None:
+        to[:n] = self.step.states(times[:n])
+
+    def switching_at(self, t: float, y: FloatArray, to: FloatArray) -> None:
+        assert self.switching.of_state
+        to[:] = _found(self.switching.of_state, t, y)
+
+    def slope_at(self, t: float, y: FloatArray, to: FloatArray) -> None:
+        to[:] = _found(self.problem.derivative, t, y)
+
+
+def _found(
+    function: Callable[[float, FloatArray], FloatArray], t: float, y: FloatArray
+) -> FloatArray | float:
+    """What a function returns; not a number if it cannot be evaluated."""
+    try:
+        return function(float(t), y)
+    except (ArithmeticError, ValueError):
+        return math.nan
 
 
 @dataclass(frozen=True)
@@ -44,42 +107,80 @@ class Retry:
     seen: bool
 
 
-@dataclass
-class BranchMonitor:
-    """Checks the steps of a run, one after another.
+def watch(
+    many: int,
+    states: int,
+    angles: Sequence[int] = (),
+    timed: bool = False,
+    *,
+    most: int = MOST_PARTS,
+    room: int = MOST_BRACKETS,
+) -> Watch:
+    """Room for switching functions along steps, for parts of a step and for brackets of zeros."""
+    sizes = {"many": many, "most": most, "room": room, "STATES": states}
+    which = np.array(angles, np.int64)
+    return with_room(Watch, **sizes, timed=timed, turning=len(which), angles=which)
 
-    allowed    y (ny,) -> (ny,), the error allowed in a step that ends at y
-    unseen     the longest step, s, if the functions cannot be followed
-    switched   the time of the last switch, s
-    features   what else it may pass over, if the run is under scrutiny
+
+def switches(states: int, room: int = MOST_BRACKETS, **given: Any) -> Switches:
+    """Room for the switches in a step; the other numbers are `given`."""
+    return with_room(Switches, room=room, STATES=states, **given)
+
+
+class BranchMonitor:
+    """Checks the steps of a run, one after another, with the tolerances `bounds`.
+
+    features   what else steps may pass over, if the run is under scrutiny
     """
 
-    problem: Problem
-    switching: Switching
-    allowed: Callable[[FloatArray], FloatArray]
-    unseen: float
-    switched: float = -math.inf
-    features: Features | None = None
-    _cut_at: float = math.nan
-    _ends: list[tuple[float, FloatArray]] = field(default_factory=list, repr=False)
-
-    def __post_init__(self) -> None:
-        of_time, scrutiny = self.switching.of_time, self.problem.scrutiny
-        self._schedule = Schedule(of_time) if of_time else None
+    def __init__(self, problem: Problem, switching: Switching, bounds: Tolerances) -> None:
+        ny = len(problem.initial)
+        self.problem, self.switching = problem, switching
+        self.unseen, self.allowed = bounds.unseen, bounds.allowed
+        self._bounds = Bounds(np.zeros(ny) + bounds.atol, bounds.rtol, math.inf)
+        self._found = self._switches()
+        self._of = watch(0, ny)
+        self._cut_at = math.nan
+        scrutiny = problem.scrutiny
+        self._schedule = Schedule(switching.of_time) if switching.of_time else None
         self._returns = Returns(self.unseen) if scrutiny else None
-        if scrutiny and scrutiny.localised:
-            self.features = Features(scrutiny.localised)
+        localised = scrutiny.localised if scrutiny else ()
+        self.features = Features(localised) if localised else None
+
+    @property
+    def _ends(self) -> list[tuple[float, FloatArray]]:
+        """The ends of the last two steps, s, and the switching functions there, if known."""
+        of = self._of
+        both = [(of.earlier, of.before.copy()), (of.here, of.first.copy())]
+        return both if of.earlier < of.here else []
 
     @property
     def memory(self) -> dict[str, Any]:
         """What the checks of the next steps depend on: numbers and arrays by name."""
         checked = [[t, *values] for t, values in self._ends] or np.empty((0, 0))
-        return {"turned": self.switched, "checked": np.array(checked)}
+        return {"turned": self._found.last, "checked": np.array(checked)}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
         """Continue from what `memory` gave."""
-        self.switched = float(memory["turned"])
-        self._ends = [(float(row[0]), np.array(row[1:])) for row in memory["checked"]]
+        self._found.last = float(memory["turned"])
+        rows = memory["checked"]
+        of = self._of
+        of.here = of.earlier = math.nan
+        if len(rows):
+            of = self._roomy(len(rows[0]) - 1)
+            (of.earlier, of.here), (of.before[:], of.first[:]) = rows[:, 0].tolist(), rows[:, 1:]
+
+    def _roomy(self, many: int, marked: int = 0) -> Watch:
+        """Room for some functions, and for parts of a step of which so many are given."""
+        of, most = self._of, MOST_PARTS + 3 * marked
+        if of.many != many or of.most < most:
+            own = len(self.problem.initial), self.switching.angles, self.switching.timed
+            made = watch(many, *own, most=most, room=most * many)
+            if of.many == many:
+                made.earlier, made.here = of.earlier, of.here
+                made.before, made.first = of.before, of.first
+            self._of = made
+        return self._of
 
     def known(self, t: float, end: float) -> tuple[float, float] | None:
         """The first time from t on, but before `end`, at which the derivative changes its branch
@@ -91,13 +192,13 @@ class BranchMonitor:
         """What compiled steps from t on are checked with; None if the next step must be checked
         here. Up to `most` steps of about this length, s, are to be made, none beyond `until`.
         """
-        functions = self.switching
-        if functions.of_state and (len(self._ends) < 2 or self._ends[-1][0] != t):
+        functions, ends = self.switching, self._ends
+        if functions.of_state and (not ends or self._of.here != t):
             return None
         clear = self._schedule.clear(t, length, most) if self._schedule else math.inf
         if not min(t + length, until) <= clear:
             return None
-        return Watched(self._ends, self.switched, clear, functions.timed, functions.angles)
+        return Watched(ends, self._found.last, clear, functions.timed, functions.angles)
 
     def check(self, step: Step) -> Retry | None:
         """How a step must be repeated; None if it is accepted.
@@ -109,24 +210,55 @@ class BranchMonitor:
             retry, marks = self._passed_over(self.features, step)
             if retry:
                 return retry
-        search = None
-        if self.switching.of_state:
-            search = Crossings(self.switching, step, self._ends, marks)
-        times, whole = self._times(search, step)
-        switched = self.switched
-        for after in times:
-            until = self._cut(step, switched, after)
-            if until is not None:
-                return Retry(until, seen=True)
-            switched = max(switched, after)
-        if not whole and step.length > self.unseen * (1 + TOGETHER):
-            return Retry(step.start + self.unseen, seen=False)
-        self.switched = switched
-        if search:
-            self._ends = [search.start, search.end]
+        times, follows = list[float](), True
+        if self._schedule:
+            times, follows = self._schedule.changes(step.start, step.end)
+        of = self._watching(step, marks)
+        found = self._known(times, of.room)
+        along = _Along(step, self.problem, self.switching)
+        given = Search(), step.start, step.end, step.first, step.last, follows
+        why = passed_over(of, found, along, self._bounds, *given)
+        if why != PASSES_NOTHING:
+            return Retry(found.until, seen=why == PASSED_OVER)
+        found.last = found.now
+        if of.many:
+            end_at(of, step.end)
             if self._returns:
-                self._returns.take(search.start, search.end, bool(times))
+                before, here = self._ends
+                self._returns.take(before, here, found.many > 0)
         return None
+
+    def _watching(self, step: Step, marks: Sequence[float]) -> Watch:
+        """The switching functions along a step, which is smooth between fractions of it, `marks`,
+        0 and 1 included; none if all of it is.
+        """
+        function, of = self.switching.of_state, self._of
+        if function and not of.many:
+            first = function(step.start, step.first)
+            of = self._roomy(len(first))
+            of.here, of.first[:] = step.start, first
+        of.marked = 0
+        if marks and of.many:
+            least = turned(of, step.first, step.last)
+            if least <= MOST_FIRST:
+                divide(of, least)
+                shares = sorted({*of.marks[: of.parts + 1].tolist(), *marks})
+                of = self._roomy(of.many, len(shares))
+                of.marked = len(shares) - 1
+                of.marks[: len(shares)] = shares
+        return of
+
+    def _known(self, times: Sequence[float], room: int) -> Switches:
+        """The switches in a step at these times, and room for more."""
+        if self._found.room < len(times) + room:
+            self._found = self._switches(self._found.last, len(times) + room)
+        self._found.many = len(times)
+        self._found.times[: len(times)] = times
+        return self._found
+
+    def _switches(self, last: float = -math.inf, room: int = MOST_BRACKETS) -> Switches:
+        ny = len(self.problem.initial)
+        return switches(ny, room, last=last, unseen=self.unseen)
 
     def passed(self, ends: FloatArray, values: FloatArray, switched: FloatArray) -> None:
         """Take compiled steps, by their ends (m,), the functions there (m, ns), and the times of
@@ -185,52 +317,3 @@ class BranchMonitor:
         except (ArithmeticError, ValueError):
             return True
         return not bool((np.abs(here - (ends[0] + ends[1]) / 2) <= allowed).all())
-
-    def _times(self, search: Crossings | None, step: Step) -> tuple[list[float], bool]:
-        """The times of the switches in a step, in order, and whether these are all. A single one is
-        not located exactly if that does not matter.
-        """
-        times, whole = list[float](), True
-        if self._schedule:
-            times, whole = self._schedule.changes(step.start, step.end)
-        if search is None or search.is_far():
-            return times, whole
-        brackets, followed = search.brackets()
-        if brackets:
-            last = max(bracket.end for bracket in brackets)
-            alone = len(brackets) + len(times) == 1 and _is_seen(self.switched, step.start, last)
-            times = sorted([*times, *(b.middle if alone else search.located(b) for b in brackets)])
-        return times, whole and followed
-
-    def _cut(self, step: Step, before: float, after: float) -> float | None:
-        """The time at which a step must end because of two consecutive switches; None if it need
-        not.
-        """
-        gap = after - before
-        if not TOGETHER * step.length < gap < math.inf:
-            return None
-        if before < step.start and _is_seen(before, step.start, after):
-            return None
-        middle = before + gap / 2
-        if not step.start + TOGETHER * step.length < middle < step.end:
-            return None
-        aside = gap / 8
-        times = (max(step.start, before - aside), middle, min(step.end, after + aside))
-        return middle if self._matters(step, times, gap) else None
-
-    def _matters(self, step: Step, times: tuple[float, float, float], length: float) -> bool:
-        """Whether the derivative at the second of three times differs from the mean of those at the
-        others by more than is allowed in a step of the given length, s.
-        """
-        states = step.states(np.array(times))
-        try:
-            slopes = [self.problem.derivative(t, y) for t, y in zip(times, states, strict=True)]
-        except (ArithmeticError, ValueError):
-            return True
-        missed = np.abs(slopes[1] - (slopes[0] + slopes[2]) / 2) * length
-        return not bool((missed <= self.allowed(states[1])).all())
-
-
-def _is_seen(before: float, between: float, after: float) -> bool:
-    """Whether a step that ends `between` two switches has evaluated the branch between them."""
-    return before == -math.inf or between >= before + INSIDE * (after - before)

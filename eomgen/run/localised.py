@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.enclosing import AT, FACTORS, INNER
+from eomgen.engine.enclosing import AT, FACTORS, INNER
 from eomgen.run.intervals import Interval
 
 NARROW = 1 / 8

@@ -3,10 +3,11 @@
 import ctypes
 from dataclasses import fields
 from functools import cache
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+T = TypeVar("T")
 TYPES: dict[Any, Any] = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_int64}
 
 
@@ -23,6 +24,37 @@ def structure(record: type) -> type[ctypes.Structure]:
 
 def _is_array(hint: Any) -> bool:
     return get_origin(hint) is Annotated and len(get_args(hint)) > 1
+
+
+def with_room(record: type[T], **given: Any) -> T:
+    """A record with these numbers and arrays; its other arrays are of zeros, in the sizes that it
+    states, of which those that are not its fields are given, too.
+    """
+    names, arrays = _fields(record)  # type: ignore[arg-type]
+    made = {name: x for name, x in given.items() if name in names}
+    for name, sizes, kind in arrays:
+        if name not in made:
+            made[name] = np.zeros([(given[n] if n else 1) * factor for n, factor in sizes], kind)
+    return record(**made)
+
+
+@cache
+def _fields(record: Any) -> tuple[set[str], list[tuple[str, list[tuple[str, int]], Any]]]:
+    """The names of a record's fields, and its arrays: their names, sizes, each a name times a
+    number, and kinds.
+    """
+    hints = get_type_hints(record, include_extras=True)
+    arrays = []
+    for name in (f.name for f in fields(record) if _is_array(hints[f.name])):
+        array, *sizes = get_args(hints[name])
+        kind = get_args(get_args(array)[1])[0]
+        arrays.append((name, [_size(size) for size in sizes], kind))
+    return {f.name for f in fields(record)}, arrays
+
+
+def _size(text: str) -> tuple[str, int]:
+    factor, _, name = text.rpartition(" * ")
+    return ("", int(name)) if name.isdigit() else (name, int(factor or 1))
 
 
 def filled(record: Any) -> ctypes.Structure:

@@ -1,6 +1,8 @@
 """Compiled steps of scenes with contacts, stops and pulses: the bits of Python's."""
 
+import ast
 import math
+from copy import deepcopy
 from functools import partial
 from typing import Any
 
@@ -11,11 +13,11 @@ from scipy.optimize import brentq
 from test_compiled_steps import assert_same, both, compiler
 
 import eomgen
-from eomgen.native import checked
+from eomgen.engine.printed import text
+from eomgen.engine.roots import FOUND, RTOL, WANTED, Search, begun, gone_on
 from eomgen.results import Run
 from eomgen.run.integrators import strides
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
-from eomgen.run.roots import root
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import read_scene
 
@@ -228,20 +230,20 @@ def test_aims_are_met_by_the_same_runs() -> None:
 
 
 @pytest.mark.every(2)
-@pytest.mark.parametrize(
-    ("scene", "fault"),
-    [
-        (WHEEL, {"far": "0.0"}),
-        (WHEEL, {"together": "2.0"}),
-        (HELD, {"gap_checks": ["0.0", "0.1"]}),
-    ],
-)
+@pytest.mark.parametrize(("scene", "fault"), [(WHEEL, "FAR"), (WHEEL, "TOGETHER"), (HELD, "")])
 def test_a_check_left_out_is_noticed(
-    scene: str, fault: dict[str, Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Any
+    scene: str, fault: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Any
 ) -> None:
+    """What C is printed from has another constant, or takes contacts to stay apart."""
     monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
-    right = checked.context
-    monkeypatch.setattr(checked, "context", lambda: {**right(), **fault})
+    of = text()
+    for name in ("are_far", "cut"):
+        other = {**of.constants[name], fault: {"FAR": 0.0, "TOGETHER": 2.0}.get(fault)}
+        monkeypatch.setitem(of.constants, name, other)
+    if not fault:
+        closes = deepcopy(of.functions["stay_apart"])
+        closes.body = ast.parse("return True").body
+        monkeypatch.setitem(of.functions, "stay_apart", closes)
     options: dict[str, Any] = {"rtol": 1e-9}
     if scene == WHEEL:
         options = {"rtol": 1e-3, "parameters": {"w": 1e-2}}
@@ -265,8 +267,10 @@ def test_zeros_are_those_of_scipy() -> None:
         given = partial(function, case=case, powers=powers, places=places)
         ends = given(a), given(b)
         if ends[0] * ends[1] < 0:
-            xtol = 10 ** random.uniform(-14, -3)
-            ours = root(given, a, b, ends, xtol=xtol)
+            search = Search(10 ** random.uniform(-14, -3), RTOL)
+            answer = begun(search, a, b, *ends)
+            while answer == WANTED:
+                answer = gone_on(search, given(search.here))
             count = len(places)
-            assert ours == brentq(given, a, b, xtol=xtol)
+            assert answer == FOUND and search.here == brentq(given, a, b, xtol=search.xtol)
             assert places[:count] == places[count:]

@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.run.branches import BranchMonitor, Retry
+from eomgen.run.branches import BranchMonitor, Retry, Step
 from eomgen.run.compiled import Steps
-from eomgen.run.crossings import Step
 from eomgen.run.failure import NOT_FINITE, StepFailure
 from eomgen.run.integrators.interface import (
     Adaptive,
@@ -174,7 +173,7 @@ class _Stepper:
         scrutiny = problem.scrutiny
         if problem.switching or (scrutiny and scrutiny.localised):
             switching = problem.switching or Switching()
-            self.branches = BranchMonitor(problem, switching, bounds.allowed, bounds.unseen)
+            self.branches = BranchMonitor(problem, switching, bounds)
         if problem.corners and not problem.switching:
             self.longest = min(bounds.longest, bounds.unseen)
         self._whole, self._unseen, self.factorisations = True, False, 0

@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+from eomgen.subset.words import Row
+
 LAST = 4
 """Degree of the polynomials."""
 AT = (1 - np.cos(np.pi * np.arange(LAST + 1) / LAST)) / 2
@@ -21,3 +23,5 @@ INNER = AT[1:-1]
 """The inner ones of these points, (3,)."""
 FACTORS = np.vstack((_TO_BERNSTEIN, _TO_CHEBYSHEV[-2:]))
 """(7, 5): from values at the points, the Bernstein and the last two Chebyshev coefficients."""
+ENCLOSING = tuple(Row(enumerate(row)) for row in FACTORS.tolist())
+"""The same, as rows of sums."""
