@@ -77,6 +77,7 @@ FORMATS: dict[str, Format] = {
     "fmu": Format("an FMI 3.0 unit for model exchange and co-simulation", ".fmu", ("integrator",)),
     "firmware": Format("a folder with C99 for firmware", options=("number", "integrator")),
     "javascript": Format("an ES module with steps, in a folder", options=("integrator",)),
+    "wasm": Format("a module of WebAssembly", ".wasm", ("integrator",)),
     "matlab": Format("a folder with functions for MATLAB and Octave"),
 }
 
