@@ -60,6 +60,7 @@ SCENES = {
     "pendulum": "pendulum",
     "top": "spinning_top",
     "loop": four_bar(),
+    "rolling": "rattleback",
 }
 RUNS = [
     *(("cart_pole", 2.0), ("tumbling_body", 3.0), (BALL, 0.45), (BALL, 1.6)),
@@ -114,8 +115,8 @@ def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_each_method_moves_as_our_own_run(
     scene: str, method: str, tmp_path: Path, quickly: None
 ) -> None:
-    """Impacts and rest, a stiff motion, a quaternion, a loop; steps of equal length to the bit."""
-    source, t_end = SCENES[scene], 1.6 if scene == "ball" else 0.2
+    """Impacts, a stiff motion, a quaternion, a loop, rolling; equal steps to the bit."""
+    source, t_end = SCENES[scene], {"ball": 1.6, "rolling": 0.04}.get(scene, 0.2)
     try:
         path = eomgen.export(source, "fmu", tmp_path / "unit.fmu", integrator=method)[0]
         refused = ""
