@@ -34,8 +34,9 @@ MADE, AT_END, UNUSUAL = 0, 1, 2
 
 @dataclass(slots=True)
 class Bounds:
-    """What steps are made with: tolerances, the longest step, s, the end of the last step, s, and
-    whether the terms of each step are kept.
+    """What steps are made with: tolerances, the longest step, s, the end of the last step, s,
+    whether the terms of each step are kept, and whether a step may end there that is shorter
+    because of that.
     """
 
     atol: Annotated[Vector, "STATES"]
@@ -43,6 +44,7 @@ class Bounds:
     longest: float
     until: float = 0.0
     dense: bool = False
+    reaches: bool = False
 
 
 @dataclass(slots=True)
@@ -287,7 +289,8 @@ def made_many(
     kept: Records,
 ) -> int:
     """Up to `kept.most` steps from a state at `at.t`, with its slope and what rounding took from
-    it. They end before one that reaches the end, or that anything is unusual in. Returns why.
+    it. They end at the end, or before one that reaches it if none may, or that anything is unusual
+    in. Returns why.
     """
     y = copy(state)
     lost = copy(loss)
@@ -298,11 +301,11 @@ def made_many(
     terms = matrix(7, len(y))
     k[0] = slope
     passed = 0
-    while at.made < kept.most:
+    while at.made < kept.most and at.t < run.until:
         length = min(at.length, run.longest)
         if not length >= 10.0 * abs(next_after(at.t) - at.t):
             return UNUSUAL
-        if not at.t + length < run.until:
+        if not run.reaches and not at.t + length < run.until:
             return AT_END
         checks.begins()
         if not made(method, system, run, at, y, lost, k, change, raw):

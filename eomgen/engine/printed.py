@@ -66,6 +66,8 @@ ON_PAGES: tuple[Root, ...] = (
     ("first_length", {}),
     ("made_many", {"method": DOP853}),
     ("within", {}),
+    ("passed_over", {}),
+    ("end_at", {}),
     ("moved_onto", {}),
     *CONTACTS,
 )
@@ -76,6 +78,8 @@ CODES = {
     "NO_FORCES": contacts.NO_FORCES,
     "UNHELD": contact_times.UNHELD,
     "PROJECTED": projection.PROJECTED,
+    "UNUSUAL": adaptive.UNUSUAL,
+    "MOST_PARTS": crossings.MOST_PARTS,
 }
 """The constants that it needs."""
 

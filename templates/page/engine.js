@@ -53,7 +53,10 @@ const makeEngine = (mechanism, data) => {
     f: derivative,
     placed: (t, y) => projected(t, y),
     given: () => [engine.grip ? NaN : 0, ...engine.p, ...engine.u], // a pull is never as it was
-    corners: Boolean(mechanism.switchingFunctions),
+    switching: mechanism.switchingFunctions && ((t, y) => mechanism.switchingFunctions(t, y, engine.p, engine.u)),
+    angles: positions.filter((i) => data.states[i].unit === "rad"),
+    unseen: (data.span ?? 10) / 1000,
+    pulses: Boolean(mechanism.switchingFunctionsOfTime),
   };
   let problem = free;
 

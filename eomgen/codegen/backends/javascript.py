@@ -36,7 +36,8 @@ IN_PAGE = replace(DIALECT, reserved=RESERVED)
 """The dialect for functions in a page, in which no name of a scene occurs."""
 OF_PAGE = (
     *("initial_state", "derivative", "kinetic_energy", "potential_energy", "joint_forces"),
-    *("body_poses", "body_velocities", "loads", "geometry", "switching_functions"),
+    *("body_poses", "body_velocities", "loads", "geometry"),
+    *("switching_functions", "switching_functions_of_time"),
     *("gaps", "gap_rates", "impact", "held"),
     *("constraint_residuals", "project_position", "project_velocity", "constraint_margins"),
 )
