@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from eomgen.codegen.backends import c
 from eomgen.engine import contacts
+from eomgen.engine.crossings import MOST_PARTS
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import CONTACTS, Root, text
 from eomgen.exports.fmu_unit import Observed, Unit
@@ -60,6 +61,8 @@ def _main(unit: Unit, token: str, method: Method) -> str:
         "span": repr(unit.simulation.t_end),
         "observed": list(_observed(unit.outputs, 0)),
         "switching": [(n, s) for n, s, _, _ in _observed(unit.switches, len(interface.contacts))],
+        "angles": [i for i, s in enumerate(interface.states) if s.position and s.unit == "rad"],
+        "most_parts": MOST_PARTS,
         **_contacts(unit, method),
         "rows": unit.interface.projected,
         "drift": repr(DRIFT),
@@ -86,6 +89,8 @@ def _more(unit: Unit, method: Method) -> Iterator[Root]:
         else:
             yield "interpolate", {"method": DOP853}
             yield "within", {}
+    if method.adapts and unit.switches:
+        yield "passed_over", {}
     if contacts:
         yield from CONTACTS
         if method.needed:

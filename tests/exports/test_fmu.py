@@ -1,6 +1,7 @@
 """Units for co-simulation: valid, and their motions and derivatives are those of our own runs."""
 
 import io
+import math
 import zipfile
 from functools import cache
 from pathlib import Path
@@ -143,6 +144,33 @@ def test_each_method_moves_as_our_own_run(
         np.testing.assert_allclose(stepped, run.y[-1], rtol=1e-8, atol=1e-8)
     else:
         assert stepped == run.y[-1].tolist()
+
+
+CAM = """
+name = "cam"
+parameters = { a = 6.1 }
+bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.4 }]
+joints = [{ name = "axle", type = "revolute", parent = "world", child = "disc", coordinate = "q" }]
+effects = [
+    { type = "motor", name = "cam", joint = "axle", torque = "-9*step(q - a)*step(a + 0.02 - q)" },
+]
+initial = { v = { q_dot = 3.0 } }
+"""
+
+
+def test_steps_pass_over_no_brief_force(tmp_path: Path, quickly: None) -> None:
+    """A cam that brakes for 7 ms in a communication step of 4 s."""
+    path = eomgen.export(CAM, "fmu", tmp_path / "unit.fmu")[0]
+    found = simulate_fmu(
+        str(path),
+        fmi_type="CoSimulation",
+        stop_time=4.0,
+        output_interval=4.0,
+        relative_tolerance=1e-9,
+        output=["q_dot"],
+    )
+    right = math.sqrt(9.0 - 2 * 9 * 0.02 / 0.4)  # what the work of the cam leaves
+    assert found["q_dot"][-1] == pytest.approx(right, abs=1e-7)
 
 
 def is_refused(scene: str, method: str) -> bool:
