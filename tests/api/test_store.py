@@ -30,6 +30,7 @@ from eomgen.native import library
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import BUILT_IN, parse_scene, read_scene
+from eomgen.show.figure import draw_motion as DRAWN
 from eomgen.study.accuracy.reference import reference
 
 KEY = "0123456789abcdef" * 2
@@ -613,6 +614,7 @@ def test_a_warm_run_computes_only_what_is_asked_for(
     monkeypatch.setattr(builtins, "compile", compiles)
     monkeypatch.setattr(Model, "__repr__", prints)
     monkeypatch.setattr("eomgen.show.framing.bounds_of", frames)
+    monkeypatch.setattr("eomgen.show.figure.draw_motion", DRAWN)
     run = eomgen.simulate("cart_pole", **asked)
     assert counts == {"compile": 0, "digest": 1}
     assert run.y.tobytes() == before.y.tobytes()

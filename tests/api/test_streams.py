@@ -462,7 +462,7 @@ def test_an_interrupt_within_this_process(
     def stopped(*given: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("eomgen.run.integrate._is_finite", stopped)
+    monkeypatch.setattr("eomgen.run.integrate.all_finite", stopped)
     assert main(["simulate", "pendulum", "-o", str(tmp_path)]) == 130
     assert capsys.readouterr().err == "eomgen: pendulum: interrupted at t = 0\n"
     assert len(list(tmp_path.iterdir())) == 5

@@ -310,7 +310,7 @@ def test_interrupted(
     def interrupt(*_: object, **__: object) -> Run:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("eomgen.run.integrate._is_finite", interrupt)
+    monkeypatch.setattr("eomgen.run.integrate.all_finite", interrupt)
     found = costed(STONE)
     assert found.stopped and found.extent is None and found.operations > 0
     assert all(item.change is None for item in found.items)
