@@ -136,7 +136,7 @@ def _equal_steps(
     unchecked = asked.unstable or asked.repairs or not method.steps_explicitly(whole)
     plain = not (asked.guard or asked.powers or whole.contacts)
     compiled = _compiled(whole) if plain and method.compiled else None
-    ahead = plain and not (whole.projection or whole.closed_form)
+    ahead = plain and not whole.projection
 
     def begin(
         problem: Problem,

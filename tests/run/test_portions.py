@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import eomgen
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import fixed_step
 from eomgen.run.problem import Problem
@@ -25,9 +26,9 @@ def pendulum(fails_at: float = np.inf) -> Problem:
     return Problem("pendulum", ("q", "v"), (0,), derivative, jacobian, np.array([1.0, 0.0]))
 
 
-@pytest.mark.parametrize("method", ["rk4", "gauss_4"])
-def test_python_makes_the_steps_of_the_engine(method: str, monkeypatch: Any) -> None:
-    """Many at once, where nothing has to look at each: the first and the last alone."""
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The numbers of steps that Python has made at once."""
     made: list[int] = []
     usual = fixed_step.equal_steps
 
@@ -37,6 +38,18 @@ def test_python_makes_the_steps_of_the_engine(method: str, monkeypatch: Any) -> 
         return why
 
     monkeypatch.setattr(fixed_step, "equal_steps", noted)
+    return made
+
+
+def test_singular_positions_are_looked_for_by_portions(made: list[int]) -> None:
+    """Where loops are closed in closed form: the margins of many steps are computed together."""
+    run = eomgen.simulate("four_bar", integrator="rk4", dt=1e-3, t_end=0.1, backend="numpy")
+    assert run.finished and max(made) > 10
+
+
+@pytest.mark.parametrize("method", ["rk4", "gauss_4"])
+def test_python_makes_the_steps_of_the_engine(method: str, made: list[int]) -> None:
+    """Many at once, where nothing has to look at each: the first and the last alone."""
     run = integrate(pendulum(), method, 2.005, dt=0.01)
     assert run.finished and sum(made) == run.counts["steps"] == 201
     assert max(made) == fixed_step.AHEAD // 2 and made[-1] == 1

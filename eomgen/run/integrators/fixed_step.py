@@ -98,7 +98,7 @@ def advances(
     i, usual, size = min(math.floor((t - grid.t_start) / grid.dt + 1e-9), steps - 1), False, Size()
     ahead = max(1, AHEAD // len(y)) if calls and len(y) else 1
     while i < steps:
-        end, mark = grid.end(i + 1)
+        (end, mark), near = grid.end(i + 1), False
         alone = i + 1 == steps or not regular
         place = compiled() if compiled and usual and not alone else None
         most = size.most if place else ahead if usual or not compiled else 1
@@ -113,9 +113,10 @@ def advances(
         why = place.make(*given, held) if place else own.make(*given, i + 1 == steps)
         n = kept.made
         margins = np.concatenate(([held.margins[1][1]], kept.margins[:n])) if held else None
-        if place and n and problem.closed_form:
+        if n and problem.closed_form:
             margins = problem.closed_form.passed(t, y, kept.ends[:n], kept.states[:n])
-            n = n if size.fits(margins is not None) else 0
+            near = margins is None  # perhaps to a singular position, for which each is looked at
+            n = 0 if not size.fits(not near) and place else n
         usual = n > 0 and (not place or why == MADE)
         if n:
             if place:
@@ -125,7 +126,7 @@ def advances(
             resumes = partial(_continuation, kept, mark) if mark is not None else None
             rows = _rows(kept, n, i, grid)
             made = (kept.ends[:n], kept.states[:n], *rows, counts, within, resumes, margins)
-            yield from Portion(problem, t, *made).advances(each)
+            yield from Portion(problem, t, *made).advances(each or near)
             i, regular = i + n, True
             t, y, lost = float(kept.ends[n - 1]), kept.states[n - 1], kept.losses[n - 1]
             if shaken:
