@@ -140,7 +140,7 @@ def _point(equations: Equations, point: Point) -> tuple[Vec, Vec]:
 def _powers(equations: Equations) -> list[Any]:
     """The power of each effect: Σ f · v of its forces plus Σ τ ω of its torques at joints."""
     s, model = equations.symbols, equations.model
-    mechanism = SymbolicMechanism(model, s)
+    mechanism: Any = SymbolicMechanism(model, s)
     index = {body.name: k for k, body in enumerate(model.bodies)}
     joint = {body.joint.name: k for k, body in enumerate(model.bodies)}
     powers = []

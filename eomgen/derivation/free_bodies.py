@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 
@@ -50,7 +51,7 @@ def draw_free_bodies(model: Model, symbols: Symbols, kinematics: Kinematics) -> 
 
     The joint force f_j acts on the parent at r_parent, and -f_j on the child at r_child.
     """
-    mechanism = SymbolicMechanism(model, symbols)
+    mechanism: Any = SymbolicMechanism(model, symbols)
     loads = [load for effect in model.effects for load in effect.loads(mechanism)]
     forces = [load for load in loads if isinstance(load, Load)]
     at_joints = [load for load in loads if isinstance(load, JointLoad)]

@@ -14,7 +14,7 @@ import sympy as sp
 from eomgen.derivation.symbols import Expr, SympyScalars
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import JointIndex, Model, dofs_of
-from eomgen.scene.effects.base import JointLoad, Unmoved
+from eomgen.scene.effects.base import JointLoad, Vector
 
 TIME = sp.Symbol("t", real=True)
 """The time, in loads."""
@@ -57,14 +57,15 @@ class LoadScalars(SympyScalars):
         return sp.Function(function, real=True)(*arguments)
 
 
-class JointMechanism(Unmoved):
-    """A model as effects see it that have a closed form, over SymPy expressions."""
+class JointMechanism:
+    """A model as plain effects see it, over SymPy expressions: see `model.dependence.is_plain`."""
 
     def __init__(self, model: Model, symbols: JointSymbols) -> None:
         self._model = model
         self._symbols = symbols
         self._scalars = LoadScalars()
         self.dimensions = model.dimensions
+        self.magnitude = model.magnitude
         self.bodies = tuple(body.name for body in model.bodies)
 
     @cached_property
@@ -75,10 +76,6 @@ class JointMechanism(Unmoved):
     def mass(self, body: str) -> Expr:
         """Mass of a body."""
         return self.value(self._model.bodies[self.bodies.index(body)].mass)
-
-    def height(self, body: str) -> Expr:
-        """No load depends on where a body is."""
-        raise NotImplementedError
 
     def coordinate(self, joint: str, index: int = 0) -> Expr:
         """Symbol of a coordinate of a joint."""
@@ -109,6 +106,10 @@ class JointMechanism(Unmoved):
     def call(self, function: str, *arguments: Expr) -> Expr:
         """A function of formulas."""
         return self._scalars.call(function, *arguments)
+
+    def called(self, letter: str, *values: Expr) -> Vector:
+        """The values themselves."""
+        return values
 
     @cached_property
     def _indices(self) -> dict[str, JointIndex]:

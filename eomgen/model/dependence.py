@@ -8,7 +8,6 @@ from typing import Any
 from eomgen.language.formula import Formula, names_in
 from eomgen.model.model import Model, dofs_of
 from eomgen.scene.effects.base import EffectTable, JointLoad, Vector
-from eomgen.scene.joints.base import WORLD
 
 
 class Traced:
@@ -54,12 +53,12 @@ class _Tracing:
         return Traced("height")
 
     def position(self, body: str, at: Vector) -> Vector:
-        return at if body == WORLD else (Traced("body"),) * self.dimensions
+        return (Traced("body"),) * self.dimensions
 
     velocity = outward = position
 
     def point(self, name: str) -> tuple[str, Vector]:
-        return self.bodies[self._points[name]], (Traced(),) * self.dimensions
+        return self.bodies[self._points[name]], (Traced("body"),) * self.dimensions
 
     def angular_velocity(self, body: str) -> Vector:
         return (Traced("body"),) * (1 if self.dimensions == 2 else 3)

@@ -7,6 +7,7 @@ inertial forces and loads in them.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 
@@ -92,7 +93,7 @@ def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...], ledger: L
     """The loads of all effects on bodies and joints; those at joints that depend on the motion get
     definitions.
     """
-    mechanism = JointMechanism(model, symbols)
+    mechanism: Any = JointMechanism(model, symbols)
     given = [load for effect in model.effects for load in effect.loads(mechanism)]
     at_joints = [load for load in given if isinstance(load, JointLoad)]
     motors, definitions = joint_loads(model, symbols, at_joints)

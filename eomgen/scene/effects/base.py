@@ -176,43 +176,6 @@ class Mechanism(Protocol):
         """
 
 
-class Unmoved:
-    """A base for mechanisms whose effects all satisfy `is_plain`: they need few members."""
-
-    @property
-    def magnitude(self) -> float:
-        """Unused."""
-        raise AssertionError
-
-    def position(self, body: str, at: Vector) -> Vector:
-        """Unused."""
-        raise AssertionError(body)
-
-    def point(self, name: str) -> tuple[str, Vector]:
-        """Unused."""
-        raise AssertionError(name)
-
-    def velocity(self, body: str, at: Vector) -> Vector:
-        """Unused."""
-        raise AssertionError(body)
-
-    def angular_velocity(self, body: str) -> Vector:
-        """Unused."""
-        raise AssertionError(body)
-
-    def outward(self, body: str, vector: Vector) -> Vector:
-        """Unused."""
-        raise AssertionError(body)
-
-    def state(self, name: str) -> Scalar:
-        """Unused."""
-        raise AssertionError(name)
-
-    def called(self, letter: str, *values: Scalar) -> Vector:
-        """The values themselves."""
-        return values
-
-
 class EffectTable(Table):
     """The base of effects: keys, inputs, states, loads and energy. By default there are none."""
 

@@ -78,9 +78,9 @@ def local_names(
     """
     used = {name for part in parts for name in names_in(part)}
     found: dict[str, Scalar] = {}
-    for prefix, vector in (("", mechanism.position), ("v", mechanism.velocity)):
+    for prefix, motion in (("", "position"), ("v", "velocity")):
         names = [f"{prefix}{axis}" for axis in "xyz"]
         if used.intersection(names):
-            values = (*vector(body, at), mechanism.number(0.0))
+            values = (*getattr(mechanism, motion)(body, at), mechanism.number(0.0))
             found |= dict(zip(names, values, strict=False))
     return found
