@@ -11,7 +11,10 @@ from typing import Annotated
 
 import numpy as np
 
+from eomgen.engine.adaptive import AT_END, MADE, UNUSUAL
 from eomgen.engine.elimination import Factors, factored, solve_by
+from eomgen.engine.equal_steps import Constrained
+from eomgen.engine.quaternions import normalised
 from eomgen.engine.rodas_5p_coefficients import (
     COUPLINGS,
     DENSE,
@@ -23,9 +26,11 @@ from eomgen.engine.rodas_5p_coefficients import (
 )
 from eomgen.engine.system import StiffSystem
 from eomgen.subset.words import (
-    Known,
     Matrix,
+    Row,
     Vector,
+    Whole,
+    combined,
     copy,
     inf,
     larger,
@@ -34,28 +39,15 @@ from eomgen.subset.words import (
     ordered,
     sqrt,
     unrolled,
-    with_arrays,
     zeros,
 )
 
 STAGES = len(NODES)
-SUMS = (
-    *(row for both in zip(PLACES[1:], COUPLINGS[1:], strict=True) for row in both),
-    END,
-    *DENSE,
+AT, FROM, TO, BETWEEN = (
+    tuple(Row(enumerate(row)) for row in rows) for rows in (PLACES, COUPLINGS, (END,), DENSE)
 )
-"""All sums over the solutions u_j of a step: for each stage after the first that of its place and
-that of its equation, then those of the end and of the dense output."""
-AT_END, IN_DENSE, MANY_SUMS = 2 * (STAGES - 1), 2 * STAGES - 1, len(SUMS)
-"""The number of the sum `END`, and of the first of `DENSE`, and how many there are."""
-COLUMNS = tuple(
-    tuple((i, row[j]) for i, row in enumerate(SUMS) if i >= 2 * j and j < len(row))
-    for j in range(STAGES)
-)
-"""The sums to which solution j adds, with its factors: those of stage j + 1 and all behind it."""
-_ADDED = tuple(
-    np.array([[row[j] if j < len(row) else 0.0] for row in SUMS[2 * j :]]) for j in range(STAGES)
-)
+"""The rows of factors of sums over the solutions u_j of a step: for the place of each stage, for
+its equation, for the end, and for the dense output."""
 SAFETY, SMALLEST, GREATEST = 0.9, 0.2, 6.0
 """Factor for the next step's length, and its bounds."""
 POWER = -1 / 5
@@ -66,8 +58,6 @@ NEGLIGIBLE = 1e-30
 ASIDE = 2.0**-10
 """The derivative with respect to time is a difference quotient over twice this part of the step,
 within the step, with an error of order 2."""
-MADE, TOO_SHORT = 1, 0
-"""What a step returns: it is made; its length would be less than the spacing between numbers."""
 
 
 @dataclass(slots=True)
@@ -85,7 +75,8 @@ class Rodas:
                    Integration, section VIII.5)
     end, last, change
                    where the step ends, the state there, and its change
-    sums           see `SUMS`
+    solutions      the u_j; in Python `Solutions`
+    dense          the sums of the dense output
     derivatives, factorisations  how many there were
     """
 
@@ -104,7 +95,33 @@ class Rodas:
     lost: Annotated[Vector, "STATES"]
     last: Annotated[Vector, "STATES"]
     change: Annotated[Vector, "STATES"]
-    sums: Annotated[Matrix, "MANY_SUMS", "STATES"]
+    solutions: Annotated[Matrix, "STAGES", "STATES"]
+    dense: Annotated[Matrix, "3", "STATES"]
+
+
+@dataclass(slots=True)
+class RodasRecords:
+    """Of each step its end, the length of the next one, its own length and error, the state at its
+    end and what rounding took from it, the least margin of constraints, and derivatives, Jacobians,
+    factorisations and rows so far; the rows at given times; how many steps were made.
+    """
+
+    ends: Annotated[Vector, "most"]
+    lengths: Annotated[Vector, "most"]
+    last_lengths: Annotated[Vector, "most"]
+    errors: Annotated[Vector, "most"]
+    states: Annotated[Matrix, "most", "STATES"]
+    losses: Annotated[Matrix, "most", "STATES"]
+    margins: Annotated[Vector, "most"]
+    derivatives: Annotated[Whole, "most"]
+    jacobians: Annotated[Whole, "most"]
+    factorisations: Annotated[Whole, "most"]
+    sampled: Annotated[Whole, "most"]
+    times: Annotated[Vector, "count"]
+    rows: Annotated[Matrix, "count", "STATES"]
+    count: int
+    most: int
+    made: int = 0
 
 
 def rms(n: int, x: Annotated[Vector, "n"], scale: Annotated[Vector, "n"]) -> float:
@@ -116,29 +133,38 @@ def rms(n: int, x: Annotated[Vector, "n"], scale: Annotated[Vector, "n"]) -> flo
     return sqrt(total / n)
 
 
-def _add_solution(n: int, i: int, u: Vector, sums: Matrix) -> None:
-    if i == 0:
-        np.add(_ADDED[0] * u, 0.0, sums)
-    else:
-        sums[2 * i :] += _ADDED[i] * u
+_ROWS = (*(row for both in zip(AT[1:], FROM[1:], strict=True) for row in both), *TO, *BETWEEN)
+_NUMBERS = {id(row): i for i, row in enumerate(_ROWS)}
+_ADDED = tuple(np.array([[dict(row).get(j, 0.0)] for row in _ROWS[2 * j :]]) for j in range(STAGES))
 
 
-@with_arrays(_add_solution)
-def add_solution(
-    n: int, i: Known, u: Annotated[Vector, "n"], sums: Annotated[Matrix, "MANY_SUMS", "n"]
-) -> None:
-    """Add solution i to all sums that depend on it; each begins with 0, and so none is -0."""
-    for k, a in unrolled(COLUMNS[i]):
-        if i == 0:
-            sums[k, :] = 0.0 + a * u
+class Solutions:
+    """The solutions u_j of n states, as Python keeps them: each is added to all sums over them at
+    once, for NumPy takes longer to begin an operation than to add some numbers.
+    """
+
+    def __init__(self, n: int) -> None:
+        self._sums = np.zeros((len(_ROWS), n))
+
+    def __setitem__(self, j: int, u: Vector) -> None:
+        """Add solution j to all sums behind its stage; each begins with 0, and so none is -0."""
+        if j == 0:
+            np.add(_ADDED[0] * u, 0.0, self._sums)
         else:
-            sums[k, :] = sums[k] + a * u
+            self._sums[2 * j :] += _ADDED[j] * u
+
+    def combined(self, row: Row) -> Vector:
+        """The sum with the factors of a row."""
+        found: Vector = self._sums[_NUMBERS[id(row)]]
+        return found
 
 
 def rodas_step(
     system: StiffSystem, run: Rodas, factors: Factors, t: float, y: Annotated[Vector, "STATES"]
-) -> int:
-    """Make a step from y at t, of the length that is due or shorter ones until one succeeds."""
+) -> bool:
+    """Make a step from y at t, of the length that is due or shorter ones until one succeeds. False
+    if it would be shorter than the spacing between numbers.
+    """
     shortest = 10.0 * abs(next_after(t) - t)
     length = max(min(run.h_abs, run.longest), shortest)
     slope = system.derivative(t, y)
@@ -166,13 +192,13 @@ def rodas_step(
             run.error = max(LEAST_ERROR, error)
             rest = run.last - y
             run.lost[:] = (y - (run.last - rest)) + (run.change - rest)
-            return MADE
+            return True
         if error < inf:
             length *= max(SMALLEST, SAFETY * error**POWER)
         else:
             length *= SMALLEST
         rejected = True
-    return TOO_SHORT
+    return False
 
 
 def next_factor(run: Rodas, h: float, error: float, rejected: bool) -> float:
@@ -199,25 +225,24 @@ def rodas_attempted(
     slope: Annotated[Vector, "STATES"],
     in_time: Annotated[Vector, "STATES"],
 ) -> float:
-    """Compute the solutions u_j of a step, the sums over them, and the state at the end; returns
-    the error, relative to the tolerance.
+    """Compute the solutions u_j of a step and the state at the end; returns the error, relative to
+    the tolerance.
     """
-    n = len(y)
     u = copy(slope)
     for i in unrolled(range(STAGES)):
         if i > 0:
-            place = y + run.sums[2 * i - 2]
+            place = y + combined(AT[i], run.solutions)
             u = system.derivative(t + NODES[i] * h, place)
-            u = u + run.sums[2 * i - 1] / h
+            u = u + combined(FROM[i], run.solutions) / h
         if run.timed:
             u = u + (h * IN_TIME[i]) * in_time
         solve_by(factors, u)
-        add_solution(n, i, u, run.sums)
-    run.change[:] = run.sums[AT_END] + run.lost
+        run.solutions[i] = u
+    run.change[:] = combined(TO[0], run.solutions) + run.lost
     run.last[:] = y + run.change
     run.derivatives += STAGES - 1
     scale = run.atol + larger(abs(y), abs(run.last)) * run.rtol
-    error = rms(n, u, scale)
+    error = rms(len(y), u, scale)
     if error < 1.0:
         within = error_within(system, run, factors, t, h, y, scale)
         if not within <= error:
@@ -234,13 +259,15 @@ def error_within(
     y: Annotated[Vector, "STATES"],
     scale: Annotated[Vector, "STATES"],
 ) -> float:
-    """An estimate of the error of the dense output in the middle of a step.
+    """The sums of the dense output, and an estimate of its error in the middle of a step.
 
     It is a step of Newton's method from there. Where a stiff motion follows a slow one, steps may
     be so long that their ends are right and what lies between is not.
     """
-    rise = (run.last - y) + (run.sums[IN_DENSE + 1] + run.sums[IN_DENSE + 2]) / 4.0
-    bend = run.sums[IN_DENSE] + (run.sums[IN_DENSE + 1] + run.sums[IN_DENSE + 2] / 2.0) / 2.0
+    for i in unrolled(range(3)):
+        run.dense[i] = combined(BETWEEN[i], run.solutions)
+    rise = (run.last - y) + (run.dense[1] + run.dense[2]) / 4.0
+    bend = run.dense[0] + (run.dense[1] + run.dense[2] / 2.0) / 2.0
     middle = (y + run.last) / 2.0 + bend / 4.0
     missing = system.derivative(t + h / 2.0, middle)
     missing = missing - rise / h
@@ -250,7 +277,6 @@ def error_within(
 
 
 def rodas_within(
-    system: StiffSystem,
     run: Rodas,
     y: Annotated[Vector, "STATES"],
     x: float,
@@ -258,5 +284,68 @@ def rodas_within(
 ) -> None:
     """The state at the part x of the last step, which began with y."""
     back = 1.0 - x
-    bend = x * (run.sums[IN_DENSE + 1] + x * run.sums[IN_DENSE + 2])
-    state[:] = back * y + x * (run.last + back * (run.sums[IN_DENSE] + bend))
+    bend = x * (run.dense[1] + x * run.dense[2])
+    state[:] = back * y + x * (run.last + back * (run.dense[0] + bend))
+
+
+def rodas_many(
+    system: StiffSystem,
+    held: Constrained,
+    run: Rodas,
+    factors: Factors,
+    begun: float,
+    smooth: float,
+    many: int,
+    quaternions: Annotated[Whole, "4 * many"],
+    state: Annotated[Vector, "STATES"],
+    kept: RodasRecords,
+) -> int:
+    """Up to `kept.most` steps from a state at the time `begun`; up to `smooth` no branch of the
+    derivative begins or ends. They end before one that reaches the end, or that anything is unusual
+    in. Returns why.
+    """
+    t = begun
+    y = copy(state)
+    place = zeros(len(y))
+    passed = 0
+    while kept.made < kept.most:
+        length = min(run.h_abs, run.longest)
+        if not length >= 10.0 * abs(next_after(t) - t):
+            return UNUSUAL
+        if not t + length < run.t_bound:
+            return AT_END
+        held.clear()
+        if not rodas_step(system, run, factors, t, y) or held.is_raised():
+            return UNUSUAL
+        if not run.end <= smooth:
+            return AT_END
+        while passed < kept.count and kept.times[passed] < run.end:
+            now = kept.times[passed]
+            rodas_within(run, y, (now - t) / run.h_last, place)
+            if not normalised(many, quaternions, place) or not held.projected(now, place):
+                return UNUSUAL
+            kept.rows[passed] = place
+            passed += 1
+        place[:] = run.last
+        if not normalised(many, quaternions, place) or not held.projected(run.end, place):
+            return UNUSUAL
+        while passed < kept.count and kept.times[passed] <= run.end:
+            kept.rows[passed] = place
+            passed += 1
+        i = kept.made
+        if held.is_raised() or not held.keep_step(run.end, place, kept.margins[i:]):
+            return UNUSUAL
+        t = run.end
+        y[:] = place
+        kept.ends[i] = t
+        kept.lengths[i] = run.h_abs
+        kept.last_lengths[i] = run.h_last
+        kept.errors[i] = run.error
+        kept.states[i] = y
+        kept.losses[i] = run.lost
+        kept.derivatives[i] = run.derivatives
+        kept.jacobians[i] = i + 1
+        kept.factorisations[i] = run.factorisations
+        kept.sampled[i] = passed
+        kept.made += 1
+    return MADE

@@ -11,14 +11,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from eomgen.codegen.backends import c
+from eomgen.engine.adaptive import UNUSUAL
 from eomgen.engine.elimination import Factors
 from eomgen.engine.few import plain_factors
 from eomgen.engine.implicit import GAUSS_4, GAUSS_6, IMPLICIT_MIDPOINT, Stages
 from eomgen.engine.rattle import Linked
-from eomgen.engine.rosenbrock import MANY_SUMS
+from eomgen.engine.rosenbrock import RodasRecords
 from eomgen.engine.symmetric import Projected
 from eomgen.native import checked, equal_steps
 from eomgen.native.checked import Function, FunctionStructure
@@ -28,9 +28,10 @@ from eomgen.native.functions import constants_of
 from eomgen.native.module import Kernels
 from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
 from eomgen.run.integrators.implicit_stages import projected_of, stages_of
+from eomgen.run.integrators.rodas_5p import rodas
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
-from eomgen.subset.structures import filled
+from eomgen.subset.structures import filled, take
 from eomgen.templating import render
 
 MAIN = "implicit.c"
@@ -55,8 +56,7 @@ GAUSS = {method.name: method for method in (IMPLICIT_MIDPOINT, GAUSS_4, GAUSS_6)
 ROOTS = [
     *((name, {"method": method}) for name in CHANGES for method in GAUSS.values()),
     ("rattle", {}),
-    ("rodas_step", {}),
-    ("rodas_within", {}),
+    ("rodas_many", {}),
 ]
 """The functions of the engine that are printed."""
 METHODS_LIBRARY = "methods"
@@ -64,8 +64,6 @@ METHODS_LIBRARY = "methods"
 OPERATIONS = 5500
 """The methods take as long to compile as a function of about this many operations."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-_UNUSUAL = 2
-"""What C returns before a step that Python must make."""
 
 
 def sources() -> Mapping[str, str]:
@@ -78,7 +76,6 @@ def sources() -> Mapping[str, str]:
         **of_constraints(),
         "engine": C.prelude + c_source([*EQUAL_STEPS, *ROOTS]),
         "compositions": [each.name for each in equal_steps.COMPOSITIONS],
-        "many_sums": MANY_SUMS,
         "linked": [*LINKED],
         "gauss": [*GAUSS],
     }
@@ -93,24 +90,6 @@ class System(ctypes.Structure):
         *((name, _POINTER) for name in ("constants", "jacobian_constants", "inputs")),
         ("quaternions", _POINTER),
         *((name, _WHOLE) for name in ("count", "states", "positions", "timed")),
-    )
-
-
-class _Settings(ctypes.Structure):
-    _fields_ = (
-        ("atol", _POINTER),
-        *((name, _REAL) for name in ("rtol", "longest", "t_end", "clear")),
-        ("held", _POINTER),
-    )
-
-
-class _Records(ctypes.Structure):
-    _fields_ = (
-        *((name, _POINTER) for name in ("ends", "lengths", "last_lengths", "errors")),
-        *((name, _POINTER) for name in ("states", "losses", "margins")),
-        *((name, _POINTER) for name in ("derivatives", "jacobians", "factorisations", "sampled")),
-        *((name, _POINTER) for name in ("times", "rows")),
-        ("count", _WHOLE),
     )
 
 
@@ -199,8 +178,8 @@ class CompiledImplicit:
         if self._system is None or name not in METHODS:
             return None
         call = self._methods.rodas_5p
-        call.restype = ctypes.c_int
-        call.argtypes = [_POINTER, _POINTER, _WHOLE, *[_REAL] * 4, *[_POINTER] * 6]
+        call.restype = ctypes.c_int64
+        call.argtypes = [*[_POINTER] * 4, _REAL, _REAL, _POINTER, _POINTER]
         return partial(_rodas_5p, call, self._system, self._functions, self._inputs)
 
     def equal(self, name: str) -> EqualSteps | None:
@@ -219,12 +198,6 @@ class CompiledImplicit:
         call = self._methods[f"steps_{name}"]
         held = given, self._inputs, self._functions, self._quaternions
         return EqualSteps(partial(equal_steps.made, call, *held), many, iterates=True)
-
-
-def _space(unknowns: int) -> tuple[Array, NDArray[np.int64]]:
-    """Space for numbers and for whole numbers in which Rodas5P solves for `unknowns` unknowns."""
-    square = unknowns * unknowns
-    return np.empty(2 * square + 24 * unknowns), np.empty(square + 2 * unknowns, np.int64)
 
 
 def _rodas_5p(
@@ -254,34 +227,31 @@ def _rodas_5p(
     assert sizes is None and not (watched and watched.ends)
     most = 0 if dense else most
     ny = system.states
+    run = rodas(ny, atol, (t_end, longest, rtol), system.positions, bool(system.timed))
+    run.h_abs, run.h_last, run.error = (float(memory[x]) for x in ("h_abs", "h_last", "error"))
+    run.lost[:] = memory["lost"]
+    margins = made_margins(constrained, most)
     ends, lengths, last_lengths, errors = np.empty((4, most))
     states, losses = np.empty((2, most, ny))
     derivatives, jacobians, factorisations, sampled = np.empty((4, most), np.int64)
-    rows, made = np.empty((len(times), ny)), ctypes.c_int64()
-    memories = {"h_abs": lengths, "h_last": last_lengths, "error": errors, "lost": losses}
+    rows = np.empty((len(times), ny))
+    arrays = ends, lengths, last_lengths, errors, states, losses, margins[1:]
     counts = derivatives, jacobians, factorisations, sampled
-    margins = made_margins(constrained, most)
+    kept = RodasRecords(*arrays, *counts, times, rows, len(times), most)
     keeps = constraints(functions, constrained, inputs, ny)
-    arrays = ends, lengths, last_lengths, errors, states, losses, margins[1:], *counts, times, rows
-    records = _Records(*(array.ctypes.data for array in arrays), len(times))
-    clear = watched.clear if watched else math.inf
-    settings = _Settings(atol.ctypes.data, rtol, longest, t_end, clear, address(keeps))
-    start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
-    reals, wholes = _space(ny)
+    left, start = filled(kept), np.ascontiguousarray(y)
+    factors, clear = plain_factors(ny), watched.clear if watched else math.inf
     why = call(
         ctypes.byref(system),
-        ctypes.byref(settings),
-        most,
-        t,
-        *(float(memory[name]) for name in ("h_abs", "h_last", "error")),
-        *(array.ctypes.data for array in start),
-        ctypes.byref(records),
-        reals.ctypes.data,
-        wholes.ctypes.data,
-        ctypes.byref(made),
+        address(keeps),
+        *(ctypes.byref(filled(record)) for record in (run, factors)),
+        *(t, clear, start.ctypes.data),
+        ctypes.byref(left),
     )
-    n = made.value
+    take(kept, left)
+    n = kept.made
     passed = int(sampled[n - 1]) if n else 0
+    memories = {"h_abs": lengths, "h_last": last_lengths, "error": errors, "lost": losses}
     return Stride(
         ends[:n],
         states[:n],
@@ -293,7 +263,7 @@ def _rodas_5p(
         np.empty((n, 0)),
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
-        usual=why != _UNUSUAL,
+        usual=why != UNUSUAL,
         jacobians=jacobians[:n],
         factorisations=factorisations[:n],
         margins=margins[: n + 1] if constrained else None,

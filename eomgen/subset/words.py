@@ -111,7 +111,11 @@ def added(terms: Iterable[Any]) -> Any:
 
 
 def combined(row: Row, k: Any) -> Vector:
-    """The sum of vectors k[j] times the factors of a row, in order, from 0 on."""
+    """The sum of vectors k[j] times the factors of a row, in order, from 0 on. An object in place
+    of an array may have it ready.
+    """
+    if own := getattr(k, "combined", None):
+        return cast(Vector, own(row))
     column = row.column
     products: Matrix = column * k[: len(column)]
     # NumPy would add a single column pairwise.

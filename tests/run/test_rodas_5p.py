@@ -1,4 +1,4 @@
-"""The stiff method Rodas5P: its coefficients, its order, its stability, its linear algebra."""
+"""The stiff method Rodas5P: its coefficients, its order, its stability."""
 
 import math
 from collections.abc import Iterator
@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from eomgen.engine import few, rosenbrock
 from eomgen.engine import rodas_5p_coefficients as own
+from eomgen.engine import rosenbrock
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import elimination, rodas_5p
+from eomgen.run.integrators import rodas_5p
 from eomgen.run.problem import Problem
 
 Array = NDArray[np.float64]
@@ -182,33 +182,3 @@ def test_the_order_is_five() -> None:
         errors.append(float(np.abs(solver.y - (math.cos(4), -math.sin(4))).max()))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (np.abs(orders - 5) < 0.4).all(), (errors, orders)
-
-
-@pytest.mark.parametrize("positions", [0, 3])
-def test_systems_are_solved(positions: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With rows to be exchanged, and with positions eliminated first; a singular one is found. With
-    numbers or arrays, the bits are the same.
-    """
-    random = np.random.default_rng(3)
-    for _ in range(20):
-        jacobian = random.normal(size=(7, 7)) * 10.0 ** random.integers(-3, 3, size=(7, 1))
-        jacobian *= random.integers(0, 2, size=(7, 7))
-        jacobian[:positions, :positions] = 0.0
-        values, found = random.normal(size=7), []
-        for small in (0, 20):
-            monkeypatch.setattr(few, "FEW", small)
-            factors = elimination.factored(jacobian, 0.01, positions)
-            assert factors is not None
-            found.append(factors.solve(values))
-            assert elimination.factored(np.diag([0.0] * 6 + [0.25]), 0.25, positions) is None
-        true = np.linalg.solve(0.01 * np.eye(7) - jacobian, values)
-        assert np.allclose(found[0], true, rtol=1e-9, atol=1e-9 * np.abs(true).max())
-        assert found[0].tobytes() == found[1].tobytes()
-
-
-def test_positions_that_depend_on_positions_are_not_eliminated_first() -> None:
-    jacobian = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 2.0], [3.0, 0.0, 1.0]])
-    factors = elimination.factored(jacobian, 0.5, 2)
-    assert factors is not None
-    true = np.linalg.solve(0.5 * np.eye(3) - jacobian, [1.0, 2.0, 3.0])
-    assert factors.solve(np.array([1.0, 2.0, 3.0])) == pytest.approx(true)

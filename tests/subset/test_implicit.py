@@ -9,6 +9,7 @@ import pytest
 from languages import NONE, Given, results
 
 from eomgen.engine import few
+from eomgen.engine.adaptive import AT_END
 from eomgen.engine.differences import differences
 from eomgen.engine.elimination import factored, solve_by
 from eomgen.engine.explicit import Step
@@ -16,10 +17,11 @@ from eomgen.engine.implicit import GAUSS_4, GAUSS_6, IMPLICIT_MIDPOINT, INVALID,
 from eomgen.engine.printed import text
 from eomgen.engine.rattle import rattle
 from eomgen.engine.rodas_5p_coefficients import GAMMA
-from eomgen.engine.rosenbrock import MANY_SUMS, Rodas
+from eomgen.engine.rosenbrock import RodasRecords, rodas_many
 from eomgen.engine.symmetric import Projected, projected_change
 from eomgen.run.integrators.implicit_stages import stages_of
 from eomgen.run.integrators.rattle import linked
+from eomgen.run.integrators.rodas_5p import rodas
 
 TEXT = text()
 SEEDED = np.random.default_rng(1)
@@ -42,6 +44,7 @@ def test_elimination(n: int, positions: int) -> None:
     jacobians[1:, :positions, :positions] = 0.0
     jacobians[-1] = np.diag([0.0] * positions + [0.25] * (n - positions))
     same("factored", [[few.plain_factors(n), 0.25, positions, a] for a in jacobians])
+    assert not factored(few.factors_of(n, n), 0.25, positions, jacobians[-1])
     for jacobian in jacobians[:-1]:
         factors, lists = few.plain_factors(n), few.factors_of(n, n)
         b = SEEDED.normal(size=n)
@@ -122,8 +125,7 @@ def test_rosenbrock_steps(timed: bool) -> None:
     JavaScript these have another `pow`.
     """
     n = 4
-    arrays = np.full(n, 1e-6), *np.zeros((3, n)), np.zeros((MANY_SUMS, n))
-    empty = Rodas(9.0, 3.0, 1e-4, 2, timed, 0.0, 0.02, 0.5, 0.0, 0, 0, *arrays)
+    empty = replace(rodas(n, 1e-6, (9.0, 3.0, 1e-4), 2, timed), h_last=0.02, error=0.5)
     starts = SEEDED.normal(size=(4, n))
     attempts, steps = list[list[Any]](), list[list[Any]]()
     for y in starts:
@@ -136,6 +138,71 @@ def test_rosenbrock_steps(timed: bool) -> None:
     same("rodas_attempted", attempts, SYSTEM)
     python, c, _ = results(TEXT, "rodas_step", steps, given=SYSTEM)
     assert python == c
+
+
+class Free(Pendulums):
+    """Nothing is held, and nothing is raised."""
+
+    def clear(self) -> None:
+        pass
+
+    def is_raised(self) -> bool:
+        return False
+
+    def projected(self, t: float, y: Any) -> bool:
+        return True
+
+    def keep_step(self, t: float, y: Any, margin: Any) -> bool:
+        return True
+
+
+FREE = Given(
+    Free(),
+    SYSTEM.c
+    + """
+typedef struct { int none; } Constrained;
+static void clear(Constrained *of) {}
+static int64_t is_raised(Constrained *of) { return 0; }
+static int64_t projected(Constrained *of, double t, double *y) { return 1; }
+static int64_t keep_step(Constrained *of, double t, double *y, double *margin) { return 1; }
+""",
+    SYSTEM.javascript
+    + """
+Object.assign(system, {
+  clear() {},
+  is_raised: () => false,
+  projected: () => true,
+  keep_step: () => true,
+});
+""",
+)
+
+
+@pytest.mark.parametrize("smooth", [9.0, 0.5])
+def test_rosenbrock_runs(smooth: float) -> None:
+    """Steps with rows between their ends, to the end of the run or to where a branch may begin. In
+    JavaScript, with another `pow`, the same but for rounding.
+    """
+    n, most, times = 4, 60, np.linspace(0.11, 2.0, 40)
+    sizes = *((most,),) * 4, (most, n), (most, n), (most,)
+    wholes = np.zeros((4, most), np.int64)
+    kept = RodasRecords(*map(np.zeros, sizes), *wholes, times, np.zeros((40, n)), 40, most)
+    run = replace(rodas(n, 1e-6, (1.9, 3.0, 1e-4), 2, timed=True), h_abs=0.01)
+    factors, none = few.plain_factors(n), np.zeros(0, np.int64)
+    cases = [
+        [FREE, FREE, run, factors, 0.1, smooth, 0, none, y, kept]
+        for y in SEEDED.normal(size=(2, n))
+    ]
+    python, c, javascript = results(TEXT, "rodas_many", cases, given=FREE)
+    assert python == c
+    assert [len(case) for case in javascript] == [len(case) for case in c]
+    made = deepcopy(cases[0])
+    given = [FREE.python, FREE.python, *made[2:]]
+    assert rodas_many(*given) == AT_END
+    kept = given[-1]
+    passed = kept.sampled[kept.made - 1]
+    assert passed == (times <= kept.ends[kept.made - 1]).sum() and passed > 0
+    assert kept.rows[:passed].all() and not kept.rows[passed:].any()
 
 
 class Circle:
@@ -394,13 +461,14 @@ const system = {
 def test_rattle() -> None:
     """Steps that converge, others that do not, and one whose constraint is not valid."""
     room, factors = linked(2, 1), [few.plain_factors(k) for k in (2, 2, 1)]
-    angles = SEEDED.normal(size=5)
+    angles = np.random.default_rng(2).normal(size=5)
     starts = [np.array([np.cos(a), np.sin(a), -np.sin(a), np.cos(a)]) for a in angles]
     starts.append(np.array([9.0, 0.0, 1.0, 1.0]))
     step = Step(*np.zeros((3, 4)))
     cases = [[BEAD, 2, 1, 0.1, y, h, room, *factors, step] for y in starts for h in (0.01, 3.0)]
     same("rattle", cases, BEAD)
-    made = [rattle(BEAD.python, *deepcopy(case[1:])) for case in cases]
+    with np.errstate(all="ignore"):
+        made = [rattle(BEAD.python, *deepcopy(case[1:])) for case in cases]
     assert min(made[:10:2]) > 0 and min(made[1:10:2]) < 1 and made[10:] == [INVALID] * 2
 
 

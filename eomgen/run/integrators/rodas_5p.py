@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from eomgen.engine import few
-from eomgen.engine.rosenbrock import IN_DENSE, MADE, MANY_SUMS, POWER, Rodas, rodas_step
+from eomgen.engine.rosenbrock import POWER, STAGES, Rodas, Solutions, rodas_step
 from eomgen.run.integrators.first_length import first_length
 from eomgen.run.integrators.interface import Adaptive, Remark, ignored
 from eomgen.run.problem import FloatArray
@@ -59,9 +59,8 @@ class Rodas5P:
         )
         self.h_last, self.error = 0.0, 1.0
         n = len(y0)
-        arrays = np.zeros(n) + atol, *np.zeros((3, n)), np.zeros((MANY_SUMS, n))
-        limits = t_bound, max_step, rtol
-        self._run = Rodas(*limits, positions, timed, 0.0, 0.0, 1.0, 0.0, 0, 0, *arrays)
+        self._run = rodas(n, atol, (t_bound, max_step, rtol), positions, timed)
+        self._run.solutions = Solutions(n)  # type: ignore[assignment]
         self._factors = few.factors_of(n, positions)
         self._step = (0.0, y0)
 
@@ -71,9 +70,9 @@ class Rodas5P:
         run.h_abs, run.h_last, run.error = self.h_abs, self.h_last, self.error
         run.longest, run.t_bound, run.factorisations = self.max_step, self.t_bound, self.nlu
         run.lost, run.last = self.lost.copy(), np.empty_like(y)
-        made = rodas_step(self, run, self._factors, t, y)
+        is_made = rodas_step(self, run, self._factors, t, y)
         self.nlu = run.factorisations
-        if made != MADE:
+        if not is_made:
             self.status = "failed"
             return TOO_SHORT
         self.h_abs, self.h_last, self.error = run.h_abs, run.h_last, run.error
@@ -86,7 +85,7 @@ class Rodas5P:
     def dense_output(self) -> Callable[[FloatArray | float], FloatArray]:
         """The states within the last step, as a function of times: (m,) -> (ny, m), or one."""
         (h, y), last, start = self._step, self.y.copy(), self.t_old
-        first, second, third = self._run.sums[IN_DENSE:].copy()
+        first, second, third = self._run.dense.copy()
 
         def states(times: FloatArray | float) -> FloatArray:
             x = (np.asarray(times)[..., None] - start) / h
@@ -95,6 +94,23 @@ class Rodas5P:
             return np.asarray(back * y + x * (last + bend)).T
 
         return states
+
+
+def rodas(
+    n: int,
+    atol: float | FloatArray,
+    limits: tuple[float, float, float],
+    positions: int,
+    timed: bool,
+) -> Rodas:
+    """What steps of n states are made with. The limits are the end, s, the longest step, s, and the
+    relative tolerance.
+    """
+    t_bound, longest, rtol = limits
+    lost, last, change = np.zeros((3, n))
+    of = t_bound, longest, rtol, positions, timed, 0.0, 0.0, 1.0, 0.0, 0, 0
+    room = np.zeros((STAGES, n)), np.zeros((3, n))
+    return Rodas(*of, np.zeros(n) + atol, lost, last, change, *room)
 
 
 INTEGRATOR = Adaptive(
