@@ -29,6 +29,9 @@ NOISE = 1e-10
 derivative, and the iteration ends. Above it, the iteration has not converged."""
 NOTHING = 1e-13
 """The same bound, absolute, for a state that is almost zero, as of a body at rest on the ground."""
+GROWTH = 2.0
+"""An update may be so much larger than the one before. Where it is more, the iteration begins too
+far from a solution for the theorem of Newton and Kantorovich, and may well end at another one."""
 SMALL = 1e-9
 """A component below this fraction of the largest one is solved to roundoff of that fraction, not of
 itself: it may be 0 in exact arithmetic."""
@@ -232,6 +235,14 @@ def is_solved(
     return previous <= 2.0 * size and size <= max(NOISE * largest, NOTHING)
 
 
+def is_noise(n: int, scale: Annotated[Vector, "n"], size: float) -> bool:
+    """Whether updates of this size may be rounding errors of the derivative."""
+    largest = 0.0
+    for j in range(n):
+        largest = max(largest, scale[j])
+    return size <= max(NOISE * largest, NOTHING)
+
+
 def improved(
     system: StiffSystem,
     method: Known,
@@ -300,6 +311,8 @@ def implicit_change(
         solved = size == 0.0
         if not solved and previous > 0.0:
             scale = abs(y) + added(abs(stages.changes[i]) for i in range(len(method.b)))
+            if size > GROWTH * previous and not is_noise(len(y), scale, size):
+                return DIVERGES
             solved = is_solved(stages.many, len(y), scale, stages.update, size, previous)
         if solved:
             # Linear convergence ends not far below roundoff.

@@ -13,6 +13,8 @@ from campaigns import light_cart_pole as cart
 from mpmath import mp
 from scipy.optimize import brentq
 
+import eomgen
+
 # t, x, theta: recomputed for this benchmark by a quadrature in 30 digits.
 ROWS = np.array(
     [
@@ -125,3 +127,13 @@ def test_energy_keeps_its_digits_in_a_spike() -> None:
         across = slide + turn * mp.cos(angle), turn * mp.sin(angle)
         exact = (mp.mpf(1e-6) * slide**2 + across[0] ** 2 + across[1] ** 2) / 2
     assert cart.module().kinetic_energy(0.0, y) == pytest.approx(float(exact), rel=1e-15)
+
+
+def test_equal_steps_that_are_too_long_are_refused() -> None:
+    """Where the pole turns over, Newton's iteration begins too far from the solution of a step of
+    10 ms: its updates grow before they shrink, at another solution.
+    """
+    for method in ("gauss_4", "gauss_6"):
+        run = eomgen.simulate("light_cart_pole", integrator=method, dt=0.01, t_end=1.0)
+        assert run.t[-1] == pytest.approx(0.45) and abs(run.y[-1][0]) < 1.0
+        assert not run.finished and "Newton's iteration diverges; take a smaller" in run.message
