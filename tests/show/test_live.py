@@ -13,7 +13,6 @@ from live import NODE, run_in_node
 import eomgen
 from eomgen.api.given import model_of, read
 from eomgen.codegen.live import live_system
-from eomgen.errors import RunError
 from eomgen.language.formula import parse
 from eomgen.model.elaborate import elaborate
 from eomgen.model.interactive import OUTPUTS, interactive, switches_of
@@ -228,39 +227,6 @@ def test_dop853_makes_the_steps_of_python(name: str) -> None:
     rows = np.array(found["rows"])
     assert rows[:, 0].tolist() == run.t[1:101].tolist()
     assert rows[:, 1:].tobytes() == np.ascontiguousarray(run.y[1:101]).tobytes()
-
-
-EXPLICIT = ("euler", "semi_implicit_euler", "leapfrog", "leapfrog_4", "leapfrog_6", "rk4")
-FREE = ("pendulum", "double_pendulum", "spinning_top")
-
-
-@pytest.mark.parametrize("name", some(FREE, built_in_names()))
-def test_explicit_steps_have_the_bits_of_python(name: str) -> None:
-    """With each method that suits the scene, from one program, with one sine."""
-    source, table, module = with_same_sines(name, liveStep=0.002)
-    exact: Any = eomgen.load(eomgen.generate(name, form="velocity"))
-    problem = as_problem(module, start=lambda y: np.array(table["initial"]))
-    problem = replace(problem, jacobian=exact.jacobian)
-    if problem.contacts or problem.projection:
-        pytest.skip("contacts and loops have steps of their own")
-    if re.search(r"Math\.(exp|tanh|log|pow|atan2)\(", source):
-        pytest.skip("these functions differ from those of node in last digits")
-    script = """
-    return given.methods.map((liveMethod) => {
-      const engine = makeEngine(mechanism, { ...given.data, liveMethod });
-      engine.advance(0.2);
-      return engine.method === liveMethod ? Array.from(engine.y) : null;
-    });
-    """
-    given = {"data": table, "methods": EXPLICIT}
-    mine = dict(zip(EXPLICIT, run_in_node(source, script, given), strict=True))
-    for method, y in mine.items():
-        try:
-            run = integrate(problem, method, 0.2, dt=0.002, unstable=True)
-        except RunError:
-            assert y is None and method.startswith("leapfrog"), method
-            continue
-        assert list(map(float, y)) == run.y[-1].tolist(), method
 
 
 STOP = """

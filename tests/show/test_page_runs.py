@@ -26,7 +26,10 @@ from eomgen.store import live_code
 
 pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
 
-EXPLICIT = {"euler": 0.001, "semi_implicit_euler": 0.001, "rk4": 0.005, "leapfrog": 0.005}
+EXPLICIT = {
+    **dict.fromkeys(("euler", "semi_implicit_euler"), 0.001),
+    **dict.fromkeys(("rk4", "leapfrog", "leapfrog_4", "leapfrog_6"), 0.005),
+}
 IMPLICIT = {"implicit_midpoint": 0.005, "gauss_4": 0.01, "gauss_6": 0.02}
 """The methods of pages with equal steps, and the lengths of these, s."""
 
@@ -103,7 +106,9 @@ def both_runs(name: str, method: str, dt: float, seconds: float) -> tuple[Any, A
 
 @pytest.mark.every(2)
 @pytest.mark.parametrize("method", EXPLICIT)
-@pytest.mark.parametrize("name", some(["bouncing_two_body", "four_bar"], built_in_names()))
+@pytest.mark.parametrize(
+    "name", some(["bouncing_two_body", "four_bar", "pendulum"], built_in_names())
+)
 def test_the_same_bits(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Time and state at the end, or that both fail."""
     # Whether it may take the steps it checks by a Jacobian, which this module does not have.
