@@ -8,6 +8,7 @@ from eomgen.engine import (
     adaptive,
     branches,
     complementarity,
+    contact_runs,
     contact_times,
     contacts,
     crossings,
@@ -36,9 +37,7 @@ from eomgen.subset.unrolled import unrolled_functions
 Root = tuple[str, Mapping[str, Any]]
 """A function of the engine, with the values of its `Known` parameters."""
 Roots = Iterable[Root]
-CONTACTS: Roots = [
-    (name, {}) for name in "begin deepest press strike release settle closing opening".split()
-]
+CONTACTS: Roots = [(name, {}) for name in "begin deepest press strike release settle taken".split()]
 """What is called for rigid contacts."""
 EQUAL: Mapping[str, Root] = {
     "euler": ("runge_kutta", {"method": explicit.EULER}),
@@ -76,7 +75,12 @@ CODES = {
     "TOLERANCE": contacts.TOLERANCE,
     "ENDLESS": contacts.ENDLESS,
     "NO_FORCES": contacts.NO_FORCES,
-    "UNHELD": contact_times.UNHELD,
+    "WHOLE": contact_runs.WHOLE,
+    "CLOSED": contact_runs.CLOSED,
+    "OPENED": contact_runs.OPENED,
+    "NOT_FOUND": contact_runs.NOT_FOUND,
+    "NOT_KEPT": contact_runs.NOT_KEPT,
+    "ENDLESSLY": contact_runs.ENDLESSLY,
     "PROJECTED": projection.PROJECTED,
     "UNUSUAL": adaptive.UNUSUAL,
     "MOST_PARTS": crossings.MOST_PARTS,
@@ -90,7 +94,7 @@ def text() -> Text:
     steps = (adaptive, differences, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, symmetric)
-    checks = (branches, contacts, contact_times, crossings)
+    checks = (branches, contacts, contact_times, contact_runs, crossings)
     return Text.of(*steps, *solved, *checks, *held, taylor, system)
 
 

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 
 from eomgen.codegen.backends import c
-from eomgen.engine import contacts
+from eomgen.engine import contact_runs, contacts
 from eomgen.engine.crossings import MOST_PARTS
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import CONTACTS, Root, text
@@ -127,5 +127,7 @@ def _contacts(unit: Unit, method: Method) -> dict[str, object]:
         "endless": contacts.ENDLESS,
         "no_forces": contacts.NO_FORCES,
         "share": repr(events.GAP_CHECKS[1] if method.adapts else 1.0),
-        "most_events": events.MOST_EVENTS,
+        "whole": contact_runs.WHOLE,
+        "closed": contact_runs.CLOSED,
+        "opened": contact_runs.OPENED,
     }

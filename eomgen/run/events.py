@@ -18,18 +18,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.engine.contact_times import NO_ZERO, UNHELD, closing, opening
-from eomgen.engine.contacts import (
-    ENDLESS,
-    NO_FORCES,
-    TOLERANCE,
-    Touching,
-    begin,
-    release,
-    settle,
-    strike,
-    weigh,
+from eomgen.engine.contact_runs import (
+    CLOSED,
+    NOT_FOUND,
+    NOT_KEPT,
+    OPENED,
+    WHOLE,
+    Place,
+    taken,
 )
+from eomgen.engine.contacts import ENDLESS, NO_FORCES, TOLERANCE, Touching, begin, strike, weigh
 from eomgen.engine.roots import Search
 from eomgen.run.contacts import (
     Holding,
@@ -50,13 +48,6 @@ GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Points of an adaptive step at which the gaps of contacts are checked; for equal steps, the ends.
 """
 
-MOST_EVENTS = 10_000
-"""Greatest number of events within 1e-9 of a run's length."""
-
-
-Flags = NDArray[np.int64]
-"""1 for some of the contacts, (nc,)."""
-
 
 @dataclass(frozen=True)
 class Stepper:
@@ -70,35 +61,6 @@ class Stepper:
     begin: Begin
     share: float
     counted: Callable[[Rate], Rate]
-
-
-@dataclass
-class _Status:
-    """The current status of a run: time, state, and what is known of contacts."""
-
-    t: float
-    y: FloatArray
-    held: Touching
-
-
-@dataclass
-class _EventLimit:
-    """Counts the events within `least` s, and stops a run with too many."""
-
-    least: float
-    since: float
-    count: int = 0
-
-    def count_event(self, t: float) -> None:
-        """Count an event at `t`. Raises `StepFailure` if there are too many."""
-        self.count += 1
-        if t - self.since > self.least:
-            self.since, self.count = t, 0
-        if self.count > MOST_EVENTS:
-            raise StepFailure(
-                f"contacts struck or opened {MOST_EVENTS} times within {self.least:.2g} s",
-                "take a larger rest_speed",
-            )
 
 
 def advances(
@@ -121,60 +83,51 @@ def advances(
     problem = replace(problem, contacts=in_sizes(problem.contacts))
     contacts = problem.contacts
     assert contacts is not None
-    now = _Status(
-        t_start, problem.initial, nothing_held(contacts, len(problem.initial), rest_speed)
-    )
-    closed = np.zeros(len(contacts.names), np.int64)
+    closed, opened = np.zeros((2, len(contacts.names)), np.int64)
+    least = 1e-9 * (t_end - t_start)
+    now = Place(t_start, problem.initial, closed, opened, least, t_start, 0)
+    held = nothing_held(contacts, len(problem.initial), rest_speed)
     begun = (now.t, now.y)
     if resume and "alpha" in resume:
-        begun = _resumed(contacts, now.held, resume)
+        begun = _resumed(contacts, held, resume)
     else:
-        begin(contacts, now.held, now.t, now.y, t_end - t_start)
+        begin(contacts, held, now.t, now.y, t_end - t_start)
         check_depth(contacts, now.t, now.y)
-        closed[contacts.gaps(now.t, now.y) <= TOLERANCE] = 1
-    limit = _EventLimit(1e-9 * (t_end - t_start), t_start)
+        now.closed[contacts.gaps(now.t, now.y) <= TOLERANCE] = 1
     made = 0
     while True:
-        if closed.any():
-            limit.count_event(now.t)
-            yield from _strike(problem, now, closed)
-        closed[:] = 0
+        if now.closed.any():
+            yield from _strike(problem, now, held)
         if now.t >= t_end:
             return
         if resume is None:
             begun = (now.t, now.y)
-        holding = Holding(contacts, deepcopy(now.held)) if now.held.holds.any() else None
+        holding = Holding(contacts, deepcopy(held)) if held.holds.any() else None
         smooth = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
-        steps = stepper.begin(smooth, now.t, made, resume, lambda: not now.held.slack.any())
+        steps = stepper.begin(smooth, now.t, made, resume, lambda: not held.slack.any())
         resume = None
         for advance in steps:
             made += advance.steps
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             step = advance._replace(contact_powers=powers)
-            closes, opens = np.inf, np.inf
-            opened = np.zeros(len(closed), np.int64)
-            within, search = _Within(now.t, now.y, step), Search()
-            given = (contacts, within, now.held, search, now.t, step.t - now.t)
-            if not advance.checked:
-                closes = closing(*given, stepper.share, closed)
-            if holding:
-                opens = opening(*given, opened)
-            _check_times(contacts, now, step, closes, opens)
-            if closes <= opens and closed.any():
-                now.held.slack[:] = 0.0
-                yield from _cut(now, step, now.t + closes, keep=True)
-                break
-            closed[:] = 0
-            if opened.any():
-                limit.count_event(now.t + opens)
-                yield from _cut(now, step, now.t + opens, keep=False)
-                yield _open(contacts, smooth, now, opened)
-                break
-            now.t, now.y = step.t, step.y
-            settle(contacts, now.held, now.t, now.y)
-            yield step._replace(resume=_resume(step, now.held, begun))
+            start, why = now.t, WHOLE
+            if advance.checked:
+                now.t, now.y = step.t, step.y
+            else:
+                within = _Within(now.t, now.y, step)
+                why = taken(contacts, within, held, Search(), now, step.t, stepper.share)
+            if why not in (WHOLE, CLOSED, OPENED):
+                raise _failure(contacts, held, why, (start, step.t), now)
+            if why == WHOLE:
+                yield step._replace(resume=_resume(step, held, begun))
+                continue
+            if now.t > start:
+                yield _part(step, now, keep=why == CLOSED)
+            if why == OPENED:
+                yield _opened(contacts, smooth, now)
+            break
 
 
 def _resume(
@@ -224,22 +177,27 @@ class _Within:
         return self.y if s <= 0 else step.y if s >= step.t - self.t else step.within(self.t + s)
 
 
-def _check_times(
-    contacts: Contacts, now: _Status, step: Advance, closes: float, opens: float
-) -> None:
-    """Raise `StepFailure` if times at which contacts close or open are not found."""
-    if opens == UNHELD:
-        raise no_forces(contacts, now.held, step.t)
-    if NO_ZERO in (closes, opens):
-        raise StepFailure(
-            f"the time of a contact is not found between {now.t:.6g} and {step.t:.6g}",
+def _failure(
+    contacts: Contacts, held: Touching, why: int, times: tuple[float, float], now: Place
+) -> StepFailure:
+    """Why a step between two times cannot be taken."""
+    start, end = times
+    if why == NOT_KEPT:
+        return no_forces(contacts, held, end)
+    if why == NOT_FOUND:
+        return StepFailure(
+            f"the time of a contact is not found between {start:.6g} and {end:.6g}",
             "take a smaller step",
         )
+    return StepFailure(
+        f"contacts struck or opened {now.events - 1} times within {now.least:.2g} s",
+        "take a larger rest_speed",
+    )
 
 
-def _strike(problem: Problem, now: _Status, closed: Flags) -> Iterator[Advance]:
-    """Yield the strikes at time `now.t`, and update `now` with the contacts that are then held."""
-    contacts, held, t = problem.contacts, now.held, now.t
+def _strike(problem: Problem, now: Place, held: Touching) -> Iterator[Advance]:
+    """Yield the strikes of contacts that have closed, and update state and contacts."""
+    contacts, t = problem.contacts, now.t
     assert contacts is not None
     count = len(contacts.names)
     made: list[tuple[int, FloatArray]] = []
@@ -253,7 +211,8 @@ def _strike(problem: Problem, now: _Status, closed: Flags) -> Iterator[Advance]:
 
     before, y = held.holds.copy(), now.y.copy()
     speeds, least = np.empty((2, count))
-    answer = strike(replace(contacts, impact=impact), held, t, y, closed, speeds, least)
+    answer = strike(replace(contacts, impact=impact), held, t, y, now.closed, speeds, least)
+    now.closed[:] = 0
     for contact, after in made:
         now.y = after
         yield instant(after, contact)
@@ -280,22 +239,17 @@ def _strike(problem: Problem, now: _Status, closed: Flags) -> Iterator[Advance]:
     yield instant(now.y)._replace(samples=rows, events=tuple(events))
 
 
-def _open(contacts: Contacts, problem: Problem, now: _Status, opened: Flags) -> Advance:
-    """Release contacts that were held."""
-    release(contacts, now.held, now.t, now.y, opened)
-    events = tuple(Event(now.t, contacts.names[k], "lift", 0.0) for k in np.flatnonzero(opened))
+def _opened(contacts: Contacts, problem: Problem, now: Place) -> Advance:
+    """That contacts which were held have opened."""
+    which = np.flatnonzero(now.opened)
+    events = tuple(Event(now.t, contacts.names[k], "lift", 0.0) for k in which)
     y = now.y
     return Advance(now.t, y, [], problem, lambda _: y, steps=0, events=events)
 
 
-def _cut(now: _Status, step: Advance, t: float, keep: bool) -> Iterator[Advance]:
-    """Yield the part of a step up to `t`, if it has any length, and update `now`. With `keep` the
-    state at `t` is a sample.
-    """
-    if t <= now.t:
-        return
-    y = step.y if t == step.t else step.within(t)
+def _part(step: Advance, now: Place, keep: bool) -> Advance:
+    """The part of a step up to an event; with `keep` the state there is a sample."""
+    t, y = now.t, now.y
     samples = [sample for sample in step.samples if sample[0] < t or (sample[0] == t and not keep)]
-    now.t, now.y = t, y
     rows = [*samples, (t, y)] if keep else samples
-    yield step._replace(t=t, y=y, samples=rows, resume=None)
+    return step._replace(t=t, y=y, samples=rows, resume=None)

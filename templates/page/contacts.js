@@ -1,4 +1,4 @@
-// `contacts`: rigid contacts and stops, by the rules of `eomgen.engine.contacts` and `contact_times`,
+// `contacts`: rigid contacts and stops, by the rules of `eomgen.engine.contacts` and `contact_runs`,
 // for steps of equal length. Gaps, their rates and accelerations are relative to `sizes`.
 
 const contacts = (() => {
@@ -33,6 +33,7 @@ const contacts = (() => {
       rest: Float64Array.from(sizes, (size) => (law.restSpeed ? law.restSpeed / size : -1)),
       found: numbers(law.many),
     };
+    const place = { t: 0, y: null, closed: new Int32Array(count), opened: new Int32Array(count), least: 0, since: 0, events: 0 };
     const flagged = (which) => Int32Array.from(all, (k) => (which.includes(k) ? 1 : 0));
     const listed = (flags) => all.filter((k) => flags[k]);
     const held = () => listed(now.holds);
@@ -69,26 +70,28 @@ const contacts = (() => {
       return { y: after, events };
     }
 
-    // When something first happens in a step, s after its start, and to which contacts; null if it does not.
-    function first(search, t, length, state, ...share) {
-      const flags = new Int32Array(count);
+    // Go to the end of a step from `y` at t, or to the first event in it: where that is, the contacts that close,
+    // and events if some open; `whole` if nothing happens.
+    function taken(t, y, end, state) {
       const within = { state: (s, out) => out.set(state(s)) };
-      const s = search(of, within, now, {}, t, length, ...share, flags);
-      if (s === steps.UNHELD) throw unheld();
-      if (!(s >= 0)) throw new Error("the time of a contact is not found: take a smaller step");
-      return s < Infinity ? { s, which: listed(flags) } : null;
+      Object.assign(place, { t, y: y.slice() });
+      const why = steps.taken(of, within, now, {}, place, end, 1);
+      if (why === steps.NOT_KEPT) throw unheld();
+      if (why === steps.NOT_FOUND) throw new Error("the time of a contact is not found: take a smaller step");
+      if (why === steps.ENDLESSLY) throw new Error("contacts strike or open without end: take another step");
+      const opened = why === steps.OPENED ? lifted(place.t, listed(place.opened)) : [];
+      return { ...place, whole: why === steps.WHOLE, closed: why === steps.CLOSED ? listed(place.closed) : [], opened };
     }
-    const closing = (t, length, state) => first(steps.closing, t, length, state, 1);
-    const opening = (t, length, state) => first(steps.opening, t, length, state);
 
+    const lifted = (t, which) => which.map((k) => ({ t, contact: names[k], kind: "lift", speed: 0 }));
+
+    // Let go contacts whose effects are switched off.
     function release(t, y, opened) {
       steps.release(of, now, t, y, flagged(opened));
-      return opened.map((k) => ({ t, contact: names[k], kind: "lift", speed: 0 }));
+      return lifted(t, opened);
     }
 
-    const settle = (t, y) => steps.settle(of, now, t, y);
-
-    return { now, held, active: law.active, begin, derivative, strike, closing, opening, release, settle };
+    return { held, active: law.active, begin, derivative, strike, taken, release };
   }
 
   return { make };

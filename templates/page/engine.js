@@ -14,7 +14,6 @@ const makeEngine = (mechanism, data) => {
   const PULL = 20; // rate at which a pulled point follows the pointer, rad/s
   const LIFTED = 0.3; // part of the whole mass that a pull moves at least as quickly
   const STRONG = 30; // acceleration that the strongest pull gives the whole mass at least, m/s²
-  const MOST_EVENTS = 10000; // at one time
   const SHARE = 0.02; // part of the mean cost of a step that the last one has
 
   const all = [...methods, ...adaptive];
@@ -36,7 +35,7 @@ const makeEngine = (mechanism, data) => {
   };
   let lost = new Float64Array(ny); // rounding errors of the last sums
   let [start, goal, cost] = [0, 0, NaN];
-  let [regular, closed, repeated] = [true, [], 0];
+  let [regular, closed] = [true, []];
   let [law, change] = [null, null];
 
   // ---- The problem ----
@@ -128,7 +127,6 @@ const makeEngine = (mechanism, data) => {
   function restart() {
     start = engine.t;
     goal = engine.t;
-    repeated = 0;
     closed = law ? law.begin(engine.t, engine.y) : [];
     renew();
   }
@@ -178,42 +176,29 @@ const makeEngine = (mechanism, data) => {
       projected(end, next);
     }
     if (!next.every(Number.isFinite)) throw new Error("the state overflows or is not a number: take a smaller step");
-    if (law && cutAtContact(t, y, next, length)) return;
+    if (law && cutAtContact(t, y, next, end)) return;
     engine.t = end;
     engine.y.set(next);
     lost = rest;
     regular = true;
-    repeated = 0;
-    if (law) law.settle(end, next);
     if (engine.onSample) engine.onSample(engine.t, engine.y);
   }
 
   // End a step where a contact closes or opens; whether one does.
-  function cutAtContact(t, y, next, length) {
+  function cutAtContact(t, y, next, end) {
     const state = (s) => {
       if (s <= 0) return y;
-      if (s >= length) return next;
+      if (s >= end - t) return next;
       if (change.free) return change(problem, t, y, t + s).slice();
       const within = change(problem, t, y, t + s - t); // to the time that is said, as in Python
       return projected(t + s, y.map((x, k) => x + within[k]));
     };
-    const closing = law.closing(t, length, state);
-    const opening = law.opening(t, length, state);
-    if (!closing && !opening) return false;
-    const first = closing && !(opening && opening.s < closing.s) ? closing : opening;
-    if (first.s > 0) {
-      const there = Float64Array.from(state(first.s));
-      engine.t = t + first.s;
-      engine.y.set(there);
-      repeated = 0;
-    } else {
-      repeated += 1;
-      if (repeated > MOST_EVENTS) throw new Error("contacts strike or open without end: take another step");
-    }
-    if (first === closing) {
-      law.now.slack.fill(0);
-      closed = closing.which;
-    } else note(law.release(engine.t, engine.y, opening.which));
+    const there = law.taken(t, y, end, state);
+    if (there.whole) return false;
+    engine.t = there.t;
+    engine.y.set(there.y);
+    closed = there.closed;
+    note(there.opened);
     renew();
     return true;
   }

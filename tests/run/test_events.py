@@ -8,11 +8,11 @@ import pytest
 from campaign import some
 from scipy.optimize import brentq
 
+from eomgen.engine import contact_runs
 from eomgen.engine.contact_times import first_zero
 from eomgen.engine.contacts import TOLERANCE
 from eomgen.engine.roots import Search
 from eomgen.errors import RunError
-from eomgen.run import events
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.problem import Contacts, Problem
@@ -573,7 +573,7 @@ def test_bouncing_without_end(monkeypatch):
     assert message(ball(1.0, 0.9999), t_end=1e5, rest_speed=1.0, max_steps=500).endswith(
         "500 steps did not suffice; try another --integrator, or a looser --rtol and --atol"
     )
-    monkeypatch.setattr(events, "MOST_EVENTS", 100)
+    monkeypatch.setattr(contact_runs, "MOST_EVENTS", 100)
     stuck = ball(0.0, 1.0, v=1e-9)
     assert "contacts struck or opened 100 times within 1e-06 s; take a larger rest_speed" in (
         message(stuck, "rk4", 1e3, dt=1.0, rest_speed=1e-30)

@@ -9,6 +9,7 @@ from complementarity import drawn, solution
 from languages import Given, results
 
 from eomgen.engine import complementarity, least_squares
+from eomgen.engine.contact_runs import Place
 from eomgen.engine.contacts import ALPHA, Touching
 from eomgen.engine.printed import CONTACTS, text
 from eomgen.engine.roots import Search
@@ -193,7 +194,8 @@ def random_case(name: str) -> list[object]:
     y = np.concatenate([1e-9 * SEEDED.random(2), SEEDED.normal(size=2)])
     y[1] += y[0]
     t = float(SEEDED.uniform(0, 1))
-    within = [STACK, STACK, known(holds), Search(), t, float(SEEDED.uniform(0.5, 2))]
+    end, share = t + float(SEEDED.uniform(0.5, 2)), float(SEEDED.choice([0.25, 1.0]))
+    at = Place(t, y, *np.zeros((2, 2), np.int64), 1.0, t, int(SEEDED.choice([0, 10_000])))
     return {
         "begin": [STACK, known(holds), t, y, 10.0],
         "press": [STACK, known(holds), t, y, np.zeros(2), np.zeros(2)],
@@ -201,8 +203,7 @@ def random_case(name: str) -> list[object]:
         "release": [STACK, known(holds), t, y, np.array([*holds[:1], 0])],
         "settle": [STACK, known(holds), t, y],
         "deepest": [STACK, t, y - 1e-9],
-        "closing": [*within, float(SEEDED.choice([0.25, 1.0])), np.zeros(2, np.int64)],
-        "opening": [*within, np.zeros(2, np.int64)],
+        "taken": [STACK, STACK, known(holds), Search(), at, end, share],
     }[name]
 
 
