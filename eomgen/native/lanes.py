@@ -20,6 +20,7 @@ from eomgen.native.library import compiled_library
 from eomgen.native.module import USUAL, USUAL_CONSTANT
 from eomgen.program.program import Program
 from eomgen.run.integrators.fixed_step import count_steps
+from eomgen.run.integrators.stability import HARM, TRIED
 from eomgen.run.problem import USUAL_LENGTH, FloatArray
 
 FLAGS: dict[int, tuple[str, ...]] = {
@@ -38,8 +39,6 @@ int width(void) {
     return 2;
 }
 """
-STREAK = 4.0
-"""Number of steps in a row that look unstable before a run is given up."""
 _POINTER, _LONG, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_int64
 
 
@@ -71,9 +70,10 @@ class Columns(ctypes.Structure):
 
 class _Times(ctypes.Structure):
     _fields_ = (
-        *((name, _REAL) for name in ("t_start", "t_end", "dt", "last", "streak")),
-        *((name, _WHOLE) for name in ("steps", "every")),
+        *((name, _REAL) for name in ("t_start", "t_end", "dt", "last", "harm")),
+        *((name, _WHOLE) for name in ("steps", "every", "tried")),
         *((name, _POINTER) for name in ("done", "stop")),
+        ("sizes", Columns),
     )
 
 
@@ -143,12 +143,14 @@ class Lanes:
         t_end: float,
         dt: float,
         every: int,
+        sizes: FloatArray,
         unstable: bool = False,
         addresses: tuple[int, int] | None = None,
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Runs from states (ny, n) at 0 to `t_end` by the classical Runge-Kutta method, with steps
         of `dt`: rows (r, ny, n) after each `every`-th step and at the end, and which runs are
-        valid: finite and, unless `unstable`, with steps that look short enough for stability.
+        valid: finite and, unless `unstable`, with steps that are short enough for stability, or
+        such that growing modes do no harm; `sizes` are those of the states, (ny, n) or (ny, 1).
 
         Of two 64-bit integers at `addresses`, members that have ended are counted in the first, and
         all runs end early once the second is not 0.
@@ -161,9 +163,8 @@ class Lanes:
         sound = np.zeros(n, dtype=np.int8)
         idle = np.zeros(2, dtype=np.int64)
         shared = addresses or (idle.ctypes.data, idle.ctypes.data + 8)
-        times = _Times(
-            0.0, t_end, dt, last, math.inf if unstable else STREAK, steps, every, *shared
-        )
+        numbers = 0.0, t_end, dt, last, HARM, steps, every, 0 if unstable else TRIED
+        times = _Times(*numbers, *shared, *columns_of(sizes))
         call = self.library.rk4
         call.argtypes, call.restype = [_POINTER, _LONG, *[Columns] * 3, *[_POINTER] * 2], None
         call(

@@ -48,6 +48,7 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
             t_end=task.t_end,
             dt=task.dt,
             every=task.every,
+            sizes=starts.sizes(),
             unstable=task.settings["unstable"],
             addresses=counter.addresses,
         )
@@ -140,22 +141,28 @@ class _Starts:
                 self.y[list(indices)] /= np.where(sound, length, 1.0)
         self.sound = np.broadcast_to(sound, count).copy()
 
-    def allowed(self) -> FloatArray:
-        """The absolute tolerances of each state, (ny, n) or (ny, 1): as `run.checks` has them for
-        a single run, with the noise of the scene's own values.
-        """
-        task, module, settings = self._task, self._module, self._task.settings
-        if settings.get("atol") is not None:
-            return np.full((len(module.STATES), 1), settings["atol"])
+    def sizes(self) -> FloatArray:
+        """The sizes of each state, (ny, n) or (ny, 1), as `as_problem` has them."""
+        module = self._module
         count = max(self.k.shape[1], self.u.shape[1])
         y = self._own if self._own.shape[1] == count else np.repeat(self._own, count, axis=1)
         slope, _ = self._kernels.output("derivative", 0.0, y, self.k, self.u)
         start = dict(zip(module.STATES, y, strict=True))
-        size = mechanism_size(module.UNITS, self._parameters, start)
         with np.errstate(all="ignore"):  # of members that are not sound
-            sizes = state_sizes(module.STATES, module.UNITS, y, slope, size)
+            size = mechanism_size(module.UNITS, self._parameters, start)
+            found = state_sizes(module.STATES, module.UNITS, y, slope, size)
+        return np.ascontiguousarray(found)
+
+    def allowed(self) -> FloatArray:
+        """The absolute tolerances of each state, (ny, n) or (ny, 1): as `run.checks` has them for
+        a single run, with the noise of the scene's own values.
+        """
+        task, settings = self._task, self._task.settings
+        if settings.get("atol") is not None:
+            return np.full((len(self._module.STATES), 1), settings["atol"])
+        with np.errstate(all="ignore"):  # of members that are not sound
             problem = _own_problem(task.source, *map(_pairs, (task.parameters, task.inputs)))
-            found = errors_of_sizes(sizes, problem, "DOP853", settings["rtol"], task.t_end)
+            found = errors_of_sizes(self.sizes(), problem, "DOP853", settings["rtol"], task.t_end)
         return np.ascontiguousarray(found)
 
 

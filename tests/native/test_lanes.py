@@ -226,7 +226,9 @@ def test_a_lane_has_the_same_bits_at_every_width_and_beside_any_others(scene: st
         for order in (np.arange(13), np.arange(13)[::-1]):
             given = [np.ascontiguousarray(array[:, order]) for array in (y, k, u)]
             slopes, sound = ours.output("derivative", 0.0, *given)
-            rows, stable = ours.rk4(*given, t_end=0.25, dt=0.01, every=10)
+            rows, stable = ours.rk4(
+                *given, sizes=np.ones((len(y), 1)), t_end=0.25, dt=0.01, every=10
+            )
             back = np.argsort(order)
             good = [j for j in range(13) if j not in (4, 6)]
             assert not sound[back][4] and stable[back][good].all() and not stable[back][4]
@@ -242,7 +244,7 @@ def test_runs_are_those_of_a_plain_loop(scene: str) -> None:
     ours, module = kernels(scene)
     y, p, u = members(module, 5)
     k, _, _ = ours.prepare(p.T)
-    rows, sound = ours.rk4(y, k, u, t_end=0.253, dt=0.01, every=5)
+    rows, sound = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=0.253, dt=0.01, every=5)
     assert sound.all() and rows.shape[0] == 6
     for j in range(5):
         state, t = y[:, j], 0.0
@@ -309,8 +311,27 @@ def test_steps_that_are_too_long_are_found(scene: str) -> None:
     nearly = [] if scene == STIFF else [(2.5, True)]
     for steps, stable in ((1.5, True), *nearly, (3.2, False), (6.0, False)):
         dt = steps / fastest
-        _, sound = ours.rk4(y, k, u, t_end=200 * dt, dt=dt, every=200)
+        _, sound = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=200 * dt, dt=dt, every=200)
         assert bool(sound[0]) is stable, steps
+
+
+BRAKE = 'type = "joint_friction", name = "brake", joint = "pin", coulomb = 1.0, speed = 0.001'
+STOP = 'type = "joint_stop", name = "stop", joint = "pin", low = -0.2, high = 0.2, stiffness = 1e4'
+
+
+@pytest.mark.parametrize(
+    ("effect", "dt", "sound"), [(BRAKE, 5.0 / 1e4, True), (STOP, 3.0 / math.sqrt(1e5), False)]
+)
+def test_steps_are_too_long_if_they_do_harm(effect: str, dt: float, sound: bool) -> None:
+    """Friction that saturates holds a brake within 0.5 % of its speed, for as many steps as there
+    are; what hits a stop is there for a step or two, and leaves it at 17 times its speed.
+    """
+    spring = STIFF[STIFF.index("type") : STIFF.index(" }]", STIFF.index("type"))]
+    ours, module = kernels(STIFF.replace(spring, effect))
+    k, _, _ = ours.prepare(np.array([[*module.PARAMETERS.values()]]))
+    given = (np.array([[0.0], [1.0]]), k, np.zeros((len(module.INPUTS), 1)))
+    _, found = ours.rk4(*given, sizes=np.ones((2, 1)), t_end=400 * dt, dt=dt, every=400)
+    assert bool(found[0]) is sound
 
 
 UNSTABLE = ("light_cart_pole",)
@@ -326,5 +347,5 @@ def test_stable_runs_are_not_taken_for_unstable(scene: str) -> None:
     ours, module = kernels(scene)
     y, p, u = members(module, 16)
     k, _, _ = ours.prepare(p.T)
-    _, sound = ours.rk4(y, k, u, t_end=0.2, dt=2e-4, every=1000)
+    _, sound = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=0.2, dt=2e-4, every=1000)
     assert sound.all()
