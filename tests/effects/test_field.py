@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from bookkeeping import differences, gained, powers
-from engine import Engine, apart, engine, quick
+from engine import Engine, apart, engine, plain, quick
 from scipy.integrate import solve_ivp
 from spatial_trees import PLANE, SPACE
 
@@ -175,6 +175,24 @@ def test_jacobian_of_steering_in_space() -> None:
     assert apart(made.module.jacobian(0.0, y), differences(made, y, 0.0)) < 1e-7
     for v in ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]):
         assert np.isfinite(made.module.jacobian(0.0, at(made, [-0.6, 0.0, 0.0], v))).all()
+
+
+PIN = """
+name = "push"
+bodies = [{ name = "arm", mass = 3.0, inertia_com = 0.5 }]
+joints = [{ name = "pin", type = "revolute", parent = "world", child = "arm", r_child = [-0.4, 0] }]
+points = [{ name = "tip", body = "arm", at = [0.3, 0.1] }]
+effects = [{ type = "field", name = "push", points = ["tip"], force = ["2", "1"] }]
+"""
+
+
+@pytest.mark.parametrize("at", ['points = ["tip"]', 'body = "arm", at = [0.3, 0.1]'])
+def test_a_constant_force_has_a_closed_form(at: str) -> None:
+    """At a named point and at one of a body."""
+    text = PIN.replace('points = ["tip"]', at)
+    one, other = (plain(text, route).module for route in ("closed", "aba"))
+    y = np.array([0.4, 1.5])
+    np.testing.assert_allclose(one.derivative(0.0, y), other.derivative(0.0, y), rtol=1e-13)
 
 
 def test_absence_is_free() -> None:
