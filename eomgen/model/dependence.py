@@ -97,7 +97,7 @@ def is_plain(effect: EffectTable, model: Model) -> bool:
     heights. It has neither states nor rigid contacts.
     """
     mechanism: Any = _Tracing(model)
-    if effect.states(model.dimensions) or effect.contact_names(mechanism.bodies):
+    if effect.states(model.dimensions) or effect.contacts(mechanism):
         return False
     at_joints, on_bodies = list[Any](), list[Any]()
     for load in effect.loads(mechanism):
