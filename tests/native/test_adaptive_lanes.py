@@ -119,7 +119,8 @@ def test_runs_are_counted_and_can_be_stopped(method: str) -> None:
             return run(ours, columns, np.array([0.5]), addresses=places)[1]
         y, p, u = map(np.ascontiguousarray, columns)
         k, _, _ = ours.prepare(p.T)
-        return ours.rk4(y, k, u, t_end=0.5, dt=0.01, every=50, addresses=places)[1]
+        sizes = np.ones((len(y), 1))
+        return ours.rk4(y, k, u, t_end=0.5, dt=0.01, every=50, sizes=sizes, addresses=places)[1]
 
     assert valid().all() and shared.tolist() == [count, 0]
     shared[1] = 1

@@ -16,8 +16,10 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.text import Text
 
 from eomgen import templating
+from eomgen.cli import main
 from eomgen.errors import RunError
 from eomgen.files import is_ours
+from eomgen.run.trajectory import load_npz
 from eomgen.scene.look import Box, Disc, Polygon, Rod, numbers
 from eomgen.show.figure import draw_motion, save_figure
 from eomgen.show.framing import View
@@ -218,6 +220,24 @@ def test_templating(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str) 
     ):
         templating.render("trial", "whole", {"xs": [], "nam": ""})
     templating.environment.cache_clear()
+
+
+def test_a_run_that_blows_up_keeps_what_it_has(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Time, state and remedy in one line, exit code 1, and finite rows in every file."""
+    command = ["simulate", "double_pendulum", "--integrator", "euler", "--dt", "0.1"]
+    assert main([*command, "--t-end", "10", "-o", str(tmp_path)]) == 1
+    err = capsys.readouterr().err
+    assert err.count("eomgen: double_pendulum: stopped at t = ") == 1
+    line = err.splitlines()[-1]
+    assert "theta_1=" in line and "take --dt 0.0" in line and "implicit" in line
+    run = load_npz(tmp_path / "double_pendulum.npz")
+    assert not run.finished and len(run.t) > 5 and np.isfinite(run.y).all()
+    table = np.loadtxt(tmp_path / "double_pendulum.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(table[:, 1:], run.y)
+    for suffix in ("png", "html"):
+        assert (tmp_path / f"double_pendulum.{suffix}").stat().st_size > 10_000
 
 
 def test_what_showing_needs() -> None:
