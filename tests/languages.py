@@ -14,9 +14,9 @@ import numpy as np
 from live import run_in_node
 
 from eomgen.native.library import compiled_library
-from eomgen.subset.braces import printed
 from eomgen.subset.expander import Text
 from eomgen.subset.languages import JAVASCRIPT, C
+from eomgen.subset.printing import printed
 from eomgen.subset.structures import filled, take
 
 BY_BITS = """

@@ -29,9 +29,9 @@ from eomgen.engine import (
     taylor,
 )
 from eomgen.engine.embedded import DOP853
-from eomgen.subset.braces import printed
 from eomgen.subset.expander import Text
 from eomgen.subset.languages import JAVASCRIPT, C, Language
+from eomgen.subset.printing import printed
 from eomgen.subset.unrolled import unrolled_functions
 
 Root = tuple[str, Mapping[str, Any]]

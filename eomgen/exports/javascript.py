@@ -45,7 +45,7 @@ def files(model: Model, options: Options) -> Written:
 def _step(method: Method, interface: Interface, size: float) -> str:
     """The source of `step`."""
     # Imported here because the printer takes a while.
-    from eomgen.subset.braces import printed
+    from eomgen.subset.printing import printed
 
     values = method.values(interface)
     call = _CASTS.sub("", values["call"]).replace("->", ".")

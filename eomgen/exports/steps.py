@@ -308,7 +308,7 @@ def step_of(
     constraints. It has what the engine's `text` prints of the roots `more`, too.
     """
     # Imported here because the printer takes a while.
-    from eomgen.subset.braces import printed
+    from eomgen.subset.printing import printed
 
     values = {
         **sizes_of(method, interface, size),

@@ -44,9 +44,9 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C source of the series and the steps."""
     # Imported here because runs whose library is in the store do without the printer.
     from eomgen.engine.printed import c_source
-    from eomgen.subset.braces import printed
     from eomgen.subset.expander import Text
     from eomgen.subset.languages import VECTORS, C
+    from eomgen.subset.printing import printed
 
     text = series_text(system_of(program, interface), [s.name for s in interface.states])
     functions = Text()

@@ -5,7 +5,7 @@ such loops only are numbers there.
 """
 
 import ast
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from eomgen.subset.expander import NotInSubsetError, Text, called
@@ -25,52 +25,16 @@ from eomgen.subset.expressions import (
 from eomgen.subset.kinds import (
     INT,
     NOTHING,
-    fields_of,
     given_function,
     indices,
-    is_protocol,
     of_annotation,
 )
-from eomgen.subset.languages import Language, type_of
-
-
-def printed(
-    text: Text,
-    roots: Iterable[tuple[str, Mapping[str, Any]]],
-    language: Language,
-) -> str:
-    """The source of functions of the engine and of all that they call, those called first. Each is
-    given with values of its `Known` parameters.
-
-    Raises `NotInSubsetError` for text outside the subset.
-    """
-    functions = text.expanded(roots)
-    made = {d.name: d for d in functions}
-    lines = list(_structures(text, made.values(), language)) if language.typed else []
-    changes: dict[str, set[str]] = {}
-    for d in functions:
-        lines += ["", *_Function(text, made, d, language, changes).lines()]
-    return "\n".join(lines).lstrip("\n") + "\n"
-
-
-def _structures(
-    text: Text, functions: Iterable[ast.FunctionDef], language: Language
-) -> Iterable[str]:
-    """C's structures of the records that are arguments."""
-    kinds = (of_annotation(a.annotation).of for d in functions for a in d.args.args)
-    for name in dict.fromkeys(kinds):
-        record = text.classes.get(name)
-        if record and not is_protocol(record):
-            yield f"typedef struct {name} {{"
-            for each, kind in fields_of(record).items():
-                yield f"    {type_of(kind, language)}{each};"
-            yield f"}} {name};"
-
+from eomgen.subset.languages import RESERVED, Language, type_of
 
 Group = list[ast.Assign]
 
 
-class _Function(Expressions):
+class Printer(Expressions):
     """The printing of a function. `changes` are the arrays among the arguments of earlier ones that
     these change.
     """
@@ -88,6 +52,8 @@ class _Function(Expressions):
 
     def lines(self) -> list[str]:
         """The lines of its source."""
+        for argument in self.d.args.args:
+            self._check_name(ast.copy_location(ast.Name(argument.arg), argument))
         self.changes[self.d.name] = self._changed()
         body = self._grouped(self.d.body)
         self.scalars = self._scalars(body)
@@ -181,6 +147,8 @@ class _Function(Expressions):
     def _check_name(self, name: ast.Name) -> None:
         if name.id in TWO:
             raise NotInSubsetError(name, "is the name of an index of loops over arrays")
+        if name.id in RESERVED:
+            raise NotInSubsetError(name, "is a word of another language")
 
     def _prepare(self, s: ast.stmt) -> None:
         """Declare loop variables, and group the statements inside."""

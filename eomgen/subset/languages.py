@@ -5,6 +5,14 @@ from dataclasses import dataclass, replace
 
 from eomgen.subset.kinds import INT, OF_NUMBERS, Kind
 
+RESERVED = frozenset(
+    "auto boolean byte case catch char const debugger default delete do double enum eval export "
+    "extends extern final function goto implements inline instanceof interface let long new null "
+    "package private protected public register restrict short signed sizeof static struct super "
+    "switch this throw throws typedef typeof undefined union unsigned var void volatile".split()
+)
+"""Words of C and JavaScript that are names in Python."""
+
 
 @dataclass(frozen=True)
 class Language:

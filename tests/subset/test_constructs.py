@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from languages import NONE, Given, results
 
-from eomgen.subset.braces import printed
 from eomgen.subset.expander import NotInSubsetError, Text
 from eomgen.subset.languages import JAVASCRIPT, C
+from eomgen.subset.printing import printed
 
 TEXT = Text.of(constructs)
 SEEDED = np.random.default_rng(2)
@@ -123,6 +123,8 @@ REFUSED = {
     "x[:] = [t, x[0]]": "while it is read",
     "for j_ in range(n): pass": "the name of an index",
     "i_ = 1": "the name of an index",
+    "new = 1": "a word of another language",
+    "for case in range(n): pass": "a word of another language",
     "z = x[::2] * 1.0": "no steps",
     "z = x + a": "different dimensions",
     "z = x[0, 1]": "too many indices",
