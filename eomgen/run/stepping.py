@@ -134,8 +134,8 @@ def _equal_steps(
     # Evaluations to check stability do not count. They need a Jacobian with all digits, which
     # doubles do not give where the derivative is repaired.
     unchecked = asked.unstable or asked.repairs or not method.steps_explicitly(whole)
-    plain = not (asked.guard or asked.powers or whole.contacts)
-    compiled = _compiled(whole) if plain and method.compiled else None
+    plain = not (asked.guard or asked.powers)
+    compiled = _compiled(whole) if plain and method.compiled and not whole.contacts else None
     ahead = plain and not whole.projection
 
     def begin(
@@ -155,7 +155,7 @@ def _equal_steps(
             resume=resume,
             compiled=partial(compiled.equal, method.compiled) if compiled else None,
             calls=calls if ahead else None,
-            each=asked.tally is not None,
+            each=bool(asked.tally or whole.contacts),
         )
 
     def rows(a: float, b: float) -> list[float]:

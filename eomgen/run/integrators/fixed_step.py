@@ -97,11 +97,12 @@ def advances(
     shaken = None if seed is None else Shaken(problem.derivative, seed)
     i, usual, size = min(math.floor((t - grid.t_start) / grid.dt + 1e-9), steps - 1), False, Size()
     ahead = max(1, AHEAD // len(y)) if calls and len(y) else 1
+    own_most = 1  # it grows: an event may end the steps, and those beyond it are in vain
     while i < steps:
         (end, mark), near = grid.end(i + 1), False
         alone = i + 1 == steps or not regular
         place = compiled() if compiled and usual and not alone else None
-        most = size.most if place else ahead if usual or not compiled else 1
+        most = size.most if place else own_most if usual or not compiled else 1
         most = 1 if alone else min(most, steps - 1 - i, shaken.left if shaken else most)
         length = grid.dt if regular and mark is not None else end - t
         ends = (end, grid.t_end, 0.0) if alone else (grid.t_start, grid.t_end, grid.dt)
@@ -127,7 +128,7 @@ def advances(
             rows = _rows(kept, n, i, grid)
             made = (kept.ends[:n], kept.states[:n], *rows, counts, within, resumes, margins)
             yield from Portion(problem, t, *made).advances(each or near)
-            i, regular = i + n, True
+            i, regular, own_most = i + n, True, min(2 * own_most, ahead)
             t, y, lost = float(kept.ends[n - 1]), kept.states[n - 1], kept.losses[n - 1]
             if shaken:
                 lost = lost + shaken.error(t, y, length, n)
@@ -212,6 +213,7 @@ class InPython:
         self._both = list(zip(self.counts.values(), self._counted.values(), strict=True))
         self._unkept: list[int] = []
         self.failure: BaseException | None = None
+        self._failed: list[tuple[float, FloatArray] | None] = []
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
@@ -222,6 +224,7 @@ class InPython:
         """Steps, as `EqualSteps.make`; `last` if it is the last one of a run."""
         self._course, self._last = course, last
         begun = [count.calls for _, count in self._both]
+        failed = [count.failed for _, count in self._both]
         self._unkept.clear()
         for calls, _ in self._both:
             calls.clear()
@@ -233,6 +236,9 @@ class InPython:
             self._unkept.append(count.calls - (calls[-1] if calls else before))
             count.calls = before
             calls[:] = [n - before for n in calls]
+        self._failed = [count.failed for _, count in self._both]
+        for (_, count), place in zip(self._both, failed, strict=True):
+            count.failed = place
         if self._monitor.rate is not None:
             self._monitor.rate = course.rate
         return why
@@ -243,9 +249,11 @@ class InPython:
             self._monitor.passed(steps, calls, course.rate, course.place, course.slope)
 
     def count_failed(self) -> None:
-        """Count the calls of a step that was not made."""
-        for (_, count), calls in zip(self._both, self._unkept, strict=True):
+        """Count the calls of a step that was not made, and say where they failed."""
+        parts = zip(self._both, self._unkept, self._failed, strict=True)
+        for (_, count), calls, place in parts:
             count.calls += calls
+            count.failed = place
 
     def changed(self, t: float, y: FloatArray, h: float, step: Step) -> int:
         """A step of the method."""
