@@ -7,6 +7,8 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from eomgen.subset.words import Whole
+
 T = TypeVar("T")
 TYPES: dict[Any, Any] = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctypes.c_int64}
 
@@ -47,7 +49,7 @@ def _fields(record: Any) -> tuple[set[str], list[tuple[str, list[tuple[str, int]
     arrays = []
     for name in (f.name for f in fields(record) if _is_array(hints[f.name])):
         array, *sizes = get_args(hints[name])
-        kind = get_args(get_args(array)[1])[0]
+        kind = np.int64 if array == Whole else np.float64
         arrays.append((name, [_size(size) for size in sizes], kind))
     return {f.name for f in fields(record)}, arrays
 

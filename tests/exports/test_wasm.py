@@ -1,5 +1,8 @@
 """WebAssembly steps as firmware does, to the same bits."""
 
+import json
+import re
+import subprocess
 from base64 import b64encode
 from importlib.util import find_spec
 from pathlib import Path
@@ -8,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from firmware import Firmware
-from live import run_in_node
+from live import NODE, run_in_node
 
 import eomgen
 from eomgen.errors import RunError, SceneError
@@ -48,6 +51,25 @@ def test_steps_have_the_bits_of_firmware(scene: str, method: str, tmp_path: Path
     found = run_in_node("", STEPS, given, scripts=())
     assert found["imports"] == 0
     assert found["y"] == native.stepped(y, u, 0.01, 200).tolist()
+
+
+@zig
+def test_the_page_of_firmware_shows_how(tmp_path: Path) -> None:
+    """Its block in JavaScript, with a `fetch` that reads the file."""
+    page = Path(__file__).parents[2] / "docs/howto/firmware.md"
+    (block,) = re.findall(r"```javascript\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+    eomgen.export("cart_pole", "wasm", tmp_path / "cart_pole.wasm")
+    read = (
+        "import { readFileSync } from 'node:fs';\nconst fetch = (name) => readFileSync(name);\n"
+        "WebAssembly.instantiateStreaming = (bytes) => WebAssembly.instantiate(bytes);\n"
+    )
+    (tmp_path / "page.mjs").write_text(f"{read}{block}console.log(JSON.stringify([...state]));")
+    run = subprocess.run(
+        [NODE or "node", "page.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    native = Firmware("cart_pole", "double", "", "-ffp-contract=off")
+    start = np.array([0.0, 0.1, 0.0, 0.0])
+    assert json.loads(run.stdout) == native.stepped(start, np.zeros(1), 0.01, 1).tolist()
 
 
 @zig
