@@ -4,13 +4,14 @@ import ctypes
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
+from eomgen.engine.branches import Switches
 from eomgen.engine.crossings import Watch
 from eomgen.engine.embedded import DOP853
 from eomgen.native import checked, equal_steps
@@ -95,6 +96,7 @@ class CompiledSteps:
         self._constants = usual_constants(module, "derivative", p)
         self._inputs = kernels.given(u)
         self._states = kernels.states
+        self._unwatched = _Checked.of(None, self._states)
         self._held = 0, 0
         if self._constants is not None and self._inputs is not None:
             self._held = ctypes.addressof(self._constants), self._inputs.ctypes.data
@@ -140,8 +142,7 @@ class CompiledSteps:
         """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
         ny = self._states
         each, whole = (most,), (most, ny)
-        watch = _watch(watched, ny)
-        found = branches.switches(ny, last=watched.switched if watched else -math.inf)
+        watch, found, *given = _Checked.of(watched, ny) if watched else self._unwatched
         functions = [self._checks.get(name) for name in (*OF_STATE, *OF_CONTACTS)]
         (ends, lengths, states, slopes, losses, switched, values, terms), at_reals = placed(
             [each, each, *[whole] * 3, each, (most, watch.many), (dense * most, 7, ny)]
@@ -160,7 +161,6 @@ class CompiledSteps:
             *(*at_reals[:2], *at_wholes[:2], *at_reals[2:5], at_reals[7], to_times, to_rows),
             *(len(times), most),
         )
-        given = filled(watch), filled(found)
         checks = _Checks(
             *(ctypes.addressof(each) for each in (system, run)),
             *(where(keeps), *map(ctypes.addressof, given)),
@@ -191,6 +191,24 @@ class CompiledSteps:
             within=partial(_within, (t, y), ends, states, terms) if dense else None,
             margins=margins[: n + 1] if constrained else None,
         )
+
+
+class _Checked(NamedTuple):
+    """Room for the switching functions along steps and for the switches found, and both as C has
+    them.
+    """
+
+    watch: Watch
+    found: Switches
+    of_watch: ctypes.Structure
+    of_found: ctypes.Structure
+
+    @staticmethod
+    def of(watched: Watched | None, states: int) -> "_Checked":
+        """The room, with what is known of the functions."""
+        watch = _watch(watched, states)
+        found = branches.switches(states, last=watched.switched if watched else -math.inf)
+        return _Checked(watch, found, filled(watch), filled(found))
 
 
 def _watch(watched: Watched | None, states: int) -> Watch:
