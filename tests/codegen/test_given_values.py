@@ -336,7 +336,7 @@ def test_nothing_is_silently_wrong_far_away() -> None:
                 assert error <= 1e-9 * size, (scene, name, y.tolist(), found, true)
                 together = np.asarray(columns[..., k])
                 assert np.allclose(together, found, rtol=1e-9, atol=1e-9 * float(size))
-    assert right > 60 and refused > 60
+    assert min(right, refused) > some(60, 100)
 
 
 def test_parameters_far_away() -> None:
@@ -347,7 +347,8 @@ def test_parameters_far_away() -> None:
     rng = np.random.default_rng(12)
     powers = {"kg": (1, 0), "m": (0, 1), "kg m^2": (1, 2), "m/s^2": (0, 1), "m/s": (0, 1)}
     right = refused = 0
-    for scene in ("double_pendulum", "cart_pole", "tumbling_body"):
+    scenes = ("double_pendulum", "cart_pole", "tumbling_body")
+    for scene in scenes + some((), ("pendulum", "spinning_top")):
         made = quick(scene)
         units = made.module.UNITS
         for _ in range(some(40, 100)):
@@ -370,7 +371,7 @@ def test_parameters_far_away() -> None:
                 error = max(abs(MP.mpf(found[i]) - true[i]) for i in own)
                 assert error <= 1e-9 * max(abs(true[i]) for i in own), (scene, p, found, true)
             right += 1
-    assert right > 50 and refused > 25
+    assert right > some(50, 100) and refused > some(25, 50)
     made = quick("pendulum")
     message = "parameter 'bob_mass' is 1e+300, larger than 1e+100; choose other units"
     with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
