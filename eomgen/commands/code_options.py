@@ -36,6 +36,7 @@ def add_import(parser: argparse.ArgumentParser) -> None:
 
 
 def add_generation(parser: argparse.ArgumentParser) -> None:
+    """The options of `generate`."""
     parser.add_argument("--backend", metavar="NAME", default="numpy", help="numpy, c or javascript")
     parser.add_argument(
         "-o",

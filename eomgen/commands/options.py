@@ -49,6 +49,7 @@ def add_inputs(parser: argparse.ArgumentParser, *, constant: bool = False) -> No
 
 
 def add_method(parser: argparse.ArgumentParser) -> None:
+    """The method of a run, its step or its tolerances."""
     parser.add_argument("--integrator", metavar="NAME", help="method (the scene's)")
     parser.add_argument("--dt", metavar="S", type=float, help="step of a fixed-step method")
     parser.add_argument("--rtol", metavar="X", type=float, help="relative tolerance (adaptive)")
@@ -57,6 +58,7 @@ def add_method(parser: argparse.ArgumentParser) -> None:
 
 
 def add_unstable(parser: argparse.ArgumentParser) -> None:
+    """Steps of any length."""
     parser.add_argument(
         "--unstable",
         action="store_true",
@@ -65,6 +67,7 @@ def add_unstable(parser: argparse.ArgumentParser) -> None:
 
 
 def add_backend(parser: argparse.ArgumentParser) -> None:
+    """Where a run is computed."""
     parser.add_argument(
         "--backend",
         metavar="NAME",
@@ -74,10 +77,12 @@ def add_backend(parser: argparse.ArgumentParser) -> None:
 
 
 def add_rows(parser: argparse.ArgumentParser) -> None:
+    """How many rows a run keeps."""
     parser.add_argument("--samples", metavar="N", type=int, default=1001, help="rows to keep")
 
 
 def add_live(parser: argparse.ArgumentParser) -> None:
+    """Whether a page integrates."""
     parser.add_argument(
         "--live",
         action=argparse.BooleanOptionalAction,
@@ -86,12 +91,14 @@ def add_live(parser: argparse.ArgumentParser) -> None:
 
 
 def add_form(parser: argparse.ArgumentParser) -> None:
+    """The form of the state."""
     parser.add_argument(
         "--form", choices=("velocity", "momentum", "redundant"), help="state form (the scene's)"
     )
 
 
 def add_route(parser: argparse.ArgumentParser) -> None:
+    """The route to the equations."""
     parser.add_argument(
         "--route",
         choices=("auto", *ROUTES),
@@ -101,6 +108,7 @@ def add_route(parser: argparse.ArgumentParser) -> None:
 
 
 def add_code(parser: argparse.ArgumentParser) -> None:
+    """What determines the module: its route and its outputs."""
     add_route(parser)
     parser.add_argument(
         "--outputs", metavar="A,B,…", help="functions of the module, or all (the scene's)"

@@ -8,6 +8,7 @@ from eomgen.commands.usage import path
 
 
 def add_verification(parser: argparse.ArgumentParser) -> None:
+    """The options of `verify`."""
     parser.add_argument(
         "--states", metavar="N", type=int, help="states of each kind (8, 2 if there are many)"
     )
@@ -38,6 +39,7 @@ def add_verification(parser: argparse.ArgumentParser) -> None:
 
 
 def add_accuracy(parser: argparse.ArgumentParser) -> None:
+    """The options of `accuracy`."""
     parser.add_argument("--methods", metavar="A,B,…", help="only these integrators (all)")
     parser.add_argument("--quick", action="store_true", help="only every second tolerance or step")
     parser.add_argument("--t-end", metavar="S", type=float, help="end time (the scene's)")
@@ -68,6 +70,7 @@ def add_accuracy(parser: argparse.ArgumentParser) -> None:
 
 
 def add_linearisation(parser: argparse.ArgumentParser) -> None:
+    """The options of `linearise`."""
     parser.add_argument(
         "--at",
         choices=("equilibrium", "rest", "initial"),

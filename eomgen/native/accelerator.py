@@ -230,8 +230,8 @@ class Accelerator:
         return functions.Compilable(module, self._values, origin, self._look, self._start)
 
     def _taylor(self, module: Any) -> taylor.CompiledTaylor | None:
-        """The Taylor series of a module; None without a compiler. They are compiled at once: other
-        code would compute other bits, so a run must not change over to them.
+        """The Taylor series of a module; None without a compiler. They are compiled at once: steps
+        in Python take far longer than that.
         """
         program, interface = self._of_model()
         taylor.system_of(program, interface)
