@@ -1,6 +1,6 @@
 """The site: `sphinx-build docs out/site`; `python tools/site.py` adds the gallery and versions."""
 
-from eomgen.version import __version__
+from eomgen.base.version import __version__
 
 project = "eomgen"
 version = release = __version__

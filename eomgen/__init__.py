@@ -7,7 +7,7 @@ access, so that unused ones cost no start-up time.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from eomgen.version import __version__ as __version__
+from eomgen.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from eomgen.api.symbolic import casadi_functions
     from eomgen.api.systems import nonlinear_system, state_space
     from eomgen.api.verifying import horizon, verify
+    from eomgen.base.errors import EomgenError, RunError, SceneError
     from eomgen.equations import Derivation
-    from eomgen.errors import EomgenError, RunError, SceneError
     from eomgen.results import Module, Run
     from eomgen.scene.built_in import built_in_names
     from eomgen.scene.schema import Scene
@@ -90,7 +90,7 @@ _PLACES = {
     **dict.fromkeys(("accuracy", "arithmetic"), "api.accuracy"),
     "effects": "api.effects",
     **dict.fromkeys(("Module", "Run"), "results"),
-    **dict.fromkeys(("EomgenError", "RunError", "SceneError"), "errors"),
+    **dict.fromkeys(("EomgenError", "RunError", "SceneError"), "base.errors"),
     "Scene": "api.given",
     "built_in_names": "scene.built_in",
 }

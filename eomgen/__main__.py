@@ -25,7 +25,7 @@ _stopped_at: list[float] = []
 
 
 def main() -> int:
-    """Run one command. The exit code is that of `eomgen.cli.main`, or after a signal of `STOPS`
+    """Run one command. The exit code is that of `commands.main.main`, or after a signal of `STOPS`
     128 plus its number, for example 130 for Ctrl-C.
 
     Each of these signals raises `KeyboardInterrupt`, so that no partial files remain and `simulate`
@@ -37,7 +37,9 @@ def main() -> int:
     gc.set_threshold(100_000, 20, 20)
     try:
         _listen()
-        from eomgen.cli import main as run  # here, so that an interrupt during the import is caught
+        from eomgen.commands.main import (
+            main as run,  # here, so that an interrupt during the import is caught
+        )
 
         code = run()
     except SystemExit as stop:

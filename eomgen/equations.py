@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.tape import TIME
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eomgen.files import check_writable, write_whole
+from eomgen.base.files import check_writable, write_whole
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.limits import Excursion, excursions

@@ -4,8 +4,8 @@ The program from which code was written is a separate entry. It is read only whe
 itself is run, in extended precision or by studies.
 
 The key is a digest of all that determines the code: the model without its notices, the relevant
-files of this program, and the libraries that it uses. `eomgen.entries` ensures that an entry is
-used only if this program wrote it.
+files of this program, and the libraries that it uses. `eomgen.base.entries` ensures that an entry
+is used only if this program wrote it.
 """
 
 import hashlib
@@ -26,14 +26,14 @@ from typing import TYPE_CHECKING
 
 import platformdirs
 
-from eomgen import plugins
-from eomgen.entries import Entries
+from eomgen.base import plugins
+from eomgen.base.entries import Entries
+from eomgen.base.templating import PACKAGE, templates_folder
+from eomgen.base.version import __version__
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
 from eomgen.program.program import Program
 from eomgen.program.saving import restored, saved
-from eomgen.templating import PACKAGE, templates_folder
-from eomgen.version import __version__
 
 if TYPE_CHECKING:
     from eomgen.codegen.interface import Interface
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 AFTER = (
     *(
         "store.py",
-        "entries.py",
+        "base/entries.py",
         "native",
         "run",
         "precision",
@@ -53,7 +53,7 @@ AFTER = (
         "exports",
         "results.py",
     ),
-    *("api", "commands", "cli.py", "__main__.py", "__init__.py"),
+    *("api", "commands", "__main__.py", "__init__.py"),
 )
 """Files and folders of this program that do not influence the generated code; all others do."""
 LIBRARIES = (
@@ -305,7 +305,8 @@ def _sources() -> list[Path]:
 
 
 def _is_after(path: Path) -> bool:
-    return path.relative_to(PACKAGE).parts[0] in AFTER
+    inside = path.relative_to(PACKAGE)
+    return inside.parts[0] in AFTER or inside.as_posix() in AFTER
 
 
 @cache

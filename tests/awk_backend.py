@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from eomgen.base.templating import render
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.kernels import kernels_of
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
-from eomgen.templating import render
 
 ABOUT = "an AWK program: states in, derivatives out, a line each"
 TEMPLATES = str(Path(__file__).parent / "awk")

@@ -14,8 +14,8 @@ from floors import imports, modules
 
 DRAWING = Path(__file__).parent.parent / "docs" / "packages.svg"
 
-BASE = ("text", "displays", "errors", "files", "streams", "entries", "loading", "templating")
-"""Small modules that all others may use: drawn as one, without arrows to it."""
+BASE = "base"
+"""What all others may use: drawn without arrows to it."""
 WIDTH, ROW, HIGH, GAP = 1000, 74, 48, 16
 WIDEST = 470
 FONT = "font-family='Helvetica, Arial, sans-serif'"
@@ -32,8 +32,7 @@ def rooms() -> dict[str, list[str]]:
 
 
 def _room(name: str) -> str:
-    first = name.split(".")[0]
-    return ", ".join(BASE) if first in BASE else first
+    return name.split(".")[0]
 
 
 @cache
@@ -52,23 +51,20 @@ def below(room: str) -> frozenset[str]:
 @cache
 def floor(room: str) -> int:
     """How many rooms lie one on another below a room."""
-    if room == _room(BASE[0]):
+    if room == BASE:
         return 0
     return 1 + max((floor(other) for other in needs(room)), default=0)
 
 
 def arrows(room: str) -> list[str]:
     """The rooms that it imports from and reaches in no other way."""
-    own = needs(room) - {_room(BASE[0])}
+    own = needs(room) - {BASE}
     return sorted(o for o in own if not any(o in below(other) for other in own))
 
 
 def about(room: str) -> str:
     """The first sentence of a room's docstring."""
-    if room not in modules():
-        return "Text made safe to print, errors, files written whole, streams, kept results."
-    name = room
-    text = ast.get_docstring(ast.parse(modules()[name].read_text("utf-8"))) or ""
+    text = ast.get_docstring(ast.parse(modules()[room].read_text("utf-8"))) or ""
     return " ".join(text.split("\n\n")[0].split())
 
 

@@ -11,15 +11,8 @@ PACKAGE = Path(eomgen.__file__).parent
 # Each room may import from itself and from those below it; the lowest comes first. A room is a
 # package or a module, and does not count what has a line of its own.
 FLOORS = (
-    "text",
-    "version",
-    "displays",
-    "errors",
-    "plugins",
-    "streams",
-    "files",
-    "loading",
-    "entries",
+    "base",
+    "tables",
     "scalars",
     "language",
     "subset",
@@ -27,15 +20,11 @@ FLOORS = (
     "scene.joints",
     "scene.effects",
     "scene.constraints",
-    "outputs",
-    "routes",
-    "integrators",
     "scene",
     "model",
     "derivation",
     "dynamics",
     "exposition",
-    "templating",
     "program",
     "codegen",
     "pipeline",
@@ -59,9 +48,6 @@ FLOORS = (
     "results",
     "api",
     "commands",
-    "usage",
-    "options",
-    "cli",
     "__main__",
 )
 

@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import eomgen.cli
+import eomgen.commands.main
 import eomgen.run.module
-from eomgen.cli import main
-from eomgen.text import LONGEST_LINE
+from eomgen.base.text import LONGEST_LINE
+from eomgen.commands.main import main
 
 COMMAND = (
     "sweep pendulum --vary theta=0.1:1:3 --vary bob_mass=-1,1 --t-end 0.1 --samples 3 "
@@ -215,7 +215,7 @@ def _run(out: Path) -> tuple[int, str]:
         redirect_stdout(io.StringIO()),
         warnings.catch_warnings(),
         patch("eomgen.show.sweep.save_sweep_figure"),
-        patch("eomgen.cli.parsers", _parsers),  # these two take most of the time
+        patch("eomgen.commands.main.parsers", _parsers),  # these two take most of the time
         patch("eomgen.run.module.load_source", _load_source),
     ):
         warnings.simplefilter("error")
@@ -228,7 +228,7 @@ def _run(out: Path) -> tuple[int, str]:
     return code, stderr.getvalue()
 
 
-_parsers, _load_source = cache(eomgen.cli.parsers), cache(eomgen.run.module.load_source)
+_parsers, _load_source = cache(eomgen.commands.main.parsers), cache(eomgen.run.module.load_source)
 
 
 def _hangs(*_: object) -> None:

@@ -15,10 +15,10 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
+from eomgen.base.text import LONGEST_LINE
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import built_in_names, find_scene, parse_scene
-from eomgen.text import LONGEST_LINE
 
 LONGEST = 3000
 """Letters of the scenes that are changed: long ones take long."""

@@ -26,10 +26,10 @@ import fuzzing
 import numpy as np
 from fuzzing import HANGS, Failure
 
-from eomgen.cli import main
-from eomgen.errors import EomgenError, RunError
+from eomgen.base.errors import EomgenError, RunError
+from eomgen.base.text import LONGEST_LINE
+from eomgen.commands.main import main
 from eomgen.run.trajectory import load_npz
-from eomgen.text import LONGEST_LINE
 
 MOST_MEMORY = 300_000
 """Thousands of bytes by which one file may let the process grow."""

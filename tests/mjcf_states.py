@@ -12,9 +12,9 @@ import numpy as np
 from peer_frames import dynamics_at, expected_frames, frames, stand_in
 
 import eomgen
+from eomgen.base.errors import SceneError
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.importers import import_file

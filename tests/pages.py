@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import eomgen
-from eomgen.cli import parsers
+from eomgen.commands.main import parsers
 from eomgen.scene.reference import reference_pages
 
 DOCS = Path(__file__).parent.parent / "docs"

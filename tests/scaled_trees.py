@@ -10,10 +10,10 @@ import numpy as np
 from engine import MP
 from spatial_trees import random_spatial_tree
 
+from eomgen.base.errors import SceneError
 from eomgen.codegen.system import System
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.errors import SceneError
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model

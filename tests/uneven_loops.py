@@ -11,10 +11,10 @@ from loop_routes import ROUTES, model_of
 from scaled_trees import apart, found, size_of, taken
 from spatial_loops import random_loops
 
+from eomgen.base.errors import SceneError
 from eomgen.dynamics.closed_positions import regular_positions
 from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.errors import SceneError
 from eomgen.language.formula import Constant
 from eomgen.model.model import Model
 from eomgen.precision.extended import extended, extended_digits

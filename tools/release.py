@@ -32,7 +32,7 @@ def text(name: str) -> str:
 
 def version() -> str:
     """The version, from the one place that states it."""
-    return re.findall(r'^__version__ = "(.*)"$', text("eomgen/version.py"), re.MULTILINE)[0]
+    return re.findall(r'^__version__ = "(.*)"$', text("eomgen/base/version.py"), re.MULTILINE)[0]
 
 
 def disagreements() -> Iterator[str]:

@@ -29,7 +29,7 @@ def main() -> None:
     """Build; see above."""
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "out" / "site"
     sys.path.insert(0, str(ROOT))
-    from eomgen.version import __version__
+    from eomgen.base.version import __version__
 
     folder = out / __version__
     python = [sys.executable, "-m"]

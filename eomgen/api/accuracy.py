@@ -25,7 +25,7 @@ from eomgen.api.given import (
 from eomgen.api.inputs import Inputs, in_formulas
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_powers

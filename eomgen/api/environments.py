@@ -8,7 +8,7 @@ import numpy as np
 
 from eomgen.api.given import Source, check_name
 from eomgen.api.stepping import stepper
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.language.formula import FormulaError, evaluate, names_in, parse
 from eomgen.run.module import GeneratedModule

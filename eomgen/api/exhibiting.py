@@ -11,8 +11,8 @@ from eomgen.api.planning import plan_run
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.simulating import run_plan
-from eomgen.errors import RunError
-from eomgen.files import check_folder, check_writable, write_whole
+from eomgen.base.errors import RunError
+from eomgen.base.files import check_folder, check_writable, write_whole
 from eomgen.results import Run
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.schema import Scene

@@ -7,9 +7,9 @@ from pathlib import Path
 from eomgen.api.given import Outputs, Source, checked, modelled, read
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
+from eomgen.base.files import check_writable, write_whole
 from eomgen.exports import Number, Options, find_format
-from eomgen.files import check_writable, write_whole
 from eomgen.model.model import Model
 from eomgen.scene.schema import Form, Route
 

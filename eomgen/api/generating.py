@@ -10,8 +10,8 @@ from typing import Literal, cast
 from eomgen.api.given import Outputs, Source, check, overridden
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.errors import RunError, SceneError
-from eomgen.files import read_plain
+from eomgen.base.errors import RunError, SceneError
+from eomgen.base.files import read_plain
 from eomgen.model.model import Model
 from eomgen.results import Module
 from eomgen.run.module import GeneratedModule, load_module

@@ -11,16 +11,16 @@ import numpy as np
 
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.displays import DISPLAYS
+from eomgen.base.displays import DISPLAYS
+from eomgen.base.errors import RunError, SceneError, nearest
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.errors import RunError, SceneError, nearest
 from eomgen.language.base import identifier
 from eomgen.model.elaborate import available_in, elaborate, outputs_for
 from eomgen.model.model import Model
-from eomgen.outputs import OUTPUTS
 from eomgen.scene.reader import find_scene, parse_scene, read_scene, read_tables, scene_text
 from eomgen.scene.schema import Form, Route, Scene
+from eomgen.tables.outputs import OUTPUTS
 
 Source = str | PathLike[str] | Mapping[str, Any] | Scene
 Values = Mapping[str, float]

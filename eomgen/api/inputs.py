@@ -11,8 +11,8 @@ import numpy as np
 
 from eomgen.api.given import check_name, named
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.errors import RunError, nearest
-from eomgen.files import read_plain
+from eomgen.base.errors import RunError, nearest
+from eomgen.base.files import read_plain
 from eomgen.language.base import identifier
 from eomgen.language.conditions import value_of
 from eomgen.language.formula import (

@@ -10,7 +10,7 @@ from eomgen.api.inputs import Inputs, constant_inputs
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, state_names, values_by_index
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule

@@ -9,14 +9,14 @@ from eomgen.api.given import Values, values_of
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import values_by_index
-from eomgen.errors import RunError, nearest
-from eomgen.integrators import INTEGRATORS
+from eomgen.base.errors import RunError, nearest
 from eomgen.model.elaborate import available_in, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.results import Run
 from eomgen.run.inputs import InputsOfTime
 from eomgen.scene.schema import SHOWN, Closing, Scene
 from eomgen.study.recording import GROUPS, SAVED
+from eomgen.tables.integrators import INTEGRATORS
 
 if TYPE_CHECKING:
     from eomgen.study.accuracy.trial import Setting

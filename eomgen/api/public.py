@@ -7,7 +7,7 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -5,7 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from eomgen.api.generating import module_of
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.results import Run
 from eomgen.run.trajectory import load_npz
 from eomgen.scene.appearance import appearance_of

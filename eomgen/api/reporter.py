@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
-from eomgen.errors import EomgenError, SceneError
+from eomgen.base.errors import EomgenError, SceneError
 from eomgen.run.progress import Progress
 from eomgen.scene.lines import with_lines
 

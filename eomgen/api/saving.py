@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.errors import EomgenError
-from eomgen.files import (
+from eomgen.base.errors import EomgenError
+from eomgen.base.files import (
     check_folder,
     check_writable,
     marked,

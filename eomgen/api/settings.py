@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.scene.schema import Simulation
 
 if TYPE_CHECKING:

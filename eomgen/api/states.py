@@ -8,7 +8,7 @@ import numpy as np
 
 from eomgen.api.given import Values, named
 from eomgen.api.reporter import Reporter
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.origin import START, Origin
 from eomgen.run.problem import FloatArray

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, check, check_name, check_time
 from eomgen.api.public import public
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.native.lanes import columns_of

@@ -17,10 +17,9 @@ from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import state_names
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
-from eomgen.outputs import OUTPUTS
 from eomgen.run.checks import (
     check_no_step,
     check_samples,
@@ -41,6 +40,7 @@ from eomgen.sweep.layout import Memory, bytes_each, layout_of, worded
 from eomgen.sweep.members import Task
 from eomgen.sweep.storage import Storage, opened
 from eomgen.sweep.together import METHODS, build
+from eomgen.tables.outputs import OUTPUTS
 
 __all__ = ["Design", "Ensemble", "Law", "ensemble", "grid", "plan_sweep", "run_sweep", "sampled"]
 

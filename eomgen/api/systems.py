@@ -12,7 +12,7 @@ from eomgen.api.inputs import Inputs, constant_inputs
 from eomgen.api.linearising import Linearised, Place, Point, linearisable, linearised_at
 from eomgen.api.public import public
 from eomgen.api.states import state_names
-from eomgen.errors import RunError, nearest
+from eomgen.base.errors import RunError, nearest
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
 from eomgen.program.tape import TIME

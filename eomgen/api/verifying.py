@@ -9,7 +9,7 @@ from eomgen.api.given import Source, check_states, check_time, model_of, read
 from eomgen.api.inputs import Inputs, all_in_formulas
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.module import load_module
 from eomgen.scene.schema import Simulation

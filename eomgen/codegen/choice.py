@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from eomgen.base.errors import SceneError
 from eomgen.codegen.derive import Derived, derive, record
 from eomgen.derivation.supported import why_not_closed, why_not_tried
 from eomgen.dynamics.assur import with_closed_form
@@ -12,13 +13,12 @@ from eomgen.dynamics.digits import ALL, Route, digits_lost, digits_lost_by_kind
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.dynamics.mixed import well_conditioned
-from eomgen.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.passes import optimise
 from eomgen.program.program import Program, cost, interpreter
 from eomgen.program.tape import TIME
-from eomgen.routes import ROUTES, routes_for
 from eomgen.scalars.floats import ArrayScalars, FloatScalars
+from eomgen.tables.routes import ROUTES, routes_for
 
 MOST_LOST = 4.0
 """Largest number of decimal digits of v̇ that a route may lose at the sampled states and still be

@@ -4,17 +4,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+from eomgen.base.errors import SceneError
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.stand_ins import with_stand_ins
 from eomgen.codegen.system import System
 from eomgen.derivation.supported import why_not_closed, why_not_momenta, why_not_pins
 from eomgen.dynamics.kinematics import Axes
-from eomgen.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.passes import optimise
 from eomgen.program.program import Output, Program, cost, finish
-from eomgen.routes import ROUTES
+from eomgen.tables.routes import ROUTES
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,13 @@ from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.symbols import Vec, rotate
 from eomgen.language.formula import evaluate
 from eomgen.model.model import Point
-from eomgen.outputs import OUTPUTS
 from eomgen.program.differentiate import jacobian as slopes_of
 from eomgen.program.lower import Lowering
 from eomgen.program.program import Check
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import TIME, Node, Stage, Tape
 from eomgen.scene.effects.base import JointLoad
+from eomgen.tables.outputs import OUTPUTS
 
 
 def from_equations(equations: Equations, *, jacobian: bool = True) -> System:

@@ -24,10 +24,10 @@ from eomgen.dynamics.reactions import reactions
 from eomgen.dynamics.vectors import Vec, in_space, zeros
 from eomgen.language.formula import is_zero
 from eomgen.model.states import initial_state, velocity_states
-from eomgen.outputs import DERIVATIVES
 from eomgen.program import differentiate
 from eomgen.program.program import Check
 from eomgen.program.tape import Node
+from eomgen.tables.outputs import DERIVATIVES
 
 ExtraInputs = dict[str, tuple[str, ...]]
 """For some outputs the names of the inputs that they take besides the state."""

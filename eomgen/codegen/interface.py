@@ -9,7 +9,7 @@ from eomgen.language.conditions import Condition, is_of_size
 from eomgen.language.formula import written
 from eomgen.model.model import Model, Prescribed
 from eomgen.model.states import velocity_states
-from eomgen.outputs import DERIVATIVES, JACOBIAN, OUTPUTS
+from eomgen.tables.outputs import DERIVATIVES, JACOBIAN, OUTPUTS
 
 ABOUT = {
     "initial_state": "The scene's initial state; momenta depend on the parameters.",

@@ -8,10 +8,10 @@ from eomgen.codegen.system import LARGEST_JACOBIAN, OutputNodes, names_of_inputs
 from eomgen.dynamics.composite import Entries, solved
 from eomgen.dynamics.sensitivity import sensitivity
 from eomgen.dynamics.vectors import sub, zeros
-from eomgen.outputs import DERIVATIVES
 from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.tape import Node, Stage
-from eomgen.routes import ROUTES
+from eomgen.tables.outputs import DERIVATIVES
+from eomgen.tables.routes import ROUTES
 
 
 @dataclass

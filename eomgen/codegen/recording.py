@@ -11,7 +11,7 @@ from eomgen.dynamics.regrouping import RegroupedDynamics
 from eomgen.model.model import Model
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import TIME, Node, Stage, Tape
-from eomgen.routes import ROUTES
+from eomgen.tables.routes import ROUTES
 
 
 class Recording:

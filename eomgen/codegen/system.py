@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 from eomgen.model.model import Model
 from eomgen.model.states import State
-from eomgen.outputs import shape_of
 from eomgen.program.passes import PassReport, optimise_and_report
 from eomgen.program.program import Check, Output, Program, finish
 from eomgen.program.switching import with_switching_functions
 from eomgen.program.tape import Node, Tape
+from eomgen.tables.outputs import shape_of
 
 LARGEST_JACOBIAN = 30_000
 """Most operations of a matrix of derivatives that is computed entry by entry.

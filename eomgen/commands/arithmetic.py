@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from eomgen.api.accuracy import arithmetic_of, check_arithmetic
+from eomgen.base.files import check_folder, check_writable
 from eomgen.commands.shared import Arguments, assignments, print_wrapped, reporter_of
-from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.scene.schema import Simulation
 

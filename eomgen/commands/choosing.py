@@ -5,8 +5,8 @@ import re
 import sys
 from typing import TYPE_CHECKING
 
+from eomgen.base.errors import RunError
 from eomgen.commands.shared import Arguments
-from eomgen.errors import RunError
 from eomgen.results import Run
 
 if TYPE_CHECKING:

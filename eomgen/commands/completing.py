@@ -2,7 +2,7 @@
 
 import argparse
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.scene.built_in import built_in_names
 
 _PREAMBLE = {

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 from eomgen.api.effects import bill_of, check_motion
 from eomgen.api.inputs import all_in_formulas
 from eomgen.api.reporter import Reporter
+from eomgen.base.errors import InterruptedRunError
+from eomgen.base.files import check_folder
 from eomgen.commands.shared import (
     OPTIONS,
     Arguments,
@@ -14,8 +16,6 @@ from eomgen.commands.shared import (
     reporter_of,
     scene_with_inputs,
 )
-from eomgen.errors import InterruptedRunError
-from eomgen.files import check_folder
 
 if TYPE_CHECKING:
     from eomgen.study.cost.bill import Bill, Item

@@ -4,9 +4,9 @@ import sys
 from pathlib import Path
 
 from eomgen.api.deriving import derivation_of
+from eomgen.base.errors import RunError
+from eomgen.base.files import check_writable, write_whole
 from eomgen.commands.shared import Arguments, read_model, reporter_of
-from eomgen.errors import RunError
-from eomgen.files import check_writable, write_whole
 
 
 def derive(given: Arguments) -> int:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from eomgen.errors import EomgenError
-from eomgen.files import read_plain, write_whole
+from eomgen.base.errors import EomgenError
+from eomgen.base.files import read_plain, write_whole
 from eomgen.run.progress import terminal_notice
 from eomgen.store import entries_of
 

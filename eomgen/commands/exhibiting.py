@@ -9,8 +9,8 @@ from eomgen.api.exhibiting import (
     gallery_paths,
     save_index,
 )
+from eomgen.base.errors import EomgenError, InterruptedRunError, report_refusal
 from eomgen.commands.shared import Arguments, reporter_of
-from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
 from eomgen.run.progress import rough_time
 from eomgen.scene.built_in import built_in_names
 from eomgen.show.gallery import Exhibit, megabytes

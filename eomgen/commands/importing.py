@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from eomgen.api.importing import import_robot
+from eomgen.base.errors import RunError
+from eomgen.base.files import write_whole
 from eomgen.commands.shared import Arguments, note
-from eomgen.errors import RunError
-from eomgen.files import write_whole
 from eomgen.scene.reader import LARGEST_FILE, imported_scene, parse_scene
 
 

@@ -7,6 +7,8 @@ import numpy as np
 
 from eomgen.api.linearising import Point, linearisable, linearised_at
 from eomgen.api.states import state_names
+from eomgen.base.errors import RunError
+from eomgen.base.files import check_writable
 from eomgen.commands.shared import (
     Arguments,
     assignments,
@@ -18,8 +20,6 @@ from eomgen.commands.shared import (
     reporter_of,
     shortened,
 )
-from eomgen.errors import RunError
-from eomgen.files import check_writable
 from eomgen.linear.linearise import Linearisation, rate_unit, save
 from eomgen.linear.modes import Mode
 from eomgen.model.model import Model

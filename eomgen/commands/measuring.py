@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.api.accuracy import Accuracy, measure, plan_measurement
 from eomgen.api.inputs import in_formulas
+from eomgen.base.files import check_folder, check_writable
 from eomgen.commands.arithmetic import check_files, print_arithmetic
 from eomgen.commands.shared import (
     Arguments,
@@ -15,7 +16,6 @@ from eomgen.commands.shared import (
     reporter_of,
     scene_with_inputs,
 )
-from eomgen.files import check_folder, check_writable
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_line
 from eomgen.scene.schema import Simulation

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from eomgen.commands.usage import path
-from eomgen.routes import ROUTES
+from eomgen.tables.routes import ROUTES
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:

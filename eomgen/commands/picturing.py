@@ -5,6 +5,8 @@ from pathlib import Path
 from eomgen.api.planning import plan_run
 from eomgen.api.reopening import load_run
 from eomgen.api.simulating import run_plan
+from eomgen.base.errors import RunError
+from eomgen.base.files import check_folder
 from eomgen.commands.shared import (
     Arguments,
     assignments,
@@ -12,8 +14,6 @@ from eomgen.commands.shared import (
     read_whole,
     reporter_of,
 )
-from eomgen.errors import RunError
-from eomgen.files import check_folder
 from eomgen.results import Run
 from eomgen.run.progress import terminal_notice, terminal_progress
 

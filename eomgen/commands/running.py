@@ -12,6 +12,7 @@ from eomgen.api.planning import plan_run
 from eomgen.api.saving import output_paths, save_run
 from eomgen.api.simulating import run_plan
 from eomgen.api.states import state_names
+from eomgen.base.errors import InterruptedRunError, RunError
 from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, warn_of_energy
 from eomgen.commands.shared import (
     Arguments,
@@ -25,7 +26,6 @@ from eomgen.commands.shared import (
     scene_with_inputs,
     shortened,
 )
-from eomgen.errors import InterruptedRunError, RunError
 from eomgen.results import Run
 from eomgen.run.parquet import check_parquet
 from eomgen.run.trajectory import Trajectory

@@ -4,8 +4,8 @@ import argparse
 import re
 from pathlib import Path
 
-from eomgen.errors import RunError
-from eomgen.files import write_whole
+from eomgen.base.errors import RunError
+from eomgen.base.files import write_whole
 from eomgen.scene.built_in import START
 from eomgen.scene.importers import is_robot_file
 from eomgen.scene.reader import LARGEST_FILE, find_scene, parse_scene, scene_text

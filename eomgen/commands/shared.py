@@ -12,8 +12,9 @@ from eomgen.api.given import Outputs, check_name, check_outputs, modelled
 from eomgen.api.inputs import Given, read_table
 from eomgen.api.overlaps import overlaps_at_start
 from eomgen.api.reporter import Reporter
+from eomgen.base.errors import RunError
+from eomgen.base.text import one_line
 from eomgen.commands.durations import timed_notice
-from eomgen.errors import RunError
 from eomgen.language.angles import number_with_unit
 from eomgen.language.base import identifier
 from eomgen.model.inputs import all_inputs
@@ -21,7 +22,6 @@ from eomgen.model.model import Model
 from eomgen.run.progress import terminal_progress
 from eomgen.scene.reader import find_scene, read_scene, scene_text
 from eomgen.scene.schema import Scene
-from eomgen.text import one_line
 
 Arguments = argparse.Namespace
 

@@ -21,6 +21,8 @@ from eomgen.api.sweeping import (
     run_sweep,
     sampled,
 )
+from eomgen.base.errors import InterruptedRunError, RunError, nearest
+from eomgen.base.files import check_folder, check_writable
 from eomgen.commands.shared import (
     Arguments,
     assignments,
@@ -30,8 +32,6 @@ from eomgen.commands.shared import (
     scene_with_inputs,
     shortened,
 )
-from eomgen.errors import InterruptedRunError, RunError, nearest
-from eomgen.files import check_folder, check_writable
 from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import terminal_progress

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from eomgen.errors import nearest
-from eomgen.text import breaks_lines, one_line
-from eomgen.version import __version__
+from eomgen.base.errors import nearest
+from eomgen.base.text import breaks_lines, one_line
+from eomgen.base.version import __version__
 
 
 def path(text: str) -> Path:

@@ -3,8 +3,8 @@
 from eomgen.api.inputs import all_in_formulas
 from eomgen.api.reporter import Reporter
 from eomgen.api.verifying import check_verification, digest, horizon_of, verified_model
+from eomgen.base.errors import InterruptedRunError, RunError
 from eomgen.commands.shared import Arguments, read_whole, reporter_of, scene_with_inputs
-from eomgen.errors import InterruptedRunError, RunError
 
 
 def verify(given: Arguments) -> int:

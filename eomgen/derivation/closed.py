@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.base.errors import SceneError
 from eomgen.derivation.elimination import (
     Collected,
     body_rows,
@@ -17,7 +18,6 @@ from eomgen.derivation.kinematics import Kinematics, differentiate_joints
 from eomgen.derivation.solution import Definition, Solution, gathered, solve
 from eomgen.derivation.supported import off_centre, why_not_pins
 from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
-from eomgen.errors import SceneError
 from eomgen.language.formula import is_zero
 from eomgen.model.model import Model
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.base.errors import SceneError
 from eomgen.derivation.closed import Equations
 from eomgen.derivation.symbols import Expr, over_bodies, over_coordinates
-from eomgen.errors import SceneError
 from eomgen.model.states import State, velocity_states
 from eomgen.scene.joints.base import WORLD
 

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.base.errors import SceneError
 from eomgen.dynamics import constraints
 from eomgen.dynamics.closed_positions import timed
 from eomgen.dynamics.closure import (
@@ -27,7 +28,6 @@ from eomgen.dynamics.closure import (
     settled,
 )
 from eomgen.dynamics.clusters import jacobian_of
-from eomgen.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.scene.joints.base import Coordinate
 

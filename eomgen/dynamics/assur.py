@@ -16,12 +16,12 @@ from itertools import permutations
 
 import numpy as np
 
+from eomgen.base.errors import SceneError
 from eomgen.dynamics.closed_positions import SAFE, reached_positions, relative_pivots, timed
 from eomgen.dynamics.closing import Turn, angle_of, solved
 from eomgen.dynamics.closure import Array, Closure
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.mechanism_state import MechanismState
-from eomgen.errors import SceneError
 from eomgen.language.formula import names_in
 from eomgen.model.groups import Group
 from eomgen.model.model import Model

@@ -47,10 +47,10 @@ from eomgen.dynamics.orthogonal import Elimination
 from eomgen.dynamics.range_space import Forward, RangeSpace, Response
 from eomgen.dynamics.solids import Solid, centres, ranked, solids
 from eomgen.dynamics.vectors import no_matrix, sub, zeros
-from eomgen.routes import ROUTES
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.effects import Effect
+from eomgen.tables.routes import ROUTES
 
 __all__ = ["Dynamics", "Forward", "Values"]
 

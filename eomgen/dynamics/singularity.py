@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eomgen.base.errors import SceneError
 from eomgen.dynamics.articulated import (
     ArticulatedInertia,
     eliminated,
@@ -21,7 +22,6 @@ from eomgen.dynamics.composite import composite_bodies
 from eomgen.dynamics.kinematics import Axes, tree_kinematics
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.vectors import Mat
-from eomgen.errors import SceneError
 from eomgen.language.formula import Constant, Formula
 from eomgen.model.model import Body, Model
 from eomgen.scalars.exact import exactly

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
+from eomgen.base.errors import RunError
 from eomgen.codegen.interface import Function, Interface
-from eomgen.errors import RunError
 from eomgen.exports import Options, Written
 from eomgen.model.model import Model
 from eomgen.program.program import Output, Program, interpreter

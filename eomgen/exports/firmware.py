@@ -8,18 +8,18 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from eomgen.base.errors import SceneError
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.engine import implicit, printed, projection
-from eomgen.errors import SceneError
 from eomgen.exports import Number, Options, Written
 from eomgen.exports.steps import contacts_left_out, method_of, model_for, size_of, start_of, step_of
-from eomgen.integrators import INTEGRATORS
 from eomgen.model.model import Model
 from eomgen.program.ordering import ordered
 from eomgen.store import interfaced_program_of
 from eomgen.subset.expander import Text
 from eomgen.subset.languages import REALS
-from eomgen.templating import render
+from eomgen.tables.integrators import INTEGRATORS
 
 METHOD = "rk4"
 """The method of steps, if no other one is wanted."""

@@ -11,7 +11,7 @@ import sys
 import zipfile
 from collections.abc import Mapping
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.exports import Options, Written
 from eomgen.exports.fmu_description import description_files
 from eomgen.exports.fmu_source import MAIN, sources_of

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from eomgen.base.errors import SceneError
+from eomgen.base.templating import render
+from eomgen.base.text import one_line
 from eomgen.codegen.interface import Variable
-from eomgen.errors import SceneError
 from eomgen.exports.directions import dependencies
 from eomgen.exports.fmu_unit import Unit
 from eomgen.exports.units import exponents
-from eomgen.templating import render
-from eomgen.text import one_line
 
 ATTRIBUTES: Mapping[str, Mapping[str, str]] = {
     "state": {"causality": "output", "variability": "continuous", "initial": "exact"},

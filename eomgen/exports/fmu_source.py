@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 
+from eomgen.base.templating import render, templates_folder
 from eomgen.codegen.backends import c
 from eomgen.engine import contact_runs, contacts
 from eomgen.engine.crossings import MOST_PARTS
@@ -15,7 +16,6 @@ from eomgen.program.ordering import ordered
 from eomgen.program.tape import TIME
 from eomgen.run import events
 from eomgen.subset.languages import C
-from eomgen.templating import render, templates_folder
 
 HEADERS = ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h")
 MAIN = "fmi3-unit.c"

@@ -7,14 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
+from eomgen.base.errors import RunError, SceneError
 from eomgen.codegen.interface import Function, Interface, Variable
-from eomgen.errors import RunError, SceneError
 from eomgen.exports.directions import with_directions
 from eomgen.exports.steps import size_of, start_of
 from eomgen.exports.units import rate_of
 from eomgen.model.model import Model
 from eomgen.native.functions import restricted
-from eomgen.outputs import OUTPUTS
 from eomgen.program.program import Program, interpret
 from eomgen.program.switching import OF_STATE, OF_TIME
 from eomgen.program.tape import TIME
@@ -22,6 +21,7 @@ from eomgen.run.sizes import state_sizes
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Simulation
 from eomgen.store import interfaced_program_of
+from eomgen.tables.outputs import OUTPUTS
 
 ENERGIES = ("kinetic_energy", "potential_energy")
 POSES = "body_poses"

@@ -3,10 +3,11 @@
 import re
 from typing import Any
 
+from eomgen.base.errors import SceneError
+from eomgen.base.templating import render
 from eomgen.codegen.backends import javascript
 from eomgen.codegen.interface import Interface
 from eomgen.engine.printed import text
-from eomgen.errors import SceneError
 from eomgen.exports import Options, Written
 from eomgen.exports.steps import (
     Method,
@@ -19,11 +20,10 @@ from eomgen.exports.steps import (
     sizes_of,
     start_of,
 )
-from eomgen.integrators import INTEGRATORS
 from eomgen.model.model import Model
 from eomgen.store import interfaced_program_of
 from eomgen.subset.languages import JAVASCRIPT
-from eomgen.templating import render
+from eomgen.tables.integrators import INTEGRATORS
 
 METHOD = "rk4"
 """The method of steps, if no other one is wanted."""

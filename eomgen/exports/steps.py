@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+from eomgen.base.errors import RunError, nearest
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine import projection
@@ -15,8 +17,6 @@ from eomgen.engine.printed import METHODS, Root, Roots
 from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import Rodas
 from eomgen.engine.symmetric import Projected
-from eomgen.errors import RunError, nearest
-from eomgen.integrators import INTEGRATORS as SPECS
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
 from eomgen.run.integrators import INTEGRATORS, Adaptive, rattle
@@ -29,7 +29,7 @@ from eomgen.store import generated_code
 from eomgen.subset.expander import Text
 from eomgen.subset.languages import Language
 from eomgen.subset.words import Whole
-from eomgen.templating import render
+from eomgen.tables.integrators import INTEGRATORS as SPECS
 
 _CALLS = {
     "runge_kutta": "system, t, y, h, step",

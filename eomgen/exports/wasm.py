@@ -10,7 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from eomgen.errors import RunError, SceneError
+from eomgen.base.errors import RunError, SceneError
 from eomgen.exports import Options, Written, firmware
 from eomgen.model.model import Model
 

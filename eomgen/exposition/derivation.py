@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from eomgen.base.errors import SceneError
 from eomgen.derivation.closed import Equations, derive
 from eomgen.derivation.elimination import symmetric
 from eomgen.derivation.matrices import Matrices, of_pins, of_projected
@@ -26,7 +27,6 @@ from eomgen.derivation.supported import (
 )
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
-from eomgen.errors import SceneError
 from eomgen.exposition.constraints import (
     DerivedConstraint,
     derived_constraints,

@@ -12,7 +12,7 @@ from eomgen.dynamics.closed_positions import safely_dependent
 from eomgen.exposition.constraints import DerivedConstraint, DerivedRow
 from eomgen.exposition.effects import equations_of
 from eomgen.model.model import Model
-from eomgen.routes import ROUTES
+from eomgen.tables.routes import ROUTES
 
 POSITIONS = (
     "g is what the constraint keeps at 0; x, y, z and p are positions in the world. Its "

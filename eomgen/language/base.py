@@ -18,7 +18,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from eomgen.errors import nearest
+from eomgen.base.errors import nearest
 from eomgen.language.angles import by_unit, radians_of
 
 LONGEST_NAME = 100

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.base import LARGEST
 from eomgen.language.formula import (
     ZERO,

@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from eomgen.errors import nearest
+from eomgen.base.errors import nearest
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scalars.protocol import Scalars
 

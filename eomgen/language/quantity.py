@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from eomgen.errors import SceneError, nearest
+from eomgen.base.errors import SceneError, nearest
 from eomgen.language.angles import radians_of
 from eomgen.language.base import Number, Table
 from eomgen.language.conditions import Condition, of_moving, of_quantity

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.errors import RunError, nearest
+from eomgen.base.errors import RunError, nearest
 from eomgen.linear.linearise import (
     evaluated,
     input_jacobian,

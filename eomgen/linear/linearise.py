@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.errors import RunError
-from eomgen.files import write_whole
+from eomgen.base.errors import RunError
+from eomgen.base.files import write_whole
 from eomgen.linear.manifold import Manifold, is_constrained, manifold
 from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.run.module import GeneratedModule

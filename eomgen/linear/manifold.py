@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.problem import FloatArray
 from eomgen.run.projection import jacobian_of
 from eomgen.run.tangents import tangents

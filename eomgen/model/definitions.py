@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from eomgen.errors import SceneError, nearest
+from eomgen.base.errors import SceneError, nearest
 from eomgen.language.base import Table
 from eomgen.language.formula import CONSTANTS, DEEPEST, Apply, Formula, Name, meant, names_in
 from eomgen.scalars.functions import FUNCTIONS

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from eomgen.errors import SceneError, check_known
+from eomgen.base.errors import SceneError, check_known
 from eomgen.language.conditions import require
 from eomgen.language.formula import ZERO, names_in
 from eomgen.language.quantity import about_slides, of_joint, with_components

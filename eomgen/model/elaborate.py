@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
-from eomgen.errors import SceneError, check_known
+from eomgen.base.errors import SceneError, check_known
 from eomgen.language.conditions import PRINTED, ROUNDING, Condition, of_inertia, require
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import Parameter, with_components
@@ -25,12 +25,12 @@ from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.orientation import oriented
 from eomgen.model.prescribed import locked_values
 from eomgen.model.tree import Link, closes, closing_joints, links_of
-from eomgen.outputs import OUTPUTS
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.chains import written_out
 from eomgen.scene.constraints import Constraint, closing
 from eomgen.scene.effects import Effect
 from eomgen.scene.schema import BodyTable, Scene
+from eomgen.tables.outputs import OUTPUTS
 
 
 def elaborate(scene: Scene) -> Model:

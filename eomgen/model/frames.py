@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeVar
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.formula import Formula
 from eomgen.language.rewriting import difference
 from eomgen.scene.effects.base import EffectTable

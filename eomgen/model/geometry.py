@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.conditions import ROUNDING
 from eomgen.language.formula import ZERO, Formula
 from eomgen.language.quantity import with_components

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from eomgen.errors import SceneError, listed
+from eomgen.base.errors import SceneError, listed
 from eomgen.language.conditions import ROUNDING
 from eomgen.model.model import Body, Prescribed, positions_of, velocities_of
 from eomgen.model.prescribed import values_by_name

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from eomgen.errors import SceneError, listed, nearest
+from eomgen.base.errors import SceneError, listed, nearest
 from eomgen.language.formula import CONSTANTS, Formula, Name, meant, names_in
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scene.chains import written_out

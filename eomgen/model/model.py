@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
 
-from eomgen.displays import Displayed
+from eomgen.base.displays import Displayed
 from eomgen.language.base import FrozenDict
 from eomgen.language.conditions import Condition, require
 from eomgen.language.formula import Constant, Formula, evaluate

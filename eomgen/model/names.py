@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.base import Table
 from eomgen.language.conditions import Condition, require
 from eomgen.language.quantity import Parameter, name_quantities

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from eomgen.errors import SceneError, nearest
+from eomgen.base.errors import SceneError, nearest
 from eomgen.language.angles import degrees_of
 from eomgen.language.base import LARGEST
 from eomgen.language.conditions import Condition, require, value_of

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from eomgen.errors import SceneError, listed, nearest
+from eomgen.base.errors import SceneError, listed, nearest
 from eomgen.language.formula import Formula, names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import Body

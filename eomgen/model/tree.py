@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from eomgen.errors import SceneError, check_known
+from eomgen.base.errors import SceneError, check_known
 from eomgen.model.names import check_names
 from eomgen.scene.chains import written_out
 from eomgen.scene.joints import Joint

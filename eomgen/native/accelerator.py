@@ -20,9 +20,9 @@ from functools import cache, partial
 from threading import RLock
 from typing import Any
 
+from eomgen.base.errors import RunError
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
-from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.native import equal_steps, functions, implicit, rattle, runs, taylor
 from eomgen.native.library import compiled_library, kept_library

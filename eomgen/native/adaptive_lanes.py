@@ -10,6 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c, c_lanes
 from eomgen.codegen.interface import Interface
 from eomgen.engine.embedded import DOP853
@@ -18,7 +19,6 @@ from eomgen.native.lanes import Columns, Lanes, columns_of
 from eomgen.program.program import Program
 from eomgen.run.problem import FloatArray
 from eomgen.subset.words import Row
-from eomgen.templating import render
 
 MAIN = "adaptive_lanes.c"
 PACES = ((10_000.0, 20.0), (100_000.0, 99.0))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 
 FLAGS = ("-std=c99", "-fPIC", "-shared", "-ffp-contract=off", "-fno-math-errno", "-w")
 """No fast mathematics and no contraction: they would change the last bits of results."""

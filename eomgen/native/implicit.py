@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.engine.adaptive import UNUSUAL
 from eomgen.engine.elimination import Factors
@@ -32,7 +33,6 @@ from eomgen.run.integrators.rodas_5p import rodas
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.subset.structures import filled, take
-from eomgen.templating import render
 
 MAIN = "implicit.c"
 NEEDED = ("derivative", "jacobian")

@@ -6,8 +6,8 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from eomgen.base.errors import RunError
 from eomgen.codegen.backends.c import MAIN
-from eomgen.errors import RunError
 from eomgen.native.compiler import FLAGS, find_compiler, suffix
 from eomgen.store import entries_of
 

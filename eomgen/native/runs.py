@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
@@ -30,7 +31,6 @@ from eomgen.run.integrators.strides import OF_CONTACTS, OF_STATE
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.subset.structures import filled, structure
-from eomgen.templating import render
 
 MAIN = "runs.c"
 CHECKS: list[equal_steps.Root] = [(name, {}) for name in ("passed_over", "end_at", "stay_apart")]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c, c_lanes
 from eomgen.codegen.interface import Interface
 from eomgen.engine.printed import c_source
@@ -29,7 +30,6 @@ from eomgen.run.problem import USUAL_LENGTH, FloatArray
 from eomgen.run.projection import PROJECTS, Projection
 from eomgen.store import interfaced_program_of
 from eomgen.subset.languages import VECTORS, C
-from eomgen.templating import render
 
 MAIN = "stepper.c"
 METHODS = ("rk4", *(name for name in equal_steps.METHODS if name != "rk4"))

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.errors import RunError
+from eomgen.base.loading import load_source
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.engine.adaptive import AT_END, UNUSUAL, Bounds, Progress, Records
 from eomgen.engine.taylor import Room, convolved, expanded
-from eomgen.errors import RunError
-from eomgen.loading import load_source
 from eomgen.native.memory import address, placed
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
@@ -23,7 +24,6 @@ from eomgen.run.integrators.taylor import HIGHEST, order_of
 from eomgen.run.module import given_values
 from eomgen.scalars.floats import FloatScalars
 from eomgen.subset.structures import filled, structure
-from eomgen.templating import render
 
 MAIN = "taylor.c"
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.integrators import INTEGRATORS, Adaptive, FixedStep, fixed_step
 from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import FloatArray, Problem

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.errors import RunError, nearest
 from eomgen.engine.sums import Sum, add_compensated
-from eomgen.errors import RunError, nearest
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Change
 from eomgen.run.module import GeneratedModule, load_module

@@ -1,6 +1,6 @@
 """The failure of a step."""
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 
 
 class StepFailure(RunError):

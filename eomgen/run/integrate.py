@@ -52,7 +52,7 @@ def integrate(
 ) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
 
-    integrator  a name in `eomgen.integrators.INTEGRATORS`
+    integrator  a name in `eomgen.tables.integrators.INTEGRATORS`
     dt          step in s of the fixed-step methods, which need it; the last one is shortened
     rtol, atol  tolerances for the error of each step of the adaptive methods. The default of atol
                 is 1e-12 of each state's size in `problem.sizes`, less if rtol is below 1e-9

@@ -8,8 +8,8 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from eomgen.errors import RunError
-from eomgen.loading import load_source
+from eomgen.base.errors import RunError
+from eomgen.base.loading import load_source
 from eomgen.run.closed_form import closed_form_of
 from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise

@@ -4,8 +4,8 @@ import io
 from importlib.util import find_spec
 from pathlib import Path
 
-from eomgen.errors import RunError
-from eomgen.files import write_whole
+from eomgen.base.errors import RunError
+from eomgen.base.files import write_whole
 from eomgen.run.trajectory import Trajectory, table_of
 
 NEEDED = "needs pyarrow; run: pip install 'eomgen[parquet]'"

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.base.errors import RunError
 from eomgen.engine import quaternions
-from eomgen.errors import RunError
 from eomgen.run.closed_form import ClosedForm
 from eomgen.run.compiled import Compiled, Series
 from eomgen.run.intervals import Interval

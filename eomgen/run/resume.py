@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.origin import START, UNITS

@@ -10,8 +10,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.errors import RunError
-from eomgen.files import is_ours, read_plain, write_whole
+from eomgen.base.errors import RunError
+from eomgen.base.files import is_ours, read_plain, write_whole
 from eomgen.run.archive import Array, checked, packed, unpacked
 from eomgen.run.origin import Origin
 from eomgen.run.problem import FloatArray

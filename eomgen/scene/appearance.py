@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from eomgen.errors import SceneError, check_known
+from eomgen.base.errors import SceneError, check_known
 from eomgen.scene.chains import written_out
 from eomgen.scene.look import Camera, Shape, check_look
 from eomgen.scene.schema import Scene

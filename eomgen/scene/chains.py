@@ -1,6 +1,6 @@
 """Expansion of chains: one table of a scene becomes links and revolute joints."""
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.base import LONGEST_NAME
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import with_components

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, get_args
 
 from pydantic import Field
 
-from eomgen.plugins import added_tables
+from eomgen.base.plugins import added_tables
 from eomgen.scene.constraints import AnyConstraint
 from eomgen.scene.constraints.base import ConstraintTable
 from eomgen.scene.effects import Effect

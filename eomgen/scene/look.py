@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field
 
-from eomgen.errors import SceneError, nearest
+from eomgen.base.errors import SceneError, nearest
 from eomgen.language.base import Identifier, Number, Positive, Table
 from eomgen.language.conditions import of_quantity, require
 from eomgen.language.formula import Constant, Formula, names_in

@@ -5,12 +5,12 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from eomgen.errors import SYNONYMS, SceneError, nearest
+from eomgen.base.errors import SYNONYMS, SceneError, nearest
+from eomgen.base.text import brief
 from eomgen.language.base import types_of
 from eomgen.scene.constraints import AnyConstraint
 from eomgen.scene.effects import Effect
 from eomgen.scene.joints import Joint
-from eomgen.text import brief
 
 MOST_MESSAGES = 10
 TABLES = {"joints": Joint, "effects": Effect, "constraints": AnyConstraint}

@@ -8,8 +8,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from eomgen.errors import SceneError, nearest
-from eomgen.files import read_plain
+from eomgen.base.errors import SceneError, nearest
+from eomgen.base.files import read_plain
+from eomgen.base.text import breaks_lines, brief
 from eomgen.language.base import LARGEST
 from eomgen.scene.built_in import BUILT_IN, built_in_names
 from eomgen.scene.importers import import_file, is_robot_file
@@ -17,7 +18,6 @@ from eomgen.scene.importers.imported import Imported
 from eomgen.scene.lines import with_lines
 from eomgen.scene.mistakes import mistakes, shown
 from eomgen.scene.schema import MOST, Scene
-from eomgen.text import breaks_lines, brief
 
 LARGEST_FILE = 2_000_000
 LONGEST_LIST = 10 * MOST

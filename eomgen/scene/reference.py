@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
 
-from eomgen.errors import SceneError, nearest
+from eomgen.base.errors import SceneError, nearest
 from eomgen.language.base import Table, types_of
 from eomgen.language.formula import CONSTANTS, ZERO, Constant, Formula
 from eomgen.language.quantity import of_any_joint

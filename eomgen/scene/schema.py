@@ -12,8 +12,7 @@ from pydantic import (
     ValidationError,
 )
 
-from eomgen.displays import Displayed
-from eomgen.integrators import INTEGRATORS
+from eomgen.base.displays import Displayed
 from eomgen.language.base import (
     AngleOrNumber,
     ByName,
@@ -25,11 +24,12 @@ from eomgen.language.base import (
 )
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity
-from eomgen.outputs import OUTPUTS
-from eomgen.routes import ROUTES
 from eomgen.scene.kinds import AnyConstraint, Effect, Joint
 from eomgen.scene.look import Camera, Shape
 from eomgen.scene.mistakes import mistakes
+from eomgen.tables.integrators import INTEGRATORS
+from eomgen.tables.outputs import OUTPUTS
+from eomgen.tables.routes import ROUTES
 
 MOST = 1000
 """Greatest number of bodies, joints, effects or parameters of a scene."""

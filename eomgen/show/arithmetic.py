@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from eomgen.files import marked, write_whole
+from eomgen.base.files import marked, write_whole
 from eomgen.run.problem import FloatArray
 from eomgen.show.style import FAINT, INK, PALETTE, plain, style, write_figure
 from eomgen.study.cost.arithmetic import Arithmetic, Solver

@@ -10,6 +10,7 @@ from typing import Any
 import sympy as sp
 from markupsafe import Markup
 
+from eomgen.base.templating import render
 from eomgen.derivation.steps import Equation, Step
 from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Model
@@ -21,7 +22,6 @@ from eomgen.show.plain import PlainPrinter, minus_signs, printer
 from eomgen.show.prose import blocks, joined, pieces, signs
 from eomgen.show.sketches import mechanism_sketch
 from eomgen.show.tex import escaped, tex, tex_symbol
-from eomgen.templating import render
 
 WIDTH = 100
 PAGE, PAPER = 124.0, 112.0

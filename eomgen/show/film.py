@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from eomgen.errors import RunError
-from eomgen.files import check_writable, write_whole
+from eomgen.base.errors import RunError
+from eomgen.base.files import check_writable, write_whole
 from eomgen.run.progress import Progress
 from eomgen.show.framing import ASPECT
 from eomgen.show.motion import Array, Motion

@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from eomgen.base.templating import render
 from eomgen.show.motion import Motion, paths, thinned
 from eomgen.show.plane import draw_plane
 from eomgen.show.space import draw_space
 from eomgen.show.style import METADATA, style
 from eomgen.show.view import eye_axes
-from eomgen.templating import render
 
 WIDE, HIGH, DPI = 3.6, 2.7, 120
 """Size of a picture, inches, and its pixels per inch."""

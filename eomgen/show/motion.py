@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.scene.look import BARE, Shape, numbers
 from eomgen.show.framing import Framing, View
 from eomgen.show.of_run import world_points

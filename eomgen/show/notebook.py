@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.model import Model
 from eomgen.show.motion import Motion
 from eomgen.show.page import PageCode, render_page

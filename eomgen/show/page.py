@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.base.errors import RunError
+from eomgen.base.files import write_whole
+from eomgen.base.templating import render, templates_folder
 from eomgen.engine.printed import steps_of_pages
-from eomgen.errors import RunError
-from eomgen.files import write_whole
 from eomgen.show.drawing_data import drawing_data
 from eomgen.show.motion import Array, Motion
 from eomgen.show.picture_data import geometry_values
-from eomgen.templating import render, templates_folder
 
 MOST_NUMBERS = 16_000
 """As many numbers of states as a page holds in double precision, or twice as many in single."""

@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
+from eomgen.base.errors import EomgenError
 from eomgen.codegen.backends.javascript import mechanism
-from eomgen.errors import EomgenError
 from eomgen.language.formula import Formula
 from eomgen.model.model import Model
 from eomgen.run.module import load_module

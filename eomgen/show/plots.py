@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.show.motion import Array, Motion
 from eomgen.show.panels import MOST_CURVES, draw_map, widen
 from eomgen.show.plane import draw_plane

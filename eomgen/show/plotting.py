@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.trajectory import Trajectory
 from eomgen.show.motion import Array, Motion, thinned
 from eomgen.show.plots import (

@@ -14,8 +14,8 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from eomgen.errors import RunError
-from eomgen.files import check_writable, write_whole
+from eomgen.base.errors import RunError
+from eomgen.base.files import check_writable, write_whole
 
 # Paul Tol's bright scheme: distinguishable by colour-blind people, and mostly in grey.
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#aa3377", "#ccbb44", "#66ccee")

@@ -12,10 +12,10 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from eomgen.integrators import INTEGRATORS, Kind
 from eomgen.show.style import ALARM, FAINT, INK, colours, plain, style, write_figure
 from eomgen.study.accuracy.ladder import Work, order
 from eomgen.study.accuracy.measure import WRONG
+from eomgen.tables.integrators import INTEGRATORS, Kind
 
 COLOURS = {
     "euler": "#999999",

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.problem import FloatArray
 from eomgen.study.observed import Observed
 from eomgen.study.recording import held_rows

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.model import Model
-from eomgen.outputs import OUTPUTS
 from eomgen.run.trajectory import Trajectory, table_of
+from eomgen.tables.outputs import OUTPUTS
 
 if TYPE_CHECKING:
     import pandas

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.errors import RunError
 from eomgen.dynamics.assembly import assembled
-from eomgen.errors import RunError
 from eomgen.model.elaborate import available_in, elaborate, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.run.module import load_module

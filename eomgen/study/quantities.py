@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.errors import RunError, nearest
+from eomgen.base.errors import RunError, nearest
 from eomgen.model.model import Model
-from eomgen.outputs import OUTPUTS
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.study.observed import Observed
 from eomgen.study.recording import FOLLOWING, GROUPS, SAVED, held_rows, labels_of
 from eomgen.study.whole import following
+from eomgen.tables.outputs import OUTPUTS
 
 ENERGIES: Mapping[str, str] = {
     "kinetic": "kinetic_energy",

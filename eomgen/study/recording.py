@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from eomgen.model.model import Model
-from eomgen.outputs import DERIVATIVES, OUTPUTS, Size
 from eomgen.run.trajectory import Saved, Trajectory
 from eomgen.study.whole import following
+from eomgen.tables.outputs import DERIVATIVES, OUTPUTS, Size
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     **{

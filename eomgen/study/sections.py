@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eomgen.errors import RunError, listed, nearest
+from eomgen.base.errors import RunError, listed, nearest
 from eomgen.language.formula import Formula, FormulaError, evaluate, names_in, parse
 from eomgen.run.problem import FloatArray
 from eomgen.scalars.floats import ArrayScalars

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.model import Model
-from eomgen.outputs import OUTPUTS
 from eomgen.run.problem import FloatArray
+from eomgen.tables.outputs import OUTPUTS
 
 OWN = (
     "constraint_residuals",

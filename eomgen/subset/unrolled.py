@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
-from eomgen.loading import load_source
+from eomgen.base.loading import load_source
 from eomgen.subset.expander import NotInSubsetError, Text, called
 from eomgen.subset.kinds import Kind, Kinds, given_function, of_annotation
 

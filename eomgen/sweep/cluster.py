@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
+from eomgen.base.text import one_line
 from eomgen.store import this_program
 from eomgen.sweep.members import Arrays, Task
 from eomgen.sweep.processes import Job
 from eomgen.sweep.together import run_chunk
-from eomgen.text import one_line
 
 CONNECTING, ALONE = 10.0, 30.0
 """Longest times until a scheduler answers, and without a worker, s."""

@@ -7,7 +7,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 

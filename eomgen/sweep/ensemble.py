@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.errors import RunError, nearest
+from eomgen.base.errors import RunError, nearest
 from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 from eomgen.study.labelled import need_package

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.base.text import one_line
 from eomgen.sweep.members import Arrays, Task, module_of, output_shape
-from eomgen.text import one_line
 
 
 class Column(NamedTuple):

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.errors import EomgenError
+from eomgen.base.errors import EomgenError
 from eomgen.model.model import Model
 from eomgen.native.accelerator import Accelerator
 from eomgen.native.needed import needed_by

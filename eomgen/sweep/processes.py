@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.sweep.counter import SIZE, Counter, StoppedError
 from eomgen.sweep.members import Arrays, Task
 from eomgen.sweep.together import run_chunk

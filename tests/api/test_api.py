@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.pipeline import compile_program
 from eomgen.run.trajectory import Outcome, load_npz
 from eomgen.scene.reader import BUILT_IN

@@ -14,8 +14,8 @@ import pytest
 from campaign import some
 from digests import SUMS, known
 
-from eomgen.cli import main
-from eomgen.files import remove_ours
+from eomgen.base.files import remove_ours
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene
 from eomgen.store import generated_code
@@ -150,7 +150,7 @@ def test_a_run_without_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert main(run) == 0
     assert len(list(tmp_path.iterdir())) == 5
     code = (
-        "import sys; from eomgen.cli import main; code = main(sys.argv[1:]); "
+        "import sys; from eomgen.commands.main import main; code = main(sys.argv[1:]); "
         "sys.exit(code or 10 * ('scipy' in sys.modules or 'matplotlib' in sys.modules))"
     )
     subprocess.run([sys.executable, "-c", code, *run, "--no-pictures"], check=True)

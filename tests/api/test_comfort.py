@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import eomgen
-from eomgen.cli import main
 from eomgen.commands import durations, generating
+from eomgen.commands.main import main
 from eomgen.commands.table import COMMANDS
 from eomgen.run import progress
 from eomgen.scene.built_in import BUILT_IN

@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 
 import eomgen
-from eomgen.cli import main
-from eomgen.files import is_ours, write_whole
+from eomgen.base.files import is_ours, write_whole
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.run.trajectory import save_csv, save_npz
 from eomgen.scene.appearance import appearance_of

@@ -14,8 +14,8 @@ from typing import Any, BinaryIO
 import pytest
 
 import eomgen
-from eomgen.cli import main
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
+from eomgen.commands.main import main
 from eomgen.native import compiler
 from eomgen.scene.importers.meshes import local
 from eomgen.sweep import processes, storage

@@ -67,13 +67,13 @@ EDITS = {
         ],
     },
     "an output": {
-        "eomgen/outputs.py": [('    "kinetic_slopes": ', f'    "energy_again": {AGAIN},')],
+        "eomgen/tables/outputs.py": [('    "kinetic_slopes": ', f'    "energy_again": {AGAIN},')],
         "eomgen/codegen/from_recursion.py": [
             ('    "coordinates": ', '    "energy_again": lambda r: [r.dynamics.kinetic_energy],')
         ],
     },
     "a route": {
-        "eomgen/routes.py": [
+        "eomgen/tables/routes.py": [
             ('    "aba": ', '    "twin": RouteSpec("as aba", "articulated", trees=True),')
         ],
     },
@@ -86,7 +86,7 @@ EDITS = {
     },
     "an integrator": {
         "eomgen/run/integrators/heun.py": OURS / "methods.py",
-        "eomgen/integrators.py": [
+        "eomgen/tables/integrators.py": [
             ('    "euler": ', '    "heun": IntegratorSpec("Heun", "explicit", "heun:HEUN"),')
         ],
     },
@@ -105,7 +105,7 @@ COMMANDS = [
 ]  # fmt: skip
 RUN = """
 import sys
-from eomgen.cli import main
+from eomgen.commands.main import main
 for line in sys.argv[1:]:
     code = main(line.split())
     assert code == 0, (line, code)

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from eomgen.errors import RunError, SceneError, nearest
+from eomgen.base.errors import RunError, SceneError, nearest
 from eomgen.model.elaborate import elaborate
-from eomgen.outputs import OUTPUTS
 from eomgen.pipeline import compile_program
 from eomgen.program.program import cost
 from eomgen.run.integrators import find_integrator
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.study.cost.bill import difference
+from eomgen.tables.outputs import OUTPUTS
 
 ROOT = Path(__file__).parent.parent.parent
 POLE = """

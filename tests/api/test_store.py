@@ -20,10 +20,10 @@ import pytest
 from campaign import some
 
 import eomgen
-import eomgen.entries
+import eomgen.base.entries
 from eomgen import store
-from eomgen.cli import main
-from eomgen.entries import LARGEST, LONGEST_UNUSED, LONGEST_WRITING, Entries
+from eomgen.base.entries import LARGEST, LONGEST_UNUSED, LONGEST_WRITING, Entries
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.native import library
@@ -212,13 +212,13 @@ def test_what_belongs_to_another_user_is_not_used(
         about = asked(handle)
         return os.stat_result((*about[:4], theirs, *about[5:]))
 
-    monkeypatch.setattr(eomgen.entries.os, "fstat", fstat)
+    monkeypatch.setattr(eomgen.base.entries.os, "fstat", fstat)
     assert Entries(folder).get(entry.stem) is None
     assert generated(tmp_path) == RIGHT
     monkeypatch.undo()
     monkeypatch.setenv("EOMGEN_CACHE", str(folder))
     wrong(entry)
-    monkeypatch.setattr(eomgen.entries.os, "geteuid", lambda: theirs)
+    monkeypatch.setattr(eomgen.base.entries.os, "geteuid", lambda: theirs)
     assert generated(tmp_path) == RIGHT
     assert "it belongs to another user; name a folder of your own in" in capsys.readouterr().err
 
@@ -293,7 +293,8 @@ def test_an_attack_takes_no_memory(folder: Path, tmp_path: Path) -> None:
     _sparse(entry_of(folder, "pendulum"))
     code = (
         "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (2 * 2**30,) * 2); "
-        "from eomgen.cli import main; sys.exit(main(['generate', 'pendulum', '-o', sys.argv[1]]))"
+        "from eomgen.commands.main import main; "
+        "sys.exit(main(['generate', 'pendulum', '-o', sys.argv[1]]))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code, str(tmp_path)],
@@ -377,7 +378,7 @@ def test_writers_at_once(tmp_path: Path) -> None:
     behind.
     """
     code = (
-        "import sys; from pathlib import Path; from eomgen.entries import Entries\n"
+        "import sys; from pathlib import Path; from eomgen.base.entries import Entries\n"
         "entries, byte = Entries(Path(sys.argv[1])), bytes([int(sys.argv[2])])\n"
         "for _ in range(100):\n"
         f"    assert entries.put({KEY!r}, byte * 100_000) == ''\n"
@@ -396,7 +397,7 @@ def test_a_killed_writer_leaves_the_store_sound(tmp_path: Path) -> None:
     entries = Entries(tmp_path / "store")
     assert entries.put(KEY, b"whole") == ""
     code = (
-        "import sys; from pathlib import Path; from eomgen.entries import Entries\n"
+        "import sys; from pathlib import Path; from eomgen.base.entries import Entries\n"
         "entries = Entries(Path(sys.argv[1])); print(flush=True)\n"
         f"while True: entries.put({KEY!r}, b'x' * 30_000_000)"
     )
@@ -436,9 +437,9 @@ def test_a_full_disk_leaves_the_store_sound(
         os.close(handle)
         return Path("/dev/full").open(mode, buffering=0)
 
-    monkeypatch.setattr(eomgen.entries.os, "fdopen", full)
+    monkeypatch.setattr(eomgen.base.entries.os, "fdopen", full)
     capsys.readouterr()
-    monkeypatch.setattr("eomgen.files.write_whole", None)
+    monkeypatch.setattr("eomgen.base.files.write_whole", None)
     assert store.generated_code(model_of("two_body")).notice == (
         f"the store {folder} is not used: it cannot be written: {os.strerror(errno.ENOSPC)}"
     )
@@ -494,14 +495,14 @@ def test_old_entries_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
     assert entries.put(OTHER, b"x") == ""
     assert kept() == sorted([*keys[:1], *keys[2:], OTHER])
-    monkeypatch.setattr(eomgen.entries, "MOST_BYTES", 3000)
+    monkeypatch.setattr(eomgen.base.entries, "MOST_BYTES", 3000)
     assert entries.put(OTHER, b"x") == ""
     assert kept() == sorted([keys[0], keys[5], OTHER]), "the last used ones"
 
 
 def test_what_is_too_large_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And is no trouble: it is derived each time."""
-    monkeypatch.setattr(eomgen.entries, "LARGEST", 1000)
+    monkeypatch.setattr(eomgen.base.entries, "LARGEST", 1000)
     entries = Entries(tmp_path / "store")
     assert entries.put(KEY, b"x" * 1000) == "" and entries.get(KEY) is None
     assert entries.put(KEY, b"x" * 500) == "" and entries.get(KEY) == b"x" * 500

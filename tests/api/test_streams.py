@@ -18,11 +18,11 @@ from typing import Any
 import pytest
 from campaign import some
 
-import eomgen.files
-from eomgen.cli import main, parsers
-from eomgen.files import write_whole
-from eomgen.streams import Steady, steady_streams
-from eomgen.text import spelled
+import eomgen.base.files
+from eomgen.base.files import write_whole
+from eomgen.base.streams import Steady, steady_streams
+from eomgen.base.text import spelled
+from eomgen.commands.main import main, parsers
 
 EOMGEN = (sys.executable, "-m", "eomgen")
 QUICK = "--no-arithmetic --quick --methods rk4 --t-end 0.1 --run-time 1"
@@ -385,7 +385,7 @@ def test_a_file_is_whole_or_not_there(tmp_path: Path, before: bytes | None) -> N
 
         def stopping(frame: FrameType, event: str, given: object, last: int = last) -> Any:
             nonlocal lines
-            if frame.f_code.co_filename != eomgen.files.__file__:
+            if frame.f_code.co_filename != eomgen.base.files.__file__:
                 return None
             lines += event == "line"
             if lines == last:
@@ -445,8 +445,8 @@ def run():
 def test_a_stop_counts_whatever_is_made_of_it(command: str, said: bytes) -> None:
     """Lost, turned into another error, or swallowed by a library."""
     code = (
-        "import signal, sys, time\nimport eomgen.__main__, eomgen.cli\n"
-        f"{command}\neomgen.cli.main = run\nsys.exit(eomgen.__main__.main())"
+        "import signal, sys, time\nimport eomgen.__main__, eomgen.commands.main\n"
+        f"{command}\neomgen.commands.main.main = run\nsys.exit(eomgen.__main__.main())"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], check=False, capture_output=True, timeout=90

@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eomgen.cli import main
-from eomgen.errors import RunError, SceneError
-from eomgen.files import read_plain
+from eomgen.base.errors import RunError, SceneError
+from eomgen.base.files import read_plain
+from eomgen.base.streams import steady_streams
+from eomgen.base.text import LONGEST_LINE
+from eomgen.commands.main import main
 from eomgen.run.module import load_module
 from eomgen.run.progress import terminal_progress
 from eomgen.run.trajectory import load_npz
 from eomgen.scene.reader import BUILT_IN
-from eomgen.streams import steady_streams
-from eomgen.text import LONGEST_LINE
 
 
 @pytest.fixture

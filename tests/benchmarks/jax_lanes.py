@@ -23,7 +23,7 @@ import numpy as np
 
 import eomgen
 from eomgen.api.given import check, read
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.store import interfaced_program_of
 
 DT = 1e-3

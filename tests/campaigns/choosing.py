@@ -27,7 +27,7 @@ sys.path.append(str(Path(__file__).parent.parent))
 
 from accuracy_scenes import SCENES, closed_end, text
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.elaborate import elaborate
 from eomgen.run.module import load_module
 from eomgen.run.problem import FloatArray

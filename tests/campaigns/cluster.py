@@ -20,7 +20,7 @@ import pytest
 from dask.distributed import LocalCluster
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.sweep import cluster
 from eomgen.sweep.storage import Storage
 

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from eomgen.errors import EomgenError
+from eomgen.base.errors import EomgenError
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 

@@ -10,11 +10,11 @@ import argparse
 import ctypes
 import sys
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.native import lanes
 from eomgen.native.compiler import NOT_JOINED
 from eomgen.native.library import compiled_library
-from eomgen.templating import render
 
 MAIN = """
 #include <math.h>

@@ -13,11 +13,11 @@ from campaign import some
 from engine import Engine, engine
 
 import eomgen
-from eomgen.cli import main
+from eomgen.base.errors import RunError
 from eomgen.codegen import kernels
 from eomgen.codegen.backends import BACKENDS
 from eomgen.codegen.interface import interface_of
-from eomgen.errors import RunError
+from eomgen.commands.main import main
 from eomgen.pipeline import python_module
 from eomgen.run.module import load_module
 from eomgen.scalars.functions import BY_MATH

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 SCENE = """\

@@ -11,7 +11,7 @@ from campaign import some
 from mechanisms import BUILT_IN, SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
 from newton_euler import Mechanism, Motion, solve
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.pipeline import compile_scene
 from eomgen.scene.reader import parse_scene
 

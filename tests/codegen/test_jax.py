@@ -10,7 +10,7 @@ import pytest
 from campaign import some
 
 import eomgen
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.study.verification.states import random_state
 from eomgen.sweep import processes
 

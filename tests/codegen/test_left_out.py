@@ -12,11 +12,11 @@ from campaign import some
 from engine import DERIVATIVES, along, apart, engine, exact
 from spatial_trees import PLANE, SPACE, random_spatial_tree
 
-from eomgen.cli import main
+from eomgen.base.errors import SceneError
 from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.interface import interface_of
+from eomgen.commands.main import main
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.errors import SceneError
 from eomgen.linear.equilibrium import equilibrium
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate

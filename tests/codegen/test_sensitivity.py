@@ -15,13 +15,13 @@ from spatial_trees import random_spatial_tree
 
 from eomgen.dynamics.assembly import assembled
 from eomgen.model.elaborate import elaborate
-from eomgen.outputs import OUTPUTS
 from eomgen.pipeline import compile_program, python_module
 from eomgen.program.extended import evaluator
 from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
 from eomgen.scene.reader import read_scene
 from eomgen.study.verification.hard_states import hard_states
+from eomgen.tables.outputs import OUTPUTS
 
 ROUNDING = 1e-12
 EXACT = 1e-13

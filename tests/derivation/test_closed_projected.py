@@ -16,11 +16,12 @@ from engine import MP
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 import eomgen.derivation.projected
-from eomgen.cli import main
+from eomgen.base.errors import SceneError
 from eomgen.codegen.from_closed_form import from_closed_form, of_projected
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System
+from eomgen.commands.main import main
 from eomgen.derivation.projected.constraints import about, hat, of_quaternion, state_joints
 from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected
 from eomgen.derivation.projected.simplify import gathered, sum_of_squares
@@ -28,7 +29,6 @@ from eomgen.derivation.projected.steps import projected_steps
 from eomgen.derivation.projected.symbols import Ledger, make_symbols, rate
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_model, compile_program

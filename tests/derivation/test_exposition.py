@@ -16,7 +16,7 @@ from effect_cases import CASES, TRIED, Case
 from followed import follow_effects, follow_recursion, instant
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.derivation.dots import dotted
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics

@@ -15,11 +15,11 @@ import pytest
 from aligned_trees import Case, case, exactly, names, nearby, scene
 from campaign import some
 
+from eomgen.base.errors import SceneError
 from eomgen.codegen.choice import ENOUGH, FEWEST
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, generate
 from eomgen.precision.extended import doubles, extended_digits

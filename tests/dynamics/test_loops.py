@@ -17,18 +17,18 @@ from loop_routes import apart_by_route, model_of, solved
 from spatial_loops import Closed, random_loops
 from spatial_trees import PLANE, SPACE
 
+from eomgen.base.errors import SceneError
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.constraints import rates, residuals
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
-from eomgen.outputs import OUTPUTS
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
 from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import parse_scene
+from eomgen.tables.outputs import OUTPUTS
 
 CASES = [(PLANE, 5, 0), (PLANE, 7, 1), (PLANE, 8, 3), (SPACE, 5, 1), (SPACE, 6, 2), (SPACE, 6, 3)]
 """Dimensions, most bodies, seed."""

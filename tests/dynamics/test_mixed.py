@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from spatial_trees import random_spatial_tree, random_state
 
+from eomgen.base.errors import SceneError
 from eomgen.codegen.choice import choose
 from eomgen.codegen.derive import derive
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.mixed import well_conditioned
 from eomgen.dynamics.orthogonal import Elimination
 from eomgen.dynamics.solids import ranked
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.program import cost

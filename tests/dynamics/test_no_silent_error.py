@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scaled_trees import apart, drawn, dynamics, found, size_of, state, truth
 
 import eomgen
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.pipeline import Compiled, compile_program
 from eomgen.scalars.extended import Bits, sixty_digits

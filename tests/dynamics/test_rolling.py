@@ -16,10 +16,10 @@ from scipy.integrate import quad
 from scipy.special import ellipj, ellipk
 from whipple import PRINTED, SPEEDS, TABLE, appendix, linearised, matrices, tangents
 
+from eomgen.base.errors import SceneError
 from eomgen.dynamics import constraints
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.mechanism_state import MechanismState, Values
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import generate

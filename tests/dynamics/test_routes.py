@@ -28,10 +28,10 @@ from eomgen.dynamics.regrouping import RegroupedDynamics
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import generate
-from eomgen.routes import ROUTES, RouteSpec
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.study.verification.routes import compiled as all_routes
+from eomgen.tables.routes import ROUTES, RouteSpec
 
 SEEDS = range(some(54, 150))
 MOST = (6, 14, 30)

@@ -20,16 +20,16 @@ from scipy.optimize import brentq
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
-from eomgen.cli import main
+from eomgen.base.errors import SceneError
+from eomgen.commands.main import main
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
-from eomgen.outputs import OUTPUTS
 from eomgen.pipeline import compile_program, python_module
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Contact, JointLoad, Load
 from eomgen.scene.effects.vectors import NEAREST
 from eomgen.scene.reader import parse_scene
+from eomgen.tables.outputs import OUTPUTS
 
 M, R, G = 2.0, 0.25, 9.81
 KEPT = ("applied_force", "kinetic_energy", "potential_energy", "momentum")

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from spatial_newton_euler import solve
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.run.module import load_module

@@ -7,7 +7,7 @@ from engine import Engine, apart, engine, plain, quick
 from scipy.integrate import solve_ivp
 from spatial_trees import PLANE, SPACE
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.scene.reader import parse_scene, read_scene

@@ -5,7 +5,7 @@ import pytest
 from engine import engine, plain, quick
 from scipy.integrate import solve_ivp
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene
 from eomgen.run.integrate import integrate

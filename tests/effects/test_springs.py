@@ -17,14 +17,14 @@ from scipy.integrate import solve_ivp
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
+from eomgen.base.errors import SceneError
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
-from eomgen.outputs import OUTPUTS
 from eomgen.pipeline import compile_program, python_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.vectors import NEAREST
 from eomgen.scene.reader import parse_scene
+from eomgen.tables.outputs import OUTPUTS
 
 EXACT = 1e-12
 KEPT = ("applied_force", "kinetic_energy", "potential_energy", "momentum")

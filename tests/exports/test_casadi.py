@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 
 CORNERS: dict[str, Any] = {
     "name": "corners",

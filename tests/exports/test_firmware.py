@@ -9,8 +9,8 @@ from crank_rocker import four_bar
 from firmware import Firmware
 
 import eomgen
+from eomgen.base.errors import RunError
 from eomgen.engine.printed import EQUAL
-from eomgen.errors import RunError
 from eomgen.exports import Number
 from eomgen.exports.firmware import ERRORS, FARTHEST
 

@@ -15,9 +15,9 @@ from fmpy.validation import validate_fmu
 from importer import begun, exchanged, instance
 
 import eomgen
-from eomgen.cli import main
+from eomgen.base.errors import RunError, SceneError
+from eomgen.commands.main import main
 from eomgen.engine.printed import METHODS
-from eomgen.errors import RunError, SceneError
 from eomgen.exports.fmu_unit import ENERGIES
 from eomgen.exports.units import exponents, rate_of
 from eomgen.native import compiler

@@ -10,8 +10,8 @@ import pytest
 from test_casadi import CORNERS
 
 import eomgen
-from eomgen.cli import main
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
+from eomgen.commands.main import main
 from eomgen.scalars.functions import BY_MATH
 
 SCENES = ("cart_pole", "tumbling_body", "bouncing_two_body", "four_bar", CORNERS)

@@ -14,7 +14,7 @@ from firmware import Firmware
 from live import NODE, run_in_node
 
 import eomgen
-from eomgen.errors import RunError, SceneError
+from eomgen.base.errors import RunError, SceneError
 
 STEPS = """
 const module = new WebAssembly.Module(Buffer.from(given.module, "base64"));

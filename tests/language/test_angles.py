@@ -8,7 +8,7 @@ import pytest
 from campaign import some
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.language.conditions import value_of
 from eomgen.language.formula import parse
 from eomgen.scalars.exact import orientation

@@ -8,8 +8,8 @@ import pytest
 from campaign import some
 from engine import quick
 
-from eomgen.cli import main
-from eomgen.errors import RunError, SceneError
+from eomgen.base.errors import RunError, SceneError
+from eomgen.commands.main import main
 from eomgen.language.conditions import of_inertia
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import elaborate

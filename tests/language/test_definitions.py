@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
+from eomgen.base.errors import SceneError
 from eomgen.codegen.recording import Recording
-from eomgen.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene
 from eomgen.run.module import load_module

@@ -12,8 +12,8 @@ import pytest
 from campaign import some
 from engine import plain, quick
 
+from eomgen.base.errors import SceneError
 from eomgen.codegen.backends.javascript import DIALECT
-from eomgen.errors import SceneError
 from eomgen.language import formula as reader
 from eomgen.language.formula import (
     Apply,

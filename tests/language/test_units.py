@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.json_schema import json_schema

@@ -9,7 +9,7 @@ import pytest
 from campaign import some
 
 import eomgen
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.native import accelerator
 from eomgen.results import Run
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8

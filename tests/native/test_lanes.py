@@ -14,6 +14,7 @@ from campaign import some
 
 import eomgen
 from eomgen.api.given import check, read
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.model.elaborate import in_order
 from eomgen.native import compiler, lanes
@@ -24,7 +25,6 @@ from eomgen.run.sine import cosine, sine
 from eomgen.scene.built_in import built_in_names
 from eomgen.store import generated_code, interfaced_program_of
 from eomgen.study.verification.states import random_state
-from eomgen.templating import render
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 pytestmark = pytest.mark.skipif(CC is None, reason="there is no C compiler")

@@ -20,10 +20,10 @@ from campaign import some
 
 import eomgen
 from eomgen.api.given import check, read
-from eomgen.cli import main
+from eomgen.base.errors import RunError
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import interface_of
-from eomgen.errors import RunError
+from eomgen.commands.main import main
 from eomgen.native import compiler, library
 from eomgen.native.module import compiled_module
 from eomgen.pipeline import compile_program, python_module

@@ -14,8 +14,8 @@ from unittest.mock import patch
 import pages
 import pytest
 
-from eomgen.cli import main
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
+from eomgen.commands.main import main
 from eomgen.language.base import Table
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.appearance import appearance_of

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from campaign import FULL, some
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.pipeline import compile_scene
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, Adaptive

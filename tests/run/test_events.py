@@ -8,11 +8,11 @@ import pytest
 from campaign import some
 from scipy.optimize import brentq
 
+from eomgen.base.errors import RunError
 from eomgen.engine import contact_runs
 from eomgen.engine.contact_times import first_zero
 from eomgen.engine.contacts import TOLERANCE
 from eomgen.engine.roots import Search
-from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.problem import Contacts, Problem

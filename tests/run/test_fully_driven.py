@@ -9,7 +9,7 @@ import pytest
 from live import NODE, run_in_node
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.show.live import live_table
 from eomgen.show.page import render_page
 from eomgen.store import live_code

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eomgen.cli import main
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, python_module
 from eomgen.precision.guarding import guard_of

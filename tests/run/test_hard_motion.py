@@ -11,7 +11,7 @@ from bookkeeping import light
 from campaign import some
 from engine import read
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.pipeline import compile_scene
 from eomgen.run.archive import checked, packed, unpacked
 from eomgen.run.integrate import integrate

@@ -10,8 +10,8 @@ import pytest
 from bookkeeping import light
 
 import eomgen
-from eomgen.cli import main
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
+from eomgen.commands.main import main
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
 from eomgen.run.problem import Problem

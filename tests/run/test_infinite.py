@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from engine import engine
 
-from eomgen.cli import main
+from eomgen.base.errors import RunError
+from eomgen.commands.main import main
 from eomgen.dynamics.diagnostics import effect_sizes, is_singular, values_at
-from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.module import as_problem

@@ -10,7 +10,7 @@ from campaign import some
 from scipy.integrate import solve_ivp
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.run.inputs import Table
 from eomgen.run.intervals import Interval
 

@@ -16,10 +16,10 @@ from campaigns import energy
 from scipy.integrate import DOP853, RK45, solve_ivp
 from scipy.special import ellipj, ellipk
 
+from eomgen.base.errors import RunError
 from eomgen.engine import dop853_coefficients as coefficients
 from eomgen.engine.explicit import RUNGE_KUTTA_4 as TABLEAU
 from eomgen.engine.tableau import ButcherTableau, density, size, trees
-from eomgen.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import (
     INTEGRATORS,

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 import eomgen
 from eomgen.api.given import check
-from eomgen.cli import main
+from eomgen.base.errors import RunError, SceneError
+from eomgen.commands.main import main
 from eomgen.dynamics.assembly import closed_start
-from eomgen.errors import RunError, SceneError
 from eomgen.run.crossing import crossing
 from eomgen.run.margins import stays_away
 from eomgen.run.module import as_problem

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate

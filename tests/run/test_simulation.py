@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_model

@@ -12,11 +12,11 @@ import pytest
 from languages import Given, results
 
 import eomgen
+from eomgen.base.errors import RunError
+from eomgen.base.loading import load_source
 from eomgen.engine import adaptive
 from eomgen.engine import taylor as engine
 from eomgen.engine.taylor import expanded
-from eomgen.errors import RunError
-from eomgen.loading import load_source
 from eomgen.model.elaborate import elaborate
 from eomgen.native import taylor
 from eomgen.native.library import compiled_library

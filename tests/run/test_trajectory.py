@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.archive import checked, packed, unpacked
 from eomgen.run.origin import Origin
 from eomgen.run.setup import Setup

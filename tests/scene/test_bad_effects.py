@@ -10,8 +10,8 @@ from typing import Any, get_args
 
 import pytest
 
-from eomgen.cli import main
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
+from eomgen.commands.main import main
 from eomgen.language.formula import Formula
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.effects import Effect

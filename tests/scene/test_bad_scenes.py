@@ -10,7 +10,7 @@ import pytest
 from mechanisms import load
 from newton_euler import Mechanism, solve
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene
 from eomgen.scalars.exact import direction

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from engine import MP, Engine, along, apart, exact, plain, quick
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene
 

@@ -9,7 +9,7 @@ import pytest
 from campaign import some
 from fuzzing import Failure, outcome, tried
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.scene.reader import find_scene
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.scene.built_in import BUILT_IN
 from eomgen.scene.lines import line_of, lines_of, with_lines
 

@@ -10,7 +10,7 @@ import pytest
 from mjcf_states import Comparison
 
 import eomgen
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.importers import import_file
 from eomgen.scene.importers.imported import Wishes

@@ -11,10 +11,10 @@ import robot_files
 from campaign import some
 from robot_files import KINDS, Kind
 
-from eomgen.cli import main
+from eomgen.base.text import LONGEST_LINE
+from eomgen.commands.main import main
 from eomgen.scene.importers.mjcf import compiled
 from eomgen.scene.importers.mjcf.compiler import compile_file
-from eomgen.text import LONGEST_LINE
 
 MUTANTS = some(120, 5000)
 

@@ -10,7 +10,7 @@ import pytest
 from robot_files import GOOD_URDF
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.scene.importers.rotations import angles_of, rotation, squared, to_axis
 
 LINK = """<link name="{name}"><inertial>

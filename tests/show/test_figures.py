@@ -15,9 +15,9 @@ from PIL import Image
 from test_show import swinging
 
 import eomgen
-from eomgen.cli import main
-from eomgen.errors import RunError
-from eomgen.files import is_ours
+from eomgen.base.errors import RunError
+from eomgen.base.files import is_ours
+from eomgen.commands.main import main
 from eomgen.run.trajectory import load_npz, save_npz
 from eomgen.scene.reader import built_in_names, read_scene, read_tables
 from eomgen.scene.tables import tables_of

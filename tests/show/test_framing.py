@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import eomgen
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate, expanded
 from eomgen.scene.appearance import Appearance, appearance_of
 from eomgen.scene.look import Camera, Sphere

@@ -9,8 +9,8 @@ import pytest
 
 import eomgen
 from eomgen.api import exhibiting
-from eomgen.cli import main
-from eomgen.files import is_ours
+from eomgen.base.files import is_ours
+from eomgen.commands.main import main
 
 NASTY = "</style><script>alert(1)</script><img src=x onerror=alert(1)>"
 SCENE = """

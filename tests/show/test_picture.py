@@ -10,7 +10,7 @@ import pytest
 from effect_cases import CASES, Case
 
 import eomgen
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.formula import Constant
 from eomgen.language.rewriting import plain_data
 from eomgen.model.elaborate import elaborate, expanded

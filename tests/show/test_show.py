@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 from matplotlib.text import Text
 
-from eomgen import templating
-from eomgen.cli import main
-from eomgen.errors import RunError
-from eomgen.files import is_ours
+from eomgen.base import templating
+from eomgen.base.errors import RunError
+from eomgen.base.files import is_ours
+from eomgen.commands.main import main
 from eomgen.run.trajectory import load_npz
 from eomgen.scene.look import Box, Disc, Polygon, Rod, numbers
 from eomgen.show.figure import draw_motion, save_figure
@@ -247,7 +247,7 @@ def test_what_showing_needs() -> None:
     )
     loaded = set(output.stdout.split())
     # pyplot wants a display; the rest would turn the way from scene to picture around.
-    assert not loaded & {"matplotlib.pyplot", "sympy", "eomgen.cli", "eomgen.pipeline"}
+    assert not loaded & {"matplotlib.pyplot", "sympy", "eomgen.commands.main", "eomgen.pipeline"}
     rooms = {"derivation", "program", "backends", "run", "study"}
     assert not {name for name in loaded if name.startswith("eomgen.")} & {
         f"eomgen.{r}" for r in rooms

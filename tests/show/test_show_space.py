@@ -11,7 +11,7 @@ import pytest
 from matplotlib.text import Text
 from pydantic import TypeAdapter
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.scene.joints.base import Primitive
 from eomgen.scene.look import BARE, Box, Camera, Cylinder, Ellipsoid, Rod, Shape, Sphere, check_look
 from eomgen.show.figure import draw_motion, save_figure

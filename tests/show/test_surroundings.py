@@ -14,7 +14,7 @@ from matplotlib.path import Path as Outline
 from test_show import panel, swinging
 from test_show_space import sliding
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene
 from eomgen.show.balance import keeps_energy, works_by_type

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import same_color
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import COUNTS, Trajectory

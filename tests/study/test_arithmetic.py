@@ -13,15 +13,14 @@ import numpy as np
 import pytest
 from engine import MP, Digits, apart, exact, read
 
-from eomgen.cli import main
 from eomgen.codegen.system import System
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
 from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, Program, finish, interpret
 from eomgen.program.tape import TIME, ExactTape, Stage, Tape
-from eomgen.routes import routes_for
 from eomgen.run.module import load_module
 from eomgen.scalars.functions import BY_MATH, FUNCTIONS
 from eomgen.scene.schema import Simulation
@@ -39,6 +38,7 @@ from eomgen.study.verification.sampled import sampled
 from eomgen.study.verification.states import random_state
 from eomgen.study.verification.truth import Truth
 from eomgen.study.verification.ulps import component_errors, ulp, vector_errors
+from eomgen.tables.routes import routes_for
 
 ROD = """
 name = "rod"

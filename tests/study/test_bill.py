@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.module import load_module

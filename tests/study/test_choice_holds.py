@@ -16,7 +16,7 @@ from accuracy_scenes import closed_end, text
 from campaign import thinned
 from mpmath import mp, mpf
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.run.checks import allowed_errors

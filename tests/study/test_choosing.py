@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.run.integrators.interface import SMALLEST_RTOL
 from eomgen.run.module import load_module

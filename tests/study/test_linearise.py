@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from eomgen.cli import main
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
+from eomgen.commands.main import main
 from eomgen.linear.equilibrium import equilibrium
 from eomgen.linear.linearise import linearise
 from eomgen.linear.modes import controllable_rank, modes, stability

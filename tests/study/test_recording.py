@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import eomgen
-from eomgen.cli import main
+from eomgen.commands.main import main
 from eomgen.run.trajectory import load_npz, save_csv, table_of
 
 SAVED = ("energy", "joint_forces", "point_positions", "works", "inputs", "momentum", "mass_matrix")

@@ -14,7 +14,7 @@ from engine import MP, engine, varied
 from gmpy2 import mpfr
 from mpmath import mp
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.precision.precise import BITS, Precise, digits, precise

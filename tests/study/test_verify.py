@@ -13,9 +13,9 @@ from campaign import some
 from engine import MP, read
 from gmpy2 import mpfr
 
-from eomgen.cli import main
+from eomgen.base.errors import RunError
+from eomgen.commands.main import main
 from eomgen.dynamics.assembly import assembled
-from eomgen.errors import RunError
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module

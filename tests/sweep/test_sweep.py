@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 import eomgen
 from eomgen.api import saving
 from eomgen.api.saving import save_statistics, save_sweep
-from eomgen.cli import main
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
+from eomgen.commands.main import main
 from eomgen.native import accelerator
 from eomgen.show.sweep import draw_sweep
 from eomgen.sweep import ensemble, execute, members, storage, together

@@ -10,7 +10,7 @@ from campaign import some
 from folder_attacks import tried
 
 import eomgen
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.sweep.cluster import run_for
 from eomgen.sweep.members import Task
 

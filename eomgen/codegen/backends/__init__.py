@@ -6,10 +6,10 @@ To add a language, write a module that is a `Backend` and its templates, and ent
 from collections.abc import Mapping
 from typing import Protocol
 
+from eomgen.base.errors import RunError, nearest
+from eomgen.base.plugins import added
 from eomgen.codegen.backends import c, javascript, jax, matlab, python
 from eomgen.codegen.interface import Interface
-from eomgen.errors import RunError, nearest
-from eomgen.plugins import added
 from eomgen.program.program import Program
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends.conditions import Test, refusals
 from eomgen.codegen.backends.division import Line, Part, divided, in_place, together
 from eomgen.codegen.interface import Interface, Variable
@@ -15,7 +16,6 @@ from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.templating import render
 
 SUFFIXES: tuple[str, ...] = (".c", ".h")
 TEMPLATES = "c"

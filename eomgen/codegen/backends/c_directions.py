@@ -10,12 +10,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.backends.division import WORD, Division, Line, divided
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.kernels import kernels_of
 from eomgen.program.program import Program
-from eomgen.templating import render
 
 LANES = 8
 """Directions at once. Narrower registers take several operations for each."""

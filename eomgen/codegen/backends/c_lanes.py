@@ -10,12 +10,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
-from eomgen.templating import render
 
 MAIN = "lanes.c"
 """The source of a shared library to compile; it includes the others."""

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends.division import divided
 from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
@@ -13,7 +14,6 @@ from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.templating import render
 
 SUFFIXES: tuple[str, ...] = (".js",)
 TEMPLATES = "javascript"

@@ -10,6 +10,7 @@ import pprint
 from collections.abc import Mapping
 from typing import Any
 
+from eomgen.base.templating import render
 from eomgen.codegen.backends.python import (
     RESERVED,
     document,
@@ -24,7 +25,6 @@ from eomgen.codegen.kernels import Kernel, kernels_of
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.templating import render
 
 SUFFIXES: tuple[str, ...] = ("_jax.py",)
 TEMPLATES = "jax"

@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from eomgen.base.errors import RunError
+from eomgen.base.templating import render
 from eomgen.codegen.interface import Function, Interface, Variable
 from eomgen.codegen.kernels import kernels_of
-from eomgen.errors import RunError
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program, interpret
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.templating import render
 
 SUFFIXES: tuple[str, ...] = (".m",)
 TEMPLATES = "matlab"

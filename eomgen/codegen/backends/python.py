@@ -8,16 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from eomgen.base.errors import listed
+from eomgen.base.templating import render
 from eomgen.codegen.backends.conditions import Test, refusals
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.kernels import Kernel, kernels_of
-from eomgen.errors import listed
 from eomgen.language.base import LARGEST
 from eomgen.language.formula import names_in
 from eomgen.program.printing import Block, Dialect
 from eomgen.program.program import Program, live_steps
 from eomgen.scalars.functions import FUNCTIONS
-from eomgen.templating import render
 
 SUFFIXES: tuple[str, ...] = (".py",)
 TEMPLATES = "python"

@@ -4,6 +4,7 @@ method).
 
 from dataclasses import dataclass
 
+from eomgen.base.errors import SceneError
 from eomgen.derivation.projected.constraints import Constraint, state_joints
 from eomgen.derivation.projected.equations import (
     Balance,
@@ -19,7 +20,6 @@ from eomgen.derivation.projected.equations import (
 from eomgen.derivation.projected.solution import Solution, solve
 from eomgen.derivation.projected.symbols import Ledger, Symbols, make_symbols
 from eomgen.derivation.supported import FEW_VELOCITIES, why_not_closed
-from eomgen.errors import SceneError
 from eomgen.model.model import Model
 
 WRITTEN, NAMED = (20, 160), (6, 40)

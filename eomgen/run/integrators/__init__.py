@@ -1,13 +1,13 @@
-"""The methods of the integrators in `eomgen.integrators`, by name."""
+"""The methods of the integrators in `eomgen.tables.integrators`, by name."""
 
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pkgutil import resolve_name
 
-from eomgen import integrators
-from eomgen.errors import RunError, nearest
+from eomgen.base.errors import RunError, nearest
 from eomgen.run.failure import EndedRunError, StepFailure
 from eomgen.run.integrators.interface import Adaptive, FixedStep
+from eomgen.tables import integrators
 
 __all__ = [
     "INTEGRATORS",

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eomgen.base.errors import RunError
 from eomgen.engine import explicit
 from eomgen.engine.explicit import LEAPFROG_4, LEAPFROG_6, Composition, Split, Step
-from eomgen.errors import RunError
 from eomgen.run.integrators import rattle
 from eomgen.run.integrators.interface import Change, FixedStep
 from eomgen.run.problem import FloatArray, Problem

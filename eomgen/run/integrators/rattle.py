@@ -4,11 +4,11 @@ from typing import cast
 
 import numpy as np
 
+from eomgen.base.errors import RunError
 from eomgen.engine import few
 from eomgen.engine.explicit import Step
 from eomgen.engine.implicit import DIVERGES, SINGULAR, UNSOLVED
 from eomgen.engine.rattle import MOST, Linked, rattle
-from eomgen.errors import RunError
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Change
 from eomgen.run.problem import FloatArray, Problem

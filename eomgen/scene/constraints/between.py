@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.quantity import Vector as VectorField
 from eomgen.language.quantity import quantity, with_components

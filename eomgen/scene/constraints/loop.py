@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.scalars import exact
 from eomgen.scene.constraints.base import Linkage, Pair, Row
 from eomgen.scene.effects.base import Load, Scalar, Vector

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.formula import names_in
 from eomgen.language.quantity import Numbers, Quantity, quantity
 from eomgen.scene.constraints.base import Linkage, Row

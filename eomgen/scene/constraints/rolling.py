@@ -12,7 +12,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.conditions import Condition
 from eomgen.language.formula import ZERO, Apply
 from eomgen.language.quantity import Numbers, Quantity, Vector, quantity

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.conditions import Condition, a_part, are_zero, can_meet, not_negative
 from eomgen.language.formula import ZERO, Apply, Constant, Formula

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from eomgen.errors import SceneError, nearest
+from eomgen.base.errors import SceneError, nearest
 from eomgen.language.base import Identifier
 from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Mechanism, Scalar, Vector

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, Vector, quantity

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.conditions import Condition, a_part, are_zero, in_order
 from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.language.base import Identifier
 from eomgen.language.conditions import Condition, are_zero, not_negative
 from eomgen.language.formula import ZERO, Formula

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
 from eomgen.scene.importers.imported import Imported, Wishes
 
 if TYPE_CHECKING:

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Callable
 
+from eomgen.base.text import brief
 from eomgen.language.base import LARGEST
 from eomgen.scene.importers.vectors import ORIGIN, Vector
 from eomgen.scene.importers.xml_elements import Element
-from eomgen.text import brief
 
 
 def required(element: Element, key: str, what: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.scene.importers.conventions import Convention, Frame, JointStates
 
 Array = npt.NDArray[np.float64]

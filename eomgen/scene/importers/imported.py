@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.scene.importers.conventions import Convention
 from eomgen.scene.importers.conversion import Conversion, conversion
 from eomgen.scene.importers.toml_text import toml_text

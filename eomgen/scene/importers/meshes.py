@@ -13,8 +13,8 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 import numpy.typing as npt
 
-from eomgen.errors import EomgenError, RunError
-from eomgen.files import read_plain
+from eomgen.base.errors import EomgenError, RunError
+from eomgen.base.files import read_plain
 from eomgen.scene.importers.collada import corners_of
 
 LARGEST_MESH = 100_000_000

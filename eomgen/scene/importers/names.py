@@ -5,8 +5,8 @@ import re
 import sys
 from collections.abc import Collection, Iterable, Sequence
 
+from eomgen.base.text import brief
 from eomgen.scene.joints.base import WORLD
-from eomgen.text import brief
 
 LONGEST = 60
 """Longer names are cut, so that names made from them are not too long either."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from eomgen.text import brief
+from eomgen.base.text import brief
 
 Tables = list[dict[str, Any]]
 SLIDING_SPEED = "friction_speed"

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from eomgen.text import one_line
+from eomgen.base.text import one_line
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 LONGEST_LINE = 100

@@ -13,8 +13,8 @@ from xml.etree.ElementTree import ParseError
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
-from eomgen.errors import SceneError
-from eomgen.files import read_plain
+from eomgen.base.errors import SceneError
+from eomgen.base.files import read_plain
 
 LARGEST_FILE = 2_000_000
 DEEPEST = 100

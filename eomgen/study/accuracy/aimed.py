@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.tally import Follow
 from eomgen.run.works import Powers
 from eomgen.study.accuracy.budgeting import within

@@ -8,7 +8,7 @@ so far. The clock is used for that and for the end of the budget only.
 import math
 from dataclasses import dataclass
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.study.accuracy.choosing import TIGHTER, error_law, growth, patience, race, rung
 from eomgen.study.accuracy.search import Choice, Plan, Say, Search
 from eomgen.study.accuracy.trial import Case, Method, Tried, method_of

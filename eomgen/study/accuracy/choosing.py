@@ -15,7 +15,7 @@ same.
 import math
 from collections.abc import Sequence
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.problem import Problem
 from eomgen.study.accuracy.estimate import ROUNDING, Law, fit
 from eomgen.study.accuracy.measure import WRONG

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.integrators import INTEGRATORS, FixedStep, find_integrator
 from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import FloatArray, Problem

@@ -19,10 +19,10 @@ from types import MappingProxyType
 import numpy as np
 import scipy
 
-from eomgen.errors import RunError
-from eomgen.files import is_ours, marked, read_plain, write_whole
-from eomgen.integrators import INTEGRATORS
+from eomgen.base.errors import RunError
+from eomgen.base.files import is_ours, marked, read_plain, write_whole
 from eomgen.study.accuracy.ladder import Rung, Status, Work, order
+from eomgen.tables.integrators import INTEGRATORS
 
 STATUSES: tuple[Status, ...] = ("ok", "wrong", "failed", "over", "refused")
 COLUMNS = (
@@ -66,7 +66,8 @@ def key(*what: object) -> str:
     digest = hashlib.sha256()
     package = here.parent.parent
     own = [here / f"{name}.py" for name in ("measure", "reference", "work_precision")]
-    for path in [*sorted((package / "run").rglob("*.py")), package / "integrators.py", *own]:
+    own.append(package / "tables" / "integrators.py")
+    for path in [*sorted((package / "run").rglob("*.py")), *own]:
         digest.update(path.read_bytes())
     machine = (platform.node(), platform.machine(), platform.python_version())
     text = json.dumps([*what, *machine, np.__version__, scipy.__version__], sort_keys=True)

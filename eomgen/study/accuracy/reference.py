@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.entries import Entries
-from eomgen.errors import RunError
-from eomgen.files import write_whole
+from eomgen.base.entries import Entries
+from eomgen.base.errors import RunError
+from eomgen.base.files import write_whole
 from eomgen.model.model import Model
 from eomgen.precision.precise import BITS, digits, precise
 from eomgen.program.program import Program
@@ -123,7 +123,7 @@ def reference(
     progress  called with the fraction done
     seconds   processor time allowed in extended precision; 0 to use doubles at once
     folder    where references are stored, so that none is computed twice; or None. One that is
-              not trusted or cannot be read or written (`eomgen.entries`) is ignored
+              not trusted or cannot be read or written (`eomgen.base.entries`) is ignored
     doubles   whether doubles may be used if extended precision cannot
     rest_speed  speed below which rigid contacts do not bounce; None: see `integrate`
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eomgen.integrators import INTEGRATORS
 from eomgen.run.noise import Fast, fast, growth
 from eomgen.run.problem import FloatArray
 from eomgen.run.sliding import SLIDES
@@ -20,6 +19,7 @@ from eomgen.study.accuracy.estimate import (
     representable,
 )
 from eomgen.study.accuracy.trial import Case, Method, Setting, Tried, method_of
+from eomgen.tables.integrators import INTEGRATORS
 
 MOST_STEPS = 2**20
 """Greatest number of equal steps in a run."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError, StepFailure
 from eomgen.run.problem import FloatArray, Problem

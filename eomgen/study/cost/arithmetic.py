@@ -14,11 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.errors import RunError
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.errors import RunError
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program
-from eomgen.routes import ROUTES
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
 from eomgen.scalars.extended import DIGITS
@@ -29,6 +28,7 @@ from eomgen.study.verification.routes import Made, compiled, loaded, velocities
 from eomgen.study.verification.samples import Sample, agreement, condition_numbers, judging_states
 from eomgen.study.verification.truth import Exact, Truth
 from eomgen.study.verification.ulps import BITS, component_errors, vector_errors
+from eomgen.tables.routes import ROUTES
 
 BASELINE = "linalg.solve"
 TERMS = ("mass_matrix", "bias_force", "applied_force")

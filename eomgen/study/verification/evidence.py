@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from eomgen.files import check_folder, check_writable, write_whole
+from eomgen.base.files import check_folder, check_writable, write_whole
 from eomgen.study.verification.bounds import OWN, Check
 from eomgen.study.verification.hard_states import KINDS, State
 from eomgen.study.verification.horizon import Horizon

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.model.model import Model
 from eomgen.precision.precise import BITS
 from eomgen.run.integrate import integrate

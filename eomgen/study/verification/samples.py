@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.errors import RunError
+from eomgen.base.errors import RunError
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from eomgen.base.errors import RunError
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
-from eomgen.routes import ROUTES
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import Progress
@@ -42,6 +41,7 @@ from eomgen.study.verification.sampled import SampledRun, sampled
 from eomgen.study.verification.slopes import worst_slope
 from eomgen.study.verification.truth import Truth
 from eomgen.study.whole import viewed, whole_of
+from eomgen.tables.routes import ROUTES
 
 OUTPUTS = (
     "inverse_dynamics",

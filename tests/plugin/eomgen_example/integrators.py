@@ -1,6 +1,6 @@
 """An integrator: its method is imported when it is first used."""
 
-from eomgen.integrators import IntegratorSpec
+from eomgen.tables.integrators import IntegratorSpec
 
 HEUN = IntegratorSpec(
     "Heun's method, order 2", "explicit", "methods:HEUN", package="eomgen_example"

@@ -12,9 +12,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from eomgen.errors import SceneError
+from eomgen.base.errors import SceneError
+from eomgen.base.text import one_line
 from eomgen.language.base import LARGEST
-from eomgen.text import one_line
 
 SECONDS = 60.0
 """Longest time that MuJoCo may take for a file."""

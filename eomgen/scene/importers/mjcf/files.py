@@ -8,8 +8,8 @@ outside of the allowed folders.
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from eomgen.base.text import brief
 from eomgen.scene.importers.xml_elements import MOST_ELEMENTS, Element, read_xml
-from eomgen.text import brief
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")
 DEEPEST = 20

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from eomgen.errors import listed
+from eomgen.base.errors import listed
 from eomgen.scene.importers.conventions import JointStates, convention, suffixed
 from eomgen.scene.importers.imported import Imported, Wishes
 from eomgen.scene.importers.mjcf.actuators import add_actuators

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from eomgen.base.text import brief
 from eomgen.scene.importers.attributes import child, number, vector
 from eomgen.scene.importers.rotations import cleaned, is_slight, rotated_inertia, rotation
 from eomgen.scene.importers.urdf.tree import Tree
 from eomgen.scene.importers.vectors import ORIGIN, Vector
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
-from eomgen.text import brief
 
 Array = npt.NDArray[np.float64]
 

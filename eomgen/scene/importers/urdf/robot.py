@@ -4,7 +4,8 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from eomgen.errors import listed
+from eomgen.base.errors import listed
+from eomgen.base.text import brief
 from eomgen.scene.importers.imported import Imported, Wishes
 from eomgen.scene.importers.meshes import ELSEWHERE
 from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
@@ -24,7 +25,6 @@ from eomgen.scene.importers.urdf.states import convention_of
 from eomgen.scene.importers.urdf.tree import SINGLE, Joint, Tree, moved, read_tree
 from eomgen.scene.importers.xml_elements import Element
 from eomgen.scene.joints.base import WORLD
-from eomgen.text import brief
 
 GRAVITY = 9.81
 OF_JOINTS = ("_dot", "_ddot", "_motor")

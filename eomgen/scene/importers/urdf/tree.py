@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from eomgen.errors import SceneError, nearest
+from eomgen.base.errors import SceneError, nearest
+from eomgen.base.text import brief
 from eomgen.scene.importers.attributes import child, number, required, vector
 from eomgen.scene.importers.vectors import Vector
 from eomgen.scene.importers.xml_elements import Element
-from eomgen.text import brief
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = ("revolute", "continuous", "prismatic")

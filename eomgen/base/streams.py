@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TextIO, cast
 
-from eomgen.text import escaped, spelled
+from eomgen.base.text import escaped, spelled
 
 
 class Steady(io.TextIOBase):

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from eomgen.plugins import added
+from eomgen.base.plugins import added
 
 Kind = Literal["explicit", "implicit", "symplectic"]
 

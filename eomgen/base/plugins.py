@@ -7,7 +7,7 @@ eomgen.effects      a class derived from `scene.effects.base.EffectTable`; the n
 eomgen.joints       a class derived from `scene.joints.base.JointTable`, likewise
 eomgen.constraints  a class derived from `scene.constraints.base.ConstraintTable`, likewise
 eomgen.backends     a module or object that is a `codegen.backends.Backend`
-eomgen.integrators  an `integrators.IntegratorSpec`
+eomgen.integrators  a `tables.integrators.IntegratorSpec`
 
 Packages are code that the user installed, and are trusted as such: a scene names what they add, but
 cannot add anything.
@@ -21,7 +21,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from eomgen.errors import EomgenError
+from eomgen.base.errors import EomgenError
 
 GROUPS = ("effects", "joints", "constraints", "backends", "integrators")
 

@@ -4,7 +4,7 @@ import difflib
 import sys
 from collections.abc import Collection, Iterable
 
-from eomgen.text import one_line
+from eomgen.base.text import one_line
 
 
 class EomgenError(Exception):

@@ -7,11 +7,11 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from eomgen.base.errors import EomgenError, InterruptedRunError, report_refusal
+from eomgen.base.streams import steady_streams
+from eomgen.base.text import one_line
 from eomgen.commands.table import COMMANDS
 from eomgen.commands.usage import Parser, Version
-from eomgen.errors import EomgenError, InterruptedRunError, report_refusal
-from eomgen.streams import steady_streams
-from eomgen.text import one_line
 
 Arguments = argparse.Namespace
 INTERRUPTED = 130

@@ -1,0 +1,1 @@
+"""Text made safe to print, errors, files written whole, streams, kept results, plugins, version."""
