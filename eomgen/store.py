@@ -45,8 +45,6 @@ AFTER = (
         "base/entries.py",
         "native",
         "run",
-        "precision",
-        "linear",
         "study",
         "sweep",
         "show",

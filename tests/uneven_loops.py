@@ -17,8 +17,8 @@ from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.language.formula import Constant
 from eomgen.model.model import Model
-from eomgen.precision.extended import extended, extended_digits
 from eomgen.scalars.floats import FloatScalars
+from eomgen.study.precision.extended import extended, extended_digits
 from eomgen.study.verification.virtual_work import FreeBodies
 
 DECADES = 6.0

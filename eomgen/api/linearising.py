@@ -18,7 +18,7 @@ from eomgen.run.problem import FloatArray
 from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
-    from eomgen.linear.linearise import Linearisation
+    from eomgen.study.linear.linearise import Linearisation
 
 Place = Literal["equilibrium", "rest", "initial"]
 
@@ -92,9 +92,9 @@ def linearisable(model: Model) -> Model:
 def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Linearised:
     """A `linearisable` model, linearised as `linearise` describes."""
     # Imported here: they import SciPy.
-    from eomgen.linear.equilibrium import equilibrium
-    from eomgen.linear.linearise import is_steady
-    from eomgen.linear.linearise import linearise as linearised
+    from eomgen.study.linear.equilibrium import equilibrium
+    from eomgen.study.linear.linearise import is_steady
+    from eomgen.study.linear.linearise import linearise as linearised
 
     at = point.at
     hold, trim = (tuple(map(identifier, names)) for names in (point.hold, point.trim))

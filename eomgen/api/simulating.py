@@ -367,8 +367,8 @@ def _guard(
     few = module.digits is not None and module.digits < WATCHED and not plan.varying
     if plan.guard is None and not few:
         return None
-    from eomgen.precision.guarding import guard_of
     from eomgen.store import program_of
+    from eomgen.study.precision.guarding import guard_of
 
     return guard_of(functions, program_of(plan.model), *values, repairs=plan.guard == "repair")
 

@@ -20,11 +20,11 @@ from eomgen.commands.shared import (
     reporter_of,
     shortened,
 )
-from eomgen.linear.linearise import Linearisation, rate_unit, save
-from eomgen.linear.modes import Mode
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
+from eomgen.study.linear.linearise import Linearisation, rate_unit, save
+from eomgen.study.linear.modes import Mode
 
 WIDEST = 12
 """A and B are printed for up to this number of states."""

@@ -31,12 +31,12 @@ from gmpy2 import mpfr
 from eomgen.dynamics.assembly import assembled
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
-from eomgen.precision.extended import doubles, extended, extended_digits
 from eomgen.run.module import load_module
 from eomgen.run.problem import FloatArray
 from eomgen.scalars.extended import BY_MPFR
 from eomgen.scene.reader import built_in_names, read_scene
 from eomgen.store import generated_code, interfaced_program_of
+from eomgen.study.precision.extended import doubles, extended, extended_digits
 from eomgen.study.verification import judging, laws
 from eomgen.study.verification import verify as verifying
 from eomgen.study.verification.hard_states import closed_states, hard_states

@@ -17,10 +17,10 @@ from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.interface import interface_of
 from eomgen.commands.main import main
 from eomgen.dynamics.singularity import check_nonsingular
-from eomgen.linear.equilibrium import equilibrium
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.scene.reader import parse_scene
+from eomgen.study.linear.equilibrium import equilibrium
 
 ROUTES = ("aba", "ldl")
 

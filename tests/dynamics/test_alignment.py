@@ -22,13 +22,13 @@ from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, generate
-from eomgen.precision.extended import doubles, extended_digits
 from eomgen.program.program import interpreter
 from eomgen.program.tape import TIME
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scalars import exact
 from eomgen.scalars.floats import ArrayScalars, FloatScalars
 from eomgen.scene.reader import find_scene, parse_scene
+from eomgen.study.precision.extended import doubles, extended_digits
 from eomgen.study.verification.truth import Truth
 from eomgen.study.verification.virtual_work import FreeBodies
 

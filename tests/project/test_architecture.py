@@ -61,8 +61,8 @@ def test_the_running_half_does_without_sympy() -> None:
     code = (
         "import sys, eomgen.store, eomgen.run.integrate, eomgen.run.module, "
         + "".join(f"eomgen.{name}, " for name in modules() if name.startswith("commands"))
-        + "eomgen.linear.linearise, eomgen.linear.equilibrium, eomgen.linear.modes, "
-        "eomgen.show.observe, eomgen.show.figure, eomgen.show.page; "
+        + "eomgen.study.linear.linearise, eomgen.study.linear.equilibrium, "
+        "eomgen.study.linear.modes, eomgen.show.observe, eomgen.show.figure, eomgen.show.page; "
         "sys.exit('sympy' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -12,7 +12,6 @@ from eomgen.base.errors import RunError
 from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, python_module
-from eomgen.precision.guarding import guard_of
 from eomgen.program.program import Program
 from eomgen.run.guard import LOST, Guard, RoundingMonitor
 from eomgen.run.integrate import integrate
@@ -20,6 +19,7 @@ from eomgen.run.integrators import StepFailure
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
 from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.study.precision.guarding import guard_of
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 

@@ -20,7 +20,6 @@ from eomgen.engine.taylor import expanded
 from eomgen.model.elaborate import elaborate
 from eomgen.native import taylor
 from eomgen.native.library import compiled_library
-from eomgen.precision.precise import digits
 from eomgen.program.program import Output, Program, finish, interpret
 from eomgen.program.tape import FUNCTIONS, TIME, Node, Stage, Tape
 from eomgen.program.taylor import (
@@ -40,6 +39,7 @@ from eomgen.scene.reader import read_scene
 from eomgen.store import generated_code
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.reference import reference
+from eomgen.study.precision.precise import digits
 from eomgen.subset.expander import Text
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")

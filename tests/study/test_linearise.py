@@ -11,15 +11,15 @@ from scipy.linalg import expm
 
 from eomgen.base.errors import RunError
 from eomgen.commands.main import main
-from eomgen.linear.equilibrium import equilibrium
-from eomgen.linear.linearise import linearise
-from eomgen.linear.modes import controllable_rank, modes, stability
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.scene.schema import SHOWN
+from eomgen.study.linear.equilibrium import equilibrium
+from eomgen.study.linear.linearise import linearise
+from eomgen.study.linear.modes import controllable_rank, modes, stability
 
 
 @cache

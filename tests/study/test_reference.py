@@ -17,7 +17,6 @@ from mpmath import mp
 from eomgen.base.errors import RunError
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.precision.precise import BITS, Precise, digits, precise
 from eomgen.run.module import as_problem, load_module
 from eomgen.scene.reader import built_in_names, parse_scene, read_scene
 from eomgen.store import generated_code, program_of
@@ -25,6 +24,7 @@ from eomgen.study.accuracy import measure
 from eomgen.study.accuracy.collocation import rows
 from eomgen.study.accuracy.gauss import gauss
 from eomgen.study.accuracy.reference import LOOSE, TIGHT, reference
+from eomgen.study.precision.precise import BITS, Precise, digits, precise
 
 ONE_SIDED = """
 name = "one_sided"

@@ -19,7 +19,6 @@ from eomgen.dynamics.assembly import assembled
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
-from eomgen.precision.extended import doubles, extended, extended_digits
 from eomgen.run.failure import EndedRunError
 from eomgen.run.integrate import integrate
 from eomgen.run.module import load_module
@@ -27,6 +26,7 @@ from eomgen.scene.reader import find_scene, parse_scene
 from eomgen.scene.schema import Simulation
 from eomgen.store import generated_code, interfaced_program_of
 from eomgen.study.diagnosis import problem_of
+from eomgen.study.precision.extended import doubles, extended, extended_digits
 from eomgen.study.verification import drift as drifting
 from eomgen.study.verification import horizon as horizons
 from eomgen.study.verification import sampled as sampling

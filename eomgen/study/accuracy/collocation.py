@@ -18,13 +18,13 @@ import numpy as np
 import scipy.linalg
 from gmpy2 import mpfr
 
-from eomgen.precision.precise import BITS, CornerBranches, Extended, Precise
 from eomgen.run.integrators.unwarned import factors
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.study.accuracy import corners
 from eomgen.study.accuracy.corners import BranchChange
 from eomgen.study.accuracy.forecast import Forecast, NoStep
 from eomgen.study.accuracy.gauss import ExtendedArray, Gauss, gauss
+from eomgen.study.precision.precise import BITS, CornerBranches, Extended, Precise
 
 MANY = 40
 """From this many states on, one Jacobian serves all stages of a step."""

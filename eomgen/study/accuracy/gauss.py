@@ -12,7 +12,7 @@ import numpy as np
 from gmpy2 import mpfr
 from numpy.typing import NDArray
 
-from eomgen.precision.precise import BITS, Extended, digits
+from eomgen.study.precision.precise import BITS, Extended, digits
 
 ExtendedArray = NDArray[np.object_]
 """An array of extended-precision numbers."""

@@ -14,7 +14,6 @@ from typing import Any, cast
 import numpy as np
 
 from eomgen.model.model import Model
-from eomgen.precision.precise import digits, exact_parameters
 from eomgen.program.kernel import fixed_values
 from eomgen.program.program import Program
 from eomgen.program.tape import Stage
@@ -24,6 +23,7 @@ from eomgen.scalars.extended import Bits
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import program_of
 from eomgen.study.diagnosis import problem_of
+from eomgen.study.precision.precise import digits, exact_parameters
 
 TIMES = 2.0
 """Rounded constants are moved by this many times their rounding error, or by a unit in the last

@@ -21,7 +21,6 @@ from eomgen.base.entries import Entries
 from eomgen.base.errors import RunError
 from eomgen.base.files import write_whole
 from eomgen.model.model import Model
-from eomgen.precision.precise import BITS, digits, precise
 from eomgen.program.program import Program
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators.interface import SMALLEST_RTOL
@@ -34,6 +33,7 @@ from eomgen.study.accuracy import measure
 from eomgen.study.accuracy.collocation import Row, rows
 from eomgen.study.accuracy.gauss import ExtendedArray
 from eomgen.study.diagnosis import problem_of
+from eomgen.study.precision.precise import BITS, digits, precise
 
 ROWS = 201
 SECONDS = 300.0

@@ -13,12 +13,12 @@ from gmpy2 import mpfr
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.model.model import JointIndex, Model, dofs_of
 from eomgen.model.orientation import rows_of
-from eomgen.precision.extended import Array, along, extended, zeros
-from eomgen.precision.precise import Extended
 from eomgen.scalars.extended import Bits
 from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD, Primitive
+from eomgen.study.precision.extended import Array, along, extended, zeros
+from eomgen.study.precision.precise import Extended
 from eomgen.study.verification.poses import (
     Pose,
     about,

@@ -7,7 +7,6 @@ import numpy as np
 
 from eomgen.base.errors import RunError
 from eomgen.model.model import Model
-from eomgen.precision.precise import BITS
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators.interface import SMALLEST_RTOL
 from eomgen.run.module import GeneratedModule
@@ -17,6 +16,7 @@ from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import Simulation
 from eomgen.study.accuracy.reference import ROWS, Reference, TooLongError, paced, reference
 from eomgen.study.diagnosis import problem_of
+from eomgen.study.precision.precise import BITS
 
 PARTED = 0.01
 """Relative to the motion's scale (see `measure`): a run with a larger error is meaningless."""

@@ -15,7 +15,9 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.extended import (
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import FloatArray
+from eomgen.study.precision.extended import (
     NOTHING,
     Array,
     doubles,
@@ -24,8 +26,6 @@ from eomgen.precision.extended import (
     of_unit_length,
     solved,
 )
-from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import FloatArray
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
 from eomgen.study.verification.truth import Truth

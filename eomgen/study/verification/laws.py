@@ -13,7 +13,11 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.extended import (
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import FloatArray
+from eomgen.scene.effects.base import JointLoad
+from eomgen.scene.joints.base import WORLD, Coordinate
+from eomgen.study.precision.extended import (
     NOTHING,
     Array,
     doubles,
@@ -23,11 +27,7 @@ from eomgen.precision.extended import (
     solved,
     zeros,
 )
-from eomgen.precision.precise import Extended
-from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import FloatArray
-from eomgen.scene.effects.base import JointLoad
-from eomgen.scene.joints.base import WORLD, Coordinate
+from eomgen.study.precision.precise import Extended
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.judging import rest_of, ulps
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share

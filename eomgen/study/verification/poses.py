@@ -12,8 +12,8 @@ from gmpy2 import mpfr
 
 from eomgen.language.angles import degrees_of
 from eomgen.language.formula import Constant, Formula
-from eomgen.precision.extended import Array, along, extended, eye, zeros
-from eomgen.precision.precise import Extended
+from eomgen.study.precision.extended import Array, along, extended, eye, zeros
+from eomgen.study.precision.precise import Extended
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,14 @@ import numpy as np
 from gmpy2 import mpfr
 
 from eomgen.model.model import Model
-from eomgen.precision.extended import Array, doubles, extended, extended_digits, of_unit_length
 from eomgen.run.problem import FloatArray
+from eomgen.study.precision.extended import (
+    Array,
+    doubles,
+    extended,
+    extended_digits,
+    of_unit_length,
+)
 from eomgen.study.verification.hard_states import State
 from eomgen.study.verification.roundings import ULP, Roundings, spread, worst_share
 from eomgen.study.verification.truth import Truth

@@ -11,12 +11,12 @@ from eomgen.dynamics.diagnostics import values_at
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
-from eomgen.precision.extended import Array, extended
 from eomgen.program.extended import evaluator
 from eomgen.program.program import Output, finish, interpreter
 from eomgen.program.tape import TIME, ExactTape
 from eomgen.run.problem import FloatArray
 from eomgen.scalars.extended import MP, Bits, Digits, exact
+from eomgen.study.precision.extended import Array, extended
 
 Exact = NDArray[np.object_]
 """An array of 60-digit numbers."""

@@ -30,11 +30,11 @@ import numpy as np
 from gmpy2 import mpfr
 from numpy.typing import NDArray
 
-from eomgen.precision.extended import NOTHING, Array, along, extended, solved, zeros
-from eomgen.precision.precise import Extended
 from eomgen.scene.constraints.base import Row
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD, Geared, WithRotor
+from eomgen.study.precision.extended import NOTHING, Array, along, extended, solved, zeros
+from eomgen.study.precision.precise import Extended
 from eomgen.study.verification.evaluated import EvaluatedModel
 from eomgen.study.verification.poses import composed
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from eomgen.base.errors import RunError
 from eomgen.base.files import write_whole
-from eomgen.linear.manifold import Manifold, is_constrained, manifold
-from eomgen.linear.modes import Mode, controllable_rank, modes, stability
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.run.tangents import tangents
+from eomgen.study.linear.manifold import Manifold, is_constrained, manifold
+from eomgen.study.linear.modes import Mode, controllable_rank, modes, stability
 
 FORMAT = "linearisation 1"
 BOUND = 1e100

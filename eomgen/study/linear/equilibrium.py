@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.base.errors import RunError, nearest
-from eomgen.linear.linearise import (
+from eomgen.run.module import GeneratedModule
+from eomgen.run.problem import FloatArray
+from eomgen.run.tangents import tangents
+from eomgen.study.linear.linearise import (
     evaluated,
     input_jacobian,
     input_values,
     rate_unit,
 )
-from eomgen.linear.manifold import directions, is_constrained, returned
-from eomgen.run.module import GeneratedModule
-from eomgen.run.problem import FloatArray
-from eomgen.run.tangents import tangents
+from eomgen.study.linear.manifold import directions, is_constrained, returned
 
 MOST_STEPS = 60
 """Greatest number of steps to the nearest equilibrium; a near one takes few."""

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.precision.extended import BITS
-from eomgen.precision.precise import digits, precise
 from eomgen.program.program import Program
 from eomgen.run.guard import LOST, Guard
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
+from eomgen.study.precision.extended import BITS
+from eomgen.study.precision.precise import digits, precise
 
 
 def guard_of(
