@@ -1,7 +1,7 @@
 """Draws the packages of eomgen on their floors into docs/packages.svg: `python tests/drawing.py`.
 
 A package stands above all that it imports. An arrow is an import that does not follow from others:
-`api` imports `run`, but also `linear`, which imports `run`; so only `linear` has the arrow.
+`api` imports `run`, but also `sweep`, which imports `run`; so only `sweep` has the arrow.
 """
 
 import ast
