@@ -32,6 +32,7 @@ PAGES = [
     DOCS / "pictures.md",
     *sorted((DOCS / "howto").glob("*.md")),
     *sorted((DOCS / "concepts").glob("*.md")),
+    DOCS / "architecture.md",
 ]
 FILE = re.compile(r"^(?:#|/\*|<!--) (append to )?(\S+\.\w+)\b.*\n")
 """The first line of a block that is a file, or the end of one."""
