@@ -50,7 +50,6 @@ AT, FROM, TO, BETWEEN = (
 its equation, for the end, and for the dense output."""
 SAFETY, SMALLEST, GREATEST = 0.9, 0.2, 6.0
 """Factor for the next step's length, and its bounds."""
-POWER = -1 / 5
 LEAST_ERROR = 0.01
 """An error below this counts as this, where the next step's length depends on two steps."""
 NEGLIGIBLE = 1e-30
@@ -159,6 +158,18 @@ class Solutions:
         return found
 
 
+def fifth_root(x: float) -> float:
+    """x^(1/5) by Newton's method, with the same bits wherever there is a square root. Far from 1,
+    where steps are not chosen by it, it is not exact.
+    """
+    eighth = sqrt(sqrt(sqrt(x)))
+    root = eighth * sqrt(eighth) * sqrt(sqrt(sqrt(eighth)))
+    for _ in range(4):
+        square = root * root
+        root -= (root - x / (square * square)) / 5.0
+    return root
+
+
 def rodas_step(
     system: StiffSystem, run: Rodas, factors: Factors, t: float, y: Annotated[Vector, "STATES"]
 ) -> bool:
@@ -194,7 +205,7 @@ def rodas_step(
             run.lost[:] = (y - (run.last - rest)) + (run.change - rest)
             return True
         if error < inf:
-            length *= max(SMALLEST, SAFETY * error**POWER)
+            length *= max(SMALLEST, SAFETY / fifth_root(error))
         else:
             length *= SMALLEST
         rejected = True
@@ -205,10 +216,10 @@ def next_factor(run: Rodas, h: float, error: float, rejected: bool) -> float:
     """The next step's length by that of this one, h, which has the given error."""
     factor = GREATEST
     if error > NEGLIGIBLE:
-        factor = SAFETY * error**POWER
+        factor = SAFETY / fifth_root(error)
         if run.h_last != 0.0:
             ratio = error * error / run.error
-            factor = min(factor, SAFETY * (h / run.h_last) * ratio**POWER)
+            factor = min(factor, SAFETY * (h / run.h_last) / fifth_root(ratio))
         factor = min(GREATEST, max(SMALLEST, factor))
     if rejected:
         return min(1.0, factor)

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 
 from eomgen.engine import few
-from eomgen.engine.rosenbrock import POWER, STAGES, Rodas, Solutions, rodas_step
-from eomgen.run.integrators.first_length import first_length
+from eomgen.engine.adaptive import Bounds, first_length
+from eomgen.engine.rosenbrock import STAGES, Rodas, Solutions, rodas_step
 from eomgen.run.integrators.interface import Adaptive, Remark, ignored
 from eomgen.run.problem import FloatArray
 
@@ -48,15 +48,9 @@ class Rodas5P:
         self.t_old = self.t
         self.status: Literal["running", "finished", "failed"] = "running"
         self.nlu, self.lost = 0, np.zeros(len(y0))
-        self.h_abs = first_length(
-            fun,
-            self.t,
-            y0,
-            fun(self.t, y0),
-            scale=atol + np.abs(y0) * rtol,
-            power=-POWER,
-            longest=min(t_bound - self.t, max_step),
-        )
+        bounds = Bounds(np.zeros(len(y0)) + atol, rtol, max_step)
+        longest = min(t_bound - self.t, max_step)
+        self.h_abs = first_length(self, bounds, self.t, y0, fun(self.t, y0), longest)
         self.h_last, self.error = 0.0, 1.0
         n = len(y0)
         self._run = rodas(n, atol, (t_bound, max_step, rtol), positions, timed)
