@@ -23,6 +23,7 @@ from eomgen.engine import (
     rattle,
     roots,
     rosenbrock,
+    separable,
     sums,
     symmetric,
     system,
@@ -93,7 +94,7 @@ def text() -> Text:
     """The text of the whole engine."""
     steps = (adaptive, differences, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
     solved = (elimination, least_squares, complementarity, roots)
-    held = (projection, rattle, symmetric)
+    held = (projection, rattle, separable, symmetric)
     checks = (branches, contacts, contact_times, contact_runs, crossings)
     return Text.of(*steps, *solved, *checks, *held, taylor, system)
 
