@@ -8,14 +8,17 @@ keeps the generated code, and `run` loads and integrates it.
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from eomgen.base.errors import RunError
 from eomgen.codegen.backends import python
 from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.choice import Candidate, Choice, choose
 from eomgen.codegen.derive import record
 from eomgen.codegen.interface import Interface, interface_of
 from eomgen.codegen.live import live_system
+from eomgen.codegen.series import with_series
 from eomgen.codegen.system import System, optimised
 from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.singularity import check_nonsingular
@@ -125,15 +128,19 @@ class Live:
     saved: Mapping[str, int]
 
 
-def live(model: Model, geometry: Sequence[Formula] = ()) -> Live:
+def live(model: Model, geometry: Sequence[Formula] = (), *, series: bool = False) -> Live:
     """The functions of a model's page, of its interactive model; `geometry` are formulas of
-    parameters and time, the entries of the function of that name.
+    parameters and time, the entries of the function of that name. With `series` they have those of
+    Taylor, if there are any.
     """
     check_nonsingular(model)
     found = live_system(model, geometry)
-    system = found.system
-    contacts = [{"name": c.name, "effect": c.effect, "unit": c.unit} for c in system.contacts]
-    source = mechanism(system.program, interface_of(system), contacts)
+    program, interface, text = found.system.program, interface_of(found.system), None
+    if series:
+        with suppress(RunError):
+            program, interface, text = with_series(program, interface)
+    contacts = [{"name": c.name, "effect": c.effect, "unit": c.unit} for c in found.system.contacts]
+    source = mechanism(program, interface, contacts, text)
     return Live(source, found.loads, found.operations, found.saved)
 
 

@@ -128,21 +128,23 @@ class LiveCode:
     saved: Mapping[str, int]
 
 
-def live_code(model: Model, geometry: Sequence["Formula"] = ()) -> LiveCode:
+def live_code(
+    model: Model, geometry: Sequence["Formula"] = (), *, series: bool = False
+) -> LiveCode:
     """The functions of a model's page, from the store, or derived and stored; `geometry` are the
-    formulas of the function of that name.
+    formulas of the function of that name. With `series` it has those of Taylor.
 
     A store that cannot be used is no obstacle.
     """
     entries = entries_of()
-    text = f"page of {key_of(model)} with {tuple(geometry)!r}"
+    text = f"page of {key_of(model)} with {tuple(geometry)!r}{' and series' * series}"
     key = hashlib.sha256(text.encode()).hexdigest()[:32]
     if entries and (kept := _live_code(entries.get(key))):
         return kept
     # Imported here because the modules that derive equations take long to load.
     from eomgen.pipeline import live
 
-    new = live(model, geometry)
+    new = live(model, geometry, series=series)
     code = LiveCode(new.source, new.loads, new.operations, new.saved)
     if entries:
         content = json.dumps([code.source, code.loads, code.operations, dict(code.saved)])

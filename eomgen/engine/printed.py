@@ -1,6 +1,9 @@
 """The engine in other languages."""
 
+import re
+import sys
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from functools import cache
 from typing import Any
 
@@ -33,6 +36,7 @@ from eomgen.engine.embedded import DOP853
 from eomgen.subset.expander import Text
 from eomgen.subset.languages import JAVASCRIPT, C, Language
 from eomgen.subset.printing import printed
+from eomgen.subset.structures import arrays_of
 from eomgen.subset.unrolled import unrolled_functions
 
 Root = tuple[str, Mapping[str, Any]]
@@ -60,18 +64,23 @@ METHODS: Mapping[str, Root] = {
 """What makes a step, by the names of all methods of the engine."""
 ON_PAGES: tuple[Root, ...] = (
     *EQUAL.values(),
-    ("constant_rates", {}),
-    ("add_compensated", {}),
-    ("normalised", {}),
-    ("first_length", {}),
-    ("made_many", {"method": DOP853}),
-    ("within", {}),
-    ("passed_over", {}),
-    ("end_at", {}),
-    ("moved_onto", {}),
+    *(("projected_change", known) for name, known in EQUAL.values() if name == "implicit_change"),
+    *[(name, {}) for name in "rattle rodas_step rodas_within expanded reach change_after".split()],
+    *[(name, {}) for name in "constant_rates coupled varying moved_force differences".split()],
+    *[(name, {}) for name in "add_compensated normalised moved_onto convolved".split()],
+    *[(name, {"method": DOP853}) for name in ("made", "interpolate")],
+    *[(name, {}) for name in "first_length within round_off passed_over end_at".split()],
     *CONTACTS,
 )
 """What a page that goes on live calls."""
+RECORDS: tuple[type, ...] = (
+    *(adaptive.Bounds, adaptive.Progress, contacts.Touching, contact_runs.Place),
+    *(branches.Switches, crossings.Watch, elimination.Factors, explicit.Split, explicit.Step),
+    *(implicit.Stages, rattle.Linked, rosenbrock.Rodas, symmetric.Projected, taylor.Room),
+)
+"""What it gives them."""
+SIZES = ("STATES", "POSITIONS", "OTHERS", "CONTACTS", "PRESSED", "FIRST", "PRODUCTS", "ORDERS")
+"""Sizes that are known for a mechanism."""
 CODES = {
     "TOLERANCE": contacts.TOLERANCE,
     "ENDLESS": contacts.ENDLESS,
@@ -85,6 +94,7 @@ CODES = {
     "PROJECTED": projection.PROJECTED,
     "UNUSUAL": adaptive.UNUSUAL,
     "MOST_PARTS": crossings.MOST_PARTS,
+    "SLOPES_USED": DOP853.last + 1,
 }
 """The constants that it needs."""
 
@@ -109,14 +119,36 @@ def c_source(functions: Roots, language: Language = C) -> str:
 
 @cache
 def steps_of_pages() -> str:
-    """JavaScript: `makeSteps(STATES, POSITIONS, OTHERS, CONTACTS, PRESSED)` returns what pages
-    call, by name. Of these numbers those are given that are needed.
+    """JavaScript: `makeSteps` returns what pages call, by name, and makers of `records`, and is
+    given those of the `SIZES` that are needed.
     """
     names = ", ".join(d.name for d in text().expanded(ON_PAGES))
     codes = "".join(f", {name}: {value!r}" for name, value in CODES.items())
+    records = ", ".join(map(record_of_pages, RECORDS))
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
-    head = "const makeSteps = (STATES, POSITIONS, OTHERS, CONTACTS, PRESSED) =>"
-    return f"{head} {{\n{source}return {{ {names}{codes} }};\n}};\n"
+    head = f"const makeSteps = ({{ {', '.join(SIZES)} }}) =>"
+    return f"{head} {{\n{source}return {{ {names}{codes}, records: {{ {records} }} }};\n}};\n"
+
+
+def record_of_pages(kind: type) -> str:
+    """JavaScript of a function that makes a record of numbers and arrays that are `given`. Others
+    are 0, or have room for the size that they state.
+    """
+    known = {
+        name: str(x) for name, x in vars(sys.modules[kind.__module__]).items() if type(x) is int
+    }
+    known |= {name: name for name in SIZES}
+
+    def size(text: str) -> str:
+        return re.sub(r"[A-Za-z_]\w*", lambda found: known.get(found[0], f"given.{found[0]}"), text)
+
+    arrays = {
+        name: f"new {'Int32' if is_whole else 'Float64'}Array({' * '.join(map(size, sizes))})"
+        for name, is_whole, sizes in arrays_of(kind)
+    }
+    plain = "".join(f"{f.name}: 0, " for f in fields(kind) if f.name not in arrays)
+    roomy = ", ".join(f"{name}: given.{name} ?? {made}" for name, made in arrays.items())
+    return f"{kind.__name__}: (given) => ({{ {plain}...given, {roomy} }})"
 
 
 @cache

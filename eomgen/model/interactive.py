@@ -26,6 +26,8 @@ from eomgen.scene.effects.base import (
 
 OUTPUTS = ("kinetic_energy", "potential_energy", "joint_forces", "body_poses", "body_velocities")
 """The outputs of the interactive model."""
+OF_RATTLE = ("mass_matrix", "kinetic_slopes")
+"""Those beside for the steps of leapfrog with constraints."""
 
 
 class Switched(EffectTable):
@@ -113,7 +115,7 @@ def interactive(model: Model) -> Model:
         parameters=(*model.parameters, *added),
         inputs=(*model.inputs, *(i for pull in pulls for i in pull.inputs(model.dimensions))),
         effects=cast(tuple[Effect, ...], (*effects, *pulls)),
-        outputs=OUTPUTS,
+        outputs=(*OUTPUTS, *(OF_RATTLE if model.constraints else ())),
         form="velocity",
         route=model.route if model.route != "closed" else "auto",
         closing="projected",

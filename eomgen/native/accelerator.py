@@ -23,6 +23,7 @@ from typing import Any
 from eomgen.base.errors import RunError
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.codegen.series import recurrences_of
 from eomgen.model.model import Model
 from eomgen.native import equal_steps, functions, implicit, rattle, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
@@ -234,7 +235,7 @@ class Accelerator:
         in Python take far longer than that.
         """
         program, interface = self._of_model()
-        taylor.system_of(program, interface)
+        recurrences_of(program, interface)
         try:
             library = self._library("taylor")
             library.compile()

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.base.errors import RunError
 from eomgen.base.loading import load_source
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.codegen.series import recurrences_of
 from eomgen.engine.adaptive import AT_END, UNUSUAL, Bounds, Progress, Records
 from eomgen.engine.taylor import Room, convolved, expanded
 from eomgen.native.memory import address, placed
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
-from eomgen.program.taylor import NoSeriesError, Recurrences, recurrences
+from eomgen.program.taylor import Recurrences
 from eomgen.program.taylor_text import SeriesText, series_text
 from eomgen.run.compiled import Array, Constrained, Series, Stride, Watched
 from eomgen.run.integrators.taylor import HIGHEST, order_of
@@ -29,17 +29,6 @@ MAIN = "taylor.c"
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
-def system_of(program: Program, interface: Interface) -> Recurrences:
-    """The recurrences of a program. Raises `RunError` if its solutions have no Taylor series."""
-    try:
-        return recurrences(program, [state.name for state in interface.states])
-    except NoSeriesError as function:
-        raise RunError(
-            f"integrator: Taylor series need smooth forces, but those of '{interface.name}' use "
-            f"{function}; take --integrator DOP853"
-        ) from None
-
-
 def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C source of the series and the steps."""
     # Imported here because runs whose library is in the store do without the printer.
@@ -48,7 +37,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     from eomgen.subset.languages import VECTORS, C
     from eomgen.subset.printing import printed
 
-    text = series_text(system_of(program, interface), [s.name for s in interface.states])
+    text = series_text(recurrences_of(program, interface), [s.name for s in interface.states])
     functions = Text()
     functions.add(text.source)
     by_four = replace(C, listed="*(V *)&{first} = (V){{ {entries} }};")
@@ -117,7 +106,7 @@ def room_of(text: SeriesText, kind: Any = float) -> Room:
 
 def plain_series(program: Program, interface: Interface, module: Any, p: Any, u: Any) -> Series:
     """The series of a module at given parameters and inputs, computed by Python."""
-    system = system_of(program, interface)
+    system = recurrences_of(program, interface)
     text = series_text(system, [state.name for state in interface.states])
     values = list(fixed_values(system, module, p, u).values())
     of = InPython(load_source(text.source, "series"), values)
@@ -137,7 +126,7 @@ class CompiledTaylor:
     def __init__(
         self, program: Program, interface: Interface, module: Any, library: ctypes.CDLL, given: Any
     ) -> None:
-        values = fixed_values(system_of(program, interface), module, *given)
+        values = fixed_values(recurrences_of(program, interface), module, *given)
         self._fixed, self._states = np.array([*values.values(), 0.0]), len(interface.states)
         self._at = self._fixed.ctypes.data
         self._series, self._steps = library.series, library.steps

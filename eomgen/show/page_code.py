@@ -57,7 +57,8 @@ def page_code(run: Ran, *, live: bool | None = None) -> PageCode:
     """The mechanism of the page of a run.
 
     A live one has functions for everything that the page can change. Otherwise they are those of
-    the generated module. With `live` None it is live unless that fails or would be too large; with
+    the generated module; Taylor series, about as long as all the rest, are in the page of a run by
+    them. With `live` None it is live unless that fails or would be too large; with
     true the errors of the derivation are raised.
     """
     events = tuple(
@@ -66,19 +67,20 @@ def page_code(run: Ran, *, live: bool | None = None) -> PageCode:
         if event.kind != "impact"
     )
     geometry = drawing_data(run.motion)[1]
-    found, why = _live(run.model, geometry, live)
+    series = run.simulation.integrator == "taylor"
+    found, why = _live(run.model, geometry, live, series)
     code = _recorded(run, why) if found is None else _going_on(run, found)
     return replace(code, smooth=not run.varying, events=events)
 
 
 def _live(
-    model: Model, geometry: Sequence[Formula], live: bool | None
+    model: Model, geometry: Sequence[Formula], live: bool | None, series: bool
 ) -> tuple[LiveCode | None, str]:
     """The functions of a live page; None and why there are none."""
     if live is False:
         return None, ""
     try:
-        code = live_code(model, geometry)
+        code = live_code(model, geometry, series=series)
     except EomgenError as error:
         if live:
             raise

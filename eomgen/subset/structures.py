@@ -1,6 +1,7 @@
 """The engine's records as C's structures, for `ctypes`."""
 
 import ctypes
+from collections.abc import Iterator
 from dataclasses import fields
 from functools import cache
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
@@ -41,17 +42,24 @@ def with_room(record: type[T], **given: Any) -> T:
     return record(**made)
 
 
+def arrays_of(record: Any) -> Iterator[tuple[str, bool, list[str]]]:
+    """The arrays of a record: their names, whether they hold whole numbers, and their sizes."""
+    hints = get_type_hints(record, include_extras=True)
+    for f in fields(record):
+        if _is_array(hints[f.name]):
+            array, *sizes = get_args(hints[f.name])
+            yield f.name, array == Whole, sizes
+
+
 @cache
 def _fields(record: Any) -> tuple[set[str], list[tuple[str, list[tuple[str, int]], Any]]]:
     """The names of a record's fields, and its arrays: their names, sizes, each a name times a
     number, and kinds.
     """
-    hints = get_type_hints(record, include_extras=True)
-    arrays = []
-    for name in (f.name for f in fields(record) if _is_array(hints[f.name])):
-        array, *sizes = get_args(hints[name])
-        kind = np.int64 if array == Whole else np.float64
-        arrays.append((name, [_size(size) for size in sizes], kind))
+    arrays = [
+        (name, [_size(size) for size in sizes], np.int64 if is_whole else np.float64)
+        for name, is_whole, sizes in arrays_of(record)
+    ]
     return {f.name for f in fields(record)}, arrays
 
 

@@ -5,99 +5,141 @@
 // problem: as for `methods`, with placed(t, y), which puts a state on the constraints; given(), the numbers
 // on which the motion depends beside its state; switching(t, y), the functions that are 0 where the derivative
 // has corners, if there are some; angles, the states that are; unseen, the longest step along which these functions
-// need not be followed; and whether there are pulses in time, which no long step may pass.
+// need not be followed; whether there are pulses in time, which no long step may pass; and `series`, that of Taylor,
+// or null where there is none, as while something is pulled.
 
 const adaptive = (() => {
   const [RTOL, ATOL] = [1e-9, 1e-12];
   const MOST = 100000; // steps within one of the page's
   const ROOM = 32; // for zeros in a step
+  const SLOPES = 16; // of DOP853
+  const numbers = (n) => new Float64Array(n);
+  const areFinite = (x) => x.every(Number.isFinite);
 
-  // The numbers and arrays of a record: `floats` and `wholes` by name, each of its size.
-  const roomy = (numbers, floats, wholes = {}) => {
-    const made = { ...numbers };
-    for (const name of Object.keys(floats)) made[name] = new Float64Array(floats[name]);
-    for (const name of Object.keys(wholes)) made[name] = new Int32Array(wholes[name]);
-    return made;
-  };
-
-  const dormandPrince = (ny) => {
-    const { first_length, made_many_DOP853, interpolate_DOP853, within, ...steps } = makeSteps(ny);
-    const { passed_over, end_at, UNUSUAL, MOST_PARTS } = steps;
-    const run = { atol: new Float64Array(ny).fill(ATOL), rtol: RTOL, longest: Infinity, until: Infinity, dense: 1, reaches: 1 };
-    const place = new Float64Array(ny);
-    let [path, of, given, next] = [[], null, [], 0];
-    let [watch, found, step] = [null, null, null];
-    const system = { derivative: (t, y, out) => out.set(of.f(t, y)) };
-    const checks = {
-      begins: () => {},
-      are_usual: (k, first, past) => k.subarray(first * ny, past * ny).every(Number.isFinite),
-      placed: (t, y) => of.placed(t, y).every(Number.isFinite),
-      seen: (at, y, raw, last, k, terms) => {
-        step = { at, y, raw, k, terms };
-        found.many = 0;
-        return passed_over(watch, found, along, run, {}, at.t, at.end, y, last, 1) ? UNUSUAL : 0;
+  // Methods. `first(t, y)` is what the first step needs beside its time and state; `made(now)` a step from the
+  // end of another one, or null: its `end`, length h, the state there, `raw`, and what the next one needs;
+  // `within(step, t, to)` the state at a time in it.
+  const dormandPrince = ({ ny, steps }, system, run) => {
+    const last = steps.SLOPES_USED - 1;
+    return {
+      first(t, y) {
+        const slope = numbers(ny);
+        system.derivative(t, y, slope);
+        const length = steps.first_length(system, run, t, y, slope, run.longest);
+        return { slope, length: length === Infinity ? 1 : length, lost: numbers(ny) }; // 1 without states
       },
-      keeps: (at) => {
-        end_at(watch, at.end);
-        found.last = found.now;
-        return 1;
+      made({ end: t, last: y, slope, length, lost: before }) {
+        const at = steps.records.Progress({ t, length });
+        const [change, raw, lost, k, terms] = [ny, ny, ny, SLOPES * ny, 7 * ny].map(numbers);
+        k.set(slope);
+        if (!steps.made_DOP853(system, run, at, y, before, k, change, raw)) return null;
+        system.derivative(at.end, raw, k.subarray(last * ny));
+        steps.interpolate_DOP853(system, at, y, raw, k, terms);
+        steps.round_off(y, raw, change, lost);
+        const next = k.slice(last * ny, (last + 1) * ny);
+        return areFinite(k) ? { end: at.end, at, raw, terms, slope: next, length: at.length, lost } : null;
+      },
+      within: ({ at, y, terms }, t, to) => steps.within(at, y, terms, t, to),
+    };
+  };
+  const rosenbrock = (free, system, run) => {
+    const { ny, steps, positions } = free;
+    const { first } = dormandPrince(free, system, run);
+    const numbersOf = { atol: run.atol, rtol: run.rtol, positions: positions.length, timed: 1 };
+    const [rodas, factors] = [steps.records.Rodas(numbersOf), steps.records.Factors({ n: ny })];
+    return {
+      first: (t, y) => ({ ...first(t, y), before: 0, error: 1 }),
+      made({ end: t, last: y, length, before, error, lost }) {
+        const dense = numbers(3 * ny);
+        Object.assign(rodas, { t_bound: run.until, longest: run.longest, h_abs: length, h_last: before, error, dense });
+        rodas.lost.set(lost);
+        if (!steps.rodas_step(system, rodas, factors, t, y)) return null;
+        const { end, h_last: h } = rodas;
+        return { end, h, raw: rodas.last.slice(), dense, length: rodas.h_abs, before: h, error: rodas.error, lost: rodas.lost.slice() };
+      },
+      within: ({ t: start, h, y, raw, dense }, t, to) => steps.rodas_within({ dense, last: raw }, y, (t - start) / h, to),
+    };
+  };
+  const taylor = (free, system, run) => {
+    const { ny, steps, series } = free;
+    const order = Math.ceil(5 - Math.log(RTOL) / 2);
+    const room = steps.records.Room({});
+    const fixed = series.fixed(...free.arguments()).slice();
+    const of = {
+      begun: (t, y, first, rates) => series.first(t, y, fixed, first, rates),
+      extended: (k, ...given) => series.next(k, fixed, ...given),
+      sums_of_products: steps.convolved,
+    };
+    return {
+      first: () => ({ lost: numbers(ny) }),
+      made({ end: t, last: y, lost: before }) {
+        const [change, raw, lost, rows] = [ny, ny, ny, (order + 1) * ny].map(numbers);
+        steps.expanded(of, t, y, order, room, rows);
+        const end = Math.min(t + steps.reach(run, order, rows, y), run.until);
+        if (!(end > t)) return null;
+        steps.change_after(end - t, order, rows, change);
+        for (let k = 0; k < ny; k += 1) {
+          change[k] += before[k];
+          raw[k] = y[k] + change[k];
+        }
+        steps.round_off(y, raw, change, lost);
+        return areFinite(raw) ? { end, raw, rows, lost } : null;
+      },
+      within({ t: start, y, rows }, t, to) {
+        steps.change_after(t - start, order, rows, to);
+        for (let k = 0; k < ny; k += 1) to[k] = y[k] + to[k];
       },
     };
+  };
+
+  const make = (maker) => (free) => {
+    const { ny, steps } = free;
+    const run = steps.records.Bounds({ atol: numbers(ny).fill(ATOL), rtol: RTOL, longest: Infinity, until: Infinity });
+    const [place, sizes] = [numbers(ny), numbers(ny).fill(1)];
+    let [path, of, given] = [[], null, []];
+    let [method, watch, found, step] = [null, null, null, null];
+    const system = {
+      derivative: (t, y, out) => out.set(of.f(t, y)),
+      jacobian: (t, y, out) => steps.differences(system, sizes, t, y, out),
+    };
     const along = {
-      states_at: (n, times, to) => {
-        interpolate_DOP853(system, step.at, step.y, step.raw, step.k, step.terms);
-        for (let i = 0; i < n; i += 1) within(step.at, step.y, step.terms, times[i], to.subarray(i * ny));
+      states_at(n, times, to) {
+        for (let i = 0; i < n; i += 1) method.within(step, times[i], to.subarray(i * ny));
       },
       switching_at: (t, y, to) => to.set(of.switching(t, y)),
       slope_at: system.derivative,
     };
-    const watching = (many) => {
-      const numbers = { many, timed: 1, turning: of.angles.length, angles: of.angles, most: MOST_PARTS, room: ROOM };
-      const parts = { marks: MOST_PARTS, starts: MOST_PARTS, ends: MOST_PARTS, values: 5 * MOST_PARTS * many };
-      const brackets = { opens: ROOM, closes: ROOM, moments: 3, places: 3 * ny };
-      const unknown = { earlier: NaN, here: NaN, marked: 0 };
-      const floats = { before: many, first: many, last: many, ...parts, ...brackets };
-      return roomy({ ...numbers, ...unknown }, floats, { asked: MOST_PARTS * many, which: ROOM });
-    };
-    const record = () => {
-      const floats = { ends: 1, lengths: 1, states: ny, slopes: ny, losses: ny, terms: 7 * ny, times: 0, rows: 0 };
-      return roomy({ count: 0, most: 1 }, floats, { derivatives: 1, sampled: 1 });
-    };
-    // A step goes from `at.t` and `y`, with the slope there and what rounding took, to the end of `to`.
     const begin = (t, y) => {
-      const to = record();
-      to.ends[0] = t;
-      to.states.set(y);
-      system.derivative(t, y, to.slopes);
-      next = first_length(system, run, t, to.states, to.slopes, run.longest);
-      if (next === Infinity) next = 1; // without states
-      watch = watching(of.switching ? of.switching(t, y).length : 0);
-      found = roomy({ last: -Infinity, unseen: of.unseen, room: ROOM }, { times: ROOM, slopes: 3 * ny });
+      const many = of.switching ? of.switching(t, y).length : 0;
+      const watched = { many, timed: 1, turning: of.angles.length, angles: of.angles, most: steps.MOST_PARTS };
+      watch = steps.records.Watch({ ...watched, room: ROOM, earlier: NaN, here: NaN });
+      found = steps.records.Switches({ last: -Infinity, unseen: of.unseen, room: ROOM });
       run.until = Infinity;
-      path = [{ at: { t, end: t, h: 0 }, y: to.states, to }];
+      method = (maker === taylor && !of.series ? dormandPrince : maker)(free, system, run);
+      path = [{ t, end: t, last: y.slice(), ...method.first(t, y) }];
     };
     const go = () => {
-      const { at: { end }, to } = path.at(-1);
-      if (end >= run.until) run.until = Infinity;
-      const made = record();
-      let at = null;
-      for (let why = UNUSUAL; why; ) {
-        at = { t: end, h: 0, end: 0, length: next, derivatives: 0, is_dense: 0, made: 0 };
-        found.until = Infinity;
-        why = made_many_DOP853(system, checks, run, at, to.states, to.slopes, to.losses, made);
-        if (why && found.until === Infinity) {
-          throw new Error("the steps become too small: the motion is not smooth here");
-        }
-        if (why) run.until = found.until; // it passed over a corner: it is repeated
+      const now = path.at(-1);
+      const { end: t, last: y } = now;
+      if (t >= run.until) run.until = Infinity;
+      for (;;) {
+        const made = method.made(now);
+        if (!made) throw new Error("the steps become too small: the motion is not smooth here");
+        step = { t, y, ...made };
+        step.last = of.placed(step.end, step.raw.slice());
+        Object.assign(found, { until: Infinity, many: 0 });
+        if (!steps.passed_over(watch, found, along, run, {}, t, step.end, y, step.last, 1)) break;
+        run.until = found.until; // it passed over a corner: it is repeated
       }
-      next = at.length;
-      path.push({ at: { ...at, t: end }, y: to.states, to: made });
+      steps.end_at(watch, step.end);
+      found.last = found.now;
+      path.push(step);
     };
     // The state at a time of the path.
     const state = (t) => {
-      const { at, y, to } = path.find((step) => t <= step.at.end);
-      if (t === at.end) return to.states;
-      within(at, y, to.terms, t, place);
+      const step = path.find(({ end }) => t <= end);
+      if (t === step.end) return step.last;
+      method.within(step, t, place);
       return of.placed(t, place);
     };
     const goesOn = (problem, t, y) => {
@@ -105,21 +147,25 @@ const adaptive = (() => {
       const known = problem === of && now.length === given.length && now.every((x, i) => x === given[i]);
       [of, given] = [problem, now];
       run.longest = Infinity;
-      if (!known || !path.length || !(path[0].at.t <= t && t <= path.at(-1).at.end)) return false;
+      if (!known || !path.length || !(path[0].t <= t && t <= path.at(-1).end)) return false;
       return state(t).every((x, k) => x === y[k]);
     };
     const change = (problem, t, y, end) => {
       if (!goesOn(problem, t, y)) begin(t, y);
       if (problem.pulses) run.longest = end - t;
-      for (let count = 0; !(path.at(-1).at.end >= end); count += 1) {
+      for (let count = 0; !(path.at(-1).end >= end); count += 1) {
         if (count === MOST) throw new Error("the steps become too small: the motion is not smooth here");
         go();
       }
-      while (path.length > 1 && path[0].at.end < t) path.shift();
+      while (path.length > 1 && path[0].end < t) path.shift();
       return state(end);
     };
     return Object.assign(change, { free: true });
   };
 
-  return [{ name: "DOP853", about: "Dormand-Prince 8(5,3), steps by tolerance", make: dormandPrince }];
+  return [
+    { name: "DOP853", about: "Dormand-Prince 8(5,3), steps by tolerance", make: make(dormandPrince) },
+    { name: "taylor", about: "Taylor series, steps by tolerance", make: make(taylor), suits: ({ series }) => Boolean(series) },
+    { name: "Rodas5P", about: "Rosenbrock method of order 5, steps by tolerance", make: make(rosenbrock) },
+  ];
 })();

@@ -1,18 +1,20 @@
-// `makeClosure` returns a state to the constraints of a mechanism's loops, as `eomgen simulate` does
-// after each step. It needs no document.
+// `makeClosure`: the constraints of a mechanism's loops, as the engine is given them. It needs no document.
 //
-// steps: those of `makeSteps`; unit(y) gives quaternions the length 1; given() returns [p, u].
+// unit(y) gives quaternions the length 1; given() returns [p, u]; derivative(t, y). What is returned has
+// `placed(t, y)`, which returns the state, changed in place, on the constraints; it throws a sentence where the
+// loops cannot be closed, and where the mechanism is singular.
 
-const makeClosure = (mechanism, steps, size, { ny, positions, others, unit, given }) => {
-  const sizes = Float64Array.from(mechanism.constraints ?? [], (force) => (force === "N" ? size : 1));
-  const rows = sizes.length;
-  const [first, left, after] = [0, 0, 0].map(() => new Float64Array(rows));
-  const there = new Float64Array(ny);
-  const constraints = {
-    residuals_at(t, y, out) {
-      out.set(mechanism.constraintResiduals(t, y, ...given()));
-      return true;
-    },
+const makeClosure = (mechanism, steps, size, { positions, others, kinds, quaternions, unit, given, derivative }) => {
+  const sizes = Float64Array.from(mechanism.constraints, (force) => (force === "N" ? size : 1));
+  const [n, nv, rows, ny] = [positions.length, kinds.filter((kind) => kind === "velocity").length, sizes.length, kinds.length];
+  const room = [rows, rows, rows, ny].map((many) => new Float64Array(many));
+  const written = (values, out, each = 0) => {
+    values.forEach((x, i) => (out[i] = each ? x / sizes[Math.floor(i / each)] : x));
+    return true;
+  };
+  const held = {
+    mechanism, n, nv, rows, quaternions,
+    residuals_at: (t, y, out) => written(mechanism.constraintResiduals(t, y, ...given()), out),
     move_closer(t, y, near) {
       mechanism.projectPosition(t, y, ...given()).forEach((x, i) => (near[positions[i]] = x));
       unit(near);
@@ -25,14 +27,26 @@ const makeClosure = (mechanism, steps, size, { ny, positions, others, unit, give
       mechanism.projectVelocity(t, y, ...given()).forEach((x, i) => (y[others[i]] = x));
       return true;
     },
+    off_by: (t, y, out) => written(mechanism.constraintResiduals(t, y, ...given()), out, 1),
+    drift_at: (t, y, out) => written(mechanism.constraintRates(t, y, ...given()), out, 1),
+    rows_at(t, y, out) {
+      if (mechanism.constraintJacobian) return written(mechanism.constraintJacobian(t, y, ...given()), out, nv);
+      const at = (k) => {
+        const moved = y.map((x, i) => (kinds[i] === "velocity" ? Number(i === k) : x));
+        return mechanism.constraintRates(t, moved, ...given()).slice();
+      };
+      const rest = at(-1);
+      for (let k = 0; k < nv; k += 1) at(n + k).forEach((x, i) => (out[i * nv + k] = (x - rest[i]) / sizes[i]));
+      return true;
+    },
+    rates_at: (t, y, out) => written(derivative(t, y), out),
+    inertia_at: (t, y, out) => written(mechanism.massMatrix(t, y, ...given()), out),
+    slopes_at: (t, y, out) => written(mechanism.kineticSlopes(t, y, ...given()), out),
+    placed(t, y) {
+      const why = steps.moved_onto(held, ny, rows, t, unit(y), sizes, ...room);
+      if (why === steps.PROJECTED) return y;
+      throw new Error("the loops do not close here: take a smaller step or other lengths");
+    },
   };
-  // The state y, changed in place. Throws a sentence where the loops cannot be closed, and where the
-  // mechanism is singular.
-  return (t, y) => {
-    unit(y);
-    if (!mechanism.projectPosition) return y;
-    const why = steps.moved_onto(constraints, ny, rows, t, y, sizes, first, left, after, there);
-    if (why === steps.PROJECTED) return y;
-    throw new Error("the loops do not close here: take a smaller step or other lengths");
-  };
+  return held;
 };

@@ -13,7 +13,7 @@ const contacts = (() => {
     const { names, sizes, ny } = law;
     const count = names.length;
     const all = [...names.keys()];
-    const steps = makeSteps(ny, 0, 0, count, law.many);
+    const steps = makeSteps({ STATES: ny, CONTACTS: count, PRESSED: law.many });
     const of = {
       gaps: (t, y, out) => law.gaps(t, y).forEach((x, k) => (out[k] = law.active(k) ? x / sizes[k] : Infinity)),
       rates: (t, y, out) => law.rates(t, y).forEach((x, k) => (out[k] = law.active(k) ? x / sizes[k] : 0)),
@@ -24,16 +24,8 @@ const contacts = (() => {
       },
     };
     const numbers = (n = count) => new Float64Array(n);
-    const now = {
-      alpha: 0,
-      fastest: 0,
-      holds: new Int32Array(count),
-      units: numbers(),
-      slack: numbers(),
-      rest: Float64Array.from(sizes, (size) => (law.restSpeed ? law.restSpeed / size : -1)),
-      found: numbers(law.many),
-    };
-    const place = { t: 0, y: null, closed: new Int32Array(count), opened: new Int32Array(count), least: 0, since: 0, events: 0 };
+    const now = steps.records.Touching({ rest: Float64Array.from(sizes, (size) => (law.restSpeed ? law.restSpeed / size : -1)) });
+    const place = steps.records.Place({});
     const flagged = (which) => Int32Array.from(all, (k) => (which.includes(k) ? 1 : 0));
     const listed = (flags) => all.filter((k) => flags[k]);
     const held = () => listed(now.holds);

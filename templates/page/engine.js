@@ -6,9 +6,9 @@ const makeEngine = (mechanism, data) => {
   const kinds = data.states.map((state) => state.kind);
   const positions = Int32Array.from([...kinds.keys()].filter((i) => kinds[i] === "position"));
   const others = Int32Array.from([...kinds.keys()].filter((i) => kinds[i] !== "position"));
-  const quaternions = data.quaternions ?? [];
-  const places = Int32Array.from(quaternions.flat());
-  const steps = makeSteps(ny, positions.length, others.length);
+  const quaternions = Int32Array.from((data.quaternions ?? []).flat());
+  const sizes = { STATES: ny, POSITIONS: positions.length, OTHERS: others.length };
+  const steps = makeSteps({ ...sizes, ORDERS: 25, ...mechanism.series?.sizes });
   const defaults = (table) => Float64Array.from(table, (x) => x.value);
   const space = data.dimensions === 3;
   const PULL = 20; // rate at which a pulled point follows the pointer, rad/s
@@ -22,7 +22,7 @@ const makeEngine = (mechanism, data) => {
     y: new Float64Array(ny),
     p: defaults(data.parameters),
     u: defaults(data.inputs),
-    methods: all.filter((m) => !m.separable || isSeparable()).map(({ name, about }) => ({ name, about })),
+    methods: [],
     method: "",
     dt: 0.01,
     events: [],
@@ -44,13 +44,26 @@ const makeEngine = (mechanism, data) => {
     if (engine.grip) pullAt(t, y);
     return mechanism.derivative(t, y, engine.p, engine.u);
   };
+  const given = () => [engine.p, engine.u];
+  const ofStates = { positions, others, kinds, quaternions };
+  const held = mechanism.projectPosition && makeClosure(mechanism, steps, data.size ?? 1, { ...ofStates, unit, given, derivative });
+  const projected = held?.placed ?? ((t, y) => unit(y));
   const free = {
     ny,
     positions,
     others,
     steps,
+    held,
     f: derivative,
-    placed: (t, y) => projected(t, y),
+    placed: projected,
+    touches: Boolean(mechanism.contacts?.length),
+    arguments: given,
+    get series() { return engine.grip ? null : mechanism.series; },
+    // A state like the first one, number k, to see what depends on what.
+    sample(k) {
+      const y = Float64Array.from(mechanism.initialState(engine.p));
+      return held ? y : y.map((x, i) => x + 0.1 * Math.max(1, Math.abs(x)) * Math.sin((k + 1) * (i + 1)));
+    },
     given: () => [engine.grip ? NaN : 0, ...engine.p, ...engine.u], // a pull is never as it was
     switching: mechanism.switchingFunctions && ((t, y) => mechanism.switchingFunctions(t, y, engine.p, engine.u)),
     angles: positions.filter((i) => data.states[i].unit === "rad"),
@@ -60,56 +73,46 @@ const makeEngine = (mechanism, data) => {
   let problem = free;
 
   function unit(y) {
-    if (steps.normalised(quaternions.length, places, y)) return y;
-    for (const four of quaternions) {
-      const length = Math.hypot(...four.map((k) => y[k]));
+    if (steps.normalised(quaternions.length / 4, quaternions, y)) return y;
+    for (let i = 0; i < quaternions.length; i += 4) {
+      const four = quaternions.subarray(i, i + 4);
+      const length = Math.hypot(...Array.from(four, (k) => y[k]));
       if (Number.isFinite(length)) for (const k of four) y[k] /= length;
     }
     return y;
   }
 
-  const given = () => [engine.p, engine.u];
-  const projected = makeClosure(mechanism, steps, data.size ?? 1, { ny, positions, others, unit, given });
+  function suits(method) {
+    try {
+      return method.suits?.(free) ?? true;
+    } catch {
+      return false;
+    }
+  }
 
   function makeLaw() {
     const table = mechanism.contacts ?? [];
     if (!table.length) return null;
     const sizes = table.map((c) => (c.unit === "m" ? data.size ?? 1 : 1));
     const switches = table.map((c) => data.effects.find((e) => e.name === c.effect)?.switch ?? null);
-    const given = (t, y) => [t, y, engine.p, engine.u];
+    const at = (t, y) => [t, y, ...given()];
     return contacts.make({
       names: table.map((c) => c.name),
       sizes,
       ny,
       active: (k) => switches[k] === null || engine.p[switches[k]] !== 0,
-      many: mechanism.held(...given(engine.t, engine.y), table.map(() => 0)).length,
-      gaps: (t, y) => mechanism.gaps(...given(t, y)),
-      rates: (t, y) => mechanism.gapRates(...given(t, y)),
+      many: mechanism.held(...at(engine.t, engine.y), table.map(() => 0)).length,
+      gaps: (t, y) => mechanism.gaps(...at(t, y)),
+      rates: (t, y) => mechanism.gapRates(...at(t, y)),
       impact: (t, y, k, bounce) =>
-        mechanism.impact(...given(t, y), [...table.map((_, i) => (i === k ? 1 : 0)), bounce]),
+        mechanism.impact(...at(t, y), [...table.map((_, i) => (i === k ? 1 : 0)), bounce]),
       held: (t, y, forces) => {
         if (engine.grip) pullAt(t, y);
-        return mechanism.held(...given(t, y), forces);
+        return mechanism.held(...at(t, y), forces);
       },
       restSpeed: data.restSpeed ?? null,
       span: data.span ?? 10,
     });
-  }
-
-  // Whether the rates of velocities depend on positions and time alone, those of positions on velocities.
-  function isSeparable() {
-    if (quaternions.length || mechanism.contacts?.length || !positions.length) return false;
-    try {
-      const p = defaults(data.parameters);
-      const y = Float64Array.from(mechanism.initialState(p), (x, i) => x + 0.1 * Math.sin(i + 1));
-      const slope = (z) => Float64Array.from(mechanism.derivative(0.1, z, p, defaults(data.inputs)));
-      const at = slope(y);
-      const moved = slope(y.map((x, i) => (kinds[i] === "position" ? x : x + 0.3 * Math.cos(i + 1))));
-      const placed = slope(y.map((x, i) => (kinds[i] === "position" ? x + 0.3 * Math.cos(i + 1) : x)));
-      return others.every((i) => at[i] === moved[i]) && positions.every((i) => at[i] === placed[i]);
-    } catch {
-      return false;
-    }
   }
 
   // ---- Steps ----
@@ -121,7 +124,7 @@ const makeEngine = (mechanism, data) => {
   function renew() {
     lost.fill(0);
     regular = engine.t === start;
-    problem = law?.held().length ? { ...free, f: law.derivative } : free;
+    problem = law?.held().length ? { ...free, f: law.derivative, series: null } : free;
   }
 
   function restart() {
@@ -145,7 +148,7 @@ const makeEngine = (mechanism, data) => {
     if (!engine.automatic || engine.method === "DOP853") throw error;
     engine.remark = `${engine.method} fails at ${Number(engine.t.toPrecision(4))} s, DOP853 goes on`;
     engine.method = "DOP853";
-    change = all.find((m) => m.name === "DOP853").make(ny);
+    change = all.find((m) => m.name === "DOP853").make(free);
     engine.dt = Math.max(engine.dt, 0.005);
     start = engine.t;
     renew();
@@ -269,7 +272,7 @@ const makeEngine = (mechanism, data) => {
     engine.method = name;
     engine.dt = dt;
     cost = NaN;
-    change = method.make(ny);
+    change = method.make(free);
     start = goal = engine.t;
     guarded(renew);
   };
@@ -281,7 +284,7 @@ const makeEngine = (mechanism, data) => {
     guarded(() => {
       engine.t = t;
       engine.y.set(y ?? data.initial ?? mechanism.initialState(engine.p));
-      change = all.find((m) => m.name === engine.method).make(ny);
+      change = all.find((m) => m.name === engine.method).make(free);
       law = makeLaw();
       restart();
     });
@@ -406,6 +409,7 @@ const makeEngine = (mechanism, data) => {
     const digit = [5, 2, 1].find((x) => x * power <= most * 1.0001) ?? 1;
     return [corners ? "rk4" : keeping, Number((digit * power).toPrecision(1))];
   }
+  engine.methods = all.filter(suits).map(({ name, about }) => ({ name, about }));
   const [method, step] = choice();
   engine.setMethod(data.liveMethod ?? method, data.liveStep ?? step);
   engine.automatic = !data.liveMethod;

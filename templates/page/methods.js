@@ -1,102 +1,132 @@
-// `methods`: those with equal steps: the arithmetic of `eomgen.run.integrators`, sums in the same order.
-// `change(problem, t, y, h)` returns y(t + h) - y(t); the next call may reuse the array.
+// `methods`: those with equal steps, which are those of the engine.
 //
-// problem: {ny, positions, others, steps, f(t, y)}; f returns an array that its next call may reuse, and
-// `steps` are the functions of the engine.
+//   make(free)   for the problem of the page without held contacts: change(problem, t, y, h), which returns
+//                y(t + h) - y(t); the next call may reuse the array
+//   suits(free)  whether it can make steps of the mechanism, if not every method can
+//
+// problem: {ny, positions, others, steps, held, f(t, y), sample(k)}; f returns an array that its next call may
+// reuse; `steps` are the functions of the engine, `held` the constraints of loops, or null; see `closure`.
 
 const methods = (() => {
   // After more iterations than SLOW the next step takes other factors; after more than MOST their end says
   // too little of the error, and Newton's method itself is taken.
   const [SLOW, MOST] = [9, 15];
+  const [STATES, VELOCITIES] = [3, 3]; // at which it is looked whether leapfrog suits
 
   // What the engine is given, for a problem `of`. For small arrays a loop is faster than `set`.
-  const systemOf = (ny) => {
+  const systemOf = (free) => {
+    const { ny, steps } = free;
+    const sizes = new Float64Array(ny).fill(1);
     const system = {
-      of: null,
+      of: free,
       derivative(t, y, rates) {
         const slope = system.of.f(t, y);
         for (let k = 0; k < ny; k += 1) rates[k] = slope[k];
       },
-      // By differences.
-      jacobian(t, y, out) {
-        const [state, slope] = [y.slice(), system.of.f(t, y).slice()];
-        for (let k = 0; k < ny; k += 1) {
-          state[k] += 2e-8 * Math.max(1, Math.abs(y[k]));
-          const [ahead, length] = [system.of.f(t, state), state[k] - y[k]];
-          for (let i = 0; i < ny; i += 1) out[i * ny + k] = (ahead[i] - slope[i]) / length;
-          state[k] = y[k];
-        }
-      },
+      jacobian: (t, y, out) => steps.differences(system, sizes, t, y, out),
     };
     return system;
   };
+  const checked = (count) => {
+    if (!(count > 0)) throw new Error("there is no step here that solves its equations: take a smaller step");
+  };
 
-  // Explicit methods are the engine's own: `of(steps, system, problem, y)` gives one that makes a step.
-  const explicit = (of) => (ny) => {
-    const step = { change: new Float64Array(ny), place: new Float64Array(ny), slope: new Float64Array(ny) };
-    const system = systemOf(ny);
+  // `of(system, free, y)` gives a function that makes a step.
+  const explicit = (of) => (free) => {
+    const [step, system] = [free.steps.records.Step({}), systemOf(free)];
     let make = null;
     return (problem, t, y, h) => {
       system.of = problem;
-      make ??= of(problem.steps, system, problem, y);
-      make(t, y, h, step);
+      make ??= of(system, free, y);
+      checked(make(t, y, h, step) ?? 1);
       return step.change;
     };
   };
-  const leapfrogs = (steps, system, { positions, others }, y) => {
-    const rates = new Float64Array(positions.length * others.length);
-    steps.constant_rates(system, positions, others, y, rates);
-    const split = { positions, others, rates };
-    return { changed: (t, z, h, step) => (steps.leapfrog(system, split, t, z, h, step), 1) };
+  const rungeKutta = (name) => explicit((system, { steps }) => (...given) => steps[`runge_kutta_${name}`](system, ...given));
+  const semiImplicit = explicit((system, { steps, positions }) => (...given) => steps.semi_implicit_euler(system, positions, ...given));
+  const splitOf = (system, { steps, positions, others }, y) => {
+    const split = steps.records.Split({ positions, others });
+    steps.constant_rates(system, positions, others, y, split.rates);
+    return split;
+  };
+  // With loops the steps are those of RATTLE.
+  const leapfrogs = (system, free, y) => {
+    const { steps, held } = free;
+    if (!held) {
+      const split = splitOf(system, free, y);
+      return { changed: (t, z, h, step) => (steps.leapfrog(system, split, t, z, h, step), 1) };
+    }
+    const { nv, rows } = held;
+    const [room, ...factors] = [steps.records.Linked({ n: nv, rows }), ...[nv, nv, rows].map((n) => steps.records.Factors({ n }))];
+    return { changed: (t, z, h, step) => steps.rattle(held, nv, rows, t, z, h, room, ...factors, step) };
+  };
+  const leapfrog = explicit((...given) => leapfrogs(...given).changed);
+  const composed = (name) => explicit((system, free, y) => {
+    const parts = leapfrogs(system, free, y);
+    return (...given) => free.steps[`composed_${name}`](parts, ...given);
+  });
+  const suits = (free) => {
+    const { steps, positions, others, held } = free;
+    const [system, states] = [systemOf(free), [...Array(STATES).keys()].map(free.sample)];
+    if (free.touches || !positions.length) return false;
+    if (!held) {
+      const split = splitOf(system, free, states[0]);
+      const splits = (y, t) =>
+        [others, positions].every((group) => steps.coupled(system, group.length, group, t, y) < 0) && steps.varying(system, split, t, y) < 0;
+      return states.every(splits);
+    }
+    const { nv, rows } = held;
+    if (!held.mechanism.kineticSlopes || free.ny !== 2 * nv) return false;
+    const [early, late] = [0.1, 1.7].map((t) => Array.from(free.f(t, states[0])));
+    if (early.some((x, i) => x !== late[i])) return false;
+    const [room, factors] = [steps.records.Linked({ n: nv, rows }), steps.records.Factors({ n: rows })];
+    const moving = (k) => states[0].map((x, i) => (i < nv ? x : Math.cos(i + k)));
+    return [...Array(VELOCITIES).keys()].every((k) => steps.moved_force(held, nv, rows, moving(k), room, factors) === -1);
   };
 
-  const euler = explicit((steps, system) => (...given) => steps.runge_kutta_euler(system, ...given));
-  const rungeKutta = explicit((steps, system) => (...given) => steps.runge_kutta_rk4(system, ...given));
-  const semiImplicitEuler = explicit((steps, system, { positions }) => (...given) =>
-    steps.semi_implicit_euler(system, positions, ...given));
-  const leapfrog = explicit((...given) => leapfrogs(...given).changed);
-  const composed = (name) => explicit((steps, ...given) => {
-    const parts = leapfrogs(steps, ...given);
-    return (...more) => steps[`composed_${name}`](parts, ...more);
-  });
-
-  // Implicit methods are the engine's, too. The factors of a step are kept while they serve: they affect
-  // how fast the iteration converges, not where to.
-  const implicit = (name, many) => (ny) => {
-    const n = many * ny;
-    const numbers = (rows, columns = 1) => new Float64Array(rows * columns);
-    const stages = { many, positions: 0, simplified: true, has_factors: false };
-    Object.assign(stages, { changes: numbers(n), update: numbers(n), couplings: numbers(many, many) });
-    Object.assign(stages, { jacobians: numbers(n, ny), matrix: numbers(n, n) });
-    const factors = { n, first: 0, diagonal: 0, right: numbers(n, n), columns: numbers(n, n) };
-    for (const [part, size] of [["entries", n * n], ["ends", n], ["order", n]]) factors[part] = new Int32Array(size);
-    const [system, change] = [systemOf(ny), numbers(ny)];
+  // Implicit methods: with loops, with symmetric projection. Else the factors of a step are kept while they
+  // serve: they affect how fast the iteration converges, not where to.
+  const implicit = (name, many) => (free) => {
+    const { ny, steps, held, positions } = free;
+    const { Stages, Factors, Projected } = steps.records;
+    const [system, change] = [systemOf(free), new Float64Array(ny)];
+    const stages = Stages({ many, positions: positions.length });
+    const factors = Factors({ n: many * ny });
+    if (held) {
+      const { n, nv, rows, quaternions } = held;
+      const room = Projected({ n, nv, rows, many: quaternions.length / 4, stages: many + 1, states: ny, quaternions });
+      const given = [stages, factors, room, Factors({ n: ny }), Factors({ n: 2 * rows }), change];
+      return (problem, t, y, h) => {
+        system.of = problem;
+        checked(steps[`projected_change_${name}`](system, held, n, nv, rows, t, h, y, ...given));
+        return change;
+      };
+    }
     let [length, count] = [0, 0];
     return (problem, t, y, h) => {
-      const make = problem.steps[name];
+      const make = () => steps[`implicit_change_${name}`](system, t, h, y, stages, factors, change);
       stages.has_factors = problem === system.of && h === length && 0 < count && count <= SLOW;
       stages.simplified = true;
-      stages.positions = problem.positions.length;
       [system.of, length] = [problem, h];
-      count = make(system, t, h, y, stages, factors, change);
+      count = make();
       if (count <= 0 || count > MOST) {
         stages.simplified = stages.has_factors = false;
-        count = make(system, t, h, y, stages, factors, change);
+        count = make();
       }
-      if (count <= 0) throw new Error("Newton's iteration does not converge: take a smaller step");
+      checked(count);
       return change;
     };
   };
 
   return [
-    { name: "euler", about: "explicit Euler, order 1", make: euler },
-    { name: "semi_implicit_euler", about: "symplectic Euler, order 1", make: semiImplicitEuler },
-    { name: "leapfrog", about: "Störmer-Verlet, order 2", make: leapfrog, separable: true },
-    { name: "leapfrog_4", about: "leapfrog composed to order 4", make: composed("leapfrog_4"), separable: true },
-    { name: "leapfrog_6", about: "leapfrog composed to order 6", make: composed("leapfrog_6"), separable: true },
-    { name: "rk4", about: "classical Runge-Kutta method, order 4", make: rungeKutta },
-    { name: "implicit_midpoint", about: "implicit midpoint rule, order 2", make: implicit("implicit_change_implicit_midpoint", 1) },
-    { name: "gauss_4", about: "Gauss collocation, order 4", make: implicit("implicit_change_gauss_4", 2) },
-    { name: "gauss_6", about: "Gauss collocation, order 6", make: implicit("implicit_change_gauss_6", 3) },
+    { name: "euler", about: "explicit Euler, order 1", make: rungeKutta("euler") },
+    { name: "semi_implicit_euler", about: "symplectic Euler, order 1", make: semiImplicit },
+    { name: "leapfrog", about: "Störmer-Verlet, order 2", make: leapfrog, suits },
+    { name: "leapfrog_4", about: "leapfrog composed to order 4", make: composed("leapfrog_4"), suits },
+    { name: "leapfrog_6", about: "leapfrog composed to order 6", make: composed("leapfrog_6"), suits },
+    { name: "rk4", about: "classical Runge-Kutta method, order 4", make: rungeKutta("rk4") },
+    { name: "implicit_midpoint", about: "implicit midpoint rule, order 2", make: implicit("implicit_midpoint", 1) },
+    { name: "gauss_4", about: "Gauss collocation, order 4", make: implicit("gauss_4", 2) },
+    { name: "gauss_6", about: "Gauss collocation, order 6", make: implicit("gauss_6", 3) },
   ];
 })();

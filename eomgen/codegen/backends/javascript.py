@@ -13,6 +13,7 @@ from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
+from eomgen.program.taylor_text import SeriesText
 from eomgen.scalars.functions import FUNCTIONS
 
 SUFFIXES: tuple[str, ...] = (".js",)
@@ -40,6 +41,7 @@ OF_PAGE = (
     *("switching_functions", "switching_functions_of_time"),
     *("gaps", "gap_rates", "impact", "held"),
     *("constraint_residuals", "project_position", "project_velocity", "constraint_margins"),
+    *("constraint_rates", "constraint_jacobian", "mass_matrix", "kinetic_slopes", "fixed"),
 )
 """The outputs that a page uses."""
 MOST = 300
@@ -100,7 +102,10 @@ def _given(names: Sequence[str], array: str) -> list[tuple[str, str]]:
 
 
 def mechanism(
-    program: Program, interface: Interface, contacts: Sequence[Mapping[str, Any]] = ()
+    program: Program,
+    interface: Interface,
+    contacts: Sequence[Mapping[str, Any]] = (),
+    series: SeriesText | None = None,
 ) -> str:
     """The source of `const mechanism = …` of a page, an object of functions of (t, y, p, u).
 
@@ -108,7 +113,7 @@ def mechanism(
     same array for its next result. State y, parameters p and inputs u are arrays in the order of
     the interface. `held` and `impact` take an array of their further inputs last. `contacts` are
     described by tables, one for each, which the object has as `contacts`. Its `constraints` are the
-    units of their forces, "N" or "N m".
+    units of their forces, "N" or "N m". Its `series` are those whose text is given, or null.
     """
     program, interface = _numbered(*_of_page(program, interface))
     kernels, constants = kernels_of(program, interface, IN_PAGE, sharing=True)
@@ -133,8 +138,22 @@ def mechanism(
         "missing": [in_page(name) for name in OF_PAGE if name not in program.outputs],
         "contacts": json.dumps(list(contacts)),
         "constraints": json.dumps([force for _, force in interface.constraints]),
+        "series": series,
+        "series_functions": _of_series(series) if series else "",
     }
     return render(TEMPLATES, "mechanism.js.jinja", context)
+
+
+def _of_series(series: SeriesText) -> str:
+    """The source of the functions of Taylor series."""
+    # Imported here because the printer takes a while.
+    from eomgen.subset.expander import Text
+    from eomgen.subset.languages import JAVASCRIPT
+    from eomgen.subset.printing import printed
+
+    functions = Text()
+    functions.add(series.source)
+    return printed(functions, [(name, {}) for name in functions.functions], JAVASCRIPT)
 
 
 def _of_page(program: Program, interface: Interface) -> tuple[Program, Interface]:
