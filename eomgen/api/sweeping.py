@@ -20,6 +20,7 @@ from eomgen.api.states import state_names
 from eomgen.base.errors import RunError
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
+from eomgen.native import equal_steps
 from eomgen.run.checks import (
     check_no_step,
     check_samples,
@@ -345,12 +346,13 @@ def _run_together(integrator: str, functions: Any) -> bool:
 
 def _mostly_in_c(integrator: str, functions: Any) -> bool:
     """Whether Python does so little in members that run one by one that threads serve them: if
-    compiled code makes almost all steps. Rigid contacts are held in Python, and steps of adaptive
-    methods that pass over a corner are repeated there.
+    compiled code makes almost all steps. For adaptive methods rigid contacts are held in Python,
+    and steps that pass over a corner are repeated there.
     """
     method = find_integrator(integrator)
     contacts: tuple[str, ...] = getattr(functions, "CONTACTS", ())
-    if not method.compiled or contacts:
+    loops: tuple[str, ...] = getattr(functions, "CONSTRAINTS", ())
+    if not method.compiled or (contacts and (loops or method.compiled not in equal_steps.METHODS)):
         return False
     return isinstance(method, FixedStep) or not hasattr(functions, "switching_functions")
 

@@ -77,11 +77,38 @@ class Constrained(Protocol):
         ...
 
 
+EVENT = 3
+"""The last step ends where rigid contacts close or open."""
+
+
+class Events(Protocol):
+    """The rigid contacts, which may end a step; none if there are none."""
+
+    def event(
+        self,
+        method: Method,
+        t: float,
+        y: Annotated[Vector, "STATES"],
+        end: Annotated[Vector, "1"],
+    ) -> int:
+        """MADE if no contact closes or opens in a step from t to the state y at `end`. EVENT if one
+        does: then state and time become those of the event. UNUSUAL if that is not known.
+        """
+        ...
+
+
 def equal_steps(
-    held: Constrained, method: Method, t: float, at: Sum, course: Course, step: Step, kept: Kept
+    held: Constrained,
+    method: Method,
+    events: Events,
+    t: float,
+    at: Sum,
+    course: Course,
+    step: Step,
+    kept: Kept,
 ) -> int:
     """Steps from t on. Ends before a step whose rate may not jump, or one with anything unusual:
-    these are made elsewhere.
+    these are made elsewhere; and with one that an event ends.
     """
     start = t
     kept.made = 0
@@ -101,15 +128,18 @@ def equal_steps(
             return UNUSUAL
         if held.is_raised() or not held.projected(end, at.value):
             return UNUSUAL
-        if not held.keep_step(end, at.value, kept.margins[n:]):
+        kept.ends[n] = end
+        why = events.event(method, start, at.value, kept.ends[n:])
+        if why == UNUSUAL or not held.keep_step(kept.ends[n], at.value, kept.margins[n:]):
             return UNUSUAL
         start = end
         course.rate = rate
         course.place = step.place
         course.slope = step.slope
-        kept.ends[n] = end
         kept.iterations[n] = iterations
         kept.states[n] = at.value
         kept.losses[n] = at.lost
         kept.made = n + 1
+        if why == EVENT:
+            return EVENT
     return MADE

@@ -25,10 +25,10 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.series import recurrences_of
 from eomgen.model.model import Model
-from eomgen.native import equal_steps, functions, implicit, rattle, runs, taylor
+from eomgen.native import contact_runs, equal_steps, functions, implicit, rattle, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.program.program import Program
-from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps
+from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps, Strikes
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.run.works import Powers
@@ -190,14 +190,21 @@ class Accelerator:
             return found
 
         def equal(name: str) -> EqualSteps | None:
+            if problem.contacts and (problem.projection or name in implicit.GAUSS):
+                return None
             if problem.projection and name in equal_steps.LEAPFROGS:
                 found = rattle_steps(name)
             elif name in implicit.GAUSS:
                 found = other.equal(name) if (other := implicit_steps(symmetric)) else None
             else:
-                found = held.equal(name, problem) if (held := explicit_steps(projects)) else None
+                needed = (*projects, *(contact_runs.FUNCTIONS if problem.contacts else ()))
+                found = held.equal(name, problem) if (held := explicit_steps(needed)) else None
             self.used = self.used or found is not None
             return found
+
+        def strikes() -> Strikes | None:
+            held = explicit_steps(contact_runs.FUNCTIONS)
+            return held.strikes() if held else None
 
         def of_solutions() -> Series:
             found = series()
@@ -206,7 +213,9 @@ class Accelerator:
         problem = with_series(problem, self._model, module, self._values)
         plain = problem.series["taylor"]
         made_of = {**problem.series, "taylor": of_solutions}
-        return replace(problem, compiled=Compiled(problem.derivative, steps, equal), series=made_of)
+        return replace(
+            problem, compiled=Compiled(problem.derivative, steps, equal, strikes), series=made_of
+        )
 
     def powers(self, powers: Powers) -> Powers:
         """The same powers, which are compiled once that pays."""

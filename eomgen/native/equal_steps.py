@@ -15,9 +15,10 @@ from eomgen.codegen.interface import Interface
 from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.explicit import EULER, LEAPFROG_4, LEAPFROG_6, RUNGE_KUTTA_4
 from eomgen.engine.sums import Sum
+from eomgen.native import contact_runs
 from eomgen.native.checked import Function
 from eomgen.native.constrained import address, constraints
-from eomgen.run.compiled import Array, Constrained, EqualSteps
+from eomgen.run.compiled import Array, Constrained, EqualSteps, Touched
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.problem import Problem
 from eomgen.subset.structures import filled, take
@@ -57,7 +58,7 @@ CALLS = {
 class System(ctypes.Structure):
     """See `templates/c/runs.c.jinja`."""
 
-    _fields_ = tuple((name, _POINTER) for name in ("k", "u", "rates"))
+    _fields_ = tuple((name, _POINTER) for name in ("k", "u", "rates", "events"))
 
 
 def context(interface: Interface) -> dict[str, Any]:
@@ -79,7 +80,7 @@ def steps(
     problem: Problem,
 ) -> EqualSteps:
     """The steps of a method, at the constants of parameters and at inputs; `functions` keep
-    constraints.
+    constraints, and are those of rigid contacts.
     """
     rates = split_of(problem).rates if name in LEAPFROGS else np.empty(0)
     system = System(ctypes.cast(constants, _POINTER), inputs.ctypes.data, rates.ctypes.data)
@@ -99,17 +100,22 @@ def made(
     course: Course,
     kept: Kept,
     constrained: Constrained | None,
+    touched: Touched | None = None,
 ) -> int:
     """Make steps, with the arguments of `run.compiled.EqualSteps`.
 
     call    the method's function
     system  what the method is given
-    functions    that keep constraints, by name
+    functions    that keep constraints, and those of rigid contacts, by name
     quaternions  the four states of each, one after another
     """
     call.restype = ctypes.c_int64
-    call.argtypes = [_POINTER, _POINTER, _REAL, *[_POINTER] * 4]
+    call.argtypes = [_POINTER, _POINTER, _POINTER, _REAL, *[_POINTER] * 4]
     keeps = constraints(functions, constrained, inputs, len(at.value))
+    ends = None
+    if touched is not None and inputs is not None:
+        ends = contact_runs.events(functions, touched, inputs)
+        system.events = ctypes.addressof(ends)
     start = [np.ascontiguousarray(array) for array in (at.value, at.lost)]
     places = np.array(quaternions, np.int64)
     limits = np.array(course.rate), np.ascontiguousarray(course.allowed)
@@ -119,10 +125,13 @@ def made(
     why: int = call(
         ctypes.byref(system),
         address(keeps),
+        None if ends is None else ctypes.addressof(ends),
         t,
         *(array.ctypes.data for array in start),
         ctypes.byref(filled(course)),
         ctypes.byref(left),
     )
     take(kept, left)
+    if touched is not None and ends is not None:
+        contact_runs.taken(touched, ends)
     return why

@@ -15,7 +15,7 @@ from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
 from eomgen.engine.branches import Switches
 from eomgen.engine.crossings import Watch
 from eomgen.engine.embedded import DOP853
-from eomgen.native import checked, equal_steps
+from eomgen.native import checked, contact_runs, equal_steps
 from eomgen.native.checked import FunctionStructure
 from eomgen.native.constrained import address as where
 from eomgen.native.constrained import constraints, made_margins
@@ -25,7 +25,7 @@ from eomgen.native.memory import address, placed
 from eomgen.native.module import Kernels, usual_constants
 from eomgen.program.program import Program
 from eomgen.run import branches
-from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
+from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Strikes, Watched
 from eomgen.run.integrators.dormand_prince_8 import interpolated
 from eomgen.run.integrators.strides import OF_CONTACTS, OF_STATE
 from eomgen.run.problem import Problem
@@ -45,14 +45,17 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     from eomgen.engine.printed import c_source
     from eomgen.subset.languages import C
 
+    of_contacts = contact_runs.context(interface)
     program, interface = restricted(program, interface, ("derivative",))
+    more = contact_runs.ROOTS if of_contacts["contacts"] else []
     context = {
         "prefix": interface.name,
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
         "engine": C.prelude + c_source(equal_steps.STEPS),
-        "steps": c_source([("made_many", {"method": DOP853}), *CHECKS]),
+        "steps": c_source([("made_many", {"method": DOP853}), *CHECKS, *more]),
+        **of_contacts,
         **of_constraints(),
         **equal_steps.context(interface),
     }
@@ -119,8 +122,16 @@ class CompiledSteps:
             return None
         if problem.projection and not set(PROJECTS) <= self._checks.keys():
             return None
+        if problem.contacts and not set(contact_runs.FUNCTIONS) <= self._checks.keys():
+            return None
         held = self._constants, self._inputs, self._checks
         return equal_steps.steps(self._library, name, *held, problem)
+
+    def strikes(self) -> Strikes | None:
+        """The strikes of rigid contacts; None if there are none for these parameters or inputs."""
+        if self._inputs is None or not set(contact_runs.FUNCTIONS) <= self._checks.keys():
+            return None
+        return partial(contact_runs.strikes, self._library, self._checks, self._inputs)
 
     def _dop853(
         self,

@@ -5,15 +5,18 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.engine.contact_runs import Place
+from eomgen.engine.contacts import ContactLaw, Touching
 from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.sums import Sum
 
 Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,17 +145,73 @@ Series = Callable[[float, Array, int], Array]
 """The Taylor coefficients (order + 1, ny) of the solution from a state y on: `(t, y, order)`."""
 
 
+CALLS = ("derivatives", "gap_checks", "held")
+"""What is counted of steps with rigid contacts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Touched:
+    """What steps that end where rigid contacts close or open are given of these, and change.
+
+    law    the contacts, in sizes; `sizes` (nc,) are these, and `names` theirs
+    now    what is known of the contacts, after the event if there is one
+    at     where the run is, then where the event is, and which contacts close or open
+    slack  (nc,), that of the contacts after the last whole step
+    calls  (most + 1, 3), those of the derivative, of gaps and their rates, and of
+           `ContactLaw.held`, up to the start of each step, or to the end of the last one
+    """
+
+    law: ContactLaw
+    names: Sequence[str]
+    sizes: Array
+    now: Touching
+    at: Place
+    slack: Array
+    calls: Whole
+
+    def copy(self, t: float, y: Array, most: int) -> "Touched":
+        """The same at a time and a state, for up to `most` steps."""
+        now, at = self.now, self.at
+        arrays = (x.copy() for x in (now.units, now.slack, now.rest, now.found))
+        flags = at.closed.copy(), at.opened.copy()
+        return Touched(
+            *(self.law, self.names, self.sizes),
+            Touching(now.alpha, now.fastest, now.holds.copy(), *arrays),
+            Place(t, y.copy(), *flags, at.least, at.since, at.events),
+            now.slack.copy(),
+            np.zeros((most + 1, len(CALLS)), np.int64),
+        )
+
+    def called(self, n: int) -> dict[str, Any]:
+        """The calls in step n."""
+        return dict(zip(CALLS, (self.calls[n + 1] - self.calls[n]).tolist(), strict=True))
+
+    def take(self, made: "Touched") -> None:
+        """Take what is known of the contacts after an event."""
+        now, at = self.now, self.at
+        now.alpha, now.fastest = made.now.alpha, made.now.fastest
+        at.since, at.events = made.at.since, made.at.events
+        for name in ("holds", "units", "slack"):
+            getattr(now, name)[:] = getattr(made.now, name)
+        at.closed[:], at.opened[:] = made.at.closed, made.at.opened
+
+
+Strikes = Callable[[Touched, Whole, Array, Array], int | None]
+"""`(touched, closed, speeds, least)`: see `engine.contacts.strike`; None if Python must."""
+
+
 @dataclass(frozen=True)
 class EqualSteps:
     """Steps of equal length, which a place makes by `eomgen.engine.equal_steps`.
 
-    make      makes steps from a sum at t along a course, and keeps them; constraints are kept if
-              they are given. Returns why they end, as the engine does
+    make      makes steps from a sum at t along a course, and keeps them; constraints are kept, and
+              rigid contacts end the steps, if they are given. Returns why they end, as the engine
+              does
     calls     derivatives in each step, or in each iteration
     iterates  whether the method iterates, with as many Jacobians as derivatives
     """
 
-    make: Callable[[float, Sum, Course, Kept, Constrained | None], int]
+    make: Callable[[float, Sum, Course, Kept, Constrained | None, Touched | None], int]
     calls: int
     iterates: bool = False
 
@@ -166,8 +225,10 @@ class Compiled:
                 None if there are none, or not yet. It is asked again and again during a run, and
                 may begin to compile when the run is a long one
     equal       the same for methods with equal steps, without further functions
+    strikes     lets rigid contacts strike; None as for steps
     """
 
     derivative: Callable[[float, Array], Array]
     steps: Callable[[str, tuple[str, ...]], Steps | None]
     equal: Callable[[str], EqualSteps | None]
+    strikes: Callable[[], Strikes | None] = lambda: None

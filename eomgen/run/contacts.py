@@ -3,12 +3,12 @@
 Its tolerances are relative to the size of the mechanism, `Contacts.sizes`: `in_sizes` scales gaps.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from eomgen.engine.contact_runs import NOT_FOUND, NOT_KEPT, Place
 from eomgen.engine.contacts import Touching, deepest, press
 from eomgen.engine.differences import differences
 from eomgen.run.failure import StepFailure
@@ -57,11 +57,6 @@ def nothing_held(contacts: Contacts, states: int, rest_speed: float | None) -> T
     )
 
 
-def names_of(contacts: Contacts, flags: NDArray[np.int64]) -> str:
-    """The names of some contacts, for a message."""
-    return ", ".join(contacts.names[k] for k in np.flatnonzero(flags))
-
-
 @dataclass(frozen=True, eq=False)
 class Holding:
     """The forces of contacts that are held: they may open, but not close."""
@@ -77,7 +72,7 @@ class Holding:
         """
         pushes, parts = np.empty((2, len(self.contacts.names)))
         if not press(self.contacts, self.held, t, y, pushes, parts):
-            raise no_forces(self.contacts, self.held, t)
+            raise no_forces(self.contacts.names, self.held, t)
         return self.held.found
 
     def derivative(self, t: float, y: FloatArray) -> FloatArray:
@@ -89,12 +84,48 @@ class Holding:
         return self.solve(t, y)[len(y) + len(self.contacts.names) :].copy()
 
 
-def no_forces(contacts: Contacts, held: Touching, t: float) -> StepFailure:
+def no_forces(names: Sequence[str], held: Touching, t: float) -> StepFailure:
     """The failure of a step for which contacts have no forces."""
+    which = ", ".join(names[k] for k in np.flatnonzero(held.holds).tolist())
     return StepFailure(
-        f"no contact forces at t = {t:.6g} keep {names_of(contacts, held.holds)} from closing "
+        f"no contact forces at t = {t:.6g} keep {which} from closing "
         "(strong friction can cause this)",
         "take less friction, or another contact law",
+    )
+
+
+@dataclass(frozen=True)
+class Within:
+    """The states of a step from t and y to `last` at `end`, and `between` these."""
+
+    t: float
+    y: FloatArray
+    last: FloatArray
+    end: float
+    between: Callable[[float], FloatArray]
+
+    def state(self, s: float) -> FloatArray:
+        """The state s seconds after its start."""
+        if s <= 0:
+            return self.y
+        return self.last if s >= self.end - self.t else self.between(self.t + s)
+
+
+def not_taken(
+    names: Sequence[str], held: Touching, why: int, times: tuple[float, float], now: Place
+) -> StepFailure:
+    """Why a step between two times cannot be taken."""
+    start, end = times
+    if why == NOT_KEPT:
+        return no_forces(names, held, end)
+    if why == NOT_FOUND:
+        return StepFailure(
+            f"the time of a contact is not found between {start:.6g} and {end:.6g}",
+            "take a smaller step",
+        )
+    return StepFailure(
+        f"contacts struck or opened {now.events - 1} times within {now.least:.2g} s",
+        "take a larger rest_speed",
     )
 
 

@@ -14,27 +14,23 @@ in grazing a curved surface, always bounces.
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.engine.contact_runs import (
-    CLOSED,
-    NOT_FOUND,
-    NOT_KEPT,
-    OPENED,
-    WHOLE,
-    Place,
-    taken,
-)
+from eomgen.engine.contact_runs import CLOSED, OPENED, WHOLE, Place, taken
 from eomgen.engine.contacts import ENDLESS, NO_FORCES, TOLERANCE, Touching, begin, strike, weigh
 from eomgen.engine.roots import Search
+from eomgen.run.compiled import Strikes, Touched
 from eomgen.run.contacts import (
     Holding,
     Rate,
+    Within,
     check_depth,
     in_sizes,
     no_forces,
+    not_taken,
     nothing_held,
     restrained,
     sizes_of,
@@ -44,6 +40,7 @@ from eomgen.run.integrators.interface import Advance, Begin, Resume
 from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import Event, Kind
 
+_NOTHING = np.empty(0), np.empty(0, np.int64)
 GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Points of an adaptive step at which the gaps of contacts are checked; for equal steps, the ends.
 """
@@ -54,12 +51,12 @@ class Stepper:
     """How a run makes steps.
 
     begin    begins steps of a problem at any time
-    share    gaps are checked at the ends of parts of a step, each this share of its length
+    strikes  lets contacts strike in compiled code; None if there is none
     counted  wraps a function so that its calls count as derivatives
     """
 
     begin: Begin
-    share: float
+    strikes: Callable[[], Strikes | None]
     counted: Callable[[Rate], Rate]
 
 
@@ -94,10 +91,10 @@ def advances(
         begin(contacts, held, now.t, now.y, t_end - t_start)
         check_depth(contacts, now.t, now.y)
         now.closed[contacts.gaps(now.t, now.y) <= TOLERANCE] = 1
-    made = 0
+    made, touched = 0, Touched(contacts, contacts.names, sizes_of(contacts), held, now, *_NOTHING)
     while True:
         if now.closed.any():
-            yield from _strike(problem, now, held)
+            yield from _strike(problem, touched, stepper.strikes())
         if now.t >= t_end:
             return
         if resume is None:
@@ -105,7 +102,7 @@ def advances(
         holding = Holding(contacts, deepcopy(held)) if held.holds.any() else None
         smooth = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
-        steps = stepper.begin(smooth, now.t, made, resume, lambda: not held.slack.any())
+        steps = stepper.begin(smooth, now.t, made, resume, touched)
         resume = None
         for advance in steps:
             made += advance.steps
@@ -115,16 +112,19 @@ def advances(
             start, why = now.t, WHOLE
             if advance.checked:
                 now.t, now.y = step.t, step.y
+                why = CLOSED if now.closed.any() else OPENED if now.opened.any() else WHOLE
             else:
-                within = _Within(now.t, now.y, step)
-                why = taken(contacts, within, held, Search(), now, step.t, stepper.share)
+                within = Within(now.t, now.y, step.y, step.t, step.within)
+                why = taken(contacts, within, held, Search(), now, step.t, GAP_CHECKS[1])
             if why not in (WHOLE, CLOSED, OPENED):
-                raise _failure(contacts, held, why, (start, step.t), now)
+                raise not_taken(contacts.names, held, why, (start, step.t), now)
             if why == WHOLE:
                 yield step._replace(resume=_resume(step, held, begun))
                 continue
             if now.t > start:
                 yield _part(step, now, keep=why == CLOSED)
+            elif step.checked:  # for what it counts
+                yield step._replace(samples=[], steps=0, resume=None)
             if why == OPENED:
                 yield _opened(contacts, smooth, now)
             break
@@ -163,44 +163,12 @@ def _resumed(contacts: Contacts, held: Touching, resume: Resume) -> tuple[float,
     return begun
 
 
-@dataclass(frozen=True)
-class _Within:
-    """The states of a step that begins at t with y."""
-
-    t: float
-    y: FloatArray
-    step: Advance
-
-    def state(self, s: float) -> FloatArray:
-        """The state s seconds after its start."""
-        step = self.step
-        return self.y if s <= 0 else step.y if s >= step.t - self.t else step.within(self.t + s)
-
-
-def _failure(
-    contacts: Contacts, held: Touching, why: int, times: tuple[float, float], now: Place
-) -> StepFailure:
-    """Why a step between two times cannot be taken."""
-    start, end = times
-    if why == NOT_KEPT:
-        return no_forces(contacts, held, end)
-    if why == NOT_FOUND:
-        return StepFailure(
-            f"the time of a contact is not found between {start:.6g} and {end:.6g}",
-            "take a smaller step",
-        )
-    return StepFailure(
-        f"contacts struck or opened {now.events - 1} times within {now.least:.2g} s",
-        "take a larger rest_speed",
-    )
-
-
-def _strike(problem: Problem, now: Place, held: Touching) -> Iterator[Advance]:
+def _strike(problem: Problem, touched: Touched, compiled: Strikes | None) -> Iterator[Advance]:
     """Yield the strikes of contacts that have closed, and update state and contacts."""
-    contacts, t = problem.contacts, now.t
+    contacts, now, held, t = problem.contacts, touched.at, touched.now, touched.at.t
     assert contacts is not None
     count = len(contacts.names)
-    made: list[tuple[int, FloatArray]] = []
+    made: list[tuple[int | None, FloatArray]] = []
 
     def impact(t: float, y: FloatArray, contact: int, bounce: float) -> FloatArray:
         made.append((contact, contacts.impact(t, y, contact, bounce)))
@@ -211,18 +179,28 @@ def _strike(problem: Problem, now: Place, held: Touching) -> Iterator[Advance]:
 
     before, y = held.holds.copy(), now.y.copy()
     speeds, least = np.empty((2, count))
-    answer = strike(replace(contacts, impact=impact), held, t, y, now.closed, speeds, least)
+    answer, counts = None, dict[str, Any]()
+    if compiled:
+        met = touched.copy(t, y, 1)
+        answer = compiled(met, now.closed, speeds, least)
+        if answer is not None:
+            touched.take(met)
+            made = [(None, met.at.y)] if speeds.any() else []
+            counts = met.called(0)
+    if answer is None:
+        law = replace(contacts, impact=impact)
+        answer = strike(law, held, t, y, now.closed, speeds, least)
     now.closed[:] = 0
     for contact, after in made:
         now.y = after
         yield instant(after, contact)
     if answer == ENDLESS:
-        names = ", ".join(contacts.names[k] for k in sorted({contact for contact, _ in made}))
+        names = ", ".join(contacts.names[k] for k in np.flatnonzero(speeds))
         raise StepFailure(
             f"the impacts among {names} at t = {t:.6g} do not end", "take less restitution"
         )
     if answer == NO_FORCES:
-        raise no_forces(contacts, held, t)
+        raise no_forces(contacts.names, held, t)
 
     found = (speeds * sizes_of(contacts)).tolist()
     events: list[Event] = []
@@ -236,12 +214,13 @@ def _strike(problem: Problem, now: Place, held: Touching) -> Iterator[Advance]:
             speed = 0.0 if kind == "lift" else found[k]
             events.append(Event(t, contacts.names[k], kind, speed))
     rows = [(t, now.y)] if made else []
-    yield instant(now.y)._replace(samples=rows, events=tuple(events))
+    yield instant(now.y)._replace(samples=rows, events=tuple(events), **counts)
 
 
 def _opened(contacts: Contacts, problem: Problem, now: Place) -> Advance:
     """That contacts which were held have opened."""
     which = np.flatnonzero(now.opened)
+    now.opened[:] = 0
     events = tuple(Event(now.t, contacts.names[k], "lift", 0.0) for k in which)
     y = now.y
     return Advance(now.t, y, [], problem, lambda _: y, steps=0, events=events)

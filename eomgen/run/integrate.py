@@ -151,9 +151,8 @@ class _Plan:
         if problem.contacts is None:
             advances = begin(problem, t_start, 0, asked.resume)
         else:
-            share = 1.0 if isinstance(asked.method, FixedStep) else events.GAP_CHECKS[1]
             advances = events.advances(
-                events.Stepper(begin, share, self.calls.derivatives.of),
+                events.Stepper(begin, self.steps.strikes, self.calls.derivatives.of),
                 problem,
                 t_start,
                 asked.t_end,

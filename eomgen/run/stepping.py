@@ -22,11 +22,12 @@ from eomgen.run.checks import (
     longest_steps,
     numbers,
 )
-from eomgen.run.compiled import Compiled
+from eomgen.run.compiled import Compiled, Strikes, Touched
 from eomgen.run.guard import Guard
 from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
 from eomgen.run.integrators.fixed_step import Grid
-from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume, always
+from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume
+from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress
 from eomgen.run.tally import Tally
@@ -102,11 +103,14 @@ class Asked:
 
 
 class Steps(NamedTuple):
-    """How the steps of a run are begun, the times of its rows, and what a later run compares."""
+    """How the steps of a run are begun, the times of its rows, and what a later run compares; and
+    what lets its rigid contacts strike in compiled code, if that makes its steps.
+    """
 
     begin: Begin
     rows: Rows
     settings: Resume
+    strikes: Callable[[], Strikes | None] = lambda: None
 
 
 def steps_of(
@@ -133,9 +137,10 @@ def _equal_steps(
     change = method.prepare(counted)
     # Evaluations to check stability do not count. They need a Jacobian with all digits, which
     # doubles do not give where the derivative is repaired.
+    monitor = StabilityMonitor(change, method.stability) if whole.contacts else None
     unchecked = asked.unstable or asked.repairs or not method.steps_explicitly(whole)
     plain = not (asked.guard or asked.powers)
-    compiled = _compiled(whole) if plain and method.compiled and not whole.contacts else None
+    compiled = _compiled(whole) if plain and method.compiled else None
     ahead = plain and not whole.projection
 
     def begin(
@@ -143,7 +148,7 @@ def _equal_steps(
         t: float,
         made: int,
         resume: Resume | None = None,
-        compiles: Callable[[], bool] = always,
+        touched: Touched | None = None,
     ) -> Iterator[Advance]:
         return fixed_step.advances(
             method,
@@ -155,7 +160,9 @@ def _equal_steps(
             resume=resume,
             compiled=partial(compiled.equal, method.compiled) if compiled else None,
             calls=calls if ahead else None,
-            each=bool(asked.tally or whole.contacts),
+            each=bool(asked.tally),
+            monitor=monitor,
+            touched=touched,
         )
 
     def rows(a: float, b: float) -> list[float]:
@@ -164,7 +171,10 @@ def _equal_steps(
         found = [mark for mark in marks if a < mark <= b and mark < asked.t_end]
         return [*found, b] if b == asked.t_end else found
 
-    return Steps(begin, rows, _settings(asked, dt))
+    settings = _settings(asked, dt)
+    return (
+        Steps(begin, rows, settings, compiled.strikes) if compiled else Steps(begin, rows, settings)
+    )
 
 
 def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Remark) -> Steps:
@@ -190,7 +200,7 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
         t: float,
         made: int,
         resume: Resume | None = None,
-        compiles: Callable[[], bool] = always,
+        touched: Touched | None = None,
     ) -> Iterator[Advance]:
         return adaptive.advances(
             method,
@@ -203,7 +213,7 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
             remark=remark,
             resume=resume,
             steps=compiled.steps if compiled and problem.compiled else None,
-            compiles=compiles,
+            touched=touched,
             each=bool(asked.tally or asked.powers),
             dense=asked.powers is not None,
         )

@@ -64,6 +64,7 @@ class Tally:
         self.derivatives, self.jacobians = derivatives, jacobians
         self.switches += advance.switches
         self.gap_checks += advance.gap_checks
+        self.held += advance.held
         self.low = np.minimum(self.low, advance.y)
         self.high = np.maximum(self.high, advance.y)
         self.check(self, advance.t)

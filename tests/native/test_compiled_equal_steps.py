@@ -5,9 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import some
+from test_compiled_events import HELD
 from test_compiled_steps import FALL, assert_same, both, compiler
 
 import eomgen
+from eomgen.native import equal_steps
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.scene.built_in import built_in_names
 
@@ -98,6 +100,32 @@ def test_steps_that_jump_are_checked_alike(
     assert_same(*runs)
     assert looks[0] == looks[1]
     assert looks[0] or not runs[0].finished
+
+
+@pytest.mark.every(2)
+@pytest.mark.parametrize("scene", [HELD, "bouncing_two_body"])
+@pytest.mark.parametrize("method", METHODS)
+def test_rigid_contacts_end_steps(scene: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They strike, are held and open. Python makes the first step, the last, and what it checks."""
+    made, steps = equal_steps.made, list[int]()
+
+    def noted(*given: Any) -> int:
+        why = made(*given)
+        steps.append(given[8].made)
+        return why
+
+    monkeypatch.setattr(equal_steps, "made", noted)
+    compiled, python = both(scene, integrator=method, t_end=3.0, dt=1e-3, samples=77)
+    assert_same(compiled, python)
+    assert compiled.trajectory.events == python.trajectory.events
+    assert {event.kind for event in python.trajectory.events} >= {"impact"}
+    assert sum(steps) > 0.97 * python.trajectory.counts["steps"]
+    for first, second in ((compiled, "numpy"), (python, "c")):
+        begun = eomgen.simulate(scene, integrator=method, t_end=1.5, dt=1e-3, backend="c")
+        run = eomgen.simulate(
+            scene, integrator=method, t_end=3.0, dt=1e-3, backend=second, resume=begun
+        )
+        assert run.y[-1].tobytes() == first.y[-1].tobytes()
 
 
 @pytest.mark.every(2)

@@ -8,6 +8,8 @@ import pytest
 from languages import Given, results
 
 from eomgen.engine import equal_steps, explicit, quaternions, sums, system
+from eomgen.engine.adaptive import MADE
+from eomgen.engine.equal_steps import EVENT
 from eomgen.engine.explicit import Step
 from eomgen.subset.expander import Text
 
@@ -17,7 +19,7 @@ N, POSITIONS, OTHERS = 5, np.array([1, 3]), np.array([0, 2, 4])
 
 
 class Python:
-    """Functions of `System`, `Method` and `Constrained`."""
+    """Functions of `System`, `Method`, `Constrained` and `Events`."""
 
     def derivative(self, t: float, y: Any) -> Any:
         return y * y[::-1] - t * y
@@ -41,6 +43,13 @@ class Python:
         y[1] *= 1.0 + 1e-3 * t
         return bool(y[1] < 2.0)
 
+    def event(self, method: Any, t: float, y: Any, end: Any) -> int:
+        if y[3] < 0.05:
+            return MADE
+        y[3] = t
+        end[0] -= 0.01
+        return EVENT
+
     def keep_step(self, t: float, y: Any, margin: Any) -> bool:
         margin[0] = y[0]
         return True
@@ -53,6 +62,7 @@ struct Step;
 typedef struct { int none; } System;
 typedef System Method;
 typedef System Constrained;
+typedef System Events;
 static void derivative(System *s, double t, const double *y, double *out) {
     (void)s;
     for (int j = 0; j < 5; j++) out[j] = y[j] * y[4 - j] - t * y[j];
@@ -68,6 +78,13 @@ static int64_t projected(Constrained *h, double t, double *y) {
     (void)h;
     y[1] *= 1.0 + 1e-3 * t;
     return y[1] < 2.0;
+}
+static int64_t event(Events *e, Method *m, double t, double *y, double *end) {
+    (void)e, (void)m;
+    if (y[3] < 0.05) return 0;
+    y[3] = t;
+    *end -= 0.01;
+    return 3;
 }
 static int64_t keep_step(Constrained *h, double t, const double *y, double *margin) {
     (void)h, (void)t;
@@ -88,6 +105,12 @@ const system = {
   is_raised: () => 0,
   may_jump: (t, y, change) => change[0] > y[2] * t,
   projected: (t, y) => { y[1] *= 1 + 1e-3 * t; return y[1] < 2; },
+  event: (method, t, y, end) => {
+    if (y[3] < 0.05) return 0;
+    y[3] = t;
+    end[0] -= 0.01;
+    return 3;
+  },
   keep_step: (t, y, margin) => { margin[0] = y[0]; return 1; },
 };
 """,
@@ -170,11 +193,11 @@ def test_many_steps() -> None:
     for many, most, allowed in ((0, 6, np.inf), (1, 3, 1e9), (0, 3, 0.01), (1, 0, np.inf)):
         for factor in (0.1, 1.0, 1e200, np.nan):
             at = sums.Sum(factor * some(N), some(N) * 1e-17)
-            given = [GIVEN, GIVEN, 0.2, at, course(many, most, allowed), step(), kept(most)]
+            given = [GIVEN, GIVEN, GIVEN, 0.2, at, course(many, most, allowed), step(), kept(most)]
             cases.append(given)
     python, *others = results(TEXT, "equal_steps", cases, given=GIVEN)
     assert others == [python, python]
-    assert len({case[-1] for case in python}) == 2
+    assert len({case[-1] for case in python}) == 3
 
 
 def test_sums_lose_nothing() -> None:

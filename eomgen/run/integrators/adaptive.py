@@ -15,15 +15,9 @@ from typing import Any
 import numpy as np
 
 from eomgen.run.branches import BranchMonitor, Retry, Step
-from eomgen.run.compiled import Steps
+from eomgen.run.compiled import Steps, Touched
 from eomgen.run.failure import NOT_FINITE, StepFailure
-from eomgen.run.integrators.interface import (
-    Adaptive,
-    Advance,
-    Remark,
-    Resume,
-    always,
-)
+from eomgen.run.integrators.interface import Adaptive, Advance, Remark, Resume
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
 from eomgen.run.integrators.strides import Before, Strides, continuation
 from eomgen.run.problem import FloatArray, Problem, Switching
@@ -73,7 +67,7 @@ def advances(
     remark: Remark,
     resume: Resume | None = None,
     steps: Callable[[str, tuple[str, ...]], Steps | None] | None = None,
-    compiles: Callable[[], bool] = always,
+    touched: Touched | None = None,
     each: bool = True,
     dense: bool = True,
 ) -> Iterator[Advance]:
@@ -87,7 +81,7 @@ def advances(
     made    number of earlier steps, which count towards `bounds.most`
     remark  called with what SciPy would warn of
     steps   see `run.compiled.Compiled`
-    compiles  asked each time whether they may be used
+    touched   what is known of rigid contacts; gaps below 0 end compiled steps
     each    whether each compiled step is yielded, or many at once
     dense   whether compiled steps give the states within them
 
@@ -103,7 +97,7 @@ def advances(
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
         until = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here)
-        use = compiled if compiled and compiles() else None
+        use = None if touched and touched.now.slack.any() else compiled
         most = min(until - here, stepper.shaken.left) if stepper.shaken else until - here
         stride = use.made(stepper, sampled, most) if use else None
         if use and stride:

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from eomgen.engine.adaptive import MADE, UNUSUAL
-from eomgen.engine.equal_steps import Course, Kept, equal_steps
+from eomgen.engine.contact_runs import CLOSED, OPENED, WHOLE, taken
+from eomgen.engine.equal_steps import EVENT, Course, Kept, equal_steps
 from eomgen.engine.explicit import Step
+from eomgen.engine.roots import Search
 from eomgen.engine.sums import Sum
 from eomgen.run.calls import Calls, Count
-from eomgen.run.compiled import EqualSteps
+from eomgen.run.compiled import CALLS, EqualSteps, Touched
+from eomgen.run.contacts import Within, not_taken
 from eomgen.run.failure import NOT_FINITE, StepFailure
 from eomgen.run.integrators.interface import Advance, Change, FixedStep, Resume
 from eomgen.run.integrators.portions import Portion, Size
@@ -52,6 +55,10 @@ class Grid:
         """Their number."""
         return int(count_steps(self.t_end - self.t_start, self.dt))
 
+    def is_row(self, i: int, t: float) -> bool:
+        """Whether step i ends at t, and is a row."""
+        return self.end(i)[0] == t and (i % self.every == 0 or i == self.steps)
+
     def end(self, i: int) -> tuple[float, float | None]:
         """When step i ends, from 1 on, and when it does by the grid; None if it is shorter."""
         # From the start each time: a sum of steps would accumulate rounding errors.
@@ -73,6 +80,8 @@ def advances(
     compiled: Callable[[], EqualSteps | None] | None = None,
     calls: Calls | None = None,
     each: bool = True,
+    monitor: StabilityMonitor | None = None,
+    touched: Touched | None = None,
 ) -> Iterator[Advance]:
     """Yield the steps of a method from time `t` on, of which `change` is one.
 
@@ -87,21 +96,27 @@ def advances(
     calls     counts the calls of the problem's functions; given if steps may be made before the
               earlier ones have been looked at
     each      whether each step is yielded, or many at once
+    monitor   of stability, that of the steps before an event if they continue those
+    touched   what compiled steps are given of rigid contacts; they then end with the part of one up
+              to an event, of which `touched` says when the part is yielded
 
     Raises `StepFailure` where there is no step, or if steps are too long for stability.
     """
-    own = InPython(change, problem, checked, StabilityMonitor(change, method.stability), calls)
+    monitor = monitor or StabilityMonitor(change, method.stability)
+    own = InPython(change, problem, checked, monitor, calls)
     regular, y, steps = t == grid.t_start or resume is not None, problem.initial, grid.steps
     lost = np.zeros_like(y) if resume is None else resume["lost"]
     seed = problem.scrutiny.seed if problem.scrutiny else None
     shaken = None if seed is None else Shaken(problem.derivative, seed)
-    i, usual, size = min(math.floor((t - grid.t_start) / grid.dt + 1e-9), steps - 1), False, Size()
+    i, size = min(math.floor((t - grid.t_start) / grid.dt + 1e-9), steps - 1), Size()
+    goes_on = usual = monitor.begin()
     ahead = max(1, AHEAD // len(y)) if calls and len(y) else 1
     own_most = 1  # it grows: an event may end the steps, and those beyond it are in vain
     while i < steps:
         (end, mark), near = grid.end(i + 1), False
         alone = i + 1 == steps or not regular
-        place = compiled() if compiled and usual and not alone else None
+        made_here = not compiled or not usual or i + 1 == steps or not (regular or goes_on)
+        place = compiled() if compiled and not made_here else None
         most = size.most if place else own_most if usual or not compiled else 1
         most = 1 if alone else min(most, steps - 1 - i, shaken.left if shaken else most)
         length = grid.dt if regular and mark is not None else end - t
@@ -111,8 +126,11 @@ def advances(
         kept = _room(most, len(y))
         held = constrained_by(problem.projection) if place else None
         given = t, Sum(y, lost), course, kept
-        why = place.make(*given, held) if place else own.make(*given, i + 1 == steps)
-        n = kept.made
+        own.touched = met = touched and touched.copy(t, y, most)
+        why = place.make(*given, held, met) if place else own.make(*given, i + 1 == steps)
+        n = kept.made - (why == EVENT)  # whole steps
+        if touched and met:
+            touched.now.slack[:] = met.slack
         margins = np.concatenate(([held.margins[1][1]], kept.margins[:n])) if held else None
         if n and problem.closed_form:
             margins = problem.closed_form.passed(t, y, kept.ends[:n], kept.states[:n])
@@ -122,16 +140,26 @@ def advances(
         if n:
             if place:
                 own.passed(n, place.calls, course)
-            counts = _counts(place, kept, n) if place else own.counts
+            counts = _counts(place, kept, n, met) if place else own.counts_of(n)
             within = partial(_within, change, problem, (t, y), kept)
             resumes = partial(_continuation, kept, mark) if mark is not None else None
             rows = _rows(kept, n, i, grid)
             made = (kept.ends[:n], kept.states[:n], *rows, counts, within, resumes, margins)
-            yield from Portion(problem, t, *made).advances(each or near)
+            whole = touched is not None
+            yield from Portion(problem, t, *made, whole).advances(each or near)
             i, regular, own_most = i + n, True, min(2 * own_most, ahead)
             t, y, lost = float(kept.ends[n - 1]), kept.states[n - 1], kept.losses[n - 1]
             if shaken:
                 lost = lost + shaken.error(t, y, length, n)
+        if touched and met and why == EVENT:
+            touched.take(met)
+            if place:
+                own.passed(1, place.calls, course)
+            else:
+                own.count_after(n)
+            part = _part(change, problem, (t, y), kept, n, grid.is_row(i + 1, kept.ends[n]))
+            yield part._replace(**(met.called(n) if place else {}))
+            return
         if not place and why != MADE:
             own.count_failed()
             raise own.failure or StepFailure(NOT_FINITE, method.remedy)
@@ -160,8 +188,27 @@ def _rows(kept: Kept, n: int, made: int, grid: Grid) -> tuple[Any, Any]:
     return found, np.arange(made + 1, made + n + 1) // every - made // every
 
 
-def _counts(place: EqualSteps, kept: Kept, n: int) -> dict[str, Any]:
+def _part(
+    change: Change,
+    problem: Problem,
+    start: tuple[float, FloatArray],
+    kept: Kept,
+    n: int,
+    rows: bool,
+) -> Advance:
+    """The part of step n of these, up to an event; its end is a row if the whole step's would be
+    that and is there.
+    """
+    t, y = float(kept.ends[n]), kept.states[n]
+    part = Kept(1, 1, kept.ends[n:], kept.states[n:], *(kept.losses, kept.iterations, kept.margins))
+    within = partial(_within, change, problem, start, part, 0)
+    return Advance(t, y, [(t, y)] if rows else [], problem, within, checked=True)
+
+
+def _counts(place: EqualSteps, kept: Kept, n: int, met: Touched | None) -> dict[str, Any]:
     """The derivatives and Jacobians so far in the first n of these steps."""
+    if met:
+        return dict(zip(CALLS, met.calls[1 : n + 1].T, strict=True))
     if not place.iterates:
         return {"derivatives": place.calls * np.arange(1, n + 1)}
     made = place.calls * np.cumsum(kept.iterations[:n])
@@ -212,13 +259,15 @@ class InPython:
         self.counts: dict[str, list[int]] = {name: [] for name in self._counted}
         self._both = list(zip(self.counts.values(), self._counted.values(), strict=True))
         self._unkept: list[int] = []
+        self.touched: Touched | None = None
         self.failure: BaseException | None = None
         self._failed: list[tuple[float, FloatArray] | None] = []
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
         """The rate of the last step, and the changes from it that are not to be looked at."""
-        return self._monitor.limits if self._checked else self._no_limits
+        none, limits = self._no_limits, self._monitor.limits
+        return (limits[0] + none[0], limits[1] + none[0]) if self._checked else none
 
     def make(self, t: float, at: Sum, course: Course, kept: Kept, last: bool) -> int:
         """Steps, as `EqualSteps.make`; `last` if it is the last one of a run."""
@@ -229,7 +278,7 @@ class InPython:
         for calls, _ in self._both:
             calls.clear()
         try:
-            why = equal_steps(self, self, t, at, course, Step(), kept)
+            why = equal_steps(self, self, self, t, at, course, Step(), kept)
         except BaseException as failure:  # those before it are kept
             self.failure, why = failure, UNUSUAL
         for (calls, count), before in zip(self._both, begun, strict=True):
@@ -239,9 +288,18 @@ class InPython:
         self._failed = [count.failed for _, count in self._both]
         for (_, count), place in zip(self._both, failed, strict=True):
             count.failed = place
-        if self._monitor.rate is not None:
+        if not self._monitor.is_first:
             self._monitor.rate = course.rate
         return why
+
+    def counts_of(self, n: int) -> dict[str, list[int]]:
+        """Those of the first n of the last steps."""
+        return {name: calls[:n] for name, calls in self.counts.items()}
+
+    def count_after(self, n: int) -> None:
+        """Count the calls of the last steps after the first n."""
+        for calls, count in self._both:
+            count.calls += calls[-1] - (calls[n - 1] if n else 0)
 
     def passed(self, steps: int, calls: int, course: Course) -> None:
         """Take account of compiled steps, of `calls` derivatives each."""
@@ -265,7 +323,7 @@ class InPython:
     def may_jump(self, t: float, y: FloatArray, change: FloatArray) -> bool:
         """Whether a step whose rate jumps may be made: it may, or this raises `StepFailure`."""
         if self._checked:
-            if self._monitor.rate is not None:
+            if not self._monitor.is_first:
                 self._monitor.rate = self._course.rate
             self._monitor.check(self._checked, *self._step)
             self._course.allowed = self._monitor.limits[1]
@@ -283,6 +341,28 @@ class InPython:
         """Put the state on the constraints, and normalise its quaternions."""
         y[:] = self._problem.projected(t, y)
         return True
+
+    def event(self, method: Any, t: float, y: FloatArray, end: FloatArray) -> int:
+        """Whether a rigid contact ends the step; raises `StepFailure` if that is not found."""
+        met = self.touched
+        if met is None:
+            return MADE
+        start, whole = (t, met.at.y), float(end[0])
+        within = Within(*start, y.copy(), whole, partial(self._within, start))
+        why = taken(met.law, within, met.now, Search(), met.at, whole, 1.0)
+        if why == WHOLE:
+            met.slack[:] = met.now.slack
+            return MADE
+        if why not in (CLOSED, OPENED):
+            raise not_taken(met.names, met.now, why, (t, whole), met.at)
+        y[:], end[0] = met.at.y, met.at.t
+        return EVENT
+
+    def _within(self, start: tuple[float, FloatArray], time: float) -> FloatArray:
+        t, y = start
+        if not time > t:
+            return y
+        return self._problem.projected(time, y + self._change(self._problem, t, y, time - t))
 
     def keep_step(self, t: float, y: FloatArray, margin: FloatArray) -> bool:
         """Take account of the step."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.compiled import Margins
+from eomgen.run.compiled import Margins, Touched
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Event
 
@@ -103,9 +103,9 @@ class Advance(NamedTuple):
     problem  whose derivative was integrated
     within   gives the state at any time in the step; valid until the next step is made
     steps    number of steps; 0 if no time passes: an impact, or `events` only
-    derivatives, jacobians, switches, gap_checks
-             calls of these, of switching functions, and of gaps and their rates, that are not
-             counted otherwise
+    derivatives, jacobians, switches, gap_checks, held
+             calls of these, of switching functions, of gaps and their rates, and of
+             `Contacts.held`, that are not counted otherwise
     factorisations  LU factorisations in the step, as far as the method counts them
     capped   number of steps that have the greatest length allowed
     cut      number of longer attempts that passed over a branch of the derivative
@@ -130,6 +130,7 @@ class Advance(NamedTuple):
     factorisations: int = 0
     switches: int = 0
     gap_checks: int = 0
+    held: int = 0
     capped: int = 0
     cut: int = 0
     checked: bool = False
@@ -140,15 +141,9 @@ class Advance(NamedTuple):
     contact_powers: Callable[[float, FloatArray], FloatArray] | None = None
 
 
-def always() -> bool:
-    """Whether steps may be made in compiled code: yes."""
-    return True
-
-
 class Begin(Protocol):
-    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run.
-
-    `compiles` is asked before steps are made in compiled code, where gaps below 0 end them.
+    """Begin steps of a problem at time t, after `made` earlier ones; `resume` continues a run, and
+    `touched` says what is known of rigid contacts.
     """
 
     def __call__(
@@ -157,5 +152,5 @@ class Begin(Protocol):
         t: float,
         made: int,
         resume: Resume | None = None,
-        compiles: Callable[[], bool] = always,
+        touched: Touched | None = None,
     ) -> Iterator[Advance]: ...

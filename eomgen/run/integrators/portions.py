@@ -16,7 +16,7 @@ from eomgen.run.rows import Row, Rows
 
 MOST = 1024
 """Greatest number of steps in a portion: after each, progress is shown, and Ctrl-C is heard."""
-COUNTED = Advance._fields[6:13]
+COUNTED = Advance._fields[6:14]
 """What steps count."""
 FEWER, MORE = 8, 2
 """By how much smaller portions become where Python has to look, and larger where it need not."""

@@ -72,12 +72,14 @@ class StabilityMonitor:
     n/2 + 60/n, as measured on mechanisms with 2 to 90 states.
 
     stability  R of the method; None to find the factors from a step on the linear problem
-    rate       (ny,), that of the last step; None before the first
+    rate       (ny,), that of the last step; None before the first one, and the first after an event
+    is_first   whether no step was made
     """
 
     change: Change
     stability: Stability | None
     rate: FloatArray | None = None
+    is_first: bool = True
     _evaluated: list[tuple[FloatArray, FloatArray]] = field(default_factory=list)
     _largest: FloatArray | float = 0.0
     _allowed: FloatArray | float = 0.0
@@ -87,6 +89,14 @@ class StabilityMonitor:
     _highest: float = 0.0
     _doubtful: bool = False
     _skipped: tuple[float, tuple[float, FloatArray, FloatArray, float] | None] = (0.0, None)
+
+    def begin(self) -> bool:
+        """Begin steps, or go on after an event, at which rates may jump. Returns whether steps were
+        made before.
+        """
+        self.rate = None
+        self._evaluated.clear()
+        return not self.is_first
 
     def recording(self, problem: Problem) -> Problem:
         """The same problem, but its derivatives are recorded for `check`."""
@@ -110,7 +120,7 @@ class StabilityMonitor:
         evaluated, rate, last = self._evaluated.copy(), step / h, self.rate
         self.rate = rate
         self.take()
-        first = last is None
+        first, self.is_first = self.is_first, False
         earlier = rate if last is None else last
         self._update(earlier)
         jumps = first or not (np.abs(rate - earlier) <= self._allowed).all()
@@ -141,11 +151,12 @@ class StabilityMonitor:
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
-        """The rate of the last step and the changes from it that are not jumps, (ny,) each; before
-        the first step all are. A step with such rates needs no check: see `take` and `passed`.
+        """The rate of the last step and the changes from it that are not jumps, (ny,) or (1,) each;
+        before the first step all are, and after an event none is. A step with such rates needs no
+        check: see `take` and `passed`.
         """
         if self.rate is None:
-            return np.zeros(1), np.array([-1.0])
+            return np.zeros(1), np.array([-1.0 if self.is_first else np.inf])
         return self.rate, np.asarray(self._allowed)
 
     def passed(
@@ -154,7 +165,7 @@ class StabilityMonitor:
         """Take steps without jumps, of `calls` derivatives each, as `check` would: the rate of the
         last one, the state at which it evaluated its last derivative, and this, (ny,) each.
         """
-        self._count(steps, steps * (len(self._evaluated) + calls))
+        self._count(steps, steps * (calls + 1) - 1 + len(self._evaluated))
         self.rate, self._evaluated[:] = rate, [(place, slope)]
 
     def finish(self, problem: Problem, t: float, y: FloatArray, step: FloatArray, h: float) -> None:
