@@ -444,15 +444,11 @@ CLOSED: dict[str, Callable[[], list[mpf]]] = {
     "orbit_99_long": lambda: _kepler_end(0.99, 1000),
     "bouncing": lambda: _bounced([0, 1.1, 0], [0.7, 0.3, 2], 2.5, [([0, 1], 0, 0.8)]),
     "slope": lambda: _bounced([0, 0.9, 0], [0.5, 0, -1], 1.7, [([-0.28, 0.96], 0, 0.7)]),
-    "boxed": lambda: _bounced(
-        [0.1, 0.8, 0],
-        [4.3, 1, 0],
-        2.0,
-        [([0, 1], 0, 0.9), ([1, 0], -1.0, 0.8), ([-1, 0], -1.0, 0.8)],
-    ),
+    "boxed": lambda: _bounced([0.1, 0.8, 0], [4.3, 1, 0], 2.0, [([0, 1], 0, 0.9), ([1, 0], -1.0,
+     0.8), ([-1, 0], -1.0, 0.8)]),
     "sliding": _slid,
     "landing": lambda: _bounced([0, 0.7, 0], [1.5, 0.2, 3], 2.0, [([0, 1], 0, 0.0)]),
-}
+}  # fmt: skip
 
 
 def text(name: str) -> str:

@@ -30,14 +30,10 @@ KINDS = {
     3: ("revolute", "revolute", "prismatic", "cylindrical", "universal", "planar", "ball", "weld"),
 }
 ENDS = {
-    "revolute": ("angle",),
-    "prismatic": ("slide",),
-    "cylindrical": ("slide", "angle"),
-    "universal": ("angle_1", "angle_2"),
-    "planar": ("x", "y", "angle"),
-    "ball": ("qw", "qx", "qy", "qz"),
-    "weld": (),
-}
+    "revolute": ("angle",), "prismatic": ("slide",), "cylindrical": ("slide", "angle"),
+    "universal": ("angle_1", "angle_2"), "planar": ("x", "y", "angle"),
+    "ball": ("qw", "qx", "qy", "qz"), "weld": (),
+}  # fmt: skip
 """How the names of coordinates end."""
 
 

@@ -24,19 +24,9 @@ from eomgen.scene.schema import Scene
 from eomgen.study.verification.states import random_state
 
 __all__ = [
-    "MP",
-    "STEP",
-    "Digits",
-    "Engine",
-    "along",
-    "apart",
-    "engine",
-    "exact",
-    "plain",
-    "quick",
-    "read",
+    "MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "plain", "quick", "read",
     "varied",
-]
+]  # fmt: skip
 
 STEP = MP.mpf(10) ** -20
 """Of central differences, which are off by its square."""

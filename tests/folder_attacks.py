@@ -43,13 +43,9 @@ ODD: tuple[Any, ...] = (
 HEADERS = (
     *((b"<f8", b">f8"), (b"<f8", b"<i8"), (b"<f8", b"|O8"), (b"<f8", b"<c8"), (b"|i1", b"|u1")),
     *((b"False", b"True "), (b"(6,", b"(3,"), (b"(6,", b"(9,"), (b"NUMPY", b"numpy")),
-    *(
-        (b"\x01\x00v", b"\x02\x00v"),
-        (b"'descr'", b"'dexxr'"),
-        (b"{", b"["),
-        (b"shape", b"\xff\xfe\xfd\xfc\xfb"),
-    ),
-)
+    *((b"\x01\x00v", b"\x02\x00v"), (b"'descr'", b"'dexxr'"), (b"{", b"["), (b"shape",
+     b"\xff\xfe\xfd\xfc\xfb")),
+)  # fmt: skip
 
 
 def _flip(path: Path, r: random.Random) -> None:

@@ -188,36 +188,17 @@ _TWO_BODIES = Scene(
 )
 REPORTED = {
     "two_body": _TWO_BODIES,
-    "two_body_forced": replace(
-        _TWO_BODIES,
-        name="two_body_forced",
-        inputs=("f_A_x", "f_A_y", "f_B_x", "f_B_y", "tau"),
-        defaults={**_HANDOUT, "d_A": -0.6, "d_B": 0.5},
-        numbers=_two_body_forced,
-    ),
-    "pendulum": Scene(
-        name="pendulum",
-        bodies=("bob",),
-        pins=("pivot",),
-        coordinates=("theta",),
-        angles=("theta",),
-        inputs=(),
-        defaults={"bob_mass": 1.0, "pivot_r_child_x": -1.0, "gravity_g": 9.81},
-        positive=frozenset({"bob_mass"}),
-        numbers=_pendulum,
-    ),
-    "double_pendulum": Scene(
-        name="double_pendulum",
-        bodies=("upper", "lower"),
-        pins=("shoulder", "elbow"),
-        coordinates=("theta_1", "theta_2"),
-        angles=("theta_1", "theta_2"),
-        inputs=(),
-        defaults={"m_1": 1.0, "m_2": 1.0, "l_1": 1.0, "l_2": 1.0, "g": 9.81},
-        positive=frozenset({"m_1", "m_2"}),
-        numbers=_double_pendulum,
-    ),
-}
+    "two_body_forced": replace(_TWO_BODIES, name="two_body_forced", inputs=("f_A_x", "f_A_y",
+     "f_B_x", "f_B_y", "tau"), defaults={**_HANDOUT, "d_A": -0.6, "d_B": 0.5},
+     numbers=_two_body_forced),
+    "pendulum": Scene(name="pendulum", bodies=("bob",), pins=("pivot",), coordinates=("theta"),
+     angles=("theta",), inputs=(), defaults={"bob_mass": 1.0, "pivot_r_child_x": -1.0,
+     "gravity_g": 9.81}, positive=frozenset({"bob_mass"}), numbers=_pendulum),
+    "double_pendulum": Scene(name="double_pendulum", bodies=("upper", "lower"), pins=("shoulder",
+     "elbow"), coordinates=("theta_1", "theta_2"), angles=("theta_1", "theta_2"), inputs=(),
+     defaults={"m_1": 1.0, "m_2": 1.0, "l_1": 1.0, "l_2": 1.0, "g": 9.81},
+     positive=frozenset({"m_1", "m_2"}), numbers=_double_pendulum),
+}  # fmt: skip
 
 # Random trees.
 

@@ -17,14 +17,10 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 Z: Vector = (0.0, 0.0, 1.0)
 PLANE, SPACE = 2, 3
 ENDS: dict[str, tuple[str, ...]] = {
-    "weld": (),
-    "revolute": ("angle",),
-    "prismatic": ("slide",),
-    "cylindrical": ("slide", "angle"),
-    "universal": ("angle_1", "angle_2"),
-    "planar": ("x", "y", "angle"),
+    "weld": (), "revolute": ("angle",), "prismatic": ("slide",), "cylindrical": ("slide", "angle"),
+    "universal": ("angle_1", "angle_2"), "planar": ("x", "y", "angle"),
     "ball": ("qw", "qx", "qy", "qz"),
-}
+}  # fmt: skip
 """How the names of a joint's coordinates end, in their order."""
 FREE_ENDS = {PLANE: ENDS["planar"], SPACE: ("x", "y", "z", *ENDS["ball"])}
 

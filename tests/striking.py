@@ -33,13 +33,8 @@ creep = 0.01
 """What both effects take for restitution, friction and slip speed."""
 
 OUTPUTS = (
-    "mass_matrix",
-    "kinetic_energy",
-    "momentum",
-    "joint_forces",
-    "body_poses",
-    "body_velocities",
-)
+    "mass_matrix", "kinetic_energy", "momentum", "joint_forces", "body_poses", "body_velocities",
+)  # fmt: skip
 
 
 class Balls(EffectTable):

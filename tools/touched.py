@@ -50,7 +50,7 @@ def tests_of(path: str) -> set[Path]:
     if parts[0] == "eomgen":
         folder = TESTS / parts[1]
         return {folder} if folder.is_dir() else {TESTS / "api"}
-    if parts[0] == "tests" and path.endswith(".py"):
+    if parts[0] in ("tests", "tools") and path.endswith(".py"):
         if parts[-1].startswith("test_"):
             return {ROOT / path} if (ROOT / path).exists() else set()
         name = re.compile(rf"^(from|import) {Path(path).stem}\b", re.MULTILINE)

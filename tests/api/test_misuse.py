@@ -199,6 +199,7 @@ def test_rows_that_are_left_out_are_told_in_a_sentence() -> None:
     [
         (["simulat", "rod"], 2, "no 'simulat' (did you mean 'simulate'?)"),
         (["simulate", "pendulum", "--t_end", "3"], 2, "(did you mean '--t-end'?)"),
+        (["generate"], 2, "no scene; name one"),
         (["new", ""], 1, "is no name of a file"),
         (["copy", "pendulum", ".."], 1, "is no name of a file"),
         ([], 0, "linearise"),

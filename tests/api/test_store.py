@@ -287,25 +287,6 @@ def test_what_is_no_entry_is_not_read(
         assert store.generated_code(model_of("pendulum")).derived is False
 
 
-def test_an_attack_takes_no_memory(folder: Path, tmp_path: Path) -> None:
-    """In a process that may have 2 GB of addresses, of which Python and SymPy take the half."""
-    folder.mkdir(mode=0o700)
-    _sparse(entry_of(folder, "pendulum"))
-    code = (
-        "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (2 * 2**30,) * 2); "
-        "from eomgen.commands.main import main; "
-        "sys.exit(main(['generate', 'pendulum', '-o', sys.argv[1]]))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)],
-        check=False,
-        capture_output=True,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-        timeout=60,
-    )
-    assert (done.returncode, done.stderr) == (0, b"")
-
-
 def _mangled(value: Any, r: random.Random) -> Any:
     """A value with something in it replaced by something else."""
     if r.random() < 0.2 or not isinstance(value, list) or not value:

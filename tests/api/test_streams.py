@@ -28,16 +28,11 @@ EOMGEN = (sys.executable, "-m", "eomgen")
 QUICK = "--no-arithmetic --quick --methods rk4 --t-end 0.1 --run-time 1"
 ARM = Path(__file__).parent.parent / "arm.urdf"
 COMMANDS = {
-    "list": "list",
-    "show": "show pendulum",
-    "new": "new {out}/swing",
-    "copy": "copy pendulum {out}/mine",
-    "completion": "completion bash",
-    "schema": "schema",
+    "list": "list", "show": "show pendulum", "new": "new {out}/swing",
+    "copy": "copy pendulum {out}/mine", "completion": "completion bash", "schema": "schema",
     "reference": "reference",
     "import": f"import {ARM} -o {{out}}/arm.toml",
-    "check": "check two_body",
-    "derive": "derive two_body",
+    "check": "check two_body", "derive": "derive two_body",
     "generate": "generate pendulum -o {out}",
     "export": "export pendulum --firmware -o {out}",
     "simulate": "simulate pendulum --t-end 0.1 -o {out}",
@@ -50,32 +45,17 @@ COMMANDS = {
     "plot": "plot pendulum --of theta,energy --t-end 0.1 -o {out}/p.pdf",
     "film": "film pendulum --t-end 0.1 -o {out}/f.gif",
     "sweep": "sweep pendulum --vary theta=1,2 --t-end 0.1 --workers 1 -o {out}",
-}
+}  # fmt: skip
 QUICKER = [name for name in COMMANDS if name != "accuracy"]
 WRITES = {
-    "new": 1,
-    "copy": 1,
-    "import": 1,
-    "generate": 1,
-    "export": 3,
-    "simulate": 5,
-    "view": 5,
-    "accuracy": 3,
-    "plot": 1,
-    "film": 1,
-    "sweep": 3,
-    "gallery": 2,
-    "effects": 1,
-}
+    "new": 1, "copy": 1, "import": 1, "generate": 1, "export": 3, "simulate": 5, "view": 5,
+    "accuracy": 3, "plot": 1, "film": 1, "sweep": 3, "gallery": 2, "effects": 1,
+}  # fmt: skip
 FAULTS = {
-    "full": ("> /dev/full", 1),
-    "closed": (">&-", 0),
-    "errors closed": ("2>&-", 0),
-    "errors full": ("2> /dev/full", 0),
-    "both closed": (">&- 2>&-", 0),
-    "both full": ("> /dev/full 2>&1", 1),
-    "input closed": ("<&-", 0),
-}
+    "full": ("> /dev/full", 1), "closed": (">&-", 0), "errors closed": ("2>&-", 0),
+    "errors full": ("2> /dev/full", 0), "both closed": (">&- 2>&-", 0),
+    "both full": ("> /dev/full 2>&1", 1), "input closed": ("<&-", 0),
+}  # fmt: skip
 """What the shell does to the streams, and the exit code of a command that writes and goes well."""
 FEW = (
     ("check", "both full"),
@@ -156,20 +136,6 @@ def test_a_terminal_of_ascii(tmp_path: Path, name: str, how: str) -> None:
     assert done.returncode == 0 and quiet(done)
     assert done.stdout.isascii() and done.stderr.isascii()
     assert "\\u" not in done.stdout or name == "schema"  # as JSON spells it anywhere
-
-
-@pytest.mark.parametrize("name", some(QUICKER[::2], list(COMMANDS)))
-@pytest.mark.every(4)
-def test_a_full_output_ends_no_command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
-) -> None:
-    """Of each command: all its files, one line of what was lost, and 1."""
-    with Path("/dev/full").open("w", encoding="utf-8") as full:
-        monkeypatch.setattr(sys, "stdout", full)
-        assert main([word.format(out=tmp_path) for word in COMMANDS[name].split()]) == 1
-    said = capsys.readouterr().err.splitlines()
-    assert said[-1] == "eomgen: standard output cannot be written: No space left on device"
-    assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
 
 
 @pytest.mark.every(2)
@@ -295,7 +261,7 @@ def began() -> Iterator[Callable[..., subprocess.Popen[str]]]:
         process.communicate()
 
 
-SOME_STOPS = ((signal.SIGINT, 0.0), (signal.SIGTERM, 0.3), (signal.SIGINT, 2.0))
+SOME_STOPS = ((signal.SIGINT, 0.0), (signal.SIGTERM, 0.3), (signal.SIGINT, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -360,8 +326,8 @@ def injected(number: str, last: int, command: str, out: Path) -> subprocess.Comp
 def test_a_stop_at_any_call(tmp_path: Path, name: str, number: str) -> None:
     """Among imports, while deriving, running, drawing, writing: one exit code, and whole files."""
     command, first = COMMANDS[name], 100  # before it listens, Python's own way to stop is 130, too
-    for _ in range(2):  # the second time the module is in the store
-        counted = injected(number, 0, command, tmp_path)
+    assert main([word.format(out=tmp_path) for word in command.split()]) == 0  # fills the store
+    counted = injected(number, 0, command, tmp_path)
     assert counted.returncode == 0
     calls = int(counted.stderr.split()[-1])
     parts = some(2, 100)

@@ -19,19 +19,11 @@ parameters = { m = 2.0, l = 0.4, angle = 0.3 }
 bodies = [{ name = "rod", mass = "m*cos(angle)", inertia_com = 0.1 }]
 joints = [{ name = "pin", type = "revolute", parent = "world", child = "rod", r_child = ["l", 0] }]
 points = [{ name = "tip", body = "rod", at = [1, 0] }]
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "external_force"
-name = "jet"
-body = "rod"
-force = ["thrust*sin(t)", 0]
-[[effects]]
-type = "motor"
-name = "push"
-joint = "pin"
-torque = "input"
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "external_force", name = "jet", body = "rod", force = ["thrust*sin(t)", 0] },
+    { type = "motor", name = "push", joint = "pin", torque = "input" },
+]
 """
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from campaign import some
 from mechanisms import BUILT_IN, SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
-from newton_euler import Mechanism, Motion, solve
+from newton_euler import Mechanism, Motion
 
 from eomgen.base.errors import SceneError
 from eomgen.pipeline import compile_scene
@@ -135,159 +135,6 @@ def c(request: pytest.FixtureRequest) -> Compiled:
     return compiled(request.param)
 
 
-@pytest.mark.every(3)
-def test_bodies_and_the_whole(c: Compiled) -> None:
-    """Velocities of bodies, centre of mass, momentum and energies, from the other solver's motion.
-
-    With the scene's parameters and with others.
-    """
-    scene, module = c.scene, c.module
-    rng = np.random.default_rng(27)
-    for k in range(TRIES):
-        y, u = scene.random_state(module, rng), scene.random_inputs(rng)
-        p = {name: v * float(rng.uniform(0.5, 2.0)) for name, v in scene.defaults.items()}
-        p = p if k % 2 else None
-        mechanism, motion = scene.mechanism(p, u), scene.motion(module, y, p, u)
-        m, inertia = np.asarray(mechanism.mass), np.asarray(mechanism.inertia)
-        (x, height, _), (xd, yd, w) = motion.poses.T, motion.velocities.T
-        velocities = module.body_velocities(0.0, y, p, u)
-        assert difference(velocities, motion.velocities[scene.body_rows(module)]) <= TOLERANCE
-        centre = np.array([m @ x, m @ height]) / np.sum(m)
-        assert difference(module.centre_of_mass(0.0, y, p, u), centre) <= TOLERANCE
-        momentum = np.array([m @ xd, m @ yd, m @ (x * yd - height * xd) + inertia @ w])
-        assert difference(module.momentum(0.0, y, p, u), momentum) <= TOLERANCE
-        kinetic = (m @ (xd**2 + yd**2) + inertia @ w**2) / 2
-        assert difference(module.kinetic_energy(0.0, y, p, u), kinetic) <= TOLERANCE
-        potential = np.asarray(mechanism.gravity * (m @ height))
-        assert difference(module.potential_energy(0.0, y, p, u), potential) <= TOLERANCE
-
-
-def test_bias_force(c: Compiled) -> None:
-    """h = V + G, and with the applied forces it is what holds the accelerations at 0."""
-    scene, module = c.scene, c.module
-    rng, n = np.random.default_rng(28), len(scene.coordinates)
-    for _ in range(TRIES):
-        y, u = scene.random_state(module, rng), scene.random_inputs(rng)
-        V, G, h, F = (
-            getattr(module, f"{kind}_force")(0.0, y, u=u)
-            for kind in ("velocity", "gravity", "bias", "applied")
-        )
-        terms = max(1.0, *(float(np.max(np.abs(part))) for part in (V, G, F)))
-        assert difference(h / terms, (V + G) / terms) <= TOLERANCE
-        needed = module.inverse_dynamics(y[:n], y[n:], np.zeros(n), u=u)
-        assert difference(needed / terms, (h - F) / terms) <= TOLERANCE
-        still = np.concatenate((y[:n], np.zeros(n)))
-        assert difference(module.bias_force(0.0, still), G) <= TOLERANCE
-
-
-def test_points(c: Compiled) -> None:
-    """Places, velocities and Jacobians of named points; a scene without any has no such output."""
-    scene, module = c.scene, c.module
-    marked = scene.points(scene.defaults)
-    assert list(module.POINTS) == [f"p{i}" for i in range(len(marked))]
-    if not marked:
-        assert not any(name.startswith("point") for name in module.COST)
-        return
-    rng, n = np.random.default_rng(29), len(scene.coordinates)
-    columns = [scene.random_state(module, rng) for _ in range(6)]
-    for y in columns:
-        p = {name: v * float(rng.uniform(0.5, 2.0)) for name, v in scene.defaults.items()}
-        motion = scene.motion(module, y, p)
-        placed = [at_point(motion, *point) for point in scene.points(p)]
-        places, rates = (np.array(parts) for parts in zip(*placed, strict=True))
-        assert difference(module.point_positions(0.0, y, p), places) <= TOLERANCE
-        assert difference(module.point_velocities(0.0, y, p), rates) <= TOLERANCE
-        J = module.point_jacobians(0.0, y, p)
-        assert J.shape == (len(marked), 2, n)
-        for i, name in enumerate(module.STATES[n:]):  # each velocity alone
-            unit = y.copy()
-            unit[n:] = [float(other == name) for other in module.STATES[n:]]
-            alone = scene.motion(module, unit, p)
-            column = np.array([at_point(alone, *point)[1] for point in scene.points(p)])
-            assert difference(J[:, :, i], column) <= TOLERANCE
-        assert difference(J @ y[n:], rates) <= TOLERANCE
-    for name in ("point_positions", "point_velocities", "point_jacobians"):
-        function = getattr(module, name)
-        together = function(0.0, np.array(columns).T)
-        apart = np.stack([function(0.0, y) for y in columns], axis=-1)
-        assert difference(together, apart) <= TOLERANCE
-
-
-def at_point(motion: Motion, body: int, at: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Place and velocity of a point of a body."""
-    x, y, angle = motion.poses[body]
-    xd, yd, w = motion.velocities[body]
-    rx = np.cos(angle) * at[0] - np.sin(angle) * at[1]
-    ry = np.sin(angle) * at[0] + np.cos(angle) * at[1]
-    return np.array([x + rx, y + ry]), np.array([xd - w * ry, yd + w * rx])
-
-
-def test_random_trees_are_of_every_kind() -> None:
-    """The trees above leave out no kind of mechanism that the generator can make."""
-    kinds = set()
-    for tree in TREES:
-        m = tree.numbers(tree.defaults, dict.fromkeys(tree.inputs, 1.0))
-        children = [list(m.parent).count(k) for k in range(len(m.parent))]
-        kinds |= {
-            ("floating" if free else "grounded")
-            for free, p in zip(m.free, m.parent, strict=True)
-            if p < 0
-        }
-        kinds |= {"branch"} if max(children) > 1 else set()
-        kinds |= {"chain of three"} if any(p >= 0 and m.parent[p] >= 0 for p in m.parent) else set()
-        kinds |= {"several trees"} if list(m.parent).count(-1) > 1 else set()
-        order = [tree.bodies.index(name) for name in compiled(tree).module.BODIES]
-        kinds |= {"reordered"} if order != sorted(order) else set()
-        kinds |= {"point mass"} if 0.0 in m.inertia else set()
-        kinds |= {"motor"} if any(m.torque) else set()
-        kinds |= {"force"} if m.forces else set()
-        kinds |= {"no gravity"} if m.gravity == 0.0 else {"gravity"}
-        arms = [tuple(bool(x) for x in arm) for arm in (*m.r_parent, *m.r_child)]
-        kinds |= {"two components"} if (True, True) in arms else set()
-        points = tree.points(tree.defaults)
-        kinds |= {"no point", "one point", "two points"} & {
-            ("no point", "one point", "two points")[len(points)]
-        }
-        kinds |= {"point off an axis"} if any(all(at) for _, at in points) else set()
-    assert kinds == {
-        "floating", "grounded", "branch", "chain of three", "several trees", "reordered",
-        "point mass", "motor", "force", "gravity", "no gravity", "two components",
-        "no point", "one point", "two points", "point off an axis",
-    }  # fmt: skip
-
-
-def test_trees_of_one_scene_do_not_mix() -> None:
-    """Two trees whose bodies alternate in the model's order move as each does alone."""
-    text = """
-    name = "two_trees"
-    outputs = "all"
-    bodies = [
-        { name = "A", mass = 1.0, inertia_com = 0.1 },
-        { name = "B", mass = 2.0, inertia_com = 0.2 },
-        { name = "C", mass = 3.0, inertia_com = 0.3 },
-    ]
-    joints = [
-        { name = "a", type = "revolute", parent = "world", child = "A", r_child = [-0.4, 0] },
-        { name = "b", type = "revolute", parent = "world", child = "B", r_child = [-0.5, 0] },
-        { name = "c", type = "revolute", parent = "A", child = "C", r_child = [-0.6, 0] },
-    ]
-    effects = [{ type = "gravity", g = 9.81 }]
-    """
-    module = load(compile_scene(parse_scene(text)))
-    mechanism = Mechanism(
-        mass=[1.0, 2.0, 3.0],
-        inertia=[0.1, 0.2, 0.3],
-        parent=[-1, -1, 0],
-        free=[False] * 3,
-        r_parent=np.zeros((3, 2)),
-        r_child=[[-0.4, 0.0], [-0.5, 0.0], [-0.6, 0.0]],
-        gravity=9.81,
-    )
-    q, v = np.array([0.3, 0.5, 0.7]), np.array([1.1, -1.3, 1.7])
-    rates = module.derivative(0.0, np.concatenate((q, v)))
-    assert difference(rates[3:], solve(mechanism, q, v).accelerations) <= TOLERANCE
-
-
 # State forms.
 
 
@@ -396,16 +243,6 @@ def test_initial_momenta_follow_the_parameters() -> None:
     motion = plain.scene.motion(plain.module, y, p)
     state, _ = in_momentum_form(plain.scene, c.module, plain.scene.numbers(p, {}), motion)
     assert difference(c.module.initial_state(p), state) <= TOLERANCE
-
-
-@pytest.mark.parametrize("tree", TREES[:4], ids=lambda tree: tree.name)
-def test_other_parameter_values_of_trees(tree: Scene) -> None:
-    """The same where parameters are shared, by name and by formula."""
-    c, rng = compiled(tree), np.random.default_rng(25)
-    used = c.module.PARAMETERS
-    for _ in range(10):
-        p = {name: tree.defaults[name] * float(rng.uniform(0.5, 2.0)) for name in used}
-        assert_agrees(c, tree.random_state(c.module, rng), tree.random_inputs(rng), p)
 
 
 Y = np.zeros(8)

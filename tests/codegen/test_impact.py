@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from campaign import FULL
 from engine import MP, Engine, along, exact
 from striking import (
     MATERIAL,
@@ -16,8 +15,6 @@ from striking import (
     striking,
     touching_velocities,
 )
-
-from eomgen.codegen import jacobians
 
 FREE = """\
 [[bodies]]
@@ -93,104 +90,36 @@ SLOPE = Balls(
 BOXES = """\
 name = "boxes"
 dimensions = 3
-[[bodies]]
-name = "box"
-mass = 2.0
-inertia_com = [0.03, 0.02, 0.04]
-[[bodies]]
-name = "arm"
-mass = 0.5
-inertia_com = [0.01, 0.02, 0.01]
-[[bodies]]
-name = "ball"
-mass = 0.7
-inertia_com = [0.01, 0.01, 0.01]
-[[joints]]
-name = "f"
-type = "free"
-parent = "world"
-child = "box"
-[[joints]]
-name = "g"
-type = "free"
-parent = "world"
-child = "ball"
-[[joints]]
-name = "h"
-type = "revolute"
-axis = [1,0,0]
-parent = "box"
-child = "arm"
-r_parent = [0.2,0,0]
-r_child = [0,0.25,0]
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "contact"
-name = "floor"
-law = "impact"
-body = "box"
-corners = [0.2,0.15,0.1]
-restitution = 0.3
-friction = 0.5
-slip_speed = 0.001
-[[effects]]
-type = "contact"
-name = "roll"
-law = "impact"
-bodies = ["ball","arm"]
-radius = 0.1
-normal = [0,0.6,0.8]
-restitution = 0.3
-[[effects]]
-type = "contact"
-name = "catch"
-law = "impact"
-body = "ball"
-radius = 0.1
-other = "arm"
-other_at = [0,0.1,0]
-other_radius = 0.05
-against = "ball"
-restitution = 0.5
-friction = 0.2
-slip_speed = 0.001
-[[effects]]
-type = "contact"
-name = "lid"
-law = "impact"
-body = "ball"
-radius = 0.1
-other = "box"
-offset = 0.1
-restitution = 0.5
-friction = 0.2
-slip_speed = 0.001
-[[effects]]
-type = "contact"
-name = "each"
-law = "impact"
-bodies = ["ball","box"]
-radius = 0.1
-against = "each_other"
-restitution = 0.5
-friction = 0.3
-slip_speed = 0.001
-[[effects]]
-type = "joint_stop"
-name = "stop"
-joint = "h"
-low = -1
-high = 1
-restitution = 0.5
+bodies = [
+    { name = "box", mass = 2.0, inertia_com = [0.03, 0.02, 0.04] },
+    { name = "arm", mass = 0.5, inertia_com = [0.01, 0.02, 0.01] },
+    { name = "ball", mass = 0.7, inertia_com = [0.01, 0.01, 0.01] },
+]
+joints = [
+    { name = "f", type = "free", parent = "world", child = "box" },
+    { name = "g", type = "free", parent = "world", child = "ball" },
+    { name = "h", type = "revolute", axis = [1,0,0], parent = "box", child = "arm", \
+r_parent = [0.2,0,0], r_child = [0,0.25,0] },
+]
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "contact", name = "floor", law = "impact", body = "box", corners = [0.2,0.15,0.1], \
+restitution = 0.3, friction = 0.5, slip_speed = 0.001 },
+    { type = "contact", name = "roll", law = "impact", bodies = ["ball","arm"], radius = 0.1, \
+normal = [0,0.6,0.8], restitution = 0.3 },
+    { type = "contact", name = "catch", law = "impact", body = "ball", radius = 0.1, \
+other = "arm", other_at = [0,0.1,0], other_radius = 0.05, against = "ball", restitution = 0.5, \
+friction = 0.2, slip_speed = 0.001 },
+    { type = "contact", name = "lid", law = "impact", body = "ball", radius = 0.1, other = "box", \
+offset = 0.1, restitution = 0.5, friction = 0.2, slip_speed = 0.001 },
+    { type = "contact", name = "each", law = "impact", bodies = ["ball","box"], radius = 0.1, \
+against = "each_other", restitution = 0.5, friction = 0.3, slip_speed = 0.001 },
+    { type = "joint_stop", name = "stop", joint = "h", low = -1, high = 1, restitution = 0.5 },
+]
 """
 MODELS = {
-    "disc": (DISC, FLOOR_2),
-    "ball": (BALL, FLOOR_3),
-    "twin": (TWIN, WALL),
-    "tree": (TREE, SLOPE),
-}
+    "disc": (DISC, FLOOR_2), "ball": (BALL, FLOOR_3), "twin": (TWIN, WALL), "tree": (TREE, SLOPE),
+}  # fmt: skip
 
 
 def approaching(engine: Engine, rng: np.random.Generator, contact: int) -> np.ndarray:
@@ -232,18 +161,6 @@ def test_a_ball_bounces_in_space() -> None:
             floor = FLOOR_3.replaced(turned=turn)
             found = striking(BALL, floor).module.impact(0.0, y, 0, p={"mu": mu})
             np.testing.assert_allclose(found[7:], expected, rtol=0, atol=2e-14)
-
-
-def test_a_falling_rod_strikes_with_its_end() -> None:
-    """Frictionless: the impulse is (1 + e) v / (1/m + (l cos θ)²/I)."""
-    end = Balls(normal=(0.0, 1.0), on_plane=(("ball", (-0.6, 0.0), 0.0),), rough=False)
-    rod = DISC.replace(str(INERTIA), "0.24")
-    angle, speed = 0.4, 3.0
-    y = np.array([0.0, 0.6 * np.sin(angle), angle, 0.5, -speed, 0.0])
-    arm = -0.6 * np.cos(angle)
-    p = 1.7 * speed / (1 / MASS + arm**2 / 0.24)
-    found = striking(rod, end).module.impact(0.0, y, 0)
-    np.testing.assert_allclose(found[3:], [0.5, p / MASS - speed, arm * p / 0.24], atol=1e-14)
 
 
 def test_a_rod_of_little_inertia_sticks() -> None:
@@ -288,36 +205,6 @@ def test_impacts_against_dense_algebra(name: str, route: str) -> None:
             size = np.max(np.abs(expected))
             np.testing.assert_allclose(found[nq:], expected, rtol=0, atol=3e-12 * size)
             assert (found[:nq] == y[:nq]).all()
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("name", list(MODELS))
-def test_normal_velocity_and_energy(name: str) -> None:
-    """The contact parts at exactly e times its approach; no energy comes from nowhere."""
-    engine = striking(*MODELS[name])
-    module, rng = engine.module, np.random.default_rng(7)
-    for _ in range(500):
-        k = int(rng.integers(len(module.CONTACTS)))
-        y = approaching(engine, rng, k)
-        rest, mu, bounce = rng.uniform(), 10 ** rng.uniform(-2, 2), rng.choice([0.0, 0.5, 1.0])
-        p = {"rest": rest, "mu": mu}
-        found = module.impact(0.0, y, k, bounce, p)
-        before, after = (module.gap_rates(0.0, x)[k] for x in (y, found))
-        size = np.max(np.abs(y))
-        assert abs(after + bounce * rest * before) <= 1e-12 * size
-        energies = [module.kinetic_energy(0.0, x) for x in (y, found)]
-        assert energies[1] <= energies[0] * (1 + 1e-13)
-
-
-def test_frictionless_and_elastic_keeps_energy() -> None:
-    """e = 1, μ = 0."""
-    engine = striking(TREE, SLOPE)
-    rng = np.random.default_rng(1)
-    for k in range(5):
-        y = approaching(engine, rng, k)
-        found = engine.module.impact(0.0, y, k, p={"rest": 1.0, "mu": 0.0})
-        energies = [engine.module.kinetic_energy(0.0, x) for x in (y, found)]
-        assert energies[1] == pytest.approx(energies[0], rel=1e-13)
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
@@ -396,10 +283,10 @@ def test_no_input_makes_what_is_no_number() -> None:
     flat = flat.replace("[0.3, 0.2, 0.7]", "[0.3, 0.7]")
     hanging = Balls(normal=(0.0, 1.0), on_plane=(("upper", (0, 0), 0.1), ("lower", (0, 0), 0.1)))
     models = [*MODELS.values(), (TWIN, hanging), (flat, FLOOR_2)]
-    models += [(wire, FLOOR_3.replaced(turned=turn)) for turn in (0.0, 0.5, 1.0, 2.0)]
+    models += [(wire, FLOOR_3.replaced(turned=turn)) for turn in (0.0, 1.0)]
     for scene, effect in models:
         engine = striking(scene, effect)
-        for size in (0.0, 1e-200, 1e-30, 1e6, 1e18, 1e100):
+        for size in (0.0, 1e-200, 1e6, 1e100):
             for mu in (0.0, 1e-12, 1e12):
                 y = engine.module.initial_state()
                 ways = rng.integers(-1, 2, size=len(engine.model.velocities))
@@ -599,37 +486,3 @@ def test_absence_is_free() -> None:
     for name in ("derivative", "joint_forces"):
         assert getattr(beside, name).__doc__.endswith(lacks)
         assert lacks not in getattr(bare.module, name).__doc__
-
-
-def test_closed_form_with_contacts() -> None:
-    """Contacts add nothing to v̇ and keep the closed form: the same impact, the same held motion."""
-    closed, ldl = (striking(TWIN, WALL, route=route) for route in ("auto", "ldl"))
-    assert closed.system.route == "closed"
-    one, other = closed.module, ldl.module
-    y = closed.random_state(np.random.default_rng(10))
-    given: dict[str, Any] = {"derivative": (), "gap_rates": (), "impact": (1,), "held": ([3, 2],)}
-    for name, more in given.items():
-        found, right = getattr(one, name)(0.1, y, *more), getattr(other, name)(0.1, y, *more)
-        np.testing.assert_allclose(found, right, rtol=1e-12, atol=1e-12, err_msg=name)
-
-
-@pytest.mark.full
-def test_kernels_grow_with_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A link with its contact costs no more where there are many."""
-    monkeypatch.setattr(jacobians, "LARGEST_JACOBIAN", -1)
-    counts = []
-    for n in (4, 8, 12) if FULL else (4, 6, 8):
-        scene = 'name = "row"\ndimensions = 3\n' + MATERIAL
-        parent, balls = "world", []
-        for i in range(n):
-            entry = HINGE.format(
-                f"b{i}", 1.0, [0.1, 0.2, 0.3], "revolute", parent, [0, 0, -0.5], [0.1, 0, 0.5]
-            )
-            scene += entry + f"axis = {[[0, 1, 0], [1, 0, 0]][i % 2]}\n"
-            parent = f"b{i}"
-            balls.append((parent, (0.1, 0.0, -0.5), 0.1))
-        floor = FLOOR_3.replaced(on_plane=tuple(balls))
-        counts.append(striking(scene, floor, route="aba").module.COST)
-    for kernel in ("gaps", "gap_rates", "impact", "held"):
-        few, some, many = (count[kernel]["total"] for count in counts)
-        assert many - some < 1.01 * (some - few), kernel

@@ -21,28 +21,13 @@ LARGE = ("chain_in_wind", "ragdoll", "walker_motors", "stewart_platform", "bicyc
 STATES = 334
 """States of each scene: a thousand together."""
 CORNERS = {
-    "name": "corners",
-    "initial": {"q": {"x": 1.0}},
+    "name": "corners", "initial": {"q": {"x": 1.0}},
     "bodies": [{"name": "puck", "mass": 2.0, "inertia_com": 0.1}],
-    "joints": [
-        {
-            "name": "rail",
-            "type": "prismatic",
-            "parent": "world",
-            "child": "puck",
-            "axis": [1, 0],
-            "coordinate": "x",
-        }
-    ],
-    "effects": [
-        {
-            "type": "motor",
-            "name": "wall",
-            "joint": "rail",
-            "torque": "(3/x if x > 0 else 1 - 2*x_dot) - sqrt(max(x, 0)) + abs(x_dot - 1)*x",
-        }
-    ],
-}
+    "joints": [{"name": "rail", "type": "prismatic", "parent": "world", "child": "puck",
+     "axis": [1, 0], "coordinate": "x",}],
+    "effects": [{"type": "motor", "name": "wall", "joint": "rail",
+     "torque": "(3/x if x > 0 else 1 - 2*x_dot) - sqrt(max(x, 0)) + abs(x_dot - 1)*x",}],
+}  # fmt: skip
 """Force of a motor: at x = 0 the quotient, which is not taken, is infinite, and so is the slope of
 the root.
 """

@@ -31,105 +31,37 @@ DERIVATIVES = ("jacobian", "input_jacobian", "parameter_jacobian")
 MACHINE = """
 name = "machine"
 dimensions = 3
-
-[parameters]
-m = 0.8
-l = 0.35
-
-[[bodies]]
-name = "base"
-mass = 2.5
-inertia_com = [0.11, 0.12, 0.17, 0.01, -0.02, 0.015]
-[[joints]]
-name = "fly"
-type = "free"
-child = "base"
-
-[[bodies]]
-name = "arm"
-mass = "m"
-inertia_com = ["m*l**2/12", "m*l**2/10", "m*l**2/11", "m*l**2/90", 0, 0.0007]
-[[joints]]
-name = "shoulder"
-type = "ball"
-parent = "base"
-child = "arm"
-r_parent = [0.2, -0.1, 0.15]
-r_child = ["-l/2", 0, 0.05]
-orientation_deg = [20, -35, 50]
-
-[[bodies]]
-name = "hand"
-mass = "m/2"
-inertia_com = [0.003, 0.004, 0.0035]
-[[joints]]
-name = "wrist"
-type = "revolute"
-parent = "arm"
-child = "hand"
-axis = [0.6, 0.0, 0.8]
-r_parent = ["l/2", 0, 0]
-r_child = [0.02, -0.06, 0.04]
-motor_inertia = 0.0004
-gear_ratio = 7.5
-
-[[bodies]]
-name = "tail"
-mass = 0.6
-inertia_com = 0
-[[joints]]
-name = "rail"
-type = "prismatic"
-parent = "base"
-child = "tail"
-axis = [0, 1, 0]
-r_parent = [-0.1, 0, 0.1]
-orientation_deg = [0, 90, 0]
-motor_inertia = 0.02
-
-[[bodies]]
-name = "head"
-mass = 0.7
-inertia_com = [0.004, 0.005, 0.006]
-[[joints]]
-name = "neck"
-type = "universal"
-parent = "base"
-child = "head"
-axes = [[1, 0, 0], [0, 1, 0]]
-r_parent = [0, 0.1, 0.3]
-r_child = [0, 0.03, -0.1]
-
-[[points]]
-name = "finger"
-body = "hand"
-at = [0.05, "l/3", -0.02]
-
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-name = "push"
-type = "external_force"
-body = "hand"
-at = [0.03, -0.02, "l/4"]
-force = "input"
-[[effects]]
-name = "pull"
-type = "external_force"
-body = "head"
-at = [0.0, 0.0, 0.1]
-force = ["2*m", 0, -3.0]
-[[effects]]
-name = "twist"
-type = "motor"
-joint = "wrist"
-torque = "input"
-[[effects]]
-name = "drive"
-type = "motor"
-joint = "rail"
-torque = "input"
+parameters = { m = 0.8, l = 0.35 }
+bodies = [
+    { name = "base", mass = 2.5, inertia_com = [0.11, 0.12, 0.17, 0.01, -0.02, 0.015] },
+    { name = "arm", mass = "m", \
+inertia_com = ["m*l**2/12", "m*l**2/10", "m*l**2/11", "m*l**2/90", 0, 0.0007] },
+    { name = "hand", mass = "m/2", inertia_com = [0.003, 0.004, 0.0035] },
+    { name = "tail", mass = 0.6, inertia_com = 0 },
+    { name = "head", mass = 0.7, inertia_com = [0.004, 0.005, 0.006] },
+]
+joints = [
+    { name = "fly", type = "free", child = "base" },
+    { name = "shoulder", type = "ball", parent = "base", child = "arm", \
+r_parent = [0.2, -0.1, 0.15], r_child = ["-l/2", 0, 0.05], orientation_deg = [20, -35, 50] },
+    { name = "wrist", type = "revolute", parent = "arm", child = "hand", axis = [0.6, 0.0, 0.8], \
+r_parent = ["l/2", 0, 0], r_child = [0.02, -0.06, 0.04], motor_inertia = 0.0004, \
+gear_ratio = 7.5 },
+    { name = "rail", type = "prismatic", parent = "base", child = "tail", axis = [0, 1, 0], \
+r_parent = [-0.1, 0, 0.1], orientation_deg = [0, 90, 0], motor_inertia = 0.02 },
+    { name = "neck", type = "universal", parent = "base", child = "head", \
+axes = [[1, 0, 0], [0, 1, 0]], r_parent = [0, 0.1, 0.3], r_child = [0, 0.03, -0.1] },
+]
+points = [{ name = "finger", body = "hand", at = [0.05, "l/3", -0.02] }]
+effects = [
+    { type = "gravity", g = 9.81 },
+    { name = "push", type = "external_force", body = "hand", at = [0.03, -0.02, "l/4"], \
+force = "input" },
+    { name = "pull", type = "external_force", body = "head", at = [0.0, 0.0, 0.1], \
+force = ["2*m", 0, -3.0] },
+    { name = "twist", type = "motor", joint = "wrist", torque = "input" },
+    { name = "drive", type = "motor", joint = "rail", torque = "input" },
+]
 """
 
 

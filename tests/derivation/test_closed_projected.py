@@ -1,7 +1,6 @@
 """The closed form of any small tree: what SymPy derives is what the recursions compute."""
 
 import ast
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -21,8 +20,7 @@ from eomgen.codegen.from_closed_form import from_closed_form, of_projected
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System
-from eomgen.commands.main import main
-from eomgen.derivation.projected.constraints import about, hat, of_quaternion, state_joints
+from eomgen.derivation.projected.constraints import hat, state_joints
 from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected
 from eomgen.derivation.projected.simplify import gathered, sum_of_squares
 from eomgen.derivation.projected.steps import projected_steps
@@ -39,13 +37,9 @@ from eomgen.scene.reader import parse_scene, read_scene
 
 REPORTED = ("cart_pole", "furuta_pendulum", "spinning_top", "babyboot", "tumbling_body")
 DYNAMICS = (
-    "forward_dynamics",
-    "inverse_dynamics",
-    "mass_matrix",
-    "velocity_force",
-    "gravity_force",
+    "forward_dynamics", "inverse_dynamics", "mass_matrix", "velocity_force", "gravity_force",
     "applied_force",
-)
+)  # fmt: skip
 EXACT, ROUNDED = 1e-52, 1e-13
 """Relative errors: of exact rotations in 60 digits, and of those that doubles only come near to."""
 
@@ -154,20 +148,6 @@ def test_closed_is_aba_in_60_digits(seed: int, dimensions: int, most: int) -> No
 def test_closed_is_aba_about_any_axis(seed: int, dimensions: int, most: int) -> None:
     """Axes and orientations that no double is exactly: to what they are rounded to."""
     agree(tree(seed, dimensions, most), seed, ROUNDED)
-
-
-def test_the_trees_are_of_every_kind() -> None:
-    """All joints, massless bodies, rotors, several trees, inputs, five bodies."""
-    models = [tree(*case) for case in (*SMALL, *FIVE)]
-    bodies = [body for model in models for body in model.bodies]
-    kinds = {"weld", "revolute", "prismatic", "cylindrical", "universal", "planar", "ball", "free"}
-    assert {body.joint.type for body in bodies} == kinds
-    masses = [model.value(body.mass) for model in models for body in model.bodies]
-    assert 0.0 in masses
-    assert any(getattr(body.joint, "motor_inertia", None) for body in bodies)
-    assert any(sum(body.parent < 0 for body in model.bodies) > 1 for model in models)
-    assert any(model.inputs for model in models)
-    assert max(len(model.bodies) for model in models) == 5
 
 
 @cache
@@ -312,27 +292,6 @@ def test_pivots_are_sums_of_weighted_squares(case: str | tuple[int, int, int]) -
         assert is_positive(pivot, definitions, masses), (pivot, definitions.get(pivot))
 
 
-def test_light_cart() -> None:
-    """A cart of a millionth of the pole's mass: no digit is lost where the recursions lose six."""
-    model = elaborate(read_scene("cart_pole"))
-    light = {"m_cart": 0.3e-6, "I_pole": 1e-9}
-    model = model.with_parameters(light)
-    exactly = evaluator(from_recursion(Recording(model, "aba")).program, "derivative")
-    worst = {}
-    for route in ("closed", "aba"):
-        module = load_module(compile_model(replace(model, route=route)))
-        worst[route] = 0.0
-        rng = np.random.default_rng(5)
-        for _ in range(40):
-            y = rng.uniform(-3.0, 3.0, 4)
-            y[1] = np.pi * rng.integers(0, 2) + 1e-4 * rng.normal()
-            given = {**model.defaults, **dict(zip(module.STATES, y, strict=True)), "push": 0.0}
-            truth = np.array([float(x) for x in exactly(given)])
-            error = np.abs(module.derivative(0.0, y) - truth).max() / np.abs(truth).max()
-            worst[route] = max(worst[route], float(error))
-    assert worst["closed"] < 2e-15 < 1e-11 < worst["aba"]
-
-
 # Parts.
 
 
@@ -358,20 +317,6 @@ def test_rotations_turn_as_they_are_said_to(seed: int) -> None:
         moved = (written.T * rate(written, rates)).xreplace(numbers)
         turning = hat(c.relative_omega).xreplace(numbers)
         np.testing.assert_allclose(np.array(moved, float), np.array(turning, float), atol=1e-14)
-
-
-def test_rotations() -> None:
-    """About an axis, and by a quaternion of any length."""
-    angle = sp.Symbol("angle", real=True)
-    axis = sp.Matrix([2, -1, 2]) / 3
-    turn = about(axis, angle)
-    assert (turn * turn.T - sp.eye(3)).applyfunc(sp.simplify).is_zero_matrix
-    assert (turn * axis - axis).applyfunc(sp.simplify).is_zero_matrix
-    quarter = about(sp.Matrix([0, 0, 1]), sp.pi / 2) * sp.Matrix([1, 0, 0])
-    assert quarter == sp.Matrix([0, 1, 0])
-    q = [3, 0, 0, 3]  # a quarter turn about z, far from unit length
-    turned = of_quaternion(q, sp.Rational(2, 18))
-    assert turned == about(sp.Matrix([0, 0, 1]), sp.pi / 2)
 
 
 def test_gathering() -> None:
@@ -509,12 +454,3 @@ def test_what_is_reported_is_true(name: str) -> None:
             np.testing.assert_allclose(turns[-1], expected[:, :3], atol=1e-5)
             expected = expected[:, 3]
         np.testing.assert_allclose(places[-1], expected[:n], rtol=1e-5, atol=1e-5)
-
-
-@pytest.mark.parametrize("format_", ["text", "latex", "html"])
-def test_derive(format_: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The command writes it in every format."""
-    assert main(["derive", "furuta_pendulum", "--format", format_]) == 0
-    text = re.sub(r"</?code>|\\texttt|[{}]", "", capsys.readouterr().out)
-    for words in ("Joint hinge: revolute, arm to pendulum", "Virtual power", "Closed form"):
-        assert words in text

@@ -264,41 +264,6 @@ def place_bodies(eq: Equations, values: dict[sp.Expr, sp.Expr]) -> None:
         values[body[1]] = values[body[0]] + values.get(coordinate[3], coordinate[3])
 
 
-@pytest.mark.every(2)
-@pytest.mark.parametrize("scene", SCENES)
-def test_closed_form_solves_the_system_symbolically(scene: str) -> None:
-    """The closed form put into (24) is an identity: cos² + sin² = 1 alone makes it vanish.
-
-    Forces and all make the polynomials large, so then the parameters are numbers.
-    """
-    eq, h = equations(scene), symbols(scene)
-    M, V, G = handout_system(h)
-    values = dict.fromkeys(eq.symbols.tau, sp.S.Zero)
-    if scene == "two_body_forced":
-        odd = (sp.Rational(k, 7) for k in range(9, 99, 2))
-        values |= dict(zip(eq.symbols.parameters.values(), odd, strict=False))
-    place_bodies(eq, values)
-    for symbol, meaning in eq.solution.definitions:
-        values[symbol] = meaning.xreplace(values)
-    balance = (M * sp.Matrix(eq.symbols.a) + V + G - eq.collected.F).xreplace(values)
-    # cos θ, sin θ, cos φ, sin φ as letters; θ + φ by the addition theorems.
-    c, s, d, e = sp.symbols("c s d e")
-    angles = {
-        C(h.theta): c,
-        S(h.theta): s,
-        C(h.phi): d,
-        S(h.phi): e,
-        C(h.theta + h.phi): c * d - s * e,
-        S(h.theta + h.phi): s * d + c * e,
-    }
-    for row in balance:
-        numerator = sp.numer(sp.together(row.xreplace(angles)))
-        assert not numerator.has(C, S)
-        assert numerator != 0
-        left = sp.reduced(sp.expand(numerator), [s**2 + c**2 - 1, e**2 + d**2 - 1], s, e, c, d)[1]
-        assert left == 0
-
-
 def test_definitions_come_in_order() -> None:
     """Each definition of the closed form uses only what stands before it, and defines it once."""
     eq = equations("two_body_forced")

@@ -66,46 +66,38 @@ LOOP = "loop = true"
 CRANK = turn("theta", "world", "crank", (0, 0), (-0.05, 0))
 BEND = turn("bend", "crank", "bar", (0.05, 0.01), (-0.3, 0.02))
 POLYGONS = {
-    "two bars on one side": BEND
-    + turn("elbow", "bar", "end", (0.3, 0.05), (-0.25, 0.0))
-    + turn("close", "end", "world", (0.25, 0.1), (0.6, 0.2), LOOP),
-    "two bars": BEND
-    + turn("swing", "world", "end", (0.6, 0.1), (-0.25, 0.05))
-    + turn("close", "bar", "end", (0.3, 0.05), (0.25, 0), LOOP),
-    "a bar and a guide": BEND
-    + slide("x", "world", "end", (0.1, 0.05), (0.02, 0.01))
-    + turn("close", "bar", "end", (0.3, 0.05), (0.05, 0.0), LOOP),
-    "a guide, then a bar": slide("x", "world", "bar", (0.3, 0.05), (0.02, 0.01))
-    + turn("elbow", "bar", "end", (0.05, 0.05), (-0.1, 0.02))
-    + turn("close", "crank", "end", (0.05, 0.05), (0.3, 0.0), LOOP),
-    "a guide that turns, then a bar": slide("x", "crank", "bar", (0.05, 0.01), (0, 0), x=(1, 2))
-    + turn("elbow", "bar", "end", (0.05, 0.05), (-0.1, 0.02))
-    + turn("close", "world", "end", (-0.3, 0.05), (0.6, 0.0), LOOP),
-    "a bar with a guide": BEND
-    + slide("x", "bar", "end", (0.1, 0.05), (0.02, 0.01), x=(2, 1))
-    + turn("close", "end", "world", (0.03, 0.05), (0.6, 0.2), LOOP),
-    "two guides": slide("x", "world", "bar", (0.1, 0.05), (0.02, 0.01))
-    + slide("y", "bar", "end", (0.1, 0.05), (0.02, 0.01), x=(1, 3))
-    + turn("close", "crank", "end", (0.05, 0.03), (0.02, 0.0), LOOP),
-    "a slider at two bars": BEND
-    + turn("elbow", "bar", "end", (0.3, 0.05), (-0.05, 0.0))
-    + slide("close", "world", "end", (0.3, 0.1), (0.02, 0.03), LOOP, x=(3, 1)),
-    "a slider at a bar and a guide": BEND
-    + slide("x", "world", "end", (0.1, 0.05), (0.02, 0.01), x=(1, 3))
-    + slide("close", "end", "bar", (0.1, 0.05), (0.02, 0.01), LOOP),
-    "a slider between bars": BEND
-    + turn("swing", "world", "end", (0.6, 0.1), (-0.25, 0.05))
-    + slide("close", "end", "bar", (0.0, 0.05), (0.3, 0.02), LOOP),
-    "a rod to a bar": turn("swing", "world", "end", (0.6, 0.1), (-0.25, 0.05))
-    + rod("crank", "end", 0.5),
-    "a rod to a guide": slide("x", "world", "end", (0.1, 0.05), (0.02, 0.01))
-    + rod("end", "crank", 0.4),
-    "a gear and a bar on it": turn("wheel", "world", "bar", (0.3, 0), (0, 0))
-    + turn("swing", "world", "end", (0.6, 0.1), (-0.25, 0.05))
-    + rod("bar", "end", 0.5)
-    + '[[constraints]]\ntype = "coupling"\nname = "gear"\ncoordinate = "wheel"\n'
-    'equals = "0.1 - 2*theta"\n',
-}
+    "two bars on one side": BEND + turn("elbow", "bar", "end", (0.3, 0.05), (-0.25,
+     0.0)) + turn("close", "end", "world", (0.25, 0.1), (0.6, 0.2), LOOP),
+    "two bars": BEND + turn("swing", "world", "end", (0.6, 0.1), (-0.25, 0.05)) + turn("close",
+     "bar", "end", (0.3, 0.05), (0.25, 0), LOOP),
+    "a bar and a guide": BEND + slide("x", "world", "end", (0.1, 0.05), (0.02,
+     0.01)) + turn("close", "bar", "end", (0.3, 0.05), (0.05, 0.0), LOOP),
+    "a guide, then a bar": slide("x", "world", "bar", (0.3, 0.05), (0.02, 0.01)) + turn("elbow",
+     "bar", "end", (0.05, 0.05), (-0.1, 0.02)) + turn("close", "crank", "end", (0.05, 0.05), (0.3,
+     0.0), LOOP),
+    "a guide that turns, then a bar": slide("x", "crank", "bar", (0.05, 0.01), (0, 0), x=(1,
+     2)) + turn("elbow", "bar", "end", (0.05, 0.05), (-0.1, 0.02)) + turn("close", "world", "end",
+     (-0.3, 0.05), (0.6, 0.0), LOOP),
+    "a bar with a guide": BEND + slide("x", "bar", "end", (0.1, 0.05), (0.02, 0.01), x=(2,
+     1)) + turn("close", "end", "world", (0.03, 0.05), (0.6, 0.2), LOOP),
+    "two guides": slide("x", "world", "bar", (0.1, 0.05), (0.02, 0.01)) + slide("y", "bar", "end",
+     (0.1, 0.05), (0.02, 0.01), x=(1, 3)) + turn("close", "crank", "end", (0.05, 0.03), (0.02,
+     0.0), LOOP),
+    "a slider at two bars": BEND + turn("elbow", "bar", "end", (0.3, 0.05), (-0.05,
+     0.0)) + slide("close", "world", "end", (0.3, 0.1), (0.02, 0.03), LOOP, x=(3, 1)),
+    "a slider at a bar and a guide": BEND + slide("x", "world", "end", (0.1, 0.05), (0.02, 0.01),
+     x=(1, 3)) + slide("close", "end", "bar", (0.1, 0.05), (0.02, 0.01), LOOP),
+    "a slider between bars": BEND + turn("swing", "world", "end", (0.6, 0.1), (-0.25,
+     0.05)) + slide("close", "end", "bar", (0.0, 0.05), (0.3, 0.02), LOOP),
+    "a rod to a bar": turn("swing", "world", "end", (0.6, 0.1), (-0.25, 0.05)) + rod("crank",
+     "end", 0.5),
+    "a rod to a guide": slide("x", "world", "end", (0.1, 0.05), (0.02, 0.01)) + rod("end", "crank",
+     0.4),
+    "a gear and a bar on it": turn("wheel", "world", "bar", (0.3, 0), (0, 0)) + turn("swing",
+     "world", "end", (0.6, 0.1), (-0.25, 0.05)) + rod("bar", "end",
+     0.5) + '[[constraints]]\ntype = "coupling"\nname = "gear"\ncoordinate = "wheel"\n'
+     'equals = "0.1 - 2*theta"\n',
+}  # fmt: skip
 """Loops on a crank that goes round."""
 
 

@@ -99,28 +99,6 @@ def test_velocity_force_is_christoffels(c: Compiled) -> None:
         assert_close(v @ exact(V), v @ rate @ v / 2, np.abs(v) @ terms)
 
 
-def test_energy_flows_as_velocity_times_force(c: Compiled) -> None:
-    """d/dt ½ vᵀ M v = vᵀ (M v̇ + V), with Ṁ along the motion."""
-    n = len(c.module.STATES) // 2
-    for y, u in samples(c, 2):
-        z, (_, v) = exact(y), halves(y)
-        rates = c.exactly("derivative", z, u)
-        flow = along(lambda z, u=u: c.exactly("kinetic_energy", z, u), z, rates)
-        M, V = c.module.mass_matrix(0.0, y, u=u), c.module.velocity_force(0.0, y, u=u)
-        inertia = M @ rates[n:].astype(float)
-        assert_close(v @ (inertia + V), flow, np.abs(v) @ (np.abs(inertia) + np.abs(V)))
-
-
-def test_velocity_force_is_quadratic(c: Compiled) -> None:
-    """V(q, s v) = s² V(q, v), exactly so where s is a power of two."""
-    for y, u in samples(c, 20):
-        q, v = halves(y)
-        V = c.module.velocity_force(0.0, y, u=u)
-        for s in (-4.0, 0.0, 0.5):
-            scaled = c.module.velocity_force(0.0, np.concatenate((q, s * v)), u=u)
-            assert np.array_equal(scaled, s**2 * V)
-
-
 def test_balance(c: Compiled) -> None:
     """M v̇ + V + G = F + τ closes for the module's own answers, and inverse undoes forward."""
     rng = np.random.default_rng(32)
@@ -166,17 +144,6 @@ def test_momentum_changes_by_the_forces_from_outside(c: Compiled) -> None:
         motion = c.scene.motion(c.module, y, u=u)
         outside = [*motion.external_force, motion.external_torque]
         assert_close(outside, flow, motion.pin_forces, motion.poses)
-
-
-def test_momentum_is_constant_when_nothing_acts_from_outside() -> None:
-    """The handout's two bodies, without gravity, keep all three momenta to 30 digits."""
-    c = compiled("two_body")
-    for y, _ in samples(c):
-        z = exact(y)
-        rates = c.exactly("derivative", z, p={"g": 0.0})
-        assert max(abs(rates[4:])) > 0.1
-        for flow in along(lambda z: c.exactly("momentum", z), z, rates):
-            assert abs(flow) < 1e-30
 
 
 CASES = [(scene, "velocity") for scene in (*BUILT_IN, *TREES)]

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from engine import DERIVATIVES, Engine, apart, engine
-from spatial_trees import PLANE, SpatialTree, random_spatial_tree, random_state
 
 ASIDE = DERIVATIVES[1:]
 EXACT = 1e-13
@@ -231,17 +230,6 @@ def test_universal(route: str) -> None:
     assert apart(module.body_velocities(0.0, y)[0, 3:], spin) < EXACT
 
 
-def test_universal_about_other_axes(route: str) -> None:
-    """The first axis carries the second: R = E R(a₁, q₁) R(a₂, q₂), at r_parent - R r_child."""
-    a, b = np.array([0.0, 0.6, 0.8]), np.array([0.8, -0.6, 0.0])
-    lines = (f"axes = [{a.tolist()}, {b.tolist()}]", at("r_child", R), "r_parent = [1, 0, 2]")
-    module = load(scene(body(), joint("universal", *lines, "orientation_deg = [90, 0, 30]")), route)
-    y = state(module, {"j_angle_1": 0.9, "j_angle_2": -1.2})
-    world = turn(Z, np.radians(30)) @ turn(X, np.pi / 2) @ turn(a, 0.9) @ turn(b, -1.2)
-    pose = np.column_stack([world, [1, 0, 2] - world @ R])
-    assert apart(module.body_poses(0.0, y)[0], pose) < EXACT
-
-
 QUATERNION = np.array([0.5, -0.7, 0.1, 0.5])
 
 
@@ -284,26 +272,6 @@ def test_ball(route: str) -> None:
     assert apart(module.body_poses(0.0, y)[0], pose) < EXACT
     assert apart(module.mass_matrix(0.0, y), I) < EXACT
     assert apart(module.velocity_force(0.0, y), np.cross(w, I @ w)) < EXACT
-
-
-def test_ball_on_a_turntable(route: str) -> None:
-    """Its velocities are relative to the parent, in the child's axes: ω = Ω ẑ + R w."""
-    text = scene(
-        body("table", 3.0, "[0.2, 0.2, 0.3]"),
-        joint("revolute", child="table", name="pivot"),
-        body(),
-        joint("ball", "r_parent = [0.4, 0, 0]", at("r_child", R), parent="table"),
-    )
-    module = load(text, route)
-    w = np.array([0.3, 0.7, -0.4])
-    motion = {"pivot_angle": 0.8, "pivot_angle_dot": 2.0, **quaternion("j"), **spin_of("j", w)}
-    y = state(module, motion)
-    table = turn(Z, 0.8)
-    world = table @ of_quaternion(*QUATERNION)
-    spin = 2.0 * Z + world @ w
-    velocity = np.cross(2.0 * Z, table @ [0.4, 0, 0]) - np.cross(spin, world @ R)
-    row = module.BODIES.index("b")
-    assert apart(module.body_velocities(0.0, y)[row], [*velocity, *spin]) < EXACT
 
 
 def test_free(route: str) -> None:
@@ -400,100 +368,7 @@ def test_weld(route: str) -> None:
     assert apart(still[3:], -moment - np.cross(arm, M * a)) < EXACT
 
 
-def test_weld_to_the_world(route: str) -> None:
-    """It does not move, and carries weights and pushes; what hangs on it moves as ever."""
-    text = scene(
-        body("stand", 4.0, "[0.1, 0.1, 0.1]"),
-        joint(
-            "weld",
-            "r_parent = [0, 0, 2]",
-            "orientation_deg = [0, 0, 90]",
-            child="stand",
-            name="bolt",
-        ),
-        body(),
-        joint("revolute", "axis = [0, 1, 0]", "r_parent = [0.5, 0, 0]", RODS, parent="stand"),
-        '[[effects]]\ntype = "external_force"\nname = "push"\nbody = "stand"\n'
-        'at = [0.1, 0, 0]\nforce = "input"\n',
-    )
-    module = load(text, route)
-    u = {"push_x": 1.0, "push_y": -2.0, "push_z": 3.0}
-    y = state(module, {"j_angle": np.pi / 2})  # the rod level, along the world's y
-    found = module.derivative(0.0, y, u=u)
-    a = 0.4 * M * G / (INERTIA[1, 1] + M * 0.16)
-    assert abs(found[1]) == pytest.approx(a, rel=EXACT)
-    assert apart(module.body_poses(0.0, y)[0], [[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 2.0]]) == 0
-    bolt = module.joint_forces(0.0, y, u=u)[module.JOINTS.index("bolt")]
-    hung = M * (G - 0.4 * a)
-    assert apart(bolt[:3], [1.0, -2.0, 3.0 - 4.0 * G - hung]) < EXACT
-    pushed = np.cross([0.0, 0.1, 0.0], [1.0, -2.0, 3.0])
-    pin = -module.joint_forces(0.0, y, u=u)[module.JOINTS.index("j")]
-    carried = np.cross([0.0, 0.5, 0.0], -pin[:3]) - pin[3:]
-    assert apart(bolt[3:], pushed + carried) < EXACT
-    assert module.potential_energy(0.0, y) == pytest.approx(4.0 * G * 2 + M * G * 2)
-    assert module.applied_force(0.0, y, u=u).tolist() == [0.0]
-
-
-RODS = "r_child = [0, 0, 0.4]"
-
-
 # What composite joints are made of.
-
-
-def chained(kinds: list[tuple[str, str]], last: tuple[str, ...], first: tuple[str, ...]) -> str:
-    """One-coordinate joints in a row, massless bodies between."""
-    tables, parent = [], "world"
-    for i, (kind, axis) in enumerate(kinds):
-        child = "b" if i == len(kinds) - 1 else f"m{i}"
-        lines = (axis, *(first if i == 0 else ()), *(last if child == "b" else ()))
-        tables.append(joint(kind, *lines, child=child, parent=parent, name=f"s{i}"))
-        tables.append(body() if child == "b" else body(child, 0, "0"))
-        parent = child
-    return scene(*tables, FORCE)
-
-
-X_AXIS, Y_AXIS, Z_AXIS = (f"axis = {a}" for a in ("[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"))
-TILTED = "axis = [0.36, 0.48, 0.8]"
-PARTS = {
-    "cylindrical": (TILTED, [("prismatic", TILTED), ("revolute", TILTED)]),
-    "universal": (
-        "axes = [[0.36, 0.48, 0.8], [0, 1, 0]]",
-        [("revolute", TILTED), ("revolute", Y_AXIS)],
-    ),
-    "planar": ("", [("prismatic", X_AXIS), ("prismatic", Y_AXIS), ("revolute", Z_AXIS)]),
-    "particle": ("", [("prismatic", a) for a in (X_AXIS, Y_AXIS, Z_AXIS)]),
-    "free": ("", [*(("prismatic", a) for a in (X_AXIS, Y_AXIS, Z_AXIS)), ("ball", "")]),
-}
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("kind", PARTS)
-def test_a_joint_is_its_parts(route: str, kind: str) -> None:
-    """Joints of several coordinates move as their parts on massless bodies do."""
-    line, parts = PARTS[kind]
-    first = ("r_parent = [0.2, 0.1, -0.3]", "orientation_deg = [10, 20, 30]")
-    last = (at("r_child", R),)
-    if kind == "free":
-        first, last = (), ()
-        whole = scene(body(), '[[joints]]\nname = "j"\ntype = "free"\nchild = "b"\n', FORCE)
-    else:
-        whole = scene(body(), joint(kind, line, *first, *last), FORCE)
-    engines = [
-        engine(text, route, leave_out=DERIVATIVES) for text in (whole, chained(parts, last, first))
-    ]
-    one, many = (e.module for e in engines)
-    rng = np.random.default_rng(8)
-    y = engines[0].random_state(rng)
-    u = {"f_x": 1.0, "f_y": -2.0, "f_z": 0.5}
-    assert len(one.STATES) == len(many.STATES)
-    assert apart(one.derivative(0.0, y, u=u), many.derivative(0.0, y, u=u)) < 1e-12
-    assert apart(one.mass_matrix(0.0, y), many.mass_matrix(0.0, y)) < EXACT
-    assert apart(one.bias_force(0.0, y), many.bias_force(0.0, y)) < 1e-12
-    assert apart(one.body_poses(0.0, y)[0], many.body_poses(0.0, y)[-1]) < EXACT
-    assert apart(one.body_velocities(0.0, y)[0], many.body_velocities(0.0, y)[-1]) < EXACT
-    if kind != "free":
-        outer, last_joint = one.joint_forces(0.0, y, u=u)[0], many.joint_forces(0.0, y, u=u)[-1]
-        assert apart(outer, last_joint) < 1e-12
 
 
 # Names and conventions.
@@ -560,37 +435,6 @@ def test_names(dimensions: int, kind: str) -> None:
             assert unit == ("rad" if "angle" in name else "" if "_q" in name else "m")
 
 
-def test_orientation_turns_about_x_then_y_then_z() -> None:
-    """R = Rz Ry Rx, in the parent's axes, for every joint that has one."""
-    E = turn(Z, 0.5) @ turn(Y, -0.3) @ turn(X, 1.1)
-    line = f"orientation_deg = {np.degrees([1.1, -0.3, 0.5]).tolist()}"
-    lines = (line, at("r_parent", np.array([0.1, 0.2, 0.3])), at("r_child", R))
-    places = [E, E @ E]
-    first = np.array([0.1, 0.2, 0.3]) - E @ R
-    second = first + E @ [0.1, 0.2, 0.3] - E @ E @ R
-    for kind in (
-        "weld",
-        "revolute",
-        "prismatic",
-        "cylindrical",
-        "universal",
-        "planar",
-        "particle",
-        "ball",
-    ):
-        axis = X_AXIS if kind == "prismatic" else ""
-        text = scene(
-            body("a"),
-            joint(kind, axis, *lines, child="a", name="i"),
-            body(),
-            joint("ball", *lines, parent="a"),
-        )
-        module = load(text, "aba")
-        poses = module.body_poses(0.0, state(module, {}))
-        for pose, turned, place in zip(poses, places, (first, second), strict=True):
-            assert apart(pose, np.column_stack([turned, place])) < EXACT, kind
-
-
 def test_orientation_in_the_plane() -> None:
     """One angle; it counts in the pose, whole turns and all."""
     text = scene(
@@ -607,84 +451,7 @@ def test_orientation_in_the_plane() -> None:
     assert apart(poses, [[c, s, turned], [2 * c, 2 * s, turned - np.pi / 6]]) < EXACT
 
 
-def test_inertia_is_in_body_axes_with_its_own_signs() -> None:
-    """xy, xz, yz are entries of the matrix, and turn with the body."""
-    module = load(scene(body(), '[[joints]]\nname = "j"\ntype = "free"\nchild = "b"\n'), "aba")
-    w = np.array([0.4, -0.8, 1.1])
-    y = state(module, {**quaternion("b"), **spin_of("b", w)})
-    world = of_quaternion(*QUATERNION)
-    assert apart(module.momentum(0.0, y)[3:], world @ INERTIA @ w) < EXACT
-    assert module.kinetic_energy(0.0, y) == pytest.approx(w @ INERTIA @ w / 2, rel=EXACT)
-
-
 # The plane is a part of space.
-
-
-def upright(tree: SpatialTree) -> str:
-    """A planar tree written as one in space: its x is x, its y is z, and it turns about -y."""
-    tables = []
-    for b in tree.bodies:
-        j = b.joint
-        J = b.inertia[2]
-        inertia = f"[{0.9 * J}, {0.7 * J}, {J}]" if J else "0"
-        tables.append(body(b.name, b.mass, inertia))
-        root, free = j.parent < 0, j.kind == "free"
-        place = [j.r_parent[0], 0.0, j.r_parent[1]] if root else [*j.r_parent]
-        lines = ["", f"r_parent = {place}", f"r_child = {[*j.r_child]}"]
-        lines.append(f"orientation_deg = {[90.0 if root else 0.0, 0.0, j.orientation_deg[2]]}")
-        if root and not free:
-            # Rz Ry Rx turns about x first: the angle in the plane is then one about -y.
-            lines[-1] = f"orientation_deg = {[90.0, -j.orientation_deg[2], 0.0]}"
-        if j.kind == "prismatic":
-            lines[0] = f"axis = {[*j.axes[0]]}"
-        if j.armature:
-            lines.append(f"motor_inertia = {j.armature}")
-        if len(j.coordinates) == 1:
-            lines.append(f'coordinate = "{j.coordinates[0]}"')
-        elif j.coordinates:
-            lines.append(f"coordinates = {[*j.coordinates]}")
-        parent = "world" if root else tree.bodies[j.parent].name
-        kind = "planar" if free else j.kind
-        tables.append(joint(kind, *lines, child=b.name, parent=parent, name=j.name))
-    head = f'name = "upright"\ndimensions = 3\n[[effects]]\ntype = "gravity"\ng = {tree.gravity}\n'
-    if tree.push is not None:
-        k, (x, y, _) = tree.push
-        tables.append(
-            '[[effects]]\ntype = "external_force"\nname = "push"\nforce = "input"\n'
-            f'body = "{tree.bodies[k].name}"\nat = [{x}, {y}, 0]\n'
-        )
-    if tree.motor >= 0:
-        name = tree.bodies[tree.motor].joint.name
-        tables.append(
-            f'[[effects]]\ntype = "motor"\nname = "drive"\njoint = "{name}"\ntorque = "input"\n'
-        )
-    return "\n".join((head, *tables))
-
-
-@pytest.mark.parametrize("seed", [*range(9), 60, 379])
-@pytest.mark.every(8)
-def test_the_plane_is_a_part_of_space(route: str, seed: int) -> None:
-    """A planar scene stood upright in space: the same motion, forces, energies."""
-    tree, text = random_spatial_tree(seed, PLANE, 5)
-    flat, solid = load(text, route), load(upright(tree), route)
-    rng = np.random.default_rng(seed)
-    q, v = random_state(tree, rng)
-    u = tree.random_inputs(rng)
-    upright_u = {{"push_y": "push_z"}.get(name, name): value for name, value in u.items()}
-    y, z = np.empty(len(flat.STATES)), np.empty(len(flat.STATES))
-    both = np.concatenate((q, v))
-    flat_places, solid_places = tree.places(flat.STATES), tree.places(solid.STATES)
-    y[flat_places], z[solid_places] = both, both
-    here, there = flat.derivative(0.0, y, u=u), solid.derivative(0.0, z, u=upright_u)
-    assert apart(here[flat_places], there[solid_places]) < 1e-12
-    rows = [solid.BODIES.index(name) for name in flat.BODIES]
-    assert apart(flat.kinetic_energy(0.0, y), solid.kinetic_energy(0.0, z)) < EXACT
-    assert apart(flat.potential_energy(0.0, y), solid.potential_energy(0.0, z)) < EXACT
-    moved, turned = flat.body_velocities(0.0, y), solid.body_velocities(0.0, z)
-    assert apart(moved, turned[rows][:, [0, 2, 4]] * [1, 1, -1]) < EXACT
-    forces, wrenches = flat.joint_forces(0.0, y, u=u), solid.joint_forces(0.0, z, u=upright_u)
-    rows = [solid.JOINTS.index(name) for name in flat.JOINTS]
-    assert apart(forces, wrenches[rows][:, [0, 2, 4]] * [1, 1, -1]) < 1e-12
 
 
 OUT_OF_PLANE = re.compile(
@@ -700,22 +467,6 @@ def test_the_plane_does_not_pay_for_space(route: str, name: str) -> None:
     assert [word for word in words if OUT_OF_PLANE.fullmatch(word)] == []
     top = engine("spinning_top", route, leave_out=ASIDE).system.program.names.values()
     assert any(OUT_OF_PLANE.fullmatch(word) for word in top)
-
-
-@pytest.mark.full
-@pytest.mark.every(2)
-def test_the_plane_is_cheaper_than_space(route: str) -> None:
-    """Pins and free bodies take fewer operations in the plane than upright in space."""
-    paid = []
-    for seed in range(24):
-        tree, text = random_spatial_tree(seed, PLANE, 5)
-        if all(b.joint.kind in ("revolute", "free", "weld") for b in tree.bodies):
-            pair = (engine(t, route, leave_out=ASIDE) for t in (text, upright(tree)))
-            costs = [e.module.COST["derivative"]["total"] for e in pair]
-            assert costs[0] <= costs[1]
-            paid.append(costs)
-    assert len(paid) > 5
-    assert sum(flat for flat, _ in paid) < 0.9 * sum(solid for _, solid in paid)
 
 
 def particle(kind: str, dimensions: int, *lines: str) -> Engine:

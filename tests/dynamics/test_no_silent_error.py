@@ -3,7 +3,6 @@
 import random
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,8 +14,6 @@ from scaled_trees import apart, drawn, dynamics, found, size_of, state, truth
 
 import eomgen
 from eomgen.base.errors import SceneError
-from eomgen.model.model import Model
-from eomgen.pipeline import Compiled, compile_program
 from eomgen.scalars.extended import Bits, sixty_digits
 from eomgen.scene.reader import parse_scene
 
@@ -59,7 +56,7 @@ def case(number: int) -> tuple[int, int, list[float], bool]:
 
 
 @settings(
-    max_examples=some(4, 100_000),
+    max_examples=some(3, 100_000),
     deadline=None,
     derandomize=True,
     database=None,
@@ -174,16 +171,3 @@ def test_most_are_right() -> None:
     """Refusing everything would be no answer."""
     outcomes = Counter(tried(seed, 2 + seed % 2, [0.0], bool(seed % 3)) for seed in range(COUNT))
     assert outcomes == {"right": COUNT}
-
-
-@pytest.mark.full
-def test_it_can_fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Articulated bodies alone are silently wrong."""
-
-    def by_one(model: Model) -> Compiled:
-        return compile_program(replace(model, route="aba"), jacobian=False)
-
-    monkeypatch.setattr(scaled_trees, "taken", by_one)
-    r = np.random.default_rng(1)
-    cases = ((seed, 2, r.uniform(-12, 12, 30).tolist(), False) for seed in range(60))
-    assert any(tried(*case).startswith("off") for case in cases)

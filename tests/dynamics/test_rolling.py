@@ -4,7 +4,6 @@ Closed forms are derived in the comments or are in the books: E. J. Routh, Dynam
 Rigid Bodies (1905); Ju. I. Neimark and N. A. Fufaev, Dynamics of Nonholonomic Systems (1972).
 """
 
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -14,7 +13,7 @@ import pytest
 from campaign import some
 from scipy.integrate import quad
 from scipy.special import ellipj, ellipk
-from whipple import PRINTED, SPEEDS, TABLE, appendix, linearised, matrices, tangents
+from whipple import PRINTED, SPEEDS, TABLE, appendix, linearised, matrices
 
 from eomgen.base.errors import SceneError
 from eomgen.dynamics import constraints
@@ -364,30 +363,6 @@ def test_a_bead_on_a_hoop_is_a_pendulum() -> None:
 # Space.
 
 
-def test_a_bead_in_a_bowl() -> None:
-    """In z = k (x² + y²) circles of every radius take 2 π/sqrt(2 g k); else energy and angular
-    momentum are kept.
-    """
-    k, turning = 0.8, np.sqrt(2 * 9.81 * 0.8)
-    for radius, speed in ((0.3, turning * 0.3), (0.3, 0.5)):
-        text = scene(
-            3,
-            body("bead", 0.7),
-            joint("particle", "bead"),
-            constraint("point_on", "bead", equations=f'["z - {k}*(x**2 + y**2)"]'),
-            start=f"[initial]\nq = {{ bead_x = {radius}, bead_y = 0 }}\n"
-            f"v = {{ bead_x_dot = 0, bead_y_dot = {speed} }}\n",
-        )
-        _, t, y = run(text, 1.5)
-        x, v = (np.array([y[f"bead_{a}{d}"] for a in "xyz"]) for d in ("", "_dot"))
-        assert x[2] == pytest.approx(k * (x[0] ** 2 + x[1] ** 2), abs=1e-13)
-        assert x[0] * v[1] - x[1] * v[0] == pytest.approx(radius * speed, abs=1e-10)
-        energy = (v * v).sum(axis=0) / 2 + 9.81 * x[2]
-        assert energy == pytest.approx(energy[0], abs=1e-9)
-        if speed != 0.5:
-            assert x[0] == pytest.approx(radius * np.cos(turning * t), abs=1e-9)
-
-
 def test_a_ball_on_a_turntable() -> None:
     """A homogeneous ball on a table that turns at Ω goes round a circle, at 2/7 Ω."""
     omega, r, m = 1.3, 0.1, 0.4
@@ -418,25 +393,6 @@ def test_a_ball_on_a_turntable() -> None:
     assert y["ball_x"] == pytest.approx(centre[0] + c * arm[0] - s * arm[1], abs=1e-10)
     assert y["ball_y"] == pytest.approx(centre[1] + s * arm[0] + c * arm[1], abs=1e-10)
     assert y["ball_z"] == pytest.approx(r, abs=1e-14)
-
-
-def test_a_ball_in_a_spherical_bowl() -> None:
-    """It swings in a plane as a pendulum of length 7/5 (R - r)."""
-    big, r, m = 0.9, 0.2, 1.5
-    text = scene(
-        3,
-        body("ball", m, [0.4 * m * r * r] * 3),
-        joint("free", "ball"),
-        constraint("rolling", "ball", radius=r, other_radius=big, inside="true"),
-        start=f"[initial]\nq = {{ ball_x = {(big - r) * np.sin(1.0) * 0.6}, ball_y = "
-        f"{(big - r) * np.sin(1.0) * 0.8}, ball_z = {-(big - r) * np.cos(1.0)} }}\n",
-    )
-    _, t, y = run(text, 3.0)
-    k = np.sin(0.5)
-    sn = ellipj(ellipk(k * k) - np.sqrt(9.81 / (1.4 * (big - r))) * t, k * k)[0]
-    angle = 2 * np.arcsin(k * sn)
-    assert y["ball_x"] == pytest.approx(0.6 * (big - r) * np.sin(angle), abs=1e-9)
-    assert y["ball_z"] == pytest.approx(-(big - r) * np.cos(angle), abs=1e-9)
 
 
 DISC = (1.3, 0.2, 1.3 * 0.04 / 4, 1.3 * 0.04 / 2)
@@ -553,42 +509,7 @@ def test_a_tippe_top_that_rolls() -> None:
     assert energy == pytest.approx(energy[0], rel=1e-10)
 
 
-@pytest.mark.full
-def test_the_rattleback_turns_round() -> None:
-    """With the parameters of Kane and Levinson 1982, energy kept. Spun the other way it goes on."""
-    made = module("rattleback")
-    problem = as_problem(made)
-    i = made.STATES.index("stone_wz")
-    for sense, end in ((1.0, 3.4), (-1.0, 1.0)):
-        start = problem.initial.copy()
-        start[7:] *= sense
-        given = replace(problem, initial=start)
-        found = integrate(given, "DOP853", end, rtol=1e-12, atol=1e-13)
-        spins = found.y[:, i]
-        assert spins[0] == pytest.approx(-5.0 * sense)
-        assert spins[-1] > 0.5 if sense > 0 else spins.min() > 4.5
-        ends = [found.y[0], found.y[-1]]
-        energy = [made.kinetic_energy(0.0, y) + made.potential_energy(0.0, y) for y in ends]
-        assert energy[1] == pytest.approx(energy[0], rel=1e-9)
-
-
 # The bicycle: see whipple.py.
-
-
-@pytest.mark.every(10)
-@pytest.mark.parametrize("speed", SPEEDS)
-def test_the_linearised_bicycle(speed: int) -> None:
-    """The Jacobian of the generated module on the manifold of the constraints, at every speed of
-    the paper's table 2, against its eigenvalues.
-    """
-    made, model = module("bicycle"), assembled(elaborate(read_scene("bicycle")))
-    state, columns = tangents(model, float(speed), FloatScalars(), float)
-    columns = np.array(columns).T
-    names = made.STATES
-    rows = [names.index(name) for name in ("lean", "steer", "lean_dot", "steer_dot")]
-    matrix = (made.jacobian(0.0, np.array(state)) @ columns)[rows]
-    found = np.sort_complex(np.linalg.eigvals(matrix))
-    assert found == pytest.approx(np.sort_complex(TABLE[speed]), abs=1e-11)
 
 
 @pytest.mark.parametrize("speed", some((5,), SPEEDS))

@@ -120,26 +120,6 @@ def test_regrouped_inertias(dimensions: int, seed: int) -> None:
                 assert body.first_moment[k] == 0.0 == min(across) <= max(across)
 
 
-@pytest.mark.every(6)
-@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
-@pytest.mark.parametrize("seed", range(12))
-def test_accelerations_from_rest(dimensions: int, seed: int) -> None:
-    """Where all coordinates are 0, quaternions 1, 0, 0, 0: much is zero, and nothing is lost."""
-    tree, text = drawn(seed, dimensions, MOST[1])
-    model = elaborate(parse_scene(text))
-    q, v = np.zeros(len(tree.coordinates)), np.zeros(len(tree.velocities))
-    q[[name.endswith("_qw") for name in tree.coordinates]] = 1.0
-    u = tree.random_inputs(np.random.default_rng(seed))
-    place = [tree.velocities.index(c.name) for c in model.velocities]
-    expected = solve(tree, q, v, u).accelerations[place]
-    for axes in ("own", "world"):
-        dynamics = in_floats(tree, model, q, v, u, axes)
-        assert apart(dynamics.articulated_forward(), expected) < ROUNDING
-        assert apart(dynamics.factored_forward(), expected) < ROUNDING
-        if axes == "own":
-            assert apart(dynamics.orthogonal_forward(), expected) < ROUNDING
-
-
 KEPT = {PLANE: [0, 1, 5], SPACE: [0, 1, 2, 3, 4, 5]}
 """Components of a wrench or of momentum that the plane has, force first."""
 

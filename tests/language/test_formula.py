@@ -305,39 +305,23 @@ def test_reading_never_warns() -> None:
 
 SCENE = """\
 name = "bead"
+initial = {{ q = [0.4] }}
+bodies = [{{ name = "bead", mass = 1, inertia_com = 0 }}]
+joints = [
+    {{ name = "wire", type = "prismatic", parent = "world", child = "bead", axis = [1, 0], \
+coordinate = "x" }},
+]
+effects = [{{ type = "motor", name = "push", joint = "wire", torque = "{}" }}]
 [parameters]
 a = 2.0
-[[bodies]]
-name = "bead"
-mass = 1
-inertia_com = 0
-[[joints]]
-name = "wire"
-type = "prismatic"
-parent = "world"
-child = "bead"
-axis = [1, 0]
-coordinate = "x"
-[[effects]]
-type = "motor"
-name = "push"
-joint = "wire"
-torque = "{}"
-[initial]
-q = [0.4]
 """
 LONGEST = [
-    "*".join(["x**16"] * 80),
-    "(" * 60 + "x" + ")**16" * 60,
-    "sin(" * 95 + "x" + ")" * 95,
-    "+".join("x" * 150),
-    "+".join(f"{i}*x" for i in range(90)),
-    "1/(2+" * 70 + "x" + ")" * 70,
-    "max(x," * 60 + "a" + ")" * 60,
-    "-(1-" * 70 + "x" + ")" * 70,
+    "*".join(["x**16"] * 80), "(" * 60 + "x" + ")**16" * 60, "sin(" * 95 + "x" + ")" * 95,
+    "+".join("x" * 150), "+".join(f"{i}*x" for i in range(90)), "1/(2+" * 70 + "x" + ")" * 70,
+    "max(x," * 60 + "a" + ")" * 60, "-(1-" * 70 + "x" + ")" * 70,
     "(x if x<a else " * 30 + "x" + ")" * 30,
     "(x**16+1)*" * 45 + "x",
-]
+]  # fmt: skip
 
 
 @pytest.mark.every(3)
@@ -369,27 +353,17 @@ def test_functions_of_parameters_alone(name: str) -> None:
 @pytest.mark.parametrize(
     ("torque", "message"),
     [
-        (
-            "x*log(0 - 1)",
-            "its part 'log((0.0 - 1.0))' is not a finite number; change it or its parameters",
-        ),
-        (
-            "x + exp(1000)",
-            "its part 'exp(1000.0)' is not a finite number; change it or its parameters",
-        ),
-        (
-            "x/(a - 2)*(1/(a - 2))",
-            "its part '(1.0 / (a - 2.0))' is not a finite number; change it or its parameters",
-        ),
-        (
-            "x*((1e99)**16)",
-            "its part '(1e+99 ** 16.0)' is not a finite number; change it or its parameters",
-        ),
-        (
-            "x*(1e308*10 - 1e308*10)",
-            "its part '((1e+308 * 10.0) - (1e+308 * 10.0))' is not a finite "
-            "number; change it or its parameters",
-        ),
+        ("x*log(0 - 1)",
+         "its part 'log((0.0 - 1.0))' is not a finite number; change it or its parameters"),
+        ("x + exp(1000)",
+         "its part 'exp(1000.0)' is not a finite number; change it or its parameters"),
+        ("x/(a - 2)*(1/(a - 2))",
+         "its part '(1.0 / (a - 2.0))' is not a finite number; change it or its parameters"),
+        ("x*((1e99)**16)",
+         "its part '(1e+99 ** 16.0)' is not a finite number; change it or its parameters"),
+        ("x*(1e308*10 - 1e308*10)",
+         "its part '((1e+308 * 10.0) - (1e+308 * 10.0))' is not a finite "
+         "number; change it or its parameters"),
         ("x + sine", "unknown parameter 'sine' (did you mean 'sin'?)"),
         ("x + sin", "unknown parameter 'sin'; the function is written sin(x)"),
         ("max*2", "unknown parameter 'max'; the function is written max(x, y)"),
@@ -398,7 +372,7 @@ def test_functions_of_parameters_alone(name: str) -> None:
         ("np + x", "unknown parameter 'np'; give it a value in [parameters]"),
         ("derivative", "unknown parameter 'derivative'; give it a value in [parameters]"),
     ],
-)
+)  # fmt: skip
 def test_what_has_no_meaning(torque: str, message: str) -> None:
     """A part that can have no value, whatever the motion; a name that nothing has."""
     with pytest.raises(SceneError) as error:

@@ -12,102 +12,43 @@ from eomgen.scene.reader import parse_scene
 
 EFFECTS = """\
 name = "cart"
-[[bodies]]
-name = "cart"
-mass = 2.0
-inertia_com = 1.0
-[[bodies]]
-name = "pole"
-mass = 1.0
-inertia_com = 1.0
-[[joints]]
-name = "rail"
-type = "prismatic"
-parent = "world"
-child = "cart"
-axis = [1, 0]
-[[joints]]
-name = "pin"
-type = "revolute"
-parent = "cart"
-child = "pole"
-r_child = [0, 1]
-[[effects]]
-type = "motor"
-name = "drive"
-joint = "JOINT"
-torque = "input"
-[[effects]]
-type = "motor"
-name = "push"
-joint = "JOINT"
-torque = 1.0
-[[effects]]
-type = "joint_spring"
-name = "spring"
-joint = "JOINT"
-stiffness = 1.0
-damping = 1.0
-rest = 1.0
-[[effects]]
-type = "joint_stop"
-name = "stop"
-joint = "JOINT"
-low = 1.0
-high = 2.0
-stiffness = 1.0
-damping = 1.0
-[[effects]]
-type = "joint_friction"
-name = "rub"
-joint = "JOINT"
-viscous = 1.0
-coulomb = 1.0
-speed = 1.0
-[[effects]]
-type = "pid"
-name = "hold"
-joint = "JOINT"
-target = 1.0
-target_rate = 1.0
-stiffness = 1.0
-damping = 1.0
-integral_gain = 1.0
-limit = 1.0
-lag = 1.0
-[[effects]]
-type = "controller"
-name = "own"
-states = { z = { rate = 1.0, unit = "rad", about = "this | that" } }
-torques = { pin = 1.0, rail = 1.0 }
+bodies = [
+    { name = "cart", mass = 2.0, inertia_com = 1.0 },
+    { name = "pole", mass = 1.0, inertia_com = 1.0 },
+]
+joints = [
+    { name = "rail", type = "prismatic", parent = "world", child = "cart", axis = [1, 0] },
+    { name = "pin", type = "revolute", parent = "cart", child = "pole", r_child = [0, 1] },
+]
+effects = [
+    { type = "motor", name = "drive", joint = "JOINT", torque = "input" },
+    { type = "motor", name = "push", joint = "JOINT", torque = 1.0 },
+    { type = "joint_spring", name = "spring", joint = "JOINT", stiffness = 1.0, damping = 1.0, \
+rest = 1.0 },
+    { type = "joint_stop", name = "stop", joint = "JOINT", low = 1.0, high = 2.0, stiffness = 1.0, \
+damping = 1.0 },
+    { type = "joint_friction", name = "rub", joint = "JOINT", viscous = 1.0, coulomb = 1.0, \
+speed = 1.0 },
+    { type = "pid", name = "hold", joint = "JOINT", target = 1.0, target_rate = 1.0, \
+stiffness = 1.0, damping = 1.0, integral_gain = 1.0, limit = 1.0, lag = 1.0 },
+    { type = "controller", name = "own", states = { z = { rate = 1.0, unit = "rad", \
+about = "this | that" } }, torques = { pin = 1.0, rail = 1.0 } },
+]
 """
 UNITS = {
-    "drive": ("N m", "N"),
-    "push_torque": ("N m", "N"),
-    "spring_stiffness": ("N m/rad", "N/m"),
+    "drive": ("N m", "N"), "push_torque": ("N m", "N"), "spring_stiffness": ("N m/rad", "N/m"),
     "spring_damping": ("N m s/rad", "N s/m"),
-    "spring_rest": ("rad", "m"),
-    "stop_low": ("rad", "m"),
-    "stop_high": ("rad", "m"),
-    "stop_stiffness": ("N m/rad", "N/m"),
-    "stop_damping": ("N m s/rad", "N s/m"),
-    "rub_viscous": ("N m s/rad", "N s/m"),
-    "rub_coulomb": ("N m", "N"),
-    "rub_speed": ("rad/s", "m/s"),
-    "hold_target": ("rad", "m"),
-    "hold_target_rate": ("rad/s", "m/s"),
-    "hold_stiffness": ("N m/rad", "N/m"),
+    "spring_rest": ("rad", "m"), "stop_low": ("rad", "m"), "stop_high": ("rad", "m"),
+    "stop_stiffness": ("N m/rad", "N/m"), "stop_damping": ("N m s/rad", "N s/m"),
+    "rub_viscous": ("N m s/rad", "N s/m"), "rub_coulomb": ("N m", "N"),
+    "rub_speed": ("rad/s", "m/s"), "hold_target": ("rad", "m"),
+    "hold_target_rate": ("rad/s", "m/s"), "hold_stiffness": ("N m/rad", "N/m"),
     "hold_damping": ("N m s/rad", "N s/m"),
     "hold_integral_gain": ("N m/(rad s)", "N/(m s)"),
-    "hold_limit": ("N m", "N"),
-    "hold_lag": ("s", "s"),
-    "hold_integral": ("rad s", "m s"),
-    "hold_torque": ("N m", "N"),
-    "own_z_rate": ("1/s", "1/s"),
-    "own_torques_pin": ("N m", "N m"),
-    "own_torques_rail": ("N", "N"),
-    "z": ("rad", "rad"),
-}
+    "hold_limit": ("N m", "N"), "hold_lag": ("s", "s"), "hold_integral": ("rad s", "m s"),
+    "hold_torque": ("N m", "N"), "own_z_rate": ("1/s", "1/s"), "own_torques_pin": ("N m", "N m"),
+    "own_torques_rail": ("N", "N"), "z": ("rad", "rad"),
+}  # fmt: skip
 """Of every quantity, input and state of the effects, at the pin and at the rail."""
 
 

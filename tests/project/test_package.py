@@ -107,7 +107,9 @@ def test_the_typed_script_runs() -> None:
 
 
 def test_generating_and_simulating_need_no_drawing() -> None:
-    """Without Matplotlib and Pillow, from an empty store."""
+    """Without Matplotlib and Pillow, from an empty store; SciPy, which takes longer to load than a
+    scene takes to generate, is for runs alone.
+    """
     code = """
 import sys, tempfile, os
 with tempfile.TemporaryDirectory() as folder:
@@ -116,6 +118,7 @@ with tempfile.TemporaryDirectory() as folder:
         sys.modules[name] = None
     import eomgen
     eomgen.generate("pendulum").save(folder + "/pendulum.py")
+    assert "scipy" not in sys.modules
     print(eomgen.simulate("pendulum", t_end=0.1).finished)
 """
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)

@@ -5,14 +5,10 @@ import re
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
-from mechanisms import load
-from newton_euler import Mechanism, solve
 
 from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_scene
 from eomgen.scalars.exact import direction
 from eomgen.scene.reader import parse_scene
 
@@ -95,10 +91,7 @@ MISTAKES = [
      "give one"),
     ("t_end = 1.0", 't_end = "1"', "simulation.t_end: '1' is not a number; give one"),
     ("mass = 0.5", "mass = nan", "bodies[1].mass: nan is not a finite number; give one that is"),
-    ("mass = 0.5", "mass = -inf", "bodies[1].mass: -inf is not a finite number; give one that is"),
     ("t_end = 1.0", "t_end = inf", "simulation.t_end: inf is not a finite number; "
-     "give one that is"),
-    ("value = 1.0", "value = nan", "parameters.m.value: nan is not a finite number; "
      "give one that is"),
     (
         "mass = 0.5",
@@ -233,11 +226,6 @@ MISTAKES = [
         "simulation.dt: 0.0 is not positive; give a number > 0",
     ),
     (
-        't_end = 1.0',
-        't_end = 1.0\ndt = -0.1',
-        "simulation.dt: -0.1 is not positive; give a number > 0",
-    ),
-    (
         'name = "wrist"\ntype = "revolute"',
         'name = "wrist"\ntype = "revolut"',
         "joints[1].type: unknown value 'revolut' (did you mean 'revolute'?)",
@@ -275,7 +263,6 @@ MISTAKES = [
      "has a whole number of thousands of digits; give at most 1e+100, or choose other units"),
     ("mass = 0.5", "mass = [[" + 10_001 * "1," + "]]",
      "bodies[1].mass[0]: has 10001 entries; give at most 10000"),
-    ("mass = 0.5", "mass = 1e999", "bodies[1].mass: inf is not a finite number; give one that is"),
     ("mass = 0.5", "mass = 1e101", "bodies[1].mass: 1e+101 is larger than 1e+100; "
      "choose other units"),
     ("t_end = 1.0", "t_end = 1e308", "simulation.t_end: 1e+308 is larger than 1e+100; "
@@ -297,19 +284,11 @@ MISTAKES = [
         "inertia_com = 0.02\nshapes = 3",
         "bodies[1].shapes: 3 is not a list; give one",
     ),
-    ("inertia_com = 0.02", "inertia_com = true",
-     "bodies[1].inertia_com: True is neither a number nor a formula; give one"),
     ("inertia_com = 0.02", "inertia_com = { xx = 1 }",
      "bodies[1].inertia_com: {'xx': 1} is neither a number nor a formula; give one"),
-    ("inertia_com = 0.02", 'inertia_com = "m*"',
-     "bodies[1].inertia_com: 'm*' is not a formula at column 3; write for example '2*m_A' or "
-     "'l_A/2'"),
     ("inertia_com = 0.02", 'inertia_com = "0.02 kg m^2"',
      "bodies[1].inertia_com: '0.02 kg m^2' has '^' at column 10, which is not allowed; write ** "
      "for a power"),
-    ("inertia_com = 0.02", 'inertia_com = "200 g"',
-     "bodies[1].inertia_com: '200 g' is not a formula at column 5; write the number alone, in SI "
-     "units, or * to multiply"),
     ("inertia_com = 0.02", 'inertia_com = "I"',
      "bodies[1].inertia_com: unknown parameter 'I'; give it a value in [parameters]"),
     ("inertia_com = 0.02", "inertia_com = [0.02]",
@@ -318,20 +297,14 @@ MISTAKES = [
     ("inertia_com = 0.02", "inertia_com = [0.02, 0.02, 0.02]",
      "bodies[1].inertia_com: body 'hand' has 3 entries; the plane takes one number"),
     # Vectors and joints of space.
-    ("r_parent = [0.5, 0]", "r_parent = [0.5, 0, 0]",
-     "joints[1].r_parent: has 3 components; the plane takes 2"),
     ("r_child = [-0.1, 0]", "r_child = [-0.1, 0, 0]",
      "joints[1].r_child: has 3 components; the plane takes 2"),
-    ("r_child = [-0.1, 0]", "r_child = [-0.1, 0, 0, 0]",
-     "joints[1].r_child: has 4 entries; give at most 3"),
     ("r_child = [-0.1, 0]", "r_child = []", "joints[1].r_child: has 0 entries; give at least 2"),
     ("r_child = [-0.1, 0]", "r_child = [[-0.1, 0]]",
      "joints[1].r_child: has lists in it; give everything in one list"),
     (None, '[[points]]\nname = "tip"\nbody = "hand"\nat = [1, 2, 3]\n',
      "points[0].at: has 3 components; the plane takes 2"),
     (None, FORCE + "force = [1, 2, 3]\n", "effects[1].force: has 3 components; the plane takes 2"),
-    (None, FORCE + 'at = [1, 2, 3]\nforce = "input"\n',
-     "effects[1].at: has 3 components; the plane takes 2"),
     (WRIST, SLIDE + "axis = [1, 0, 0]", "joints[1].axis: has 3 components; the plane takes 2"),
     (WRIST, SLIDE + "axis = [0, 0.0]",
      "joints[1].axis: has no length; give a direction, for example [1.0, 0.0]"),
@@ -345,18 +318,12 @@ MISTAKES = [
      "joints[1].orientation_deg: has 3 components; the plane takes one angle"),
     (WRIST, WRIST + '\norientation_deg = "90"',
      "joints[1].orientation_deg: '90' is not a number; give one"),
-    (WRIST, WRIST + "\norientation_deg = inf",
-     "joints[1].orientation_deg: inf is not a finite number; give one that is"),
     ('name = "swing"', 'name = "swing"\ndimensions = 4',
      "dimensions: unknown value 4; known: 2, 3"),
-    ('name = "swing"', 'name = "swing"\ndimensions = "3"',
-     "dimensions: unknown value '3'; known: 2, 3"),
     ('name = "swing"', 'name = "swing"\ndimensions = 3',
      "joints[0].r_child: has 2 components; space takes 3"),
     # What else a joint may say.
     (WRIST, WRIST + "\nlimits = [1, -1]", "joints[1].limits: 1 is not below -1; give [low, high]"),
-    (WRIST, WRIST + "\nlimits = [1, 1]", "joints[1].limits: 1 is not below 1; give [low, high]"),
-    (WRIST, WRIST + "\nlimits = [1]", "joints[1].limits[1]: missing; the list is too short"),
     (WRIST, WRIST + "\ngear_ratio = 50",
      "joints[1].gear_ratio: does nothing without a motor_inertia; give one"),
     (WRIST, WRIST + "\nmotor_inertia = 1e-5\ngear_ratio = 0",
@@ -366,16 +333,12 @@ MISTAKES = [
     (WRIST, 'name = "wrist"\ntype = "weld"\nmotor_inertia = 1e-5',
      "joints[1].motor_inertia: unknown key; known here: name, parent, child, r_parent, r_child, "
      "orientation_deg, orientation, loop, type"),
-    (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b"]',
-     "joints[1].coordinates[2]: missing; the list is too short"),
     (WRIST, 'name = "wrist"\ntype = "planar"\ncoordinates = ["a", "b", "a"]\n',
      "joints[1]: 'a' would be the name of a coordinate and of another (joints[1]); rename one of "
      "them"),
     (None, FORCE + "force = 3\n", "effects[1].force: 3 is not a list; give one"),
     (None, FORCE + 'force = "inptu"\n',
      "effects[1].force: unknown value 'inptu' (did you mean 'input'?)"),
-    (None, FORCE + "force = [1, true]\n",
-     "effects[1].force[1]: True is neither a number nor a formula; give one"),
     (None, FORCE, "effects[1].force: missing; every such table needs it"),
     # Chains.
     *((None, CHAIN.replace("count = 3", f"count = {count}"), f"chains[0].count: {message}")
@@ -517,15 +480,9 @@ r_child = [0.1, 0, 0]
 
 MISTAKES_IN_SPACE = [
     # Masses and inertias that are none.
-    ("mass = 0.5", "mass = 0", "bodies[1].inertia_com: body 'hand' has inertia but no mass; "
-     "give it a mass, or inertia_com = 0"),
-    ("mass = 0.5", "mass = -1", "bodies[1].mass: -1 is negative; give a number >= 0 in kg"),
     (INERTIA, "inertia_com = 0.1", "bodies[1].inertia_com: body 'hand' has one number; "
      "space takes [xx, yy, zz], or 0 for a particle"),
     (INERTIA, "inertia_com = []", f"bodies[1].inertia_com: has 0 entries; {WHAT_INERTIA}"),
-    (INERTIA, "inertia_com = [1, 1]", f"bodies[1].inertia_com: has 2 entries; {WHAT_INERTIA}"),
-    (INERTIA, "inertia_com = [1, 0, 0, 0, 1, 0, 0, 0, 1]",
-     f"bodies[1].inertia_com: has 9 entries; {WHAT_INERTIA}"),
     *((INERTIA, f"inertia_com = {entries}", f"bodies[1].inertia_com: body 'hand' has {count} "
        "entries; give [xx, yy, zz], or those and xy, xz, yz")
       for count, entries in ((4, "[1, 1, 1, 0]"), (5, "[1, 1, 1, 0, 0]"))),
@@ -533,8 +490,6 @@ MISTAKES_IN_SPACE = [
      "bodies[1].inertia_com: has lists in it; give everything in one list"),
     (INERTIA, "inertia_com = [1, nan, 1]",
      "bodies[1].inertia_com[1]: nan is not a finite number; give one that is"),
-    (INERTIA, "inertia_com = [1, true, 1]",
-     "bodies[1].inertia_com[1]: True is neither a number nor a formula; give one"),
     (INERTIA, 'inertia_com = [1, "mm", 1]',
      "bodies[1].inertia_com[1]: unknown parameter 'mm' (did you mean 'm'?)"),
     (INERTIA, "inertia_com = [1, -1, 1]",
@@ -556,13 +511,7 @@ MISTAKES_IN_SPACE = [
     (AXIS, "axis = [0, 0, 0]",
      "joints[0].axis: has no length; give a direction, for example [1.0, 0.0, 0.0]"),
     (AXIS, "axis = [0, 1]", "joints[0].axis: has 2 components; space takes 3"),
-    (AXIS, "axis = [0, 1, 0, 0]", "joints[0].axis: has 4 entries; give at most 3"),
-    (AXIS, "axis = [1]", "joints[0].axis: has 1 entry; give at least 2"),
-    (AXIS, "axis = 1", "joints[0].axis: 1 is not a list; give one"),
-    (AXIS, 'axis = "y"', "joints[0].axis: 'y' is not a list; give one"),
     (AXIS, 'axis = ["m", 0, 0]', "joints[0].axis[0]: 'm' is not a number; give one"),
-    (AXIS, "axis = [0, inf, 0]",
-     "joints[0].axis[1]: inf is not a finite number; give one that is"),
     (BALL, UNIVERSAL + "[[1, 0, 0], [-2, 0, 1e-15]]",
      "joints[1].axes: are parallel; give two that cross, or a revolute joint"),
     (BALL, UNIVERSAL + "[[1, 0, 0], [0, 0, 0]]",
@@ -574,18 +523,11 @@ MISTAKES_IN_SPACE = [
      "joints[1].axes[1]: has 2 components; space takes 3"),
     (BALL, BALL + "\norientation_deg = 90",
      "joints[1].orientation_deg: is one angle; space takes 3, about x, y and z"),
-    (BALL, BALL + "\norientation_deg = [90, 0]",
-     "joints[1].orientation_deg[2]: missing; the list is too short"),
-    (BALL, BALL + '\norientation_deg = [0, "m", 0]',
-     "joints[1].orientation_deg[1]: 'm' is not a number; give one"),
     # Vectors of the plane.
     ("r_parent = [0.5, 0, 0]", "r_parent = [0.5, 0]",
      "joints[1].r_parent: has 2 components; space takes 3"),
-    ("r_child = [-0.1, 0, 0]", "r_child = [-0.1, 0]",
-     "joints[1].r_child: has 2 components; space takes 3"),
     (None, '[[points]]\nname = "tip"\nbody = "hand"\nat = [1, 2]\n',
      "points[0].at: has 2 components; space takes 3"),
-    (None, FORCE + "force = [1, 2]\n", "effects[1].force: has 2 components; space takes 3"),
     (None, FORCE + 'at = [1, 2]\nforce = "input"\n',
      "effects[1].at: has 2 components; space takes 3"),
     *((SPACE, LINKS.replace("r_child", f"{field} = [0.1, 0]\nr_child").replace(twice, ""),
@@ -594,8 +536,6 @@ MISTAKES_IN_SPACE = [
     (SPACE, LINKS.replace("r_child = [0.1, 0, 0]", "r_child = [0.1, 0]"),
      "chains[0].r_child: has 2 components; space takes 3"),
     (SPACE, LINKS + "axis = [1, 0]\n", "chains[0].axis: has 2 components; space takes 3"),
-    (SPACE, LINKS + "axis = [0, 0, 0]\n",
-     "chains[0].axis: has no length; give a direction, for example [1.0, 0.0, 0.0]"),
     # Joints that cannot do what is asked.
     (None, '[[effects]]\ntype = "motor"\nname = "tau"\njoint = "wrist"\ntorque = "input"\n',
      "effects[1].joint: 'wrist' is a ball joint and has no angle"),
@@ -609,9 +549,6 @@ MISTAKES_IN_SPACE = [
      "joints[1].parent: unknown value 'arm'; known: world"),
     # States at the start.
     ("[0.1, 1.0, 0.0, 0.0, 0.0]", "[0.1, 0, 0, 0, 0]",
-     "initial.q: the quaternion that starts at wrist_qw has no length; give 1, 0, 0, 0 for "
-     "no rotation"),
-    ("[0.1, 1.0, 0.0, 0.0, 0.0]", "{ wrist_qw = 0 }",
      "initial.q: the quaternion that starts at wrist_qw has no length; give 1, 0, 0, 0 for "
      "no rotation"),
     ("[0.1, 1.0, 0.0, 0.0, 0.0]", "[0.1]",
@@ -634,7 +571,6 @@ MISTAKES_IN_SPACE = [
     ("dimensions = 3", 'dimensions = 3\nform = "momentum"',
      "form: 'momentum' needs the closed form, and it is derived in the plane; leave it out"),
     ("dimensions = 3", "dimensions = 2", "joints[0].r_child: has 3 components; the plane takes 2"),
-    ("dimensions = 3", "dimensions = true", "dimensions: unknown value True; known: 2, 3"),
 ]  # fmt: skip
 
 
@@ -745,60 +681,6 @@ def test_a_quaternion_that_is_not_given() -> None:
     assert model.notices == ()
 
 
-def test_a_massless_body_in_a_chain() -> None:
-    """It is allowed where M stays regular, and moves as the independent solver says."""
-    text = GOOD.replace('mass = "m"\ninertia_com = 0.1', "mass = 0\ninertia_com = 0")
-    module = load(compile_scene(parse_scene(text)))
-    mechanism = Mechanism(
-        mass=[0.0, 0.5],
-        inertia=[0.0, 0.02],
-        parent=[-1, 0],
-        free=[False, False],
-        r_parent=[[0.0, 0.0], [0.5, 0.0]],
-        r_child=[[-0.5, 0.0], [-0.1, 0.0]],
-        gravity=9.81,
-    )
-    q, v = np.array([0.3, 0.8]), np.array([1.1, -1.3])
-    expected = solve(mechanism, q, v).accelerations
-    rates = module.derivative(0.0, np.concatenate((q, v)))[2:]
-    assert rates == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("good", "start", "wrist", "inertia"),
-    [
-        (GOOD, "[0.1, 0.2]", WRIST, "inertia_com = 0.02"),
-        (SPACE, "[0.1, 1.0, 0.0, 0.0, 0.0]", BALL, INERTIA),
-    ],
-    ids=["plane", "space"],
-)
-def test_a_massless_body_that_is_welded(good: str, start: str, wrist: str, inertia: str) -> None:
-    """A tool or a sensor without mass changes nothing about the motion, but has its own pose."""
-    text = good.replace(f"mass = 0.5\n{inertia}", "mass = 0\ninertia_com = 0")
-    text = text.replace(wrist, 'name = "wrist"\ntype = "weld"')
-    text = text.replace(start, "[0.1]").replace("v = [0.0, 0.0]", "")
-    module = load(compile_scene(parse_scene(text)))
-    tables = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
-    kept = [table for table in tables if not re.search(r'name = "(hand|wrist)"', table)]
-    assert len(kept) == len(tables) - 2
-    alone = load(compile_scene(parse_scene("".join(kept))))
-    assert (alone.BODIES, module.BODIES) == (("arm",), ("arm", "hand"))
-    y = np.array([0.4, 1.7])
-    assert alone.derivative(0.0, y)[1] != 0.0
-    assert module.derivative(0.0, y) == pytest.approx(alone.derivative(0.0, y), rel=1e-14)
-
-
-def test_a_rotor_makes_a_massless_body_move() -> None:
-    """What a joint's own rotor resists needs no mass, as long as it turns along."""
-    text = GOOD.replace("mass = 0.5\ninertia_com = 0.02", "mass = 0\ninertia_com = 0")
-    text = text.replace('name = "swing"', 'name = "swing"\noutputs = ["forward_dynamics"]')
-    geared = text.replace(WRIST, WRIST + "\nmotor_inertia = 1e-3\ngear_ratio = 10")
-    module = load(compile_scene(parse_scene(geared)))
-    pushed = module.forward_dynamics([0.4, 0.3], [0.0, 0.0], [0.0, 0.7])
-    still = module.forward_dynamics([0.4, 0.3], [0.0, 0.0])
-    assert pushed - still == pytest.approx([0.0, 0.7 / (10**2 * 1e-3)], rel=1e-12)
-
-
 def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """A path that leads nowhere, a folder, a file that is no text."""
     assert main(["check", "two_boddy"]) == 1
@@ -820,22 +702,15 @@ def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (
-            ["--integrator", "rk5"],
-            "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
-            "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
-            "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
-            "DOP853, taylor, Rodas5P, Radau, Radau_differences, BDF, "
-            "BDF_differences, LSODA",
-        ),
-        (
-            ["--integrator", "rk4", "--dt", "0"],
-            "dt: 0 is not a positive step; give e.g. --dt 0.001",
-        ),
-        (
-            ["--integrator", "rk4", "--dt", "-0.1"],
-            "dt: -0.1 is not a positive step; give e.g. --dt 0.001",
-        ),
+        (["--integrator", "rk5"],
+         "integrator: unknown name 'rk5' (did you mean 'rk4'?); known: euler, "
+         "semi_implicit_euler, leapfrog, leapfrog_4, leapfrog_6, "
+         "rk4, implicit_midpoint, gauss_4, gauss_6, RK45, "
+         "DOP853, taylor, Rodas5P, Radau, Radau_differences, BDF, " "BDF_differences, LSODA",),
+        (["--integrator", "rk4", "--dt", "0"], "dt: 0 is not a positive step; give e.g. --dt 0.001",
+         ),
+        (["--integrator", "rk4", "--dt", "-0.1"],
+         "dt: -0.1 is not a positive step; give e.g. --dt 0.001",),
         (["--set", "n=1"], "--set: no parameter 'n'; known: m, arm_inertia_com, "),
         (["--set", "m=one"], "--set m=one: gives no finite number; write --set m=1.5"),
         (["--set", "m"], "--set m: gives no finite number; write --set m=1.5"),
@@ -843,7 +718,7 @@ def test_a_file_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: 
         (["--samples", "100000000000"], "samples: 100000000000 is too many; give at most 1000000"),
         (["--input", "tau=1"], "--input: no input 'tau'; known: none"),
     ],
-)
+)  # fmt: skip
 def test_a_wrong_option(
     scene: Path, capsys: pytest.CaptureFixture[str], options: list[str], message: str
 ) -> None:
@@ -886,18 +761,6 @@ def test_a_point_mass_too_near_its_pin(scene: Path, capsys: pytest.CaptureFixtur
         f"eomgen: swing.toml: {SINGULAR.format('hand', 'wrist_angle_dot')}\n"
     )
     assert not list(output.iterdir())
-
-
-def test_two_scenes_of_one_name(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Neither overwrites the other."""
-    scene.write_text(GOOD)
-    other = scene.parent / "other.toml"
-    other.write_text(GOOD)
-    output = scene.parent / "made"
-    assert main(["generate", str(scene), str(other), "-o", str(output)]) == 1
-    assert capsys.readouterr().err == (
-        f"eomgen: {output}/swing.py: would be written for {scene} and for {other}; rename one\n"
-    )
 
 
 def test_a_refusal_stops_no_other_scene(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -944,27 +807,3 @@ def test_all_unknown_keys_are_reported(scene: Path, capsys: pytest.CaptureFixtur
     assert time.process_time() - began < 5.0
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 11 and lines[-1] == "eomgen: swing.toml: and 4990 more"
-
-
-def test_a_tree_too_large_for_the_closed_form(
-    scene: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A limit that is said at once, not a derivation that never ends."""
-    scene.write_text('name = "swing"\nroute = "closed"\n' + CHAIN.replace("= 3", "= 13"))
-    assert main(["generate", str(scene), "-o", str(scene.parent / "made")]) == 1
-    assert capsys.readouterr().err == (
-        "eomgen: swing.toml:2: route: 'closed' needs the closed form, and it is for 6 bodies at "
-        "most, or 12 in a tree of pins and free bodies in the plane; leave it out\n"
-    )
-
-
-def test_wrong_usage_is_exit_code_2(capsys: pytest.CaptureFixture[str]) -> None:
-    """An option that does not exist is the shell's matter, not the scene's."""
-    with pytest.raises(SystemExit) as stop:
-        main(["simulate", "two_body", "--nonsense"])
-    assert stop.value.code == 2
-    assert "--nonsense" in capsys.readouterr().err
-    with pytest.raises(SystemExit) as stop:
-        main(["generate"])
-    assert stop.value.code == 2
-    assert "no scene; name one" in capsys.readouterr().err

@@ -79,28 +79,6 @@ def test_jacobian_of_a_ball_is_exact_also_where_it_rests(angle: float) -> None:
         assert apart(jacobian[:, i], column) < 1e-12
 
 
-def test_frequency_of_a_ball_on_a_spring() -> None:
-    """Of a sphere at its centre: ω² = k/I about any axis, to the end of a half turn."""
-    scene = """
-name = "sphere"
-dimensions = 3
-bodies = [{ name = "s", mass = 1.0, inertia_com = [0.02, 0.02, 0.02] }]
-joints = [{ name = "j", type = "ball", parent = "world", child = "s" }]
-effects = [{ type = "joint_spring", name = "k", joint = "j", stiffness = 0.5 }]
-"""
-    from scipy.integrate import solve_ivp
-
-    made = quick(scene)
-    start = np.array([math.cos(1.25), *(math.sin(1.25) * AXIS), 0.0, 0.0, 0.0])
-    times = np.linspace(0.0, 2 * math.pi / 5, 9)  # one period
-    run = solve_ivp(
-        made.module.derivative, (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13
-    )
-    angle = 2.5 * np.cos(5 * times)
-    expected = np.array([np.cos(angle / 2), *(np.outer(AXIS, np.sin(angle / 2)))])
-    assert apart(run.y[:4], expected) < 1e-10
-
-
 @pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("several", "one_by_one"),
@@ -201,54 +179,32 @@ def test_powers_add_up() -> None:
     ("effect", "message"),
     [
         (SPRING, "effects[0].joint: is missing; give one of joint, joints"),
-        (
-            SPRING + 'joint = "pin"\njoints = "all"\n',
-            "effects[0].joint: is given in addition to 'joints'; give one of joint, joints",
-        ),
-        (
-            SPRING + 'joints = ["pin", "crass"]\n',
-            "effects[0].joints[1]: no joint that moves is named 'crass' (did you mean 'cross'?)",
-        ),
-        (
-            SPRING + 'joints = ["pin", "pin"]\n',
-            "effects[0].joints[1]: 'pin' is listed twice; leave one out",
-        ),
-        (
-            SPRING + 'joints = "all"\ncoordinate = "pin_angle"\n',
-            "effects[0].coordinate: belongs to one joint; name that joint as joint",
-        ),
-        (
-            SPRING + 'joint = "ball"\nrest = 0.3\n',
-            "effects[0].rest: at a ball joint ('ball') it is 0; leave it out",
-        ),
-        (
-            SPRING + 'joint = "cross"\ncoordinate = "cross_angle_3"\n',
-            "effects[0].coordinate: 'cross' has no angle or slide 'cross_angle_3' "
-            "(did you mean 'cross_angle_2'?)",
-        ),
-        (
-            STOP + 'joint = "ball"\nlow = -1\nhigh = 1\nstiffness = 1\n',
-            "effects[0].low: the angle of a ball joint ('ball') is never below 0; give high",
-        ),
-        (
-            STOP + 'joints = "all"\nhigh = 1\nrestitution = 1\n',
-            "effects[0].joints: a rigid stop acts on one joint; name it as joint",
-        ),
-        (
-            STOP + 'joint = "cross"\nhigh = 1\nrestitution = 1\n',
-            "effects[0].coordinate: missing; a rigid stop acts on one coordinate, and 'cross' has "
-            "cross_angle_1, cross_angle_2",
-        ),
-        (
-            '[[effects]]\ntype = "motor"\nname = "m"\njoint = "ball"\ntorque = 1\n',
-            "effects[0].joint: 'ball' is a ball joint and has no angle",
-        ),
-        (
-            '[[effects]]\ntype = "motor"\nname = "m"\njoint = "cross"\ntorque = 1\n',
-            "effects[0].coordinate: missing; 'cross' has cross_angle_1, cross_angle_2: give one",
-        ),
+        (SPRING + 'joint = "pin"\njoints = "all"\n',
+         "effects[0].joint: is given in addition to 'joints'; give one of joint, joints"),
+        (SPRING + 'joints = ["pin", "crass"]\n',
+         "effects[0].joints[1]: no joint that moves is named 'crass' (did you mean 'cross'?)"),
+        (SPRING + 'joints = ["pin", "pin"]\n',
+         "effects[0].joints[1]: 'pin' is listed twice; leave one out"),
+        (SPRING + 'joints = "all"\ncoordinate = "pin_angle"\n',
+         "effects[0].coordinate: belongs to one joint; name that joint as joint"),
+        (SPRING + 'joint = "ball"\nrest = 0.3\n',
+         "effects[0].rest: at a ball joint ('ball') it is 0; leave it out"),
+        (SPRING + 'joint = "cross"\ncoordinate = "cross_angle_3"\n',
+         "effects[0].coordinate: 'cross' has no angle or slide 'cross_angle_3' "
+         "(did you mean 'cross_angle_2'?)"),
+        (STOP + 'joint = "ball"\nlow = -1\nhigh = 1\nstiffness = 1\n',
+         "effects[0].low: the angle of a ball joint ('ball') is never below 0; give high"),
+        (STOP + 'joints = "all"\nhigh = 1\nrestitution = 1\n',
+         "effects[0].joints: a rigid stop acts on one joint; name it as joint"),
+        (STOP + 'joint = "cross"\nhigh = 1\nrestitution = 1\n',
+         "effects[0].coordinate: missing; a rigid stop acts on one coordinate, and 'cross' has "
+         "cross_angle_1, cross_angle_2"),
+        ('[[effects]]\ntype = "motor"\nname = "m"\njoint = "ball"\ntorque = 1\n',
+         "effects[0].joint: 'ball' is a ball joint and has no angle"),
+        ('[[effects]]\ntype = "motor"\nname = "m"\njoint = "cross"\ntorque = 1\n',
+         "effects[0].coordinate: missing; 'cross' has cross_angle_1, cross_angle_2: give one"),
     ],
-)
+)  # fmt: skip
 def test_bad_input_gets_one_clear_line(effect: str, message: str) -> None:
     """Place, value, remedy."""
     with pytest.raises(SceneError) as error:

@@ -48,39 +48,20 @@ effects = [{ type = "motor", name = "drive", joint = "axle", torque = 0.6 }]
 ARM = """
 name = "arm"
 simulation = { t_end = 0.5 }
-[initial]
-q = { r = 0.3 }
-v = { q_dot = 2.0, link_joint_1_angle_dot = 3.0 }
-[[chains]]
-name = "link"
-count = 2
-mass = 1.0
-inertia_com = 0.1
-r_parent = [0.5, 0]
-r_child = [-0.5, 0]
-[[bodies]]
-name = "hand"
-mass = 0.5
-inertia_com = 0.02
-[[joints]]
-name = "wrist"
-type = "revolute"
-parent = "link_2"
-child = "hand"
-r_parent = [0.5, 0]
-r_child = [-0.1, 0]
-coordinate = "r"
-[[joints]]
-name = "nail"
-type = "prismatic"
-parent = "world"
-child = "peg"
-axis = [1, 0]
-coordinate = "q"
-[[bodies]]
-name = "peg"
-mass = 0.5
-inertia_com = 0.02
+chains = [
+    { name = "link", count = 2, mass = 1.0, inertia_com = 0.1, r_parent = [0.5, 0], \
+r_child = [-0.5, 0] },
+]
+bodies = [
+    { name = "hand", mass = 0.5, inertia_com = 0.02 },
+    { name = "peg", mass = 0.5, inertia_com = 0.02 },
+]
+joints = [
+    { name = "wrist", type = "revolute", parent = "link_2", child = "hand", r_parent = [0.5, 0], \
+r_child = [-0.1, 0], coordinate = "r" },
+    { name = "nail", type = "prismatic", parent = "world", child = "peg", axis = [1, 0], \
+coordinate = "q" },
+]
 [[effects]]
 type = "gravity"
 g = 9.81
@@ -104,6 +85,9 @@ type = "controller"
 name = "own"
 states = { z = { rate = "command - z" } }
 torques = { link_joint_1 = "2*z" }
+[initial]
+q = { r = 0.3 }
+v = { q_dot = 2.0, link_joint_1_angle_dot = 3.0 }
 """
 
 

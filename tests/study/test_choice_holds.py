@@ -233,15 +233,12 @@ def test_no_clock_has_a_say(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 FORCED = [
-    ("crank", "LSODA", (1e-3, 1e-9)),
-    ("crank", "DOP853", (1e-3, 1e-9)),
-    ("crank", "rk4", (1e-3,)),
+    ("crank", "LSODA", (1e-3, 1e-9)), ("crank", "DOP853", (1e-3, 1e-9)), ("crank", "rk4", (1e-3,)),
     ("stiff_hinges", "LSODA", (1e-3, 1e-6)),
     ("stiff_hinges", "Radau", (1e-3, 1e-6)),
     ("stiff_hinges", "Rodas5P", (1e-3, 1e-6)),
-    ("slope", "RK45", (1e-6,)),
-    ("slope", "DOP853", (1e-6,)),
-]
+    ("slope", "RK45", (1e-6,)), ("slope", "DOP853", (1e-6,)),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(

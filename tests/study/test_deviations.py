@@ -54,22 +54,14 @@ name = "pursuit"
 bodies = [{ name = "p", mass = 1.5 }, { name = "r", mass = 1.0, inertia_com = 0.2 }]
 effects = [{ type = "external_force", name = "back", body = "p", force = ["-3*x", "-y"] }]
 initial = { q = { x = 0.7, y = 0.3, turn = 0.4 }, v = { x_dot = 1.0, turn_dot = 0.5 } }
-[[joints]]
-name = "f"
-type = "particle"
-parent = "world"
-child = "p"
-coordinates = ["x", "y"]
-[[joints]]
-name = "g"
-type = "revolute"
-parent = "world"
-child = "r"
-coordinate = "turn"
-[[constraints]]
-type = "equation"
-name = "chase"
-velocity = "y_dot*cos(turn + y) - x_dot*sin(turn + y) + 0.2*x"
+joints = [
+    { name = "f", type = "particle", parent = "world", child = "p", coordinates = ["x", "y"] },
+    { name = "g", type = "revolute", parent = "world", child = "r", coordinate = "turn" },
+]
+constraints = [
+    { type = "equation", name = "chase", \
+velocity = "y_dot*cos(turn + y) - x_dot*sin(turn + y) + 0.2*x" },
+]
 """
 ROLLING = {  # scenes, and outputs, of which few depend on neither place nor heading
     "bicycle": ("bicycle", ["y", "steer", "body_poses"]),

@@ -61,24 +61,6 @@ def test_cart_and_pole_as_in_textbooks() -> None:
     assert controllable_rank(linear.A, linear.B) == 4
 
 
-def test_normal_modes_of_a_double_pendulum() -> None:
-    """Both frequencies of the hanging acrobot from the quadratic of M ω² = K, absolute angles."""
-    module = module_of("acrobot")
-    p = module.PARAMETERS
-    m_1, m_2, i_1, i_2 = (p[name] for name in ("m_1", "m_2", "I_1", "I_2"))
-    l_1, c_1, c_2, g = (p[name] for name in ("l_1", "c_1", "c_2", "g"))
-    m_11, m_12, m_22 = i_1 + m_1 * c_1**2 + m_2 * l_1**2, m_2 * l_1 * c_2, i_2 + m_2 * c_2**2
-    k_1, k_2 = (m_1 * c_1 + m_2 * l_1) * g, m_2 * c_2 * g
-    a, b, c = m_11 * m_22 - m_12**2, -(m_11 * k_2 + m_22 * k_1), k_1 * k_2
-    squares = [(-b - sign * math.sqrt(b**2 - 4 * a * c)) / (2 * a) for sign in (1, -1)]
-    resting = equilibrium(module, module.initial_state(), settle=True)
-    found = modes(linearise(module, resting.y).A)
-    assert stability(found) == "marginal"
-    assert [mode.angular_frequency for mode in found] == pytest.approx(np.sqrt(squares), rel=1e-10)
-    assert [mode.damping for mode in found] == [0.0, 0.0]
-    assert found[0].frequency == pytest.approx(math.sqrt(squares[0]) / (2 * math.pi))
-
-
 def test_a_hanging_chain_has_the_roots_of_laguerre() -> None:
     """Ten equal beads on massless links: ω² = (g/l) x over the roots of L_10(x)."""
     text = """
@@ -126,29 +108,6 @@ def test_the_nearest_equilibrium_is_near() -> None:
         for turn in (-0.5, 0.5):
             y, _ = equilibrium(module, np.array([upright + turn, 0.0, 0.0, 0.0]))
             np.testing.assert_allclose(y, [upright, 0.0, 0.0, 0.0], atol=1e-9)
-
-
-@pytest.mark.full
-def test_the_hanging_figure_comes_to_rest() -> None:
-    """38 degrees of freedom, 6 quaternions: a minimum of potential energy without growing modes."""
-    module = module_of("hanging_figure")
-    start = module.initial_state()
-    y, _ = equilibrium(module, start, settle=True)
-    for indices in module.QUATERNIONS:
-        assert np.linalg.norm(y[list(indices)]) == pytest.approx(1.0, abs=1e-15)
-    least = linearise(module, y).reduced()
-    assert least.A.shape == (76, 76) and len(least.state_names) == 76
-    assert {"grip_rx", "grip_ry", "grip_rz"} < set(least.state_names)
-    assert stability(modes(least.A)) == "marginal"
-    rng = np.random.default_rng(3)
-    low = float(module.potential_energy(0.0, y))
-    assert low < module.potential_energy(0.0, start)
-    problem = as_problem(module)
-    for size in (1e-3, 1e-1, 1.0):
-        for _ in range(10):
-            other = y.copy()
-            other[: len(module.POSITIONS)] += size * rng.normal(size=len(module.POSITIONS))
-            assert module.potential_energy(0.0, problem.unit(other)) > low - 1e-9
 
 
 def test_the_sleeping_top() -> None:
@@ -334,16 +293,6 @@ def test_the_command_on_quaternions_and_states(capsys: pytest.CaptureFixture[str
     options = ["--state", "theta_1_deg=20", "--hold", "theta_1", "--trim", "tau"]
     assert main(["linearise", "acrobot", "--route", "aba", *options]) == 0
     assert "inputs      tau = -5.0277" in capsys.readouterr().out
-
-
-@pytest.mark.full
-def test_a_figure_is_reported_in_short(capsys: pytest.CaptureFixture[str]) -> None:
-    """76 states: no matrix is printed, lines have at most 100 columns, modes are counted."""
-    assert main(["linearise", "hanging_figure", "--at", "rest"]) == 0
-    out = capsys.readouterr().out
-    assert "A is 76 x 76; -o FILE.npz or -o FILE.csv writes them" in out
-    assert "stays or drifts, " in out and "stability   marginal" in out
-    assert max(map(len, out.splitlines())) <= 100
 
 
 def test_faults_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -29,51 +29,32 @@ from eomgen.study.precision.precise import BITS, Precise, digits, precise
 ONE_SIDED = """
 name = "one_sided"
 dimensions = 2
-[parameters]
-k = 400.0
-w = 9.5
-c = 2.0
-[[bodies]]
-name = "block"
-mass = 1.0
-inertia_com = 1.0
-[[joints]]
-name = "slide"
-type = "prismatic"
-parent = "world"
-child = "block"
-axis = [1.0, 0.0]
-coordinate = "x"
-[[effects]]
-type = "external_force"
-name = "push"
-body = "block"
-force = ["max(-k * x, 0) + c * step(-x) - w", 0]
-[initial]
-q = { x = 0.75 }
+parameters = { k = 400.0, w = 9.5, c = 2.0 }
+initial = { q = { x = 0.75 } }
+bodies = [{ name = "block", mass = 1.0, inertia_com = 1.0 }]
+joints = [
+    { name = "slide", type = "prismatic", parent = "world", child = "block", axis = [1.0, 0.0], \
+coordinate = "x" },
+]
+effects = [
+    { type = "external_force", name = "push", body = "block", \
+force = ["max(-k * x, 0) + c * step(-x) - w", 0] },
+]
 """
 """A block that falls on a spring, with a kink, and into a field, with a jump, again and again."""
 FORCED = """
 name = "forced"
 dimensions = 2
-[parameters]
-a = 0.3
-[[bodies]]
-name = "block"
-mass = 1.0
-inertia_com = 1.0
-[[joints]]
-name = "slide"
-type = "prismatic"
-parent = "world"
-child = "block"
-axis = [1.0, 0.0]
-coordinate = "x"
-[[effects]]
-type = "external_force"
-name = "push"
-body = "block"
-force = ["select(x - 0.3, 0.7, 0.1) * a * step(x_dot) - min(abs(x), 0.1) / 3 + sin(t) * x_dot", 0]
+parameters = { a = 0.3 }
+bodies = [{ name = "block", mass = 1.0, inertia_com = 1.0 }]
+joints = [
+    { name = "slide", type = "prismatic", parent = "world", child = "block", axis = [1.0, 0.0], \
+coordinate = "x" },
+]
+effects = [
+    { type = "external_force", name = "push", body = "block", force = \
+["select(x - 0.3, 0.7, 0.1) * a * step(x_dot) - min(abs(x), 0.1) / 3 + sin(t) * x_dot", 0] },
+]
 """
 """Corners of every kind, with plain numbers that meet."""
 
@@ -256,27 +237,16 @@ def test_corners_are_met_exactly() -> None:
 STOPPED = """
 name = "stopped"
 dimensions = 2
-[[bodies]]
-name = "block"
-mass = 1.0
-inertia_com = 1.0
-[[joints]]
-name = "slide"
-type = "prismatic"
-parent = "world"
-child = "block"
-axis = [1.0, 0.0]
-coordinate = "x"
-[[effects]]
-type = "joint_stop"
-name = "stop"
-joint = "slide"
-low = -0.5
-high = 0.5
-stiffness = 100.0
-damping = 2.0
-[initial]
-v = { x_dot = 1.0 }
+initial = { v = { x_dot = 1.0 } }
+bodies = [{ name = "block", mass = 1.0, inertia_com = 1.0 }]
+joints = [
+    { name = "slide", type = "prismatic", parent = "world", child = "block", axis = [1.0, 0.0], \
+coordinate = "x" },
+]
+effects = [
+    { type = "joint_stop", name = "stop", joint = "slide", low = -0.5, high = 0.5, \
+stiffness = 100.0, damping = 2.0 },
+]
 """
 
 
@@ -318,18 +288,11 @@ dimensions = 2
 bodies = [{ name = "b", mass = 0.3, inertia_com = 1e-3 }]
 joints = [{ name = "j", type = "free", child = "b" }]
 initial = { q = { b_y = 0.9 } }
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "contact"
-name = "floor"
-law = "impact"
-body = "b"
-radius = 0.1
-restitution = 0.6
-friction = 0.3
-slip_speed = 0.01
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "contact", name = "floor", law = "impact", body = "b", radius = 0.1, \
+restitution = 0.6, friction = 0.3, slip_speed = 0.01 },
+]
 """
 
 

@@ -52,73 +52,27 @@ bodies = [
     { name = "e", mass = 0.3, inertia_com = [0.02, 0.03, 0.04] },
     { name = "f", mass = 0.2, inertia_com = [0.02, 0.03, 0.04] },
 ]
-[[joints]]
-name = "ja"
-type = "revolute"
-parent = "world"
-child = "a"
-axis = [0.6, 0.0, 0.8]
-r_parent = [0.1, 0.2, 0.3]
-r_child = [-0.4, 0.1, 0.0]
-orientation_deg = [90.0, 0.0, 180.0]
-motor_inertia = 0.002
-gear_ratio = 20.0
-[[joints]]
-name = "jb"
-type = "universal"
-parent = "a"
-child = "b"
-r_parent = [0.3, 0.0, 0.1]
-r_child = [0.0, 0.2, -0.2]
-[[joints]]
-name = "jc"
-type = "cylindrical"
-parent = "b"
-child = "c"
-axis = [0.0, 1.0, 0.0]
-r_child = [0.3, 0.1, -0.2]
-[[joints]]
-name = "jd"
-type = "ball"
-parent = "a"
-child = "d"
-r_parent = [-0.3, 0.0, 0.1]
-r_child = [0.0, 0.0, 0.4]
-[[joints]]
-name = "je"
-type = "prismatic"
-parent = "d"
-child = "e"
-axis = [0.0, 0.0, 1.0]
-r_parent = [0.1, 0.1, 0.1]
-[[joints]]
-name = "jf"
-type = "planar"
-parent = "d"
-child = "f"
-r_parent = [0.0, 0.2, 0.1]
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "driven"
-name = "drive"
-joint = "je"
-coordinate = "0.1*sin(3*t)"
-[[effects]]
-type = "spring"
-name = "cord"
-body_1 = "world"
-at_1 = [0.5, 0.5, 0.5]
-body_2 = "c"
-stiffness = 30.0
-damping = 0.4
-rest_length = 0.2
-[[effects]]
-type = "motor"
-name = "tau"
-joint = "ja"
-torque = "input"
+joints = [
+    { name = "ja", type = "revolute", parent = "world", child = "a", axis = [0.6, 0.0, 0.8], \
+r_parent = [0.1, 0.2, 0.3], r_child = [-0.4, 0.1, 0.0], orientation_deg = [90.0, 0.0, 180.0], \
+motor_inertia = 0.002, gear_ratio = 20.0 },
+    { name = "jb", type = "universal", parent = "a", child = "b", r_parent = [0.3, 0.0, 0.1], \
+r_child = [0.0, 0.2, -0.2] },
+    { name = "jc", type = "cylindrical", parent = "b", child = "c", axis = [0.0, 1.0, 0.0], \
+r_child = [0.3, 0.1, -0.2] },
+    { name = "jd", type = "ball", parent = "a", child = "d", r_parent = [-0.3, 0.0, 0.1], \
+r_child = [0.0, 0.0, 0.4] },
+    { name = "je", type = "prismatic", parent = "d", child = "e", axis = [0.0, 0.0, 1.0], \
+r_parent = [0.1, 0.1, 0.1] },
+    { name = "jf", type = "planar", parent = "d", child = "f", r_parent = [0.0, 0.2, 0.1] },
+]
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "driven", name = "drive", joint = "je", coordinate = "0.1*sin(3*t)" },
+    { type = "spring", name = "cord", body_1 = "world", at_1 = [0.5, 0.5, 0.5], body_2 = "c", \
+stiffness = 30.0, damping = 0.4, rest_length = 0.2 },
+    { type = "motor", name = "tau", joint = "ja", torque = "input" },
+]
 """
 """All joints of space but the free one, a rotor, a drive, a spring with damping, a motor."""
 
@@ -126,11 +80,10 @@ PENDULUM_ROUTES = ("closed", "ldl", "aba", "orthogonal")
 
 
 @pytest.fixture(autouse=True)
-def in_little_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Short runs will do; nothing is left in the user's cache."""
+def in_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short runs will do."""
     monkeypatch.setattr(sampling, "MOST_OPERATIONS", 20_000)
     monkeypatch.setattr(drifting, "MOST_CALLS", 2_000)
-    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path / "store"))
 
 
 @cache
@@ -270,15 +223,6 @@ def test_a_good_module_passes_by_every_route() -> None:
     assert check(found, "virtual work").value < 1e-40
     assert check(found, "energy law").value < 30
     assert check(found, "drift of momentum x").value < 1e-9  # a rail without friction
-
-
-@pytest.mark.full
-def test_a_floating_tree_keeps_what_it_should() -> None:
-    """Thrown upwards: x of momentum, not y, and the momentum law holds."""
-    found = verify(*scene_of("two_body"), states=some(1, 2))
-    assert not found.missed and check(found, "momentum law").value < 30
-    drifts = [line.what for line in found.checks if line.what.startswith("drift")]
-    assert drifts == ["drift of energy", "drift of momentum x"]
 
 
 def test_what_takes_energy_is_named() -> None:
@@ -499,17 +443,17 @@ def test_a_horizon_that_chatters_keeps_to_its_time_and_reports_how_far_it_is() -
 def test_horizon_is_where_doubles_part_from_long_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     """A short run means something all along; asked for more digits, it has them for a while."""
     model, wanted = scene_of("double_pendulum")
-    model, wanted = replace(model, outputs=()), wanted.replaced(t_end=1.5)
+    model, wanted = replace(model, outputs=()), wanted.replaced(t_end=0.8)
     module = load_module(python_module(compile_program(model).system))
     whole = horizon_of(model, wanted, module)
     assert whole.time is None and 1e-16 < whole.worst < 1e-10 and whole.sure < 1e-15
-    assert whole.words.startswith("doubles are meaningful for the whole run, 1.5 s: off by")
+    assert whole.words.startswith("doubles are meaningful for the whole run, 0.8 s: off by")
     monkeypatch.setattr(horizons, "PARTED", whole.worst / 2)
     part = horizon_of(model, wanted, module)
-    assert part.time is not None and 0.1 < part.time <= 1.5
-    assert part.words.startswith(f"doubles are meaningful to t = {part.time:.4g} s of 1.5 s")
+    assert part.time is not None and 0.1 < part.time <= 0.8
+    assert part.words.startswith(f"doubles are meaningful to t = {part.time:.4g} s of 0.8 s")
     with pytest.raises(
-        RunError, match=r"^horizon: no run of 1\.5 s in .* more than 1e-06 s in extended precision"
+        RunError, match=r"^horizon: no run of 0\.8 s in .* more than 1e-06 s in extended precision"
     ):
         horizon_of(model, wanted, module, seconds=1e-6)
     with pytest.raises(RunError, match="rigid contacts strike"):
@@ -574,22 +518,16 @@ route = "ROUTE"
 effects = [{ type = "gravity", g = 9.81 }]
 bodies = [{ name = "tip", mass = 1e12, inertia_com = 1e11 }]
 simulation = { t_end = 0.2, integrator = "rk4", dt = 0.01 }
-[[chains]]
-name = "link"
-count = 5
-mass = 1
-inertia_com = 0.1
-r_parent = [0.5, 0]
-r_child = [-0.5, 0]
-[[joints]]
-name = "last"
-type = "revolute"
-parent = "link_5"
-child = "tip"
-r_parent = [0.5, 0]
-r_child = [-0.5, 0]
+chains = [
+    { name = "link", count = 2, mass = 1, inertia_com = 0.1, r_parent = [0.5, 0], \
+r_child = [-0.5, 0] },
+]
+joints = [
+    { name = "last", type = "revolute", parent = "link_2", child = "tip", r_parent = [0.5, 0], \
+r_child = [-0.5, 0] },
+]
 """
-"""A tip of 1e12 kg on five links of 1 kg."""
+"""A tip of 1e12 kg on two links of 1 kg."""
 
 
 def test_an_interrupt_keeps_the_states_judged_so_far(
@@ -645,17 +583,16 @@ def test_a_small_fault_in_a_component_is_noticed(
 FALLING = """
 name = "falling"
 bodies = [
-    { name = "frame", mass = 1, inertia_com = 0 },
     { name = "hull", mass = 3, inertia_com = 0.7 },
     { name = "mast", mass = 0.3, inertia_com = 0.025 },
 ]
 effects = [{ type = "gravity", g = 9.81 }]
 joints = [
-    { name = "sway", type = "prismatic", parent = "world", child = "frame", axis = [1, 0] },
-    { name = "heave", type = "prismatic", parent = "frame", child = "hull", axis = [0, 1] },
-    { name = "pin", type = "revolute", parent = "hull", child = "mast", r_parent = [0, 0.37], r_child = [0, -0.53] },
+    { name = "flight", type = "free", child = "hull" },
+    { name = "pin", type = "revolute", parent = "hull", child = "mast", \
+r_parent = [0, 0.37], r_child = [0, -0.53] },
 ]
-"""  # noqa: E501
+"""
 
 
 def test_an_acceleration_of_nothing_is_no_loss(monkeypatch: pytest.MonkeyPatch) -> None:

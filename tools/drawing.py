@@ -1,4 +1,4 @@
-"""Draws the packages of eomgen on their floors into docs/packages.svg: `python tests/drawing.py`.
+"""Draws the packages of eomgen on their floors into docs/packages.svg: `python tools/drawing.py`.
 
 A package stands above all that it imports. An arrow is an import that does not follow from others:
 `api` imports `run`, but also `sweep`, which imports `run`; so only `sweep` has the arrow.

@@ -1,4 +1,4 @@
-"""Draws the README's picture that moves: `python tests/moving_picture.py`.
+"""Draws the README's picture that moves: `python tools/moving_picture.py`.
 
 The two bodies of the handout, thrown upwards, with the paths of their centres of mass and of the
 common one.

@@ -1,4 +1,4 @@
-"""Writes the pages that are made from the program itself: `python tests/pages.py`.
+"""Writes the pages that are made from the program itself: `python tools/pages.py`.
 
 docs/commands.md from the command line's own help, docs/functions.md from the docstrings of the
 public functions and classes, docs/reference from the tables of scenes.

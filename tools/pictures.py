@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/pictures.md: `python tests/pictures.py`.
+"""Draws the pictures of docs/pictures.md: `python tools/pictures.py`.
 
 Each is a small scene at one time: a shape, an element of an effect, or a mode of the camera.
 """
