@@ -102,7 +102,7 @@ class Following:
         while stack:
             i, factor = stack.pop()
             step = self.tape.steps[i]
-            value = self.tape.values[i]
+            value = self.tape.values.get(i)
             if value is not None:
                 found[NUMBER] = found.get(NUMBER, 0.0) + factor * value
             elif step.operation == "neg":

@@ -85,6 +85,7 @@ def _united(parts: Sequence[Program]) -> Program:
 
 def _report(name: str, parts: Sequence[Program]) -> PassReport:
     derivative, jacobian = (
-        sum(part.operations.get(output, 0) for part in parts) for output in (FIRST, "jacobian")
+        sum(part.operations[output] for part in parts if output in part.outputs)
+        for output in (FIRST, "jacobian")
     )
     return PassReport(name, sum(len(part.steps) for part in parts), derivative, jacobian)

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import compress
 from operator import neg
 from typing import Any
 
@@ -88,15 +89,16 @@ def live_steps(
     live = bytearray(len(program.steps))
     for node in nodes:
         live[node] = 1
-    steps, found = program.steps, []
+    steps = program.steps
     i = live.rfind(1)
     while i >= 0:  # backwards, because operands precede the steps that use them
-        found.append(i)
         if is_leaf is None or not is_leaf(i):
             for operand in steps[i][1]:
                 live[operand] = 1
-        i = live.rfind(1, 0, i)
-    return found[::-1]
+        i -= 1
+        if i >= 0 and not live[i]:
+            i = live.rfind(1, 0, i)
+    return list(compress(range(len(live)), live))
 
 
 def cost(program: Program, output: str) -> dict[str, int]:

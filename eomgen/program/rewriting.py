@@ -1,7 +1,7 @@
 """Rewriting of a program that needs fewer operations afterwards; see `passes`."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import combinations
@@ -22,14 +22,16 @@ MOST_TRIED = 1000
 class Rule(Generic[Found]):
     """Another way to compute an operation on steps.
 
-    find  what is to be done about an operation and its operands among steps, or None
-    make  records that on a tape and returns the step of the result
-    note  is told of each old step, its new operation and its new place
+    operations  the operations, of two operands each, that it is for
+    once        the results of these that are used exactly once, which rewriting keeps up to date
+    find        what is to be done about an operation and its operands among steps, or None
+    make        records that on a tape and returns the step of the result
     """
 
-    find: Callable[[Sequence[Step], str, Sequence[int]], Found | None]
+    operations: frozenset[str]
+    once: set[int]
+    find: Callable[[Sequence[Step], str, tuple[int, int]], Found | None]
     make: Callable[[Tape, str, Found], int]
-    note: Callable[[int, str, int], None]
 
 
 class Steps:
@@ -49,7 +51,7 @@ class Steps:
 
     def apply(self, operation: str, *operands: int) -> int:
         """The index of an operation on steps, as it stands."""
-        stage = max(self.all[o].stage for o in operands)
+        stage = max([self.all[o].stage for o in operands])
         return self.put(Step(operation, operands, stage))
 
     def copied(self, program: Program) -> list[int]:
@@ -66,18 +68,18 @@ def without_dead_steps(program: Program) -> Program:
     keep = live_steps(program, [*roots, *(check.node for check in program.checks)])
     if len(keep) == len(program.steps):
         return program
-    new = {old: i for i, old in enumerate(keep)}
-    steps = [
-        Step(operation, tuple([new[o] for o in operands]), stage, value)
-        for operation, operands, stage, value in (program.steps[i] for i in keep)
-    ]
-    names = {i: name for i, name in program.names.items() if i in new}
+    first = next(i for i, old in enumerate([*keep, -1]) if i != old)
+    steps = list(program.steps[:first])
+    new = [*range(first), *[-1] * (len(program.steps) - first)]
+    for i, old in enumerate(keep[first:], first):
+        new[old] = i
+        operation, operands, stage, value = program.steps[old]
+        steps.append(Step(operation, tuple([new[o] for o in operands]), stage, value))
+    names = {i: name for i, name in program.names.items() if new[i] >= 0}
     return renumbered(replace(program, names=names), steps, new)
 
 
-def renumbered(
-    program: Program, steps: Sequence[Step], new: Mapping[int, int] | Sequence[int]
-) -> Program:
+def renumbered(program: Program, steps: Sequence[Step], new: Sequence[int]) -> Program:
     """A program with other steps: `new` is for each old step the one that has its value."""
     names: dict[int, str] = {}
     for i, name in program.names.items():
@@ -101,23 +103,25 @@ def gather_parameters(program: Program) -> Program:
 
 def _gathered(program: Program, *, shared: bool) -> Program:
     """`gather_parameters`; `shared` takes k·x apart in l·(k·x) even if k·x is used elsewhere."""
-    used_once = _UsedOnce(program, ("mul", "add"))
+    once = set[int]()
 
     def is_inner(steps: Sequence[Step], operation: str, node: int) -> bool:
         inner, operands, _, _ = steps[node]
         if inner != operation:
             return False
-        fixed = shared and any(steps[o].stage <= Stage.PARAMETERS for o in operands)
-        return node in used_once.results or fixed
+        return node in once or (
+            shared and any(steps[o].stage <= Stage.PARAMETERS for o in operands)
+        )
 
     def find(
-        steps: Sequence[Step], operation: str, nodes: Sequence[int]
+        steps: Sequence[Step], operation: str, nodes: tuple[int, int]
     ) -> tuple[list[int], list[int]] | None:
         """The factors, or terms, that are parameters, and the others."""
-        if operation not in ("mul", "add"):
+        left, right = nodes
+        if steps[left][0] != operation and steps[right][0] != operation:
             return None
         inner = partial(is_inner, steps, operation)
-        if not any(map(inner, nodes)):
+        if not (inner(left) or inner(right)):
             return None
         parts = _flattened(steps, nodes, inner)
         fixed = [n for n in parts if steps[n].stage <= Stage.PARAMETERS]
@@ -126,10 +130,10 @@ def _gathered(program: Program, *, shared: bool) -> Program:
         return fixed, [n for n in parts if steps[n].stage > Stage.PARAMETERS]
 
     def make(tape: Tape, operation: str, found: tuple[list[int], list[int]]) -> int:
-        combine = partial(tape.applied, operation)
+        combine = partial(tape.combined, operation)
         return combine(*(reduce(combine, parts) for parts in found))
 
-    return _rebuilt(program, Rule(find, make, used_once.note))
+    return _rebuilt(program, Rule(frozenset(("mul", "add")), once, find, make))
 
 
 def _flattened(
@@ -158,13 +162,13 @@ def factor_sums(program: Program) -> Program:
 
 def _factored(program: Program, *, shared: bool) -> Program:
     """`factor_sums`; with `shared`, one of the two products may be used elsewhere."""
-    used_once = _UsedOnce(program, ("mul", "add", "sub"))
+    once = set[int]()
 
     def common(steps: Sequence[Step], left: int, right: int) -> tuple[int, int, int] | None:
         """a, x, y of the products a·x and a·y; None if they are not, or have no common a."""
         if not steps[left].operation == steps[right].operation == "mul":
             return None
-        if sum(node in used_once.results for node in (left, right)) < 2 - shared:
+        if (left in once) + (right in once) < 2 - shared:
             return None
         a, b = steps[left].operands, steps[right].operands
         factor = next((i for i in a if i in b), None)
@@ -174,16 +178,16 @@ def _factored(program: Program, *, shared: bool) -> Program:
         return factor, x, y
 
     def find(
-        steps: Sequence[Step], operation: str, nodes: Sequence[int]
+        steps: Sequence[Step], operation: str, nodes: tuple[int, int]
     ) -> tuple[tuple[int, int, int], Step | None] | None:
         """a, x, y; and the sum s ± a·x if it is one."""
-        if operation not in ("add", "sub"):
-            return None
         left, right = nodes
+        if operation == "mul" or steps[right][0] != "mul":
+            return None
         if products := common(steps, left, right):
             return products, None
         inner = steps[left]
-        if left not in used_once.results or inner.operation not in ("add", "sub"):
+        if left not in once or inner.operation not in ("add", "sub"):
             return None
         products = common(steps, inner.operands[1], right)
         return products and (products, inner)
@@ -191,12 +195,12 @@ def _factored(program: Program, *, shared: bool) -> Program:
     def make(tape: Tape, operation: str, found: tuple[tuple[int, int, int], Step | None]) -> int:
         (factor, x, y), inner = found
         if inner is None:
-            return tape.applied("mul", factor, tape.applied(operation, x, y))
+            return tape.combined("mul", factor, tape.combined(operation, x, y))
         alike = "add" if inner.operation == operation else "sub"
-        product = tape.applied("mul", factor, tape.applied(alike, x, y))
-        return tape.applied(inner.operation, inner.operands[0], product)
+        product = tape.combined("mul", factor, tape.combined(alike, x, y))
+        return tape.combined(inner.operation, inner.operands[0], product)
 
-    return _rebuilt(program, Rule(find, make, used_once.note))
+    return _rebuilt(program, Rule(frozenset(("mul", "add", "sub")), once, find, make))
 
 
 def share_factors(program: Program) -> Program:
@@ -235,7 +239,7 @@ def share_factors(program: Program) -> Program:
     if not plans:
         return program
 
-    made = _rebuilt(program, Rule(lambda *_: None, lambda *_: 0, lambda *_: None), plans)
+    made = _rebuilt(program, Rule(frozenset(), set(), lambda *_: None, lambda *_: 0), plans)
     # What two outputs shared they may now compute in different ways.
     pairs = program.operations.items()
     return made if all(made.operations[name] <= count for name, count in pairs) else program
@@ -267,6 +271,8 @@ def absorb_minus_signs(program: Program) -> Program:
 
     It is the last pass: a tape moves minus signs outwards again.
     """
+    if not any(s[0] == "neg" and s[2] > Stage.PARAMETERS for s in program.steps):
+        return program
     uses, once, steps = _uses(program), set[int](), Steps()
 
     def opposite(i: int) -> int | None:
@@ -303,22 +309,6 @@ def _pairs(factors: Sequence[int]) -> list[tuple[int, int]]:
     return sorted({(min(p), max(p)) for p in combinations(factors, 2) if p[0] != p[1]})
 
 
-class _UsedOnce:
-    """The steps of a tape, results of given operations, that are used exactly once."""
-
-    def __init__(self, program: Program, operations: Collection[str]) -> None:
-        self.results: set[int] = set()
-        self._uses = _uses(program)
-        self._operations = operations
-
-    def note(self, old: int, operation: str, new: int) -> None:
-        """Note that step `old` of the program became step `new`, the result of `operation`."""
-        if self._uses[old] == 1 and operation in self._operations:
-            self.results.add(new)
-        else:
-            self.results.discard(new)
-
-
 def _uses(program: Program) -> list[int]:
     """How often each step is an operand or an output entry."""
     uses = [0] * len(program.steps)
@@ -338,34 +328,43 @@ def _rebuilt(
     if it finds nothing. The `products` are recorded as those of the given steps, from the left.
     """
     old, start = program.steps, 0
-    while start < len(old) and start not in products:
-        operation, operands, _, _ = old[start]
-        if rule.find(old, operation, operands) is not None:
+    uses, operations, once, find = _uses(program), rule.operations, rule.once, rule.find
+    for start, (operation, operands, _, _) in enumerate(old):
+        if start in products:
             break
-        rule.note(start, operation, start)
-        start += 1
-    if start == len(old):
+        if operation in operations:
+            a, b = operands
+            if find(old, operation, (a, b)) is not None:
+                break
+            if uses[start] == 1:
+                once.add(start)
+    else:
         return program
     tape = ExactTape.continued(old[:start])
     tape.names |= {i: name for i, name in program.names.items() if i < start}
+    steps, combined, names = tape.steps, tape.combined, program.names
     new = list(range(start))
     for i, (operation, operands, stage, value) in enumerate(old[start:], start):
-        if operation == "constant":
+        if i in products:
+            node = reduce(partial(combined, "mul"), [new[o] for o in products[i]])
+        elif operation in operations:
+            a, b = operands
+            a, b = new[a], new[b]
+            found = find(steps, operation, (a, b))
+            node = combined(operation, a, b) if found is None else rule.make(tape, operation, found)
+        elif operands:
+            node = tape.applied(operation, *[new[o] for o in operands])
+        elif operation == "constant":
             node = tape.number(float(value or 0.0))
-        elif operation == "input":
-            node = tape.input(str(value), stage).index
-        elif i in products:
-            node = reduce(partial(tape.applied, "mul"), [new[o] for o in products[i]])
         else:
-            nodes = [new[o] for o in operands]
-            found = rule.find(tape.steps, operation, nodes)
-            if found is None:
-                node = tape.applied(operation, *nodes)
+            node = tape.input(str(value), stage).index
+        if i in names:
+            tape.names.setdefault(node, names[i])
+        if operations and steps[node][0] in operations:
+            if uses[i] == 1:
+                once.add(node)
             else:
-                node = rule.make(tape, operation, found)
-        if i in program.names:
-            tape.names.setdefault(node, program.names[i])
-        rule.note(i, tape.steps[node].operation, node)
+                once.discard(node)
         new.append(node)
     outputs = {
         name: Output(output.shape, tuple([new[n] for n in output.nodes]))

@@ -26,7 +26,7 @@ class TapeScalars(Scalars):
 
     def is_zero(self, value: Node) -> bool:
         """Whether a node is the constant 0."""
-        return self._tape.values[value.index] == 0.0
+        return self._tape.values.get(value.index) == 0.0
 
     def named(self, value: Node, name: str) -> Node:
         """The same node. Suggests a name unless it is an input, a constant or a negation."""

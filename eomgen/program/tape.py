@@ -36,6 +36,8 @@ ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
     "mul": operator.mul,
     "div": operator.truediv,
 }
+_SIMPLIFYING = frozenset(("constant", "neg", "div"))
+"""Operations whose results the folding rules of arithmetic look at."""
 COUNTED = (*ARITHMETIC, "neg", *FUNCTIONS)
 """Operations that count towards the cost, one each."""
 
@@ -65,19 +67,19 @@ class Node:
 
     def __add__(self, other: "Node") -> "Node":
         tape = self.tape
-        return Node(tape, tape.applied("add", self.index, other.index))
+        return Node(tape, tape.combined("add", self.index, other.index))
 
     def __sub__(self, other: "Node") -> "Node":
         tape = self.tape
-        return Node(tape, tape.applied("sub", self.index, other.index))
+        return Node(tape, tape.combined("sub", self.index, other.index))
 
     def __mul__(self, other: "Node") -> "Node":
         tape = self.tape
-        return Node(tape, tape.applied("mul", self.index, other.index))
+        return Node(tape, tape.combined("mul", self.index, other.index))
 
     def __truediv__(self, other: "Node") -> "Node":
         tape = self.tape
-        return Node(tape, tape.applied("div", self.index, other.index))
+        return Node(tape, tape.combined("div", self.index, other.index))
 
     def __neg__(self) -> "Node":
         return Node(self.tape, self.tape.applied("neg", self.index))
@@ -89,33 +91,44 @@ class Tape:
     def __init__(self) -> None:
         self.steps: list[Step] = []
         self.names: dict[int, str] = {}
-        self.values: list[float | None] = []
-        """For each step its value if it is a constant, else None."""
-        self.minus: list[int | None] = []
-        """For each step its operand if it is a negation, else None."""
+        self.values: dict[int, float] = {}
+        """The value of each step that is a constant."""
+        self.minus: dict[int, int] = {}
+        """The operand of each step that is a negation."""
+        self._simplifying: set[int] = set()
+        """Steps of which arithmetic may be simplified: these, and quotients by parameters."""
         self._known: dict[tuple[Any, ...], int] = {}
 
     @classmethod
     def continued(cls, steps: Sequence[Step]) -> "Tape":
         """A tape on which these steps are recorded, each at its place."""
         tape = cls()
-        for step in steps:
-            operation, operands, _, value = step
-            number = float(value) if isinstance(value, float) else None
-            key = (operation, operands if operands else value)
-            known = tape._known.get(key)
-            index = tape._add(key, step, number)
-            if known is not None:
-                tape._known[key] = min(known, index)
+        tape.steps = list(steps)
+        for index, (operation, operands, _, value) in enumerate(steps):
+            key = (operation, *operands) if operands else (operation, value)
+            tape._known.setdefault(key, index)
+            if operation in _SIMPLIFYING:
+                tape._note(index)
         return tape
 
-    def _add(self, key: tuple[Any, ...], step: Step, number: float | None = None) -> int:
+    def _add(self, key: tuple[Any, ...], step: Step) -> int:
         """Append a new step and return its index."""
         index = self._known[key] = len(self.steps)
         self.steps.append(step)
-        self.values.append(number)
-        self.minus.append(step.operands[0] if step.operation == "neg" else None)
+        if step[0] in _SIMPLIFYING:
+            self._note(index)
         return index
+
+    def _note(self, index: int) -> None:
+        """Note a constant, a negation or a quotient by parameters."""
+        operation, operands, _, value = self.steps[index]
+        if operation == "constant":
+            self.values[index] = float(value or 0.0)
+        elif operation == "neg":
+            self.minus[index] = operands[0]
+        elif self.steps[operands[1]][2] != Stage.PARAMETERS:
+            return
+        self._simplifying.add(index)
 
     def number(self, value: float) -> int:
         """The step of a constant."""
@@ -123,7 +136,7 @@ class Tape:
         index = self._known.get(("constant", number))
         if index is None:
             step = Step("constant", (), Stage.CONSTANT, number)
-            index = self._add(("constant", number), step, number)
+            index = self._add(("constant", number), step)
         return index
 
     def constant(self, value: float) -> Node:
@@ -149,24 +162,41 @@ class Tape:
 
     def applied(self, operation: str, *operands: int) -> int:
         """The step of an operation on steps, simplified if a folding rule applies."""
+        if operation in ARITHMETIC:
+            return self.combined(operation, *operands)
         fold = _FOLD.get(operation)
         if fold is not None:
             folded = fold(self, *operands)
             if folded is not None:
                 return folded
         if operation in FUNCTIONS:
-            values = [self.values[i] for i in operands]
+            values = [self.values.get(i) for i in operands]
             number = None if None in values else self.folded(FUNCTIONS[operation], *values)
             if number is not None:
                 return self.number(number)
-        elif (operation == "add" or operation == "mul") and operands[0] > operands[1]:
-            operands = operands[::-1]
-        key = (operation, operands)
+        key = (operation, *operands)
         index = self._known.get(key)
         if index is None:
             steps = self.steps
             stage = max([steps[i][2] for i in operands])
             index = self._add(key, Step(operation, operands, stage))
+        return index
+
+    def combined(self, operation: str, a: int, b: int) -> int:
+        """The same of one of the operations of `ARITHMETIC`."""
+        simplifying = self._simplifying
+        if a in simplifying or b in simplifying or a == b:
+            folded = _FOLD[operation](self, a, b)
+            if folded is not None:
+                return folded
+        if a > b and (operation == "add" or operation == "mul"):
+            a, b = b, a
+        key = (operation, a, b)
+        index = self._known.get(key)
+        if index is None:
+            steps = self.steps
+            stage, other = steps[a][2], steps[b][2]
+            index = self._add(key, Step(operation, (a, b), stage if stage >= other else other))
         return index
 
     def folded(self, function: Callable[..., float], *values: float | None) -> float | None:
@@ -204,14 +234,14 @@ def _folded(tape: Tape, operation: str, a: float, b: float) -> int | None:
 
 
 def _fold_add(tape: Tape, a: int, b: int) -> int | None:
-    va, vb = tape.values[a], tape.values[b]
+    va, vb = tape.values.get(a), tape.values.get(b)
     if va is not None and vb is not None:
         return _folded(tape, "add", va, vb)
     if va == 0.0:
         return b
     if vb == 0.0:
         return a
-    minus_a, minus_b = tape.minus[a], tape.minus[b]
+    minus_a, minus_b = tape.minus.get(a), tape.minus.get(b)
     if minus_b is not None:
         return tape.applied("sub", a, minus_b)
     if minus_a is not None:
@@ -220,7 +250,7 @@ def _fold_add(tape: Tape, a: int, b: int) -> int | None:
 
 
 def _fold_sub(tape: Tape, a: int, b: int) -> int | None:
-    va, vb = tape.values[a], tape.values[b]
+    va, vb = tape.values.get(a), tape.values.get(b)
     if va is not None and vb is not None:
         return _folded(tape, "sub", va, vb)
     if vb == 0.0:
@@ -229,7 +259,7 @@ def _fold_sub(tape: Tape, a: int, b: int) -> int | None:
         return tape.applied("neg", b)
     if a == b:
         return tape.number(0.0)
-    minus_a, minus_b = tape.minus[a], tape.minus[b]
+    minus_a, minus_b = tape.minus.get(a), tape.minus.get(b)
     if minus_b is not None:
         return tape.applied("add", a, minus_b)
     if minus_a is not None:
@@ -238,7 +268,7 @@ def _fold_sub(tape: Tape, a: int, b: int) -> int | None:
 
 
 def _fold_mul(tape: Tape, a: int, b: int) -> int | None:
-    va, vb = tape.values[a], tape.values[b]
+    va, vb = tape.values.get(a), tape.values.get(b)
     if va is not None and vb is not None:
         return _folded(tape, "mul", va, vb)
     if va is not None or vb is not None:
@@ -249,7 +279,7 @@ def _fold_mul(tape: Tape, a: int, b: int) -> int | None:
             return other
         if value is not None and value < 0.0:
             return tape.applied("neg", tape.applied("mul", tape.number(-value), other))
-    minus_a, minus_b = tape.minus[a], tape.minus[b]
+    minus_a, minus_b = tape.minus.get(a), tape.minus.get(b)
     if minus_a is not None:
         return tape.applied("neg", tape.applied("mul", minus_a, b))
     if minus_b is not None:
@@ -266,7 +296,7 @@ def _fold_mul(tape: Tape, a: int, b: int) -> int | None:
 
 
 def _fold_div(tape: Tape, a: int, b: int) -> int | None:
-    va, vb = tape.values[a], tape.values[b]
+    va, vb = tape.values.get(a), tape.values.get(b)
     if va is not None and vb is not None:
         return _folded(tape, "div", va, vb)
     if va == 0.0:
@@ -277,7 +307,7 @@ def _fold_div(tape: Tape, a: int, b: int) -> int | None:
         return tape.applied("neg", tape.applied("div", a, tape.number(-vb)))
     if va is not None and va < 0.0:
         return tape.applied("neg", tape.applied("div", tape.number(-va), b))
-    minus_a, minus_b = tape.minus[a], tape.minus[b]
+    minus_a, minus_b = tape.minus.get(a), tape.minus.get(b)
     if minus_a is not None:
         return tape.applied("neg", tape.applied("div", minus_a, b))
     if minus_b is not None:
@@ -286,7 +316,7 @@ def _fold_div(tape: Tape, a: int, b: int) -> int | None:
 
 
 def _fold_neg(tape: Tape, a: int) -> int | None:
-    value, minus = tape.values[a], tape.minus[a]
+    value, minus = tape.values.get(a), tape.minus.get(a)
     if value is not None:
         return tape.number(-value)
     if minus is not None:
@@ -298,12 +328,12 @@ def _fold_neg(tape: Tape, a: int) -> int | None:
 
 
 def _fold_sin(tape: Tape, a: int) -> int | None:
-    minus = tape.minus[a]
+    minus = tape.minus.get(a)
     return None if minus is None else tape.applied("neg", tape.applied("sin", minus))
 
 
 def _fold_cos(tape: Tape, a: int) -> int | None:
-    minus = tape.minus[a]
+    minus = tape.minus.get(a)
     return None if minus is None else tape.applied("cos", minus)
 
 
