@@ -69,19 +69,21 @@ def _walks(model: Model) -> tuple[tuple[Place, ...], ...]:
     """All walks. They are the same for each way to write the equations, and those that are compared
     ask for them one after another.
     """
-    return _walked(replace(model, pivots=(), blocks=(), route="auto", outputs=(), notices=()))
+    alike = replace(model, pivots=(), blocks=(), groups=(), outputs=(), notices=())
+    return _walked(replace(alike, route="auto", closing="auto"))
 
 
 @lru_cache(maxsize=2)
 def _walked(model: Model) -> tuple[tuple[Place, ...], ...]:
-    return tuple(tuple(_walk(model, walk)) for walk in range(WALKS))
+    closure = Closure.of(model)
+    return tuple(tuple(_walk(closure, walk)) for walk in range(WALKS))
 
 
-def _walk(model: Model, walk: int) -> Iterator[Place]:
+def _walk(closure: Closure, walk: int) -> Iterator[Place]:
     """Positions along a walk with their J. It ends near a singular one, where a run ends too:
     beyond, a linkage may go on in another way than the one it was assembled in.
     """
-    closure, nv = Closure.of(model), len(model.velocities)
+    model, nv = closure.model, len(closure.model.velocities)
     rng = random.Random(walk // 2)
     heading = np.array([rng.gauss(0.0, 1.0) for _ in range(nv)]) * (1.0 if walk % 2 else -1.0)
     q = np.array(model.initial_q)

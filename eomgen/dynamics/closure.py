@@ -1,7 +1,7 @@
 """The constraints of a mechanism as functions of its coordinates, and Newton's method on them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +15,9 @@ from eomgen.dynamics.frames import Linkage
 from eomgen.dynamics.linkage import make_linkage
 from eomgen.dynamics.mechanism_state import Values
 from eomgen.model.model import Model
+from eomgen.program.program import Output, finish, interpreter
+from eomgen.program.scalars import TapeScalars
+from eomgen.program.tape import Stage, Tape
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.joints.base import Coordinate
 
@@ -80,24 +83,44 @@ class Closure:
         return bool(near and np.abs(rates).max(initial=0.0) <= CLOSED * speed)
 
     def both(self, q: Array) -> tuple[Array, Array]:
-        """`residuals` and `jacobian`."""
+        """`residuals` and `jacobian`, for many positions: they are recorded once."""
+        nc, names = len(self.model.rows), [c.name for c in self.model.coordinates]
         try:
-            d = self.dynamics(q)
-            found, rows = constraints.residuals(d), jacobian_of(d)
+            found = self._recorded(dict(zip(names, q.tolist(), strict=True)))
         except (ArithmeticError, ValueError):
             return self.residuals(q), self.jacobian(q)
-        return np.array(found) / self._units, self._in_sizes(rows)
+        return np.array(found[:nc]) / self._units, self._in_sizes(found[nc:])
+
+    @cached_property
+    def _recorded(self) -> Callable[[Mapping[str, float]], list[float]]:
+        """g of each row and the rows of J as a program of the coordinates."""
+        model, tape = self.model, Tape()
+        scalars = TapeScalars(tape)
+        given = (
+            model.defaults,
+            {i.name: i.default for i in model.inputs},
+            {x.name: x.initial for x in model.extra},
+        )
+        parameters, inputs, states = ({n: scalars.number(x) for n, x in g.items()} for g in given)
+        q = [tape.input(c.name, Stage.POSITIONS) for c in model.coordinates]
+        still = [scalars.number(0.0)] * len(model.velocities)
+        values = Values(parameters, inputs, q, still, states, scalars.number(self.time))
+        d = Dynamics(model, values, scalars)
+        entries = [*constraints.residuals(d), *(x for row in jacobian_of(d) for x in row)]
+        output = Output((len(entries),), tuple(node.index for node in entries))
+        return interpreter(finish(tape, {"both": output}, ()), "both", FloatScalars())
 
     def jacobian(self, q: Array) -> Array:
         """J (nc, nv) in sizes."""
         try:
-            rows: Sequence[Sequence[float]] = jacobian_of(self.dynamics(q))
+            entries = [x for row in jacobian_of(self.dynamics(q)) for x in row]
         except (ArithmeticError, ValueError):
-            rows = [[np.nan] * len(self.model.velocities)] * len(self.model.rows)
-        return self._in_sizes(rows)
+            entries = [np.nan] * len(self.model.velocities) * len(self.model.rows)
+        return self._in_sizes(entries)
 
-    def _in_sizes(self, rows: Sequence[Sequence[float]]) -> Array:
-        matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.model.velocities))
+    def _in_sizes(self, entries: Sequence[float]) -> Array:
+        shape = len(self.model.rows), len(self.model.velocities)
+        matrix = np.array(entries, dtype=np.float64).reshape(shape)
         scaled: Array = matrix * self.lengths / self._units[:, np.newaxis]
         return scaled
 

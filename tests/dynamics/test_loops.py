@@ -19,6 +19,7 @@ from spatial_trees import PLANE, SPACE
 
 from eomgen.base.errors import SceneError
 from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.closure import Closure
 from eomgen.dynamics.constraints import rates, residuals
 from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
@@ -365,3 +366,15 @@ def test_a_loop_joint_that_is_there_twice_is_dropped_and_named() -> None:
     twice = another("coupler", (0.4, 0), "rocker", (0.275, 0))
     model = assembled(elaborate(parse_scene(bars(twice))))
     assert model.dropped == ("pin_more_x", "pin_more_y")
+
+
+@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
+def test_recorded_constraints_are_those_of_floats(dimensions: int) -> None:
+    """The same bits, so that walks along closed positions are what they were."""
+    closure = Closure.of(model_of(random_loops(3, dimensions, 4, 1)))
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        q = np.array(closure.model.initial_q) + rng.uniform(-1.0, 1.0, len(closure.model.initial_q))
+        found, matrix = closure.both(q)
+        assert np.array_equal(found, closure.residuals(q))
+        assert np.array_equal(matrix, closure.jacobian(q))
