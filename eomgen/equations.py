@@ -26,7 +26,8 @@ class Derivation:
     """Equations of motion M v̇ + V + G = F as SymPy expressions, and the steps of their derivation.
 
     `matrices` has the equations and the symbols of coordinates `q`, velocities `v` and
-    accelerations `a`. A mechanism whose steps are those of an algorithm has none; the functions
+    accelerations `a`; with constraints in closed form those of the freedoms, as in the state of its
+    module. A mechanism whose steps are those of an algorithm has none; the functions
     `mass_matrix`, `velocity_force`, `gravity_force`, `applied_force` of its module give numbers.
     """
 
@@ -107,7 +108,7 @@ class Derivation:
 
     def written_out(self, expression: "Expr") -> "Expr":
         """An expression over q, v, t, inputs and parameters alone: all other symbols, as those of
-        forces, are replaced by what they stand for. With loops their multipliers λ stay.
+        forces or of what constraints determine, are replaced by what they stand for.
         """
         from eomgen.derivation.matrices import written_out
 

@@ -1,20 +1,22 @@
 """What a derivation states, followed in numbers, beside the numeric solver."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.steps import Equation, Step
 from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.exposition.constraints import DerivedConstraint
 from eomgen.exposition.derivation import used_bodies
 from eomgen.exposition.effects import DerivedEffect, derived_effects
-from eomgen.exposition.evaluate import Numbers, define, follow
+from eomgen.exposition.evaluate import Numbers, array, define, follow, number
 from eomgen.exposition.frames import frames_of
 from eomgen.exposition.poses import poses
+from eomgen.exposition.reading import reading_names
 from eomgen.exposition.recursion import recursive_steps
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
@@ -57,6 +59,100 @@ def instant(model: Model, seed: int = 0, shake: float = 0.3, *, closed: bool = F
     return Instant(solver, known)
 
 
+class LookedUp(dict[str, Any]):
+    """Values by the names of a derivation that is only read: what is not known is looked up in its
+    equations, the last that defines it first, and so on down to states, parameters and inputs.
+    """
+
+    def __init__(self, model: Model, steps: Sequence[Step], known: Numbers) -> None:
+        names = reading_names(model)
+        super().__init__({names.get(name, name): x for name, x in known.items()})
+        self.model = model
+        self.lines: dict[str, list[tuple[Equation, int]]] = {}
+        for line in (line for step in steps for line in step.equations):
+            for i, symbol in enumerate(_defined(line)):
+                self.lines.setdefault(symbol.name, []).append((line, i))
+        self._busy: set[int] = set()
+        self._frames = {frame.name: frame for frame in frames_of(model)}
+
+    def __missing__(self, name: str) -> Any:
+        for line, i in reversed(self.lines.get(name, [])):
+            if id(line) in self._busy:
+                continue
+            self._busy.add(id(line))
+            try:
+                self[name] = self._ordered(name, self._of_line(line, i))
+            except KeyError:
+                continue
+            finally:
+                self._busy.discard(id(line))
+            return self[name]
+        self[name] = self._ordered(name, self._by_words(name))
+        return self[name]
+
+    def _ordered(self, name: str, value: Any) -> Any:
+        """Rows and columns in the order v_d, v_i, if that is the order of the equations."""
+        if name not in ("M", "h_0") or "v_d" not in self.lines:
+            return value
+        dependent = [j for _, j in self.model.pivots]
+        order = [*dependent, *(j for j in range(len(value)) if j not in dependent)]
+        return value[np.ix_(order, order)] if name == "M" else value[order]
+
+    def _of_line(self, line: Equation, i: int) -> Any:
+        if isinstance(line.left, sp.MatrixBase):
+            right = line.right
+            if isinstance(right, sp.MatrixBase):
+                return number(list(right)[i], self)
+            return float(array(right, self).ravel()[i])
+        if line.right.is_Matrix:
+            return array(line.right, self)
+        return number(line.right, self)
+
+    def _by_words(self, name: str) -> Any:
+        """What the words between the equations say."""
+        letter, _, rest = name.partition("_")
+        velocities = self.model.velocities
+        free = [f for f in self._frames.values() if f.free]
+        if letter in ("r^×", "c^×"):
+            (x,), (y,), (z,) = self[f"{letter[0]}_{rest}"]
+            return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        if letter == "W" and "," in rest:
+            body, _, place = rest.rpartition(",")
+            return self[f"W_{body}"]["xyz".index(place[0]), "xyz".index(place[1])]
+        if name == "h_0" and free:
+            return np.vstack([self[f"h_{frame.name}"] for frame in free])
+        if name == "M" and free:
+            rows = [[self._block(a, b) for b in free] for a in free]
+            return np.block(rows)
+        if letter == "J" and rest in ("d", "i"):
+            dependent = [j for _, j in self.model.pivots]
+            others = [j for j in range(len(velocities)) if j not in dependent]
+            return self["J"][:, dependent if rest == "d" else others]
+        if name == "J":
+            words = [c.name.removesuffix("_dot") for c in velocities]
+            return np.array(
+                [[self._entry(f"J_{row},{word}") for word in words] for row, _ in self.model.rows]
+            )
+        raise KeyError(name)
+
+    def _entry(self, name: str) -> float:
+        return float(self[name]) if name in self.lines else 0.0
+
+    def _block(self, a: Any, b: Any) -> Any:
+        if f"M_{a.name},{b.name}" in self.lines:
+            return self[f"M_{a.name},{b.name}"]
+        if f"M_{b.name},{a.name}" in self.lines:
+            return self[f"M_{b.name},{a.name}"].T
+        return np.zeros((len(a.v), len(b.v)))
+
+
+def _defined(line: Equation) -> Iterable[Any]:
+    """The symbols that a line defines."""
+    if isinstance(line.left, sp.MatrixBase):
+        return [x for x in line.left if x.is_Symbol]
+    return [line.left] if line.left.is_Symbol or isinstance(line.left, sp.MatrixSymbol) else []
+
+
 def follow_effects(model: Model, effects: Sequence[DerivedEffect], known: Numbers) -> None:
     """Poses, and what each effect says."""
     needed = dict.fromkeys(body for t in effects for body in used_bodies(t))
@@ -69,14 +165,10 @@ def follow_effects(model: Model, effects: Sequence[DerivedEffect], known: Number
         define(t.rates, known)
 
 
-def follow_recursion(
-    model: Model, known: Numbers, constraints: Sequence[DerivedConstraint] = ()
-) -> tuple[list[float], list[float]]:
-    """v̇ and F by the steps of the algorithm, in the order of v, with the forces of constraints
-    whose multipliers are known.
-    """
+def follow_recursion(model: Model, known: Numbers) -> tuple[list[float], list[float]]:
+    """v̇ and F by the steps of the algorithm, in the order of v."""
     frames = frames_of(model)
-    effects = (*derived_effects(model), *(c.force for c in constraints))
+    effects = derived_effects(model)
     follow_effects(model, effects, known)
     for step in recursive_steps(model, frames, effects):
         follow(step.equations, known)

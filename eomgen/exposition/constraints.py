@@ -1,7 +1,7 @@
 """The constraints of a mechanism, over symbols: their equations, differentiated, and their forces.
 
-A multiplier is a symbol. The forces of a constraint are loads with these symbols, so that the
-derivation of the tree takes them as it takes the forces of effects.
+A multiplier is a symbol, and the forces of a constraint are loads with these symbols. They do no
+work in the motions that the constraints allow, so that the motion is found without them.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +14,7 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
-from eomgen.exposition.effects import AnyLoad, DerivedEffect, StandIn, named_loads
+from eomgen.exposition.effects import AnyLoad, DerivedEffect, named_loads
 from eomgen.exposition.frames import Frame, frames_of
 from eomgen.exposition.impacts import power
 from eomgen.exposition.mechanism import (
@@ -101,17 +101,9 @@ def derived_constraints(model: Model) -> tuple[DerivedConstraint, ...]:
     return tuple(found)
 
 
-def with_multipliers(model: Model, constraints: Sequence[DerivedConstraint]) -> Model:
-    """The tree alone, with the forces of the constraints as inputs."""
-    stand_ins: list[Any] = [StandIn(name=c.force.effect.name, derived=c.force) for c in constraints]
-    inputs = [x for s in stand_ins for x in s.inputs(model.dimensions)]
-    return replace(
-        model,
-        constraints=(),
-        dropped=(),
-        effects=(*model.effects, *stand_ins),
-        inputs=(*model.inputs, *inputs),
-    )
+def tree_of(model: Model) -> Model:
+    """The tree alone, without its constraints."""
+    return replace(model, constraints=(), dropped=(), groups=(), pivots=(), blocks=())
 
 
 def _mechanism(model: Model, notes: Notes) -> Any:

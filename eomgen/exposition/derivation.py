@@ -16,7 +16,7 @@ from eomgen.derivation.closed import Equations, derive
 from eomgen.derivation.elimination import symmetric
 from eomgen.derivation.matrices import Matrices, of_pins, of_projected
 from eomgen.derivation.projected.derive import derive_projected
-from eomgen.derivation.projected.steps import projected_steps
+from eomgen.derivation.projected.steps import POWER, projected_steps
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation, Step, handout_steps, readable
 from eomgen.derivation.supported import (
@@ -27,15 +27,21 @@ from eomgen.derivation.supported import (
 )
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
-from eomgen.exposition.constraints import (
-    DerivedConstraint,
-    derived_constraints,
-    with_multipliers,
-)
+from eomgen.dynamics.assur import with_closed_form
+from eomgen.exposition.composite import composite_steps
+from eomgen.exposition.constraints import DerivedConstraint, derived_constraints, tree_of
 from eomgen.exposition.effects import DerivedEffect, derived_effects, equations_of, with_symbols
+from eomgen.exposition.embedding import embedded
 from eomgen.exposition.frames import frames_of
 from eomgen.exposition.impacts import impact_steps
-from eomgen.exposition.loops import constraint_steps, solution_steps
+from eomgen.exposition.loops import (
+    bias_of,
+    constraint_steps,
+    elimination_steps,
+    freedom_algorithm,
+    freedom_steps,
+    polygon_steps,
+)
 from eomgen.exposition.mechanism import NamingMechanism, Notes
 from eomgen.exposition.poses import poses
 from eomgen.exposition.reading import numbered, read_all, reading_names
@@ -121,15 +127,15 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
     Raises `SceneError` for a form that the mechanism does not have.
     """
     form = form or model.form
+    model = with_closed_form(model)
     effects, constraints = derived_effects(model), derived_constraints(model)
     if form != "velocity" and constraints:
         raise SceneError(f"form: no derivation in the form '{form}': {why_not_momenta(model)}")
-    bare = with_multipliers(with_symbols(model, effects), constraints)
-    bare = replace(bare, form=form)
+    bare = replace(tree_of(with_symbols(model, effects)), form=form)
     parts = Parts(effects, constraints)
     small = len(model.bodies) <= MOST_REPORTED
     long = f"it is written out for up to {MOST_REPORTED} bodies, and there are {len(model.bodies)}"
-    why_not = why_not_pins(bare) or ("" if small else long)
+    why_not = why_not_pins(model) or ("" if small else long)
     if form != "velocity" and why_not:
         module = f"; a module has it: eomgen generate --form {form}" if why_not == long else ""
         raise SceneError(
@@ -153,8 +159,7 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
     place = next(i for i, step in enumerate(steps) if step.number == "(37)")
     written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
     last = form_step(model, form, written, parts.effects)
-    solved = solution_steps(model, parts.constraints, recursive=False)
-    ends = [_symmetry(equations), *solved, *impact_steps(model, parts.effects), last]
+    ends = [_symmetry(equations), *impact_steps(model, parts.effects), last]
     inner = _numbered_within(_effect_steps(model, parts), "36")
     steps = [
         Step("", "The handout", HANDOUT, ()),
@@ -167,59 +172,101 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
 
 
 def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
-    equations = derive_projected(bare)
+    tied = bool(parts.constraints)
+    equations = derive_projected(bare, solving=not tied)
     names = reading_names(model)
     found = [_renamed(step, names) for step in projected_steps(equations)]
-    place = next(i for i, step in enumerate(found) if step.title == "Closed form")
-    solved = {line.left.name: line.right for line in found[place].equations}
-    rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
-    form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
-    ends = [
-        *solution_steps(model, parts.constraints, recursive=False),
-        *impact_steps(model, parts.effects),
-        form_step(model, "velocity", form, parts.effects),
-    ]
+    titles = [step.title for step in found]
+    joints = next(i for i, title in enumerate(titles) if title in ("Parts of the motion", POWER))
     words = (
         "Each body by itself, with its weight, the forces of the effects, and those of its joints."
     )
-    state = replace(found[0], figure="mechanism")
-    steps = [
-        state,
+    start = [
+        replace(found[0], figure="mechanism"),
         Step("", "Free bodies", words, (), "bodies"),
-        *found[1:place],
+        *found[1:joints],
+    ]
+    if tied:
+        return _of_tied(model, parts, start, found[joints:], of_projected(equations))
+    place = titles.index("Closed form")
+    solved = {line.left.name: line.right for line in found[place].equations}
+    rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
+    form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
+    ends = [*impact_steps(model, parts.effects), form_step(model, "velocity", form, parts.effects)]
+    steps = [
+        *start,
+        *found[joints:place],
         *(_renamed(step, names) for step in _effect_steps(model, parts)),
         *found[place:],
         *(_renamed(step, names) for step in ends),
     ]
-    whole = numbered([replace(step, number="") for step in steps])
-    intro = Step("", "Compared with the handout", PROJECTED, ())
-    matrices = _whole(of_projected(equations), model, parts)
-    return Exposition((intro, *whole), matrices, parts.loads)
+    return _told(model, PROJECTED, steps, _whole(of_projected(equations), model, parts), parts)
+
+
+def _of_tied(
+    model: Model, parts: Parts, start: list[Step], balance: list[Step], tree: Matrices
+) -> Exposition:
+    """A small mechanism with constraints: the tree, then what the constraints leave free."""
+    matrices = None
+    effects = _effect_steps(model, parts)
+    if model.groups:
+        found = embedded(model, parts.constraints)
+        solved, reduced = freedom_steps(found, tree, parts.constraints)
+        matrices = _whole(reduced, model, parts, len(found.definitions))
+        before, ends = [*polygon_steps(model, found)], [*effects, *solved]
+    else:
+        before, ends = [], [*effects, *constraint_steps(model, parts.constraints)]
+        ends += elimination_steps(model, parts.constraints, bias_of(len(model.velocities)))
+    ends += [*impact_steps(model, parts.effects), _last(model, parts)]
+    names = reading_names(model)
+    names |= {s.name: text for s, text in tree.formulas.items()}
+    before, ends = ([_renamed(step, names) for step in x] for x in (before, ends))
+    return _told(model, PROJECTED, [*start, *before, *balance, *ends], matrices, parts)
 
 
 def _recursive(model: Model, parts: Parts) -> Exposition:
-    names = reading_names(model)
     frames = frames_of(model)
     state = [
         Equation(sp.Symbol(letter), sp.Matrix([[real(c.name) for c in group]]))
         for letter, group in (("q", model.coordinates), ("v", model.velocities))
     ]
     state += prescribed_motion(model)
-    form = plain_form(model, [real(c.acceleration) for c in model.velocities])
     words = "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
     words += "axes of the body to which it belongs."
     steps = [
         Step("", "State", words, tuple(state), "mechanism"),
         Step("", "Free bodies", _free_words(model), (), "bodies"),
-        *_effect_steps(model, parts, every=True),
-        *recursive_steps(model, frames, parts.loads),
-        *solution_steps(model, parts.constraints, recursive=True),
-        *impact_steps(model, parts.effects),
-        form_step(model, "velocity", form, parts.effects),
     ]
-    renamed = [_renamed(step, names) for step in steps]
-    intro = Step("", "Compared with the handout", RECURSIVE, ())
-    return Exposition((intro, *numbered(renamed)), None, parts.loads)
+    effects = _effect_steps(model, parts, every=True)
+    if not parts.constraints:
+        steps += [*effects, *recursive_steps(model, frames, parts.effects)]
+    elif model.groups:
+        found = embedded(model, parts.constraints)
+        steps += [*polygon_steps(model, found), *effects]
+        steps += composite_steps(model, frames, parts.effects)
+        steps += freedom_algorithm(found, parts.constraints)
+    else:
+        steps += [*effects, *constraint_steps(model, parts.constraints)]
+        steps += composite_steps(model, frames, parts.effects)
+        steps += elimination_steps(model, parts.constraints)
+    steps += [*impact_steps(model, parts.effects), _last(model, parts)]
+    names = reading_names(model)
+    return _told(model, RECURSIVE, [_renamed(step, names) for step in steps], None, parts)
+
+
+def _last(model: Model, parts: Parts) -> Step:
+    """The state and its derivative, the accelerations by the steps before."""
+    form = plain_form(model, [real(c.acceleration) for c in model.velocities])
+    return form_step(model, "velocity", form, parts.effects)
+
+
+def _told(
+    model: Model, intro: str, steps: list[Step], matrices: Matrices | None, parts: Parts
+) -> Exposition:
+    """Steps with an introduction, numbered from one."""
+    whole = numbered([replace(step, number="") for step in steps])
+    first = Step("", "Compared with the handout", intro, ())
+    return Exposition((first, *whole), matrices, parts.loads)
 
 
 def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterator[Step]:
@@ -227,9 +274,10 @@ def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterato
 
     The recursion needs the poses of bodies with forces that no motion changes as well (`every`).
     """
-    needed = dict.fromkeys(
-        body for t in parts.loads if every or not t.kept for body in used_bodies(t)
-    )
+    used = [t for t in parts.effects if every or not t.kept]
+    needed = dict.fromkeys(body for t in used for body in used_bodies(t))
+    if not model.groups:
+        needed |= dict.fromkeys(body for c in parts.constraints for body in c.bodies)
     if needed:
         words = (
             "The forces below depend on where bodies are in the world and how they move. o is the "
@@ -257,7 +305,6 @@ def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterato
             derived.words,
             tuple(lines),
         )
-    yield from constraint_steps(model, parts.constraints)
 
 
 def used_bodies(derived: DerivedEffect) -> Iterator[str]:
@@ -338,13 +385,11 @@ def _numbered_within(steps: Iterator[Step], number: str) -> list[Step]:
     return [replace(step, number=f"({number}.{i})") for i, step in enumerate(steps, 1)]
 
 
-def _whole(found: Matrices, model: Model, parts: Parts) -> Matrices:
-    """The matrices with the forces of effects and constraints written out."""
-    needed = dict.fromkeys(body for derived in parts.loads for body in used_bodies(derived))
+def _whole(found: Matrices, model: Model, parts: Parts, following: int = 0) -> Matrices:
+    """The matrices with the forces of effects written out, after `following` definitions."""
+    needed = dict.fromkeys(body for derived in parts.effects for body in used_bodies(derived))
     more, _ = poses(model, frames_of(model), needed)
     more += [pair for derived in parts.effects for pair in derived.definitions]
-    for constraint in parts.constraints:
-        more += (*constraint.definitions, *constraint.force.definitions)
     if not more:
         return found
     known = {s.name: s for e in (found.M, found.V, found.G, found.F) for s in e.free_symbols}
@@ -353,4 +398,5 @@ def _whole(found: Matrices, model: Model, parts: Parts) -> Matrices:
         (symbol, e.xreplace({s: known.get(s.name, s) for s in e.free_symbols}))
         for symbol, e in more
     ]
-    return replace(found, definitions=(*definitions, *found.definitions))
+    before, after = found.definitions[:following], found.definitions[following:]
+    return replace(found, definitions=(*before, *definitions, *after))

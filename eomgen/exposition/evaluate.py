@@ -26,6 +26,9 @@ def follow(equations: Iterable[Equation], known: Numbers) -> None:
     """Add the values of the left sides of matrix equations to what is known."""
     for equation in equations:
         value = array(equation.right, known)
+        if isinstance(equation.left, sp.MatrixBase):  # the components of a vector
+            known.update(zip((x.name for x in equation.left), value.ravel(), strict=True))
+            continue
         known[equation.left.name] = value
         letter, _, rest = equation.left.name.partition("_")
         if letter in ("r", "c") and value.shape == (3, 1):

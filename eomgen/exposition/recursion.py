@@ -37,6 +37,24 @@ ABOUT = (
     "(2008), table 7.1. Here it is with the bodies, joints and constants of this mechanism."
 )
 
+VECTORS = {
+    3: "A motion is a column of ω_z, v_x, v_y and a force one of n_z, f_x, f_y",
+    6: "A motion is a column of ω and v, a force one of n and f, six components each",
+}
+"""What spatial vectors are, by their components."""
+FRAMES = (
+    ", at the origin of a frame and in its axes. A frame moves on its "
+    "parent by one joint primitive, with the motion subspace S; a joint with several "
+    "primitives is a chain of frames, all but the last without mass. R turns axes of the "
+    "frame into the parent's, r runs from the parent's origin to its own, X takes motions "
+    "from the parent to the frame, and its transpose takes forces back. The matrix of r × is "
+    "written r^×. I is the inertia of the frame's own body at the frame's origin, × the cross "
+    "product of two motions, and ×* that of a motion and a force."
+)
+PIVOTS = (
+    " D is a number for one degree of freedom, and a matrix of three rows for a ball. It is "
+    "positive for positive masses, so no division can fail."
+)
 KINDS = ("gravity", "applied")
 
 
@@ -87,12 +105,10 @@ def recursive_steps(
 ) -> Iterator[Step]:
     """The steps of the algorithm, frame by frame."""
     r = Recursion(model, frames, effects)
-    yield Step("", "The algorithm", _algorithm(r), ())
-    for k, frame in enumerate(frames):
-        yield Step("", f"Frame `{frame.name}`: {_kind(r, k)}", "", tuple(_constants(r, frame)))
+    yield from frame_steps(r, f"{ABOUT}\n\n{VECTORS[r.size]}{FRAMES}{PIVOTS}")
     order = range(len(frames))
-    lines = [line for k in order for line in _velocities(r, k)]
-    yield Step("", "Outwards: velocities and bias forces", _outward_words(r), tuple(lines))
+    lines = [line for k in order for line in velocities(r, k)]
+    yield Step("", "Outwards: velocities and bias forces", outward_words(r), tuple(lines))
     words = (
         "From the leaves to the root. I^A is the inertia that a frame seems to have with all that "
         "hangs on it, p^A the force on it that would leave it without acceleration. What is left "
@@ -118,18 +134,18 @@ def _applied(r: Recursion) -> Step:
         applied = _wrench(r, frame, ["applied"])
         terms = [r.vector("f", frame)] if applied else []
         if len(applied) < len(_wrench(r, frame)):  # a weight that is given as a load
-            terms = [_sum(applied, r.size)] if applied else []
+            terms = [total(applied, r.size)] if applied else []
         for i, child in enumerate(r.frames):
             if child.parent == k and i in loaded:
                 terms.append(sp.MatMul(r.matrix("X", child).T, r.vector("Phi", child)))
-        force: list[Expr] = [tau] if _moves(frame) and any(tau := _joint_force(r, frame)) else []
+        force: list[Expr] = [tau] if moves(frame) and any(tau := joint_force(r, frame)) else []
         if terms:
             loaded.add(k)
-            lines.append(Equation(r.vector("Phi", frame), _sum(terms, r.size)))
-            if _moves(frame):
-                force.append(sp.MatMul(_subspace(r, frame).T, r.vector("Phi", frame)))
+            lines.append(Equation(r.vector("Phi", frame), total(terms, r.size)))
+            if moves(frame):
+                force.append(sp.MatMul(subspace_of(r, frame).T, r.vector("Phi", frame)))
         if frame.free:
-            lines.append(Equation(r.joint("F", frame), _sum(force, len(frame.v))))
+            lines.append(Equation(r.joint("F", frame), total(force, len(frame.v))))
     words = (
         "The same F as in M dv/dt + V + G = F, joint by joint; M, V and G do not depend on it. Φ "
         "is the sum of the loads f on a frame and on all that hangs on it, moved to its origin; "
@@ -138,24 +154,11 @@ def _applied(r: Recursion) -> Step:
     return Step("", "Applied forces, term by term", words, tuple(lines))
 
 
-def _algorithm(r: Recursion) -> str:
-    plane = r.size == 3
-    vectors = (
-        "A motion is a column of ω_z, v_x, v_y and a force one of n_z, f_x, f_y"
-        if plane
-        else "A motion is a column of ω and v, a force one of n and f, six components each"
-    )
-    return (
-        f"{ABOUT}\n\n{vectors}, at the origin of a frame and in its axes. A frame moves on its "
-        "parent by one joint primitive, with the motion subspace S; a joint with several "
-        "primitives is a chain of frames, all but the last without mass. R turns axes of the "
-        "frame into the parent's, r runs from the parent's origin to its own, X takes motions "
-        "from the parent to the frame, and its transpose takes forces back. The matrix of r × is "
-        "written r^×. I is the inertia of the frame's own body at the frame's origin, × the cross "
-        "product of two motions, and ×* that of a motion and a force. D is a number for one "
-        "degree of freedom, and a matrix of three rows for a ball. It is positive for positive "
-        "masses, so no division can fail."
-    )
+def frame_steps(r: Recursion, words: str) -> Iterator[Step]:
+    """What the algorithm is, and the constants of each frame."""
+    yield Step("", "The algorithm", words, ())
+    for k, frame in enumerate(r.frames):
+        yield Step("", f"Frame `{frame.name}`: {_kind(r, k)}", "", tuple(_constants(r, frame)))
 
 
 def _kind(r: Recursion, k: int) -> str:
@@ -202,7 +205,7 @@ def _constants(r: Recursion, frame: Frame) -> Iterator[Equation]:
     moved = sp.MatMul(-1, rotation.T, lever) if any(frame.offset) else nothing
     transform = sp.BlockMatrix([[rotation.T, nothing], [moved, rotation.T]])
     yield Equation(r.matrix("X", frame), transform)
-    if _moves(frame):
+    if moves(frame):
         subspace = motion_subspace(frame.kind, frame.axis)
         name = sp.MatrixSymbol(f"S_{frame.name}", *subspace.shape)
         blocks = sp.BlockMatrix([[sp.Identity(3)], [nothing]])
@@ -231,54 +234,59 @@ def _column(vector: Expr) -> Expr:
     return sp.Transpose(sp.ImmutableMatrix(vector.T))
 
 
-def _outward_words(r: Recursion) -> str:
+def outward_words(r: Recursion) -> str:
+    """What the velocities of the frames are, in words."""
     words = (
-        "v is the velocity of a frame, c what the velocities alone make of its acceleration, and p "
+        "v is the velocity of a frame, ζ what the velocities alone make of its acceleration, and p "
         "the force that would leave its body without acceleration: of inertia, less the loads f of "
         "the effects, whose components are named with the effects."
     )
     if r.still:
-        words += " The scene leaves the velocity forces out: c and the inertial part of p are 0."
+        words += " The scene leaves the velocity forces out: ζ and the inertial part of p are 0."
     return words
 
 
-def _subspace(r: Recursion, frame: Frame) -> Expr:
+def subspace_of(r: Recursion, frame: Frame) -> Expr:
+    """S of a frame."""
     return sp.MatrixSymbol(f"S_{frame.name}", r.size, len(frame.v))
 
 
-def _moves(frame: Frame) -> bool:
+def moves(frame: Frame) -> bool:
+    """Whether a frame moves on its parent."""
     return frame.kind != "fixed"
 
 
-def _velocities(r: Recursion, k: int) -> Iterator[Equation]:
+def velocities(r: Recursion, k: int) -> Iterator[Equation]:
+    """v, ζ, f and p of a frame."""
     frame = r.frames[k]
     v, own = r.vector("v", frame), None
-    if _moves(frame):
-        own = sp.MatMul(_subspace(r, frame), r.rate(frame))
+    if moves(frame):
+        own = sp.MatMul(subspace_of(r, frame), r.rate(frame))
         if len(frame.v) > 1:
             yield Equation(r.rate(frame), sp.Matrix(frame.v))
     terms = [own] if own is not None else []
     if frame.parent >= 0:
         terms.insert(0, sp.MatMul(r.matrix("X", frame), r.vector("v", r.frames[frame.parent])))
-    yield Equation(v, _sum(terms, r.size))
+    yield Equation(v, total(terms, r.size))
     c = []
     if own is not None and frame.parent >= 0 and not r.still:
         c.append(MotionCross(v, own))
     if frame.given:
-        c.append(sp.MatMul(_subspace(r, frame), r.rate(frame, 2)))
-    yield Equation(r.vector("c", frame), _sum(c, r.size))
+        c.append(sp.MatMul(subspace_of(r, frame), r.rate(frame, 2)))
+    yield Equation(r.vector("zeta", frame), total(c, r.size))
     loads = _wrench(r, frame)
     if loads:
-        yield Equation(r.vector("f", frame), _sum(loads, r.size))
+        yield Equation(r.vector("f", frame), total(loads, r.size))
     bias = []
     if frame.body >= 0 and not r.still:
         bias.append(ForceCross(v, sp.MatMul(r.matrix("I", frame), v)))
     if loads:
         bias.append(sp.MatMul(-1, r.vector("f", frame)))
-    yield Equation(r.vector("p", frame), _sum(bias, r.size))
+    yield Equation(r.vector("p", frame), total(bias, r.size))
 
 
-def _sum(terms: Sequence[Expr], rows: int, columns: int = 1) -> Expr:
+def total(terms: Sequence[Expr], rows: int, columns: int = 1) -> Expr:
+    """A sum of matrices; 0 without terms."""
     if not terms:
         return sp.ZeroMatrix(rows, columns)
     return terms[0] if len(terms) == 1 else sp.MatAdd(*terms)
@@ -313,10 +321,10 @@ def _one_wrench(load: Load, frame: Frame, name: str, size: int) -> list[Expr]:
     if any(load.torque):
         moments.append(sp.MatMul(back, sp.ImmutableMatrix(load.torque)))
     lower = force if any(load.force) else sp.ZeroMatrix(3, 1)
-    return [sp.BlockMatrix([[_sum(moments, 3)], [lower]])]
+    return [sp.BlockMatrix([[total(moments, 3)], [lower]])]
 
 
-def _joint_force(r: Recursion, frame: Frame) -> Expr:
+def joint_force(r: Recursion, frame: Frame) -> Expr:
     """The loads along a frame's own coordinates."""
     parts = [sp.Integer(0)] * len(frame.v)
     start = [f.name for f in r.frames if f.joint == frame.joint].index(frame.name)
@@ -338,17 +346,17 @@ def _articulated(r: Recursion, k: int) -> Iterator[Equation]:
         x = r.matrix("X", child)
         inertias.append(sp.MatMul(x.T, r.matrix("I^a", child), x))
         forces.append(sp.MatMul(x.T, r.vector("p^a", child)))
-    yield Equation(whole, _sum(inertias, size, size))
-    yield Equation(bias, _sum(forces, size))
+    yield Equation(whole, total(inertias, size, size))
+    yield Equation(bias, total(forces, size))
     handed = (r.matrix("I^a", frame), r.vector("p^a", frame))
-    c = r.vector("c", frame)
+    c = r.vector("zeta", frame)
     if not frame.free:
         if frame.parent >= 0:
             yield Equation(handed[0], whole)
             yield Equation(handed[1], sp.MatAdd(bias, sp.MatMul(whole, c)))
         return
     n = len(frame.v)
-    subspace, column = _subspace(r, frame), sp.MatrixSymbol(f"U_{frame.name}", size, n)
+    subspace, column = subspace_of(r, frame), sp.MatrixSymbol(f"U_{frame.name}", size, n)
     pivot, left = r.joint("D", frame, n), r.joint("u", frame)
     yield Equation(column, sp.MatMul(whole, subspace))
     along = sp.MatMul(subspace.T, column)
@@ -356,7 +364,7 @@ def _articulated(r: Recursion, k: int) -> Iterator[Equation]:
         along = sp.MatAdd(along, sp.ImmutableMatrix(frame.armature * sp.eye(n)))
     yield Equation(pivot, along)
     pull = sp.MatMul(-1, subspace.T, bias)
-    tau = _joint_force(r, frame)
+    tau = joint_force(r, frame)
     yield Equation(left, sp.MatAdd(tau, pull) if any(tau) else pull)
     if frame.parent >= 0:
         taken = sp.MatMul(-1, column, sp.Inverse(pivot), column.T)
@@ -370,9 +378,9 @@ def _accelerations(r: Recursion, k: int) -> Iterator[Equation]:
     before, after = r.vector("a'", frame), r.vector("a", frame)
     base = sp.MatrixSymbol("a_world", r.size, 1)
     if k == 0:
-        yield Equation(base, _falling(r))
+        yield Equation(base, falling(r))
     above = r.vector("a", r.frames[frame.parent]) if frame.parent >= 0 else base
-    c = r.vector("c", frame)
+    c = r.vector("zeta", frame)
     reached = sp.MatAdd(sp.MatMul(r.matrix("X", frame), above), c)
     if not frame.free:
         yield Equation(after, reached)
@@ -382,15 +390,17 @@ def _accelerations(r: Recursion, k: int) -> Iterator[Equation]:
     rest = sp.MatAdd(r.joint("u", frame), sp.MatMul(-1, column.T, before))
     rate = r.rate(frame, 2)
     yield Equation(rate, sp.MatMul(sp.Inverse(r.joint("D", frame, len(frame.v))), rest))
+    if len(frame.a) > 1:
+        yield Equation(sp.Matrix(frame.a), rate)
     if r.children(k):
-        yield Equation(after, sp.MatAdd(before, sp.MatMul(_subspace(r, frame), rate)))
+        yield Equation(after, sp.MatAdd(before, sp.MatMul(subspace_of(r, frame), rate)))
 
 
-def _falling(r: Recursion) -> Expr:
-    """Minus the acceleration of uniform gravity."""
+def falling(r: Recursion) -> Expr:
+    """Minus the acceleration of uniform gravity, a spatial vector."""
     mechanism: Any = NamingMechanism(r.model, Notes())
-    total = sp.zeros(r.model.dimensions, 1)
+    fall = sp.zeros(r.model.dimensions, 1)
     for derived in r.effects:
         if derived.falls:
-            total -= sp.Matrix(derived.effect.acceleration(mechanism))
-    return sp.Matrix([0] * (r.size - r.model.dimensions) + list(total))
+            fall -= sp.Matrix(derived.effect.acceleration(mechanism))
+    return sp.Matrix([0] * (r.size - r.model.dimensions) + list(fall))

@@ -168,7 +168,7 @@ def plain_form(model: Model, accelerations: Sequence[Expr]) -> WrittenForm:
         ]
     order = {c.name: i for i, c in enumerate(model.coordinates)}
     both = sorted(zip(states, rates, strict=True), key=lambda pair: order[pair[0].name])
-    states, rates = [s for s, _ in both], [r for _, r in both]
-    states += [real(c.name) for c in model.velocities]
-    rates += list(accelerations)
+    both += zip((real(c.name) for c in model.velocities), accelerations, strict=True)
+    own = {*model.states}
+    states, rates = ([pair[i] for pair in both if pair[0].name in own] for i in (0, 1))
     return WrittenForm(tuple(states), tuple(rates), ())

@@ -27,7 +27,7 @@ TERMS: Mapping[str, str] = {
     "delta": "linear acceleration of {}, beside that at v̇ = 0",
     "omega": "angular velocity ω of {}",
     "velocity": "velocity v of {}",
-    "bias": "acceleration of {} at v̇ = 0: c of the recursion, α and a of the closed form",
+    "bias": "acceleration of {} at v̇ = 0: ζ of the recursion, α and a of the closed form",
     "angle": "angle ψ of {}",
     "moment": "first moment of mass m c of {}: in the inertia I of its frame",
     "inertia": "moment of inertia of {}: in the inertia I of its frame",

@@ -44,8 +44,9 @@ class ProjectedEquations:
     solution: Solution
 
 
-def derive_projected(model: Model) -> ProjectedEquations:
-    """Derive and solve; see the modules of this package for each step.
+def derive_projected(model: Model, *, solving: bool = True) -> ProjectedEquations:
+    """Derive and solve; see the modules of this package for each step. Without `solving`, the
+    definitions of `solution` are those of the motion alone.
 
     Raises `SceneError` for a model that is too large to be read or derived.
     """
@@ -61,7 +62,9 @@ def derive_projected(model: Model) -> ProjectedEquations:
     motions = body_motions(model, constraints, applied_loads.uniform, world, ledger, symbols)
     equations = balance(model, symbols, bodies, motions, applied_loads, world, ledger)
     before = len(ledger.definitions)
-    solution = solve(model, symbols, bodies, motions, applied_loads, world, ledger)
+    solution = Solution(ledger.definitions, (), ())
+    if solving:
+        solution = solve(model, symbols, bodies, motions, applied_loads, world, ledger)
     return ProjectedEquations(
         model, symbols, bodies, constraints, motions, applied_loads, equations, before, solution
     )

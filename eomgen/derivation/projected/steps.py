@@ -19,6 +19,8 @@ LONGEST = 160
 """Operations of an expression up to which it is gathered for reading."""
 SLACK = 2.5
 """How much longer than its shortest form a sum may be whose terms are to be seen."""
+POWER = "Virtual power"
+"""The title of the step with the mass matrix."""
 ROTATIONS = ("R__", "k__")
 """How names of entries of rotations begin, which are shown with their joint."""
 
@@ -33,7 +35,9 @@ def projected_steps(equations: ProjectedEquations) -> tuple[Step, ...]:
         return expression.xreplace(numbers).xreplace(shown)
 
     steps = []
-    parts = (*_joints(equations), *_balance(equations), *_solution(equations))
+    solved = {*equations.symbols.a} <= {*equations.solution.definitions}
+    ends = _solution(equations) if solved else ()
+    parts = (*_joints(equations), *_balance(equations), *ends)
     for number, (title, words, pairs) in enumerate(parts, 1):
         lines = [Equation(read(left), read(right)) for left, right in pairs]
         kept = tuple(line for line in lines if line.left != line.right)
@@ -159,7 +163,7 @@ def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
         )
     weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
     yield (
-        "Virtual power",
+        POWER,
         "For every velocity that the joints leave free, the forces of inertia do the work of "
         f"the loads: m a for each body's force{weights}. Forces in the joints do none. This is "
         "M dv/dt + V + G = F; first the mass matrix,",

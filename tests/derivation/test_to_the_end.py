@@ -1,0 +1,110 @@
+"""Derivations read to their end: Ẏ by nothing but the printed equations is that of the module."""
+
+import sys
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from campaign import some
+from followed import LookedUp, instant
+
+import eomgen
+from eomgen.derivation.dots import dotted
+from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.assur import with_closed_form
+from eomgen.model.elaborate import elaborate
+from eomgen.model.model import Model
+from eomgen.scene.built_in import built_in_names
+from eomgen.scene.reader import parse_scene, read_scene
+
+ATWOOD = """
+name = "atwood"
+dimensions = 2
+parameters = { m_1 = 2.0, m_2 = 1.5, m_3 = 0.8, R = 0.1, g = 9.81 }
+bodies = [
+    { name = "left", mass = "m_1", inertia_com = 0 },
+    { name = "right", mass = "m_2", inertia_com = 0 },
+    { name = "pulley", mass = "m_3", inertia_com = "m_3*R**2/2" },
+]
+joints = [
+    { name = "rope_1", type = "prismatic", parent = "world", child = "left", axis = [0, 1], coordinate = "y" },
+    { name = "rope_2", type = "prismatic", parent = "world", child = "right", axis = [0, 1], coordinate = "h" },
+    { name = "axle", type = "revolute", parent = "world", child = "pulley", coordinate = "theta" },
+]
+constraints = [
+    { type = "coupling", name = "rope", coordinate = "h", equals = "-y" },
+    { type = "coupling", name = "grip", coordinate = "theta", equals = "y/R" },
+]
+effects = [{ type = "gravity", g = "g" }]
+"""  # noqa: E501
+LOOPS = ("four_bar", "slider_crank", "differential", "peaucellier", "rattleback", "bicycle",
+         "car_suspension", "stewart_platform")  # fmt: skip
+SCENES = some((ATWOOD, *LOOPS, "two_body_forced", "furuta_pendulum"), (ATWOOD, *built_in_names()))
+
+
+@cache
+def model_of(scene: str) -> Model:
+    """The model of a built-in scene or of a text, as its derivation takes it."""
+    found = parse_scene(scene) if "\n" in scene else read_scene(scene)
+    return with_closed_form(assembled(elaborate(found)))
+
+
+@pytest.mark.every(2)
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_last_step_by_the_printed_equations(scene: str) -> None:
+    """Each entry of Ẏ looked up, and what it needs looked up in turn; Y is the module's state."""
+    model, found = model_of(scene), eomgen.derive(scene)
+    module = eomgen.load(eomgen.generate(scene))
+    sys.setrecursionlimit(20_000)
+    for seed in range(2):
+        at = instant(model, seed, 0.02, closed=bool(model.constraints))
+        start = {name: x for name, x in at.known.items() if not _follows(model, name)}
+        known = LookedUp(model, found.steps, start)
+        own, rates = (list(line.right) for line in found.steps[-1].equations[:2])
+        assert len(own) == len(module.STATES)
+        y = np.array([at.known[name] for name in module.STATES])
+        inputs = {i.name: at.known[i.name] for i in model.inputs}
+        want = module.derivative(0.4, y, None, inputs) if inputs else module.derivative(0.4, y)
+        ours = np.array([float(np.ravel(known[rate.name])[0]) for rate in rates])
+        order = [[s.name for s in own].index(_read(model, name)) for name in module.STATES]
+        size = max(1.0, float(np.abs(want).max()))
+        assert float(np.abs(ours[order] - want).max()) < 1e-6 * size
+
+
+def _follows(model: Model, name: str) -> bool:
+    """Whether a coordinate or velocity follows from others."""
+    every = {c.name for c in (*model.coordinates, *model.velocities)}
+    return name in every - {*model.states}
+
+
+def _read(model: Model, name: str) -> str:
+    from eomgen.exposition.reading import reading_names
+
+    return reading_names(model).get(name, name)
+
+
+def test_atwood_as_in_textbooks() -> None:
+    """ÿ = (m₂ - m₁) g / (m₁ + m₂ + m₃/2), and no multiplier in M, V, G, F and the solution."""
+    found = eomgen.derive(ATWOOD)
+    (rate,) = found.solution.values()
+    m_1, m_2, m_3, g = (found.symbols[x] for x in ("m_1", "m_2", "m_3", "g"))
+    assert sp.simplify(rate - (m_2 - m_1) * g / (m_1 + m_2 + m_3 / 2)) == 0
+    assert found.M.shape == (1, 1)
+    text = found.text()
+    assert "−g⋅(m_1 − m_2)" in text.split(") Solved")[1]
+
+
+@pytest.mark.parametrize("scene", some(("four_bar",), ("four_bar", "slider_crank", "differential")))
+def test_no_multiplier_is_left_in_a_solution(scene: str) -> None:
+    """M, V, G, F and the accelerations are free of λ; λ stands in the step on forces only."""
+    found = eomgen.derive(scene)
+    parts: list[Any] = [found.M, found.V, found.G, found.F, *found.matrices.definitions]
+    names = {s.name for e in parts for s in sp.sympify(e).free_symbols}
+    assert not any(name.startswith("lambda_") for name in names)
+    before = [step for step in found.steps if "forces of the constraints" not in step.title]
+    solved = next(step for step in before if step.title == "Solved")
+    used = {s.name for line in solved.equations for s in line.right.free_symbols}
+    assert not any(name.startswith("lambda") for name in used), used
+    assert any(dotted("x", 2).partition("x")[2] in line.left.name for line in solved.equations)
