@@ -1,6 +1,8 @@
 """Programs for other tools: `export`."""
 
+import warnings
 from collections.abc import Callable
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -40,13 +42,15 @@ def export(
     force    also overwrite files that this program did not write
 
     Raises `SceneError` or `RunError` if the scene has something that the format cannot hold, or a
-    file cannot be written; then none of them is written.
+    file cannot be written; then none of them is written. Warns of what they lack, such as a
+    binary that the compiler did not make.
     """
     scene = read(source)
     model = modelled(scene, form=form, route=route, outputs=outputs)
     target = None if path is None else Path(path)
     options = Options(number=number, integrator=integrator, simulation=scene.simulation)
-    return exported(model, format, target, options, force=force)
+    remark = partial(warnings.warn, stacklevel=3)
+    return exported(model, format, target, options, force=force, remark=remark)
 
 
 def exported(

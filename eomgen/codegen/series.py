@@ -7,6 +7,7 @@ from eomgen.codegen.interface import Function, Interface
 from eomgen.program.program import Output, Program
 from eomgen.program.taylor import NoSeriesError, Recurrences, recurrences
 from eomgen.program.taylor_text import SeriesText, series_text
+from eomgen.subset.languages import Language
 
 FIXED = "fixed"
 """The function of what the recurrences need that depends on parameters and inputs alone."""
@@ -37,3 +38,14 @@ def with_series(program: Program, interface: Interface) -> tuple[Program, Interf
         replace(interface, functions=(*interface.functions, function)),
         text,
     )
+
+
+def series_functions(text: SeriesText, language: Language) -> str:
+    """The source of the recurrences, `first_coefficients` and `next_coefficients`."""
+    # Imported here because the printer takes a while.
+    from eomgen.subset.expander import Text
+    from eomgen.subset.printing import printed
+
+    functions = Text()
+    functions.add(text.source)
+    return printed(functions, [(name, {}) for name in functions.functions], language)

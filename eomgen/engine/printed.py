@@ -59,6 +59,7 @@ EQUAL: Mapping[str, Root] = {
 METHODS: Mapping[str, Root] = {
     **EQUAL,
     "DOP853": ("made", {"method": DOP853}),
+    "taylor": ("expanded", {}),
     "Rodas5P": ("rodas_step", {}),
 }
 """What makes a step, by the names of all methods of the engine."""
@@ -76,7 +77,7 @@ ON_PAGES: tuple[Root, ...] = (
 RECORDS: tuple[type, ...] = (
     *(adaptive.Bounds, adaptive.Progress, contacts.Touching, contact_runs.Place),
     *(branches.Switches, crossings.Watch, elimination.Factors, explicit.Split, explicit.Step),
-    *(implicit.Stages, rattle.Linked, rosenbrock.Rodas, symmetric.Projected, taylor.Room),
+    *(implicit.Stages, rattle.Linked, rosenbrock.Rodas, symmetric.Projected, taylor.Terms),
 )
 """What it gives them."""
 SIZES = ("STATES", "POSITIONS", "OTHERS", "CONTACTS", "PRESSED", "FIRST", "PRODUCTS", "ORDERS")

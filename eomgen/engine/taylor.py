@@ -52,7 +52,7 @@ AT_ONCE = 4
 class Recurrences(Protocol):
     """The series of a mechanism; see `eomgen.program.taylor_text`."""
 
-    def begun(
+    def started(
         self,
         t: float,
         y: Annotated[Vector, "STATES"],
@@ -86,7 +86,7 @@ class Recurrences(Protocol):
 
 
 @dataclass(slots=True)
-class Room:
+class Terms:
     """Where coefficients are computed: the first ones, sums of products, and those of factors."""
 
     first: Annotated[Vector, "FIRST"]
@@ -135,12 +135,12 @@ def convolved(
         n += AT_ONCE
 
 
-def _expanded(of: Any, t: float, y: Vector, order: int, room: Room, rows: Matrix) -> None:
+def _expanded(of: Any, t: float, y: Vector, order: int, room: Terms, rows: Matrix) -> None:
     """As `expanded`, with numbers in lists where they are taken one by one."""
     first, n = room.first.tolist(), room.left.shape[1]
     state, rates = y.tolist(), [0.0] * len(y)
     left, right = [0.0] * n, [0.0] * n
-    of.begun(t, state, first, rates)
+    of.started(t, state, first, rates)
     rows[0], rows[1] = y, rates
     for k in range(1, order):
         of.sums_of_products(k, room.left, room.right, room.sums)
@@ -155,12 +155,12 @@ def expanded(
     t: float,
     y: Annotated[Vector, "STATES"],
     order: int,
-    room: Room,
+    room: Terms,
     rows: Annotated[Matrix, "ORDERS", "STATES"],
 ) -> None:
     """The Taylor coefficients of the solution from y at t on, up to an order of at least 2."""
     rows[0] = y
-    of.begun(t, y, room.first, rows[1])
+    of.started(t, y, room.first, rows[1])
     for k in range(1, order):
         of.sums_of_products(k, room.left, room.right, room.sums)
         of.extended(k, room.first, room.sums, rows[k], rows[k + 1], room.left[k], room.right[k])
@@ -215,7 +215,7 @@ def taylor_steps(
     at: Progress,
     state: Annotated[Vector, "STATES"],
     loss: Annotated[Vector, "STATES"],
-    room: Room,
+    room: Terms,
     rows: Annotated[Matrix, "ORDERS", "STATES"],
     kept: Records,
 ) -> int:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from eomgen.base.templating import render, templates_folder
 from eomgen.codegen.backends import c
+from eomgen.codegen.series import series_functions
 from eomgen.engine import contact_runs, contacts
 from eomgen.engine.crossings import MOST_PARTS
 from eomgen.engine.embedded import DOP853
@@ -15,6 +16,7 @@ from eomgen.native.functions import restricted
 from eomgen.program.ordering import ordered
 from eomgen.program.tape import TIME
 from eomgen.run import events
+from eomgen.run.integrators.taylor import HIGHEST
 from eomgen.subset.languages import C
 
 HEADERS = ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h")
@@ -66,14 +68,17 @@ def _main(unit: Unit, token: str, method: Method) -> str:
         **_contacts(unit, method),
         "rows": unit.interface.projected,
         "drift": repr(DRIFT),
-        "step": step_of(method, interface, unit.size, C, text(), _more(unit, method)),
-        "method": method.name,
+        "step": step_of(method, interface, unit.size, C, text(), _more(unit, method), unit.series),
+        "series": unit.series,
+        "series_functions": series_functions(unit.series, C) if unit.series else "",
+        "orders": HIGHEST + 1,
+        "by_slopes": method.name == "DOP853" or (unit.series and interface.contacts),
         "adapts": method.adapts,
         "solves": "jacobian" in method.needed,
         "dt": repr(unit.simulation.dt),
         "slopes": len(DOP853.nodes),
         "last": DOP853.last,
-        "parts": method.parts(interface),
+        "parts": method.parts(interface, unit.series),
         "timed": _timed(unit),
     }
     return render("fmu", "unit.c.jinja", context)
@@ -83,8 +88,12 @@ def _more(unit: Unit, method: Method) -> Iterator[Root]:
     """What is called of the engine beside steps: states within them only where events are."""
     contacts = unit.interface.contacts
     yield ("first_length" if method.adapts else "add_compensated"), {}
+    if unit.series:
+        yield from [(name, {}) for name in ("reach", "change_after", "round_off", "convolved")]
+        if contacts:  # while they are held there are no series
+            yield "made", {"method": DOP853}
     if method.adapts and (unit.switches or contacts):
-        if method.needed:
+        if "jacobian" in method.needed:
             yield "rodas_within", {}
         else:
             yield "interpolate", {"method": DOP853}
@@ -93,7 +102,7 @@ def _more(unit: Unit, method: Method) -> Iterator[Root]:
         yield "passed_over", {}
     if contacts:
         yield from CONTACTS
-        if method.needed:
+        if "jacobian" in method.needed:
             yield "differences", {}
 
 

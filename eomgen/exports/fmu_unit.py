@@ -9,6 +9,7 @@ import numpy as np
 
 from eomgen.base.errors import RunError, SceneError
 from eomgen.codegen.interface import Function, Interface, Variable
+from eomgen.codegen.series import FIXED, with_series
 from eomgen.exports.directions import with_directions
 from eomgen.exports.steps import size_of, start_of
 from eomgen.exports.units import rate_of
@@ -17,6 +18,7 @@ from eomgen.native.functions import restricted
 from eomgen.program.program import Program, interpret
 from eomgen.program.switching import OF_STATE, OF_TIME
 from eomgen.program.tape import TIME
+from eomgen.program.taylor_text import SeriesText
 from eomgen.run.sizes import state_sizes
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Simulation
@@ -56,6 +58,7 @@ class Unit:
     outputs   what it observes beside the states
     gaps      of rigid contacts, and `switches`, the functions whose signs select a branch of the
               derivative: its event indicators
+    series    the text of its Taylor series, if steps are made by them
     """
 
     program: Program
@@ -67,6 +70,7 @@ class Unit:
     outputs: tuple[Observed, ...]
     gaps: tuple[Observed, ...]
     switches: tuple[Observed, ...]
+    series: SeriesText | None
 
     @property
     def rates(self) -> tuple[Variable, ...]:
@@ -111,6 +115,9 @@ def unit_of(model: Model, simulation: Simulation, needed: Sequence[str] = ()) ->
     starts = start_of(program, interface)
     names = [name for name in (*KERNELS, *needed) if name in program.outputs]
     program, interface = restricted(program, interface, names)
+    series = None
+    if FIXED in needed:
+        program, interface, series = with_series(program, interface)
     size, nominals = _sizes(program, interface, starts)
     observed = (*_energies(), *_positions(interface))
     gaps = _gaps(interface)
@@ -121,7 +128,8 @@ def unit_of(model: Model, simulation: Simulation, needed: Sequence[str] = ()) ->
         *((o.function, o.picks) for o in (*observed, *gaps, *switches)),
     ]
     program, interface = with_directions(program, interface, entries)
-    return Unit(program, interface, simulation, starts, nominals, size, observed, gaps, switches)
+    sizes = starts, nominals, size
+    return Unit(program, interface, simulation, *sizes, observed, gaps, switches, series)
 
 
 def _sizes(

@@ -10,6 +10,7 @@ from eomgen.base.errors import RunError, nearest
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
+from eomgen.codegen.series import FIXED
 from eomgen.engine import projection
 from eomgen.engine.elimination import Factors
 from eomgen.engine.implicit import Stages
@@ -17,10 +18,13 @@ from eomgen.engine.printed import METHODS, Root, Roots
 from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import Rodas
 from eomgen.engine.symmetric import Projected
+from eomgen.engine.taylor import Terms
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
+from eomgen.program.taylor_text import SeriesText
 from eomgen.run.integrators import INTEGRATORS, Adaptive, rattle
 from eomgen.run.integrators.leapfrog import split_of
+from eomgen.run.integrators.taylor import HIGHEST
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
 from eomgen.run.sizes import mechanism_size
@@ -87,8 +91,11 @@ class Method:
     @property
     def needed(self) -> tuple[str, ...]:
         """Functions of the module that it calls, beside the derivative and those of projection."""
-        jacobian = ("jacobian",) if self._one[0] in _IMPLICIT else ()
-        return (*jacobian, *(name for _, name in self.linkage if name != "derivative"))
+        own = {"expanded": (FIXED,), **dict.fromkeys(_IMPLICIT, ("jacobian",))}
+        return (
+            *own.get(self._one[0], ()),
+            *(name for _, name in self.linkage if name != "derivative"),
+        )
 
     @property
     def roots(self) -> Iterator[Root]:
@@ -101,8 +108,8 @@ class Method:
     def _one(self) -> Root:
         return self.of or self.root
 
-    def parts(self, interface: Interface) -> list["Part"]:
-        """The records that a step is given, with room for their arrays."""
+    def parts(self, interface: Interface, series: SeriesText | None = None) -> list["Part"]:
+        """The records that a step is given, with room for their arrays, as for `series`."""
         (function, known), n = self._one, len(interface.states)
         many = len(known["method"].b) if "method" in known and function in _IMPLICIT else 1
         nq, nv, rows = interface.coordinates, interface.velocities, len(interface.constraints)
@@ -119,6 +126,14 @@ class Method:
             factors |= {"first": n, "second": 2 * rows}
         if function == "rodas_step":
             found.append(Part("rodas", Rodas, {"positions": leading(interface), "STATES": n}))
+        if series:
+            found.append(
+                Part(
+                    "room_of",
+                    Terms,
+                    {"FIRST": series.first, "PRODUCTS": series.products, "ORDERS": HIGHEST + 1},
+                )
+            )
         if function == "rattle":
             found.append(Part("room_of", Linked, {"n": nv, "rows": rows}))
             factors = {"first": nv, "second": nv, "third": rows}
@@ -303,6 +318,7 @@ def step_of(
     language: Language,
     text: Text,
     more: Roots = (),
+    series: SeriesText | None = None,
 ) -> str:
     """C that makes steps of a mechanism of this size, m, by a method, and puts states on its
     constraints. It has what the engine's `text` prints of the roots `more`, too.
@@ -317,6 +333,6 @@ def step_of(
         "velocities": interface.velocities,
         "rates": [language.literal.format(repr(x)) for x in method.rates],
         "method": method.values(interface),
-        "parts": method.parts(interface),
+        "parts": method.parts(interface, series),
     }
     return render(c.TEMPLATES, "step.c.jinja", values)

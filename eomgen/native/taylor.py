@@ -11,9 +11,9 @@ from eomgen.base.loading import load_source
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
-from eomgen.codegen.series import recurrences_of
+from eomgen.codegen.series import recurrences_of, series_functions
 from eomgen.engine.adaptive import AT_END, UNUSUAL, Bounds, Progress, Records
-from eomgen.engine.taylor import Room, convolved, expanded
+from eomgen.engine.taylor import Terms, convolved, expanded
 from eomgen.native.memory import address, placed
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
@@ -33,13 +33,9 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
     """The C source of the series and the steps."""
     # Imported here because runs whose library is in the store do without the printer.
     from eomgen.engine.printed import c_source
-    from eomgen.subset.expander import Text
     from eomgen.subset.languages import VECTORS, C
-    from eomgen.subset.printing import printed
 
     text = series_text(recurrences_of(program, interface), [s.name for s in interface.states])
-    functions = Text()
-    functions.add(text.source)
     by_four = replace(C, listed="*(V *)&{first} = (V){{ {entries} }};")
     context = {
         "states": len(interface.states),
@@ -48,7 +44,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "prelude": C.prelude,
         "engine": c_source([("taylor_steps", {}), ("normalised", {})]),
         "convolved": c_source([("convolved", {})], VECTORS),
-        "functions": printed(functions, [(name, {}) for name in functions.functions], by_four),
+        "functions": series_functions(text, by_four),
         "quaternions": interface.quaternions,
     }
     return {MAIN: render(c.TEMPLATES, "taylor.c.jinja", context)}
@@ -91,17 +87,17 @@ class InPython:
         self._first, self._next = text.first_coefficients, text.next_coefficients
         self._fixed = fixed
 
-    def begun(self, t: float, y: Any, first: Any, rates: Any) -> None:
+    def started(self, t: float, y: Any, first: Any, rates: Any) -> None:
         self._first(t, y, self._fixed, first, rates)
 
     def extended(self, k: int, first: Any, *others: Any) -> None:
         self._next(k, self._fixed, first, *others)
 
 
-def room_of(text: SeriesText, kind: Any = float) -> Room:
+def room_of(text: SeriesText, kind: Any = float) -> Terms:
     """Room for the series of a text, in numbers of a kind."""
     shapes = (text.first,), (text.products,), *[(HIGHEST + 1, text.products)] * 2
-    return Room(*(np.zeros(shape, kind) for shape in shapes))
+    return Terms(*(np.zeros(shape, kind) for shape in shapes))
 
 
 def plain_series(program: Program, interface: Interface, module: Any, p: Any, u: Any) -> Series:

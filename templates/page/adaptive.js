@@ -63,10 +63,10 @@ const adaptive = (() => {
   const taylor = (free, system, run) => {
     const { ny, steps, series } = free;
     const order = Math.ceil(5 - Math.log(RTOL) / 2);
-    const room = steps.records.Room({});
+    const room = steps.records.Terms({});
     const fixed = series.fixed(...free.arguments()).slice();
     const of = {
-      begun: (t, y, first, rates) => series.first(t, y, fixed, first, rates),
+      started: (t, y, first, rates) => series.first(t, y, fixed, first, rates),
       extended: (k, ...given) => series.next(k, fixed, ...given),
       sums_of_products: steps.convolved,
     };

@@ -303,3 +303,15 @@ def test_units_have_their_dimensions(folder: Path) -> None:
     description = read_model_description(str(unit(folder, "cart_pole")))
     units = {each.name: each.baseUnit for each in description.unitDefinitions}
     assert (units["J"].kg, units["J"].m, units["J"].s) == (1, 2, -2)
+
+
+def test_a_unit_that_does_not_compile_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A warning, and in a terminal a line."""
+    monkeypatch.setattr("eomgen.exports.fmu.FLAGS", ("-Ddouble=none",))
+    path = tmp_path / "unit.fmu"
+    with pytest.warns(UserWarning, match="the unit has sources alone: .*error"):
+        eomgen.export("pendulum", "fmu", path, integrator="Rodas5P")
+    with zipfile.ZipFile(path) as made:
+        assert not [name for name in made.namelist() if name.startswith("binaries")]

@@ -9,12 +9,14 @@ from eomgen.base.templating import render
 from eomgen.codegen.backends.division import divided
 from eomgen.codegen.interface import Interface, Variable
 from eomgen.codegen.kernels import Kernel, kernels_of
+from eomgen.codegen.series import series_functions
 from eomgen.program.ordering import ordered
 from eomgen.program.printing import Dialect
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
 from eomgen.program.taylor_text import SeriesText
 from eomgen.scalars.functions import FUNCTIONS
+from eomgen.subset.languages import JAVASCRIPT
 
 SUFFIXES: tuple[str, ...] = (".js",)
 TEMPLATES = "javascript"
@@ -139,21 +141,9 @@ def mechanism(
         "contacts": json.dumps(list(contacts)),
         "constraints": json.dumps([force for _, force in interface.constraints]),
         "series": series,
-        "series_functions": _of_series(series) if series else "",
+        "series_functions": series_functions(series, JAVASCRIPT) if series else "",
     }
     return render(TEMPLATES, "mechanism.js.jinja", context)
-
-
-def _of_series(series: SeriesText) -> str:
-    """The source of the functions of Taylor series."""
-    # Imported here because the printer takes a while.
-    from eomgen.subset.expander import Text
-    from eomgen.subset.languages import JAVASCRIPT
-    from eomgen.subset.printing import printed
-
-    functions = Text()
-    functions.add(series.source)
-    return printed(functions, [(name, {}) for name in functions.functions], JAVASCRIPT)
 
 
 def _of_page(program: Program, interface: Interface) -> tuple[Program, Interface]:
