@@ -274,12 +274,11 @@ class Run:
         Raises `RunError` for another suffix, without ffmpeg, or if the file exists and this program
         did not write it.
         """
+        from eomgen.show.filming import FilmOptions
         from eomgen.show.plotting import filmed
 
-        times = (start, end)
-        return filmed(
-            self.trajectory, self.motion, Path(path), fps, speed, times, size, force, progress
-        ).path
+        options = FilmOptions(fps=fps, speed=speed, start=start, end=end, size=size, force=force)
+        return filmed(self.trajectory, self.motion, Path(path), options, progress).path
 
     def save(
         self,

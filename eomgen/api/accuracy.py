@@ -3,33 +3,25 @@
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from eomgen import store
 from eomgen.api.generating import compiled
-from eomgen.api.given import (
-    Source,
-    Values,
-    check_states,
-    check_time,
-    model_of,
-    named,
-    overridden,
-    read,
-    values_of,
-)
-from eomgen.api.inputs import Inputs, in_formulas
+from eomgen.api.given import Values, model_of, named, overridden, read, values_of
+from eomgen.api.inputs import in_formulas
+from eomgen.api.options import AccuracyOptions, ArithmeticOptions
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.base.errors import RunError
+from eomgen.base.options import taking
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_powers
-from eomgen.scene.schema import SHOWN, Form, Route, Simulation
+from eomgen.run.progress import Progress
+from eomgen.scene.schema import SHOWN, Simulation
 from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
@@ -38,10 +30,6 @@ if TYPE_CHECKING:
     from eomgen.study.accuracy.reference import Reference
     from eomgen.study.accuracy.work_precision import Bench
     from eomgen.study.cost.arithmetic import Arithmetic
-
-MOST_STATES = 100_000
-RUN_TIME, ALL_TIME = 3.0, 300.0
-"""Longest time of one run, and time after which no run is started, s."""
 
 Notice = Callable[[int, float, "Rung"], None]
 """Called before each run: number of runs so far, the time they took, s, and the next run."""
@@ -80,7 +68,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class MeasurementPlan:
-    """Checked arguments of `accuracy`, which describes them."""
+    """Checked options of `accuracy`."""
 
     model: Model
     simulation: Simulation
@@ -88,133 +76,70 @@ class MeasurementPlan:
     parameters: Mapping[str, float]
     inputs: Mapping[str, float]
     t_end: float
-    quick: bool
-    run_time: float
-    time: float
+    options: AccuracyOptions
 
 
 @public
-def accuracy(
-    source: Source,
-    *,
-    methods: Sequence[str] | None = None,
-    quick: bool = False,
-    t_end: float | None = None,
-    run_time: float = RUN_TIME,
-    time: float = ALL_TIME,
-    parameters: Values | None = None,
-    inputs: Inputs | None = None,
-    form: Form | None = None,
-    route: Route | None = None,
-    table: str | PathLike[str] | None = None,
-    fresh: bool = False,
-) -> Accuracy:
+@taking(AccuracyOptions)
+def accuracy(options: AccuracyOptions) -> Accuracy:
     """Measure time and error of runs of a scene, by each method at each tolerance or step.
-
-    methods     names of integrators; None: all
-    quick       only every second tolerance or step
-    t_end       end time, s; None: the scene's own
-    run_time    longest time of one run, s
-    time        time after which no run is started, s
-    parameters  values that replace those of the scene, by name
-    inputs      by name constant values, or formulas of t, the motion and parameters; or the path
-                of a table, as for `simulate`. Others have their defaults
-    form        state form; None: the scene's own
-    route       to the equations; None: the scene's own
-    table       a CSV file to which runs are written and, unless `fresh`, from which earlier runs
-                are taken
 
     Raises `SceneError`, or `RunError` for an invalid argument, or if the error of the reference is
     too large to compare methods.
     """
-    scene, constants = in_formulas(read(source), inputs)
-    plan = plan_measurement(
-        overridden(model_of(scene, source), form=form, route=route),
-        scene.simulation,
-        methods=None if methods is None else ",".join(methods),
-        quick=quick,
-        t_end=t_end,
-        run_time=run_time,
-        time=time,
-        parameters=parameters,
-        inputs=constants,
-    )
-    return measure(plan, table=None if table is None else Path(table), fresh=fresh).found
+    scene, constants = in_formulas(read(options.source), options.inputs)
+    model = model_of(scene, options.source)
+    model = overridden(model, form=options.form, route=options.route)
+    return measure(plan_measurement(model, scene.simulation, options, constants)).found
 
 
 def plan_measurement(
     model: Model,
     simulation: Simulation,
-    *,
-    methods: str | None = None,
-    quick: bool = False,
-    t_end: float | None = None,
-    run_time: float = RUN_TIME,
-    time: float = ALL_TIME,
-    parameters: Values | None = None,
-    inputs: Values | None = None,
+    options: AccuracyOptions,
+    constants: Values | None = None,
     reporter: Reporter = SILENT,
 ) -> MeasurementPlan:
-    """Check the arguments of `accuracy`. Raises `RunError` for an invalid one."""
+    """Check the options of `accuracy`; `constants` are those of inputs. Raises `RunError`."""
     from eomgen.study.accuracy.ladder import methods_named
 
-    for name, value in (("run_time", run_time), ("time", time)):
-        check_time(value, reporter.argument(name))
     _check_moves(model)
-    chosen = methods_named(methods)
-    parameters, inputs = values_of(model, parameters, inputs, reporter)
-    end = simulation.t_end if t_end is None else t_end
-    check_time(end, reporter.argument("t_end"))
+    chosen = methods_named(options.methods)
+    parameters, inputs = values_of(model, options.parameters, constants, reporter)
+    end = simulation.t_end if options.t_end is None else options.t_end
     model = replace(model, outputs=in_order((*SHOWN, "effect_powers")))
-    return MeasurementPlan(
-        model, simulation, chosen, parameters, inputs, end, quick, run_time, time
-    )
+    return MeasurementPlan(model, simulation, chosen, parameters, inputs, end, options)
 
 
 def measure(
     plan: MeasurementPlan,
     *,
-    table: Path | None = None,
-    fresh: bool = False,
     force: bool = False,
     name: str = "",
     notice: Notice = lambda count, spent, rung: None,
     reporter: Reporter = SILENT,
 ) -> Measurement:
     """Measure as planned; `name` is the name of the scene in messages."""
-    from eomgen import pipeline  # imported now, so that its import does not count as generation
     from eomgen.study.accuracy import records
-    from eomgen.study.accuracy.reference import reference
     from eomgen.study.accuracy.work_precision import call_times, left_out
 
+    table = None if plan.options.table is None else Path(plan.options.table)
     model, t_end = plan.model, plan.t_end
     name = name or model.name
-    values = (plan.parameters or None, plan.inputs or None)
     begin = clock.perf_counter()
     module, functions = compiled(model, reporter=reporter)
     generation = clock.perf_counter() - begin if module.derived else None
     given = (dict(plan.parameters), dict(plan.inputs))
     key = records.key(module.source, *given, t_end, plan.simulation.rest_speed)
     done: Mapping[Rung, Work] = {}
-    if table is not None and not fresh:
+    if table is not None and not plan.options.fresh:
         done, earlier = records.load(table, key)
         generation = earlier if generation is None else generation
     if generation is None:
         with reporter.waiting(f"timing the generation of {name} …"):
-            begin = clock.perf_counter()
-            pipeline.generate(model)
-            generation = clock.perf_counter() - begin
+            generation = _generation(model)
     with reporter.located(), reporter.progress(f"reference of {name}") as progress:
-        folder = _reference_folder(reporter)
-        truth = reference(
-            model,
-            functions,
-            *values,
-            t_end,
-            progress=progress,
-            folder=folder,
-            rest_speed=plan.simulation.rest_speed,
-        )
+        truth = _reference(plan, functions, progress, reporter)
         bench = _bench(plan, functions, truth)
         _check_reference(bench)
         costs = call_times(bench.problem, truth)
@@ -233,6 +158,33 @@ def measure(
     missing = tuple(left_out(ladder, plan.methods, works))
     found = Accuracy(tuple(shown), truth, costs, generation, t_end, made, missing)
     return Measurement(found, bench, plan.methods)
+
+
+def _generation(model: Model) -> float:
+    """The time that it takes to generate a module, s."""
+    from eomgen import pipeline  # imported now, so that its import does not count
+
+    begin = clock.perf_counter()
+    pipeline.generate(model)
+    return clock.perf_counter() - begin
+
+
+def _reference(
+    plan: MeasurementPlan, module: GeneratedModule, progress: Progress, reporter: Reporter
+) -> "Reference":
+    """The solution that errors are measured against."""
+    from eomgen.study.accuracy.reference import reference
+
+    return reference(
+        plan.model,
+        module,
+        plan.parameters or None,
+        plan.inputs or None,
+        plan.t_end,
+        progress=progress,
+        folder=_reference_folder(reporter),
+        rest_speed=plan.simulation.rest_speed,
+    )
 
 
 def _columns(
@@ -322,8 +274,8 @@ def _ladder(bench: "Bench", plan: MeasurementPlan) -> "Ladder":
         t_end=plan.t_end,
         first=first_steps(bench.problem, truth.t, truth.y, truth.scale),
         atol_scale=atol_scale(truth.y, truth.scale),
-        quick=plan.quick,
-        run_time=plan.run_time,
+        quick=plan.options.quick,
+        run_time=plan.options.run_time,
         noise=float(max(noise(plan.t_end))) if noise else 0.0,
     )
 
@@ -344,7 +296,7 @@ def _climb(
     def reported(rung: "Rung") -> None:
         notice(len(works), clock.perf_counter() - begin, rung)
 
-    for work in sweep(bench, ladder, plan.methods, works, begin + plan.time, reported):
+    for work in sweep(bench, ladder, plan.methods, works, begin + plan.options.time, reported):
         works[work.rung] = work
         made += 1
         keep(works)
@@ -352,28 +304,16 @@ def _climb(
 
 
 @public
-def arithmetic(
-    source: Source,
-    *,
-    states: int | None = None,
-    seed: int = 0,
-    single: bool = False,
-    parameters: Values | None = None,
-) -> "Arithmetic":
+@taking(ArithmeticOptions)
+def arithmetic(options: ArithmeticOptions) -> "Arithmetic":
     """Measure the error of v̇ by each route against 60 digits, in units in the last place.
-
-    states      number of states of each kind; None: as many as are quick
-    seed        of the random states
-    single      also in float32
-    parameters  values that replace those of the scene, by name
 
     Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene = read(source)
-    model = model_of(scene, source)
-    check_arithmetic(states, seed)
-    model = model.with_parameters(named(parameters, model.defaults, "parameters", "parameter"))
-    return arithmetic_of(model, scene.simulation, states=states, seed=seed, single=single)
+    scene = read(options.source)
+    model = model_of(scene, options.source)
+    given = named(options.parameters, model.defaults, "parameters", "parameter")
+    return arithmetic_of(model.with_parameters(given), scene.simulation, options)
 
 
 def _check_moves(model: Model) -> None:
@@ -385,18 +325,11 @@ def _check_moves(model: Model) -> None:
         )
 
 
-def check_arithmetic(states: int | None, seed: int, reporter: Reporter = SILENT) -> None:
-    """Raise `RunError` for an invalid argument of `arithmetic`."""
-    check_states(states, seed, MOST_STATES, reporter)
-
-
 def arithmetic_of(
     model: Model,
     simulation: Simulation,
+    options: ArithmeticOptions,
     *,
-    states: int | None = None,
-    seed: int = 0,
-    single: bool = False,
     name: str = "",
     reporter: Reporter = SILENT,
 ) -> "Arithmetic":
@@ -405,8 +338,11 @@ def arithmetic_of(
     from eomgen.study.cost.arithmetic import arithmetic as measured
 
     name = name or model.name
+    wanted: dict[str, Any] = {
+        "states": options.states,
+        "seed": options.seed,
+        "single": options.single,
+    }
     with reporter.located(), reporter.progress(f"arithmetic of {name}") as progress:
-        found = measured(
-            model, simulation, states=states, seed=seed, single=single, progress=progress
-        )
+        found = measured(model, simulation, **wanted, progress=progress)
     return replace(found, name=name)

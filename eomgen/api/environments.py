@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.api.given import Source, check_name
+from eomgen.api.given import check_name
+from eomgen.api.options import EnvironmentOptions
 from eomgen.api.stepping import stepper
 from eomgen.base.errors import RunError
+from eomgen.base.options import taking
 from eomgen.language.base import identifier
 from eomgen.language.formula import FormulaError, evaluate, names_in, parse
 from eomgen.run.module import GeneratedModule
@@ -20,32 +22,10 @@ NEEDED = "environment: needs Gymnasium; run: pip install 'eomgen[gym]'"
 Columns = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 
-def environment(
-    source: Source,
-    reward: str,
-    *,
-    actions: Mapping[str, tuple[float, float]],
-    observe: Sequence[str] = (),
-    ended: str = "0",
-    start: Mapping[str, Law | tuple[str, float, float]] | None = None,
-    dt: float = 0.02,
-    parts: int = 4,
-    t_end: float = 10.0,
-    lanes: int | None = None,
-) -> Any:
+@taking(EnvironmentOptions)
+def environment(options: EnvironmentOptions) -> Any:
     """A `gymnasium.Env` over a scene or, with `lanes`, a `gymnasium.vector.VectorEnv` of so many
     environments that step together.
-
-    reward   formula of t, states, inputs and parameters, after each step
-    actions  the inputs that are set, with their bounds; what is beyond them is cut
-    observe  formulas that are observed; (): all states
-    ended    formula that is not 0 where an episode has failed, for example "abs(theta) > 0.2"
-    start    distributions of states at the beginning, as those of `sampled`; others have the values
-             of the scene
-    dt       length of a step, s; it is made by `parts` steps of the classical Runge-Kutta method,
-             in compiled code if there is a compiler, see `stepper`
-    t_end    time after which an episode is cut off, s
-    lanes    number of environments that step together
 
     A seed determines an episode. A state that is not finite ends an episode, and
     `info["diverged"]` says so. Raises `SceneError`; `RunError` for an unknown name, a formula that
@@ -54,12 +34,13 @@ def environment(
     """
     if find_spec("gymnasium") is None:
         raise RunError(NEEDED)
+    dt, parts, t_end, lanes = options.dt, options.parts, options.t_end, options.lanes
     _check_steps(dt, parts, t_end, lanes)
-    step = stepper(source, dt=dt / parts, lanes=lanes or 1)
+    step = stepper(options.source, dt=dt / parts, lanes=lanes or 1)
     module = step.module
     from eomgen.exports.gymnasium_envs import SceneEnv, SceneVectorEnv, Task
 
-    bounds = {identifier(name): each for name, each in actions.items()}
+    bounds = {identifier(name): each for name, each in options.actions.items()}
     for name, (low, high) in bounds.items():
         check_name(name, list(module.INPUTS), "actions", "input")
         if not (np.isfinite([low, high]).all() and low < high):
@@ -74,10 +55,10 @@ def environment(
         lambda y, u, t: step(y, u, t=t, steps=parts),
         step.projected,
         bounds,
-        _stacked([_function(text, "observe", module) for text in observe or module.STATES]),
-        _function(reward, "reward", module),
-        _function(ended, "ended", module),
-        _laws(start or {}, module),
+        _stacked([_function(text, "observe", module) for text in options.observe or module.STATES]),
+        _function(options.reward, "reward", module),
+        _function(options.ended, "ended", module),
+        _laws(options.start or {}, module),
         dt,
         max(1, round(t_end / dt)),
     )

@@ -6,11 +6,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from eomgen.api.given import Source, model_of, read
-from eomgen.api.planning import plan_run
+from eomgen.api.given import Source, read
+from eomgen.api.options import RunOptions
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.api.simulating import run_plan
+from eomgen.api.simulating import plan_of, run_plan
 from eomgen.base.errors import RunError
 from eomgen.base.files import check_folder, check_writable, write_whole
 from eomgen.results import Run
@@ -50,7 +50,8 @@ def gallery(
     done: list[Exhibit] = []
     try:
         for scene in chosen:
-            done += [exhibited(scene, paths[scene.name], live=live, force=force, **options)]
+            wanted = RunOptions(scene, **options)
+            done += [exhibited(scene, wanted, paths[scene.name], live=live, force=force)]
     finally:
         save_index(paths[""], done, force=force)
     return paths[""]
@@ -82,18 +83,17 @@ def gallery_paths(folder: Path, scenes: Sequence[Scene], *, force: bool = False)
 
 def exhibited(
     scene: Scene,
+    options: RunOptions,
     path: Path,
     *,
     live: bool | None = None,
     force: bool = False,
     reporter: Reporter = SILENT,
-    **options: Any,
 ) -> Exhibit:
-    """Simulate a scene, and write its page. Raises as `simulate` does, and `KeyboardInterrupt` if
-    an interrupt ended the run, which then is not shown.
+    """Simulate a scene as `options` say, and write its page. Raises as `simulate` does, and
+    `KeyboardInterrupt` if an interrupt ended the run, which then is not shown.
     """
-    plan = plan_run(scene, model_of(scene, scene), reporter=reporter, **options)
-    run = run_plan(plan, reporter=reporter)
+    run = run_plan(plan_of(options, reporter), reporter=reporter)
     if run.outcome.kind == "interrupted":
         raise KeyboardInterrupt
     with reporter.waiting(f"writing {scene.name} …"):

@@ -190,17 +190,3 @@ def values_of(
         named(parameters, model.defaults, reporter.argument("parameters"), "parameter"),
         named(inputs, [i.name for i in model.inputs], reporter.argument("inputs"), "input"),
     )
-
-
-def check_time(value: float, argument: str) -> None:
-    """Raise `RunError` unless a time, s, is positive and finite."""
-    if not 0 < value < math.inf:
-        raise RunError(f"{argument}: {value:g} is not a positive time; give one in s")
-
-
-def check_states(states: int | None, seed: int, most: int, reporter: Reporter = SILENT) -> None:
-    """Raise `RunError` unless there are 1 to `most` random states and the seed is not negative."""
-    if states is not None and not 1 <= states <= most:
-        raise RunError(f"{reporter.argument('states')}: {states} is not a number from 1 to {most}")
-    if seed < 0:
-        raise RunError(f"{reporter.argument('seed')}: {seed} is negative; give 0, 1, 2, …")

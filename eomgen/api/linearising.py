@@ -1,16 +1,18 @@
 """Linearisation about an equilibrium or a state: `linearise`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check, values_of
-from eomgen.api.inputs import Inputs, constant_inputs
+from eomgen.api.given import Values, check, values_of
+from eomgen.api.inputs import constant_inputs
+from eomgen.api.options import PointOptions
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.states import initial_with, state_names, values_by_index
 from eomgen.base.errors import RunError
+from eomgen.base.options import taking
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
@@ -19,20 +21,6 @@ from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
     from eomgen.study.linear.linearise import Linearisation
-
-Place = Literal["equilibrium", "rest", "initial"]
-
-
-@dataclass(frozen=True)
-class Point:
-    """The point about which a model is linearised, and how it is found; see `linearise`."""
-
-    at: Place = "equilibrium"
-    state: Values | None = None
-    parameters: Values | None = None
-    inputs: Inputs | None = None
-    hold: Sequence[str] = ()
-    trim: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,31 +40,13 @@ class Linearised:
 
 
 @public
-def linearise(
-    source: Source,
-    *,
-    at: Place = "equilibrium",
-    state: Values | None = None,
-    parameters: Values | None = None,
-    inputs: Inputs | None = None,
-    hold: Sequence[str] = (),
-    trim: Sequence[str] = (),
-) -> "Linearisation":
+@taking(PointOptions)
+def linearise(options: PointOptions) -> "Linearisation":
     """Linearise a scene: A and B of δẏ = A δy + B δu about an equilibrium or a state.
-
-    at          "equilibrium": the nearest one, stable or not; "rest": where the motion comes to
-                rest; "initial": the given state, which may move
-    state       values that replace those of the scene's initial state, by name; `<name>_deg` in
-                degrees
-    parameters  values that replace those of the scene, by name
-    inputs      constant values, by name; others are 0
-    hold        coordinates that keep their values while an equilibrium is searched for
-    trim        inputs whose values are searched for as well
 
     Raises `SceneError`, or `RunError` for an invalid argument or if there is no equilibrium.
     """
-    point = Point(at, state, parameters, inputs, hold, trim)
-    return linearised_at(linearisable(check(source)), point).linearisation
+    return linearised_at(linearisable(check(options.source)), options).linearisation
 
 
 def linearisable(model: Model) -> Model:
@@ -89,7 +59,7 @@ def linearisable(model: Model) -> Model:
     return replace(model, form="velocity", outputs=needed, closing="projected")
 
 
-def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Linearised:
+def linearised_at(model: Model, point: PointOptions, reporter: Reporter = SILENT) -> Linearised:
     """A `linearisable` model, linearised as `linearise` describes."""
     # Imported here: they import SciPy.
     from eomgen.study.linear.equilibrium import equilibrium
@@ -98,10 +68,6 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
 
     at = point.at
     hold, trim = (tuple(map(identifier, names)) for names in (point.hold, point.trim))
-    if at not in ("equilibrium", "rest", "initial"):
-        raise RunError(
-            f"{reporter.argument('at')}: '{at}' is not one of equilibrium, rest, initial"
-        )
     constants = constant_inputs(point.inputs, reporter)
     parameters, inputs = values_of(model, point.parameters, constants, reporter)
     _, module = compiled(model, reporter=reporter)
@@ -126,7 +92,7 @@ def linearised_at(model: Model, point: Point, reporter: Reporter = SILENT) -> Li
 
 
 def _start(
-    model: Model, initial: FloatArray, point: Point, reporter: Reporter, parameters: Values
+    model: Model, initial: FloatArray, point: PointOptions, reporter: Reporter, parameters: Values
 ) -> FloatArray:
     """The initial state with the given values."""
     given = values_by_index(model, point.state, reporter)

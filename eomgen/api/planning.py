@@ -1,18 +1,17 @@
-"""Checked arguments of a simulation: `plan_run`, which `simulate` calls."""
+"""Checked options of a simulation: `plan_run`, which `simulate` calls."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from eomgen.api.given import Values, values_of
+from eomgen.api.options import RunOptions
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import values_by_index
 from eomgen.base.errors import RunError, nearest
 from eomgen.model.elaborate import available_in, in_order, outputs_for
 from eomgen.model.model import Model
-from eomgen.results import Run
 from eomgen.run.inputs import InputsOfTime
 from eomgen.scene.schema import SHOWN, Closing, Scene
 from eomgen.study.recording import GROUPS, SAVED
@@ -21,23 +20,21 @@ from eomgen.tables.integrators import INTEGRATORS
 if TYPE_CHECKING:
     from eomgen.study.accuracy.trial import Setting
 
-GuardMode = Literal["stop", "repair"]
-Backend = Literal["auto", "numpy", "c"]
-EarlierRun = str | PathLike[str] | Run
-
 
 @dataclass(frozen=True)
 class Plan:
-    """Checked arguments of a run.
+    """Checked options of a run.
 
-    scene    its settings and appearance are used
-    model    with the outputs that the run and its pictures need
-    setting  method and tolerances or step; None if `accuracy` or `budget` choose them
-    outputs  those that the caller named
-    state    values of the initial state, by index in [q, v, x]
-    varying  all inputs, if some of them are tables or functions of time
-
-    The other fields are arguments of `simulate`.
+    scene       its settings and appearance are used
+    model       with the outputs that the run and its pictures need
+    setting     method and tolerances or step; None if `accuracy` or `budget` choose them
+    t_end       end time, s
+    parameters  values that are not the scene's own
+    inputs      constant inputs that are not their defaults
+    options     all options, as they were given
+    outputs     those that the caller named
+    state       values of the initial state, by index in [q, v, x]
+    varying     all inputs, if some of them are tables or functions of time
     """
 
     scene: Scene
@@ -46,110 +43,80 @@ class Plan:
     t_end: float
     parameters: Mapping[str, float]
     inputs: Mapping[str, float]
+    options: RunOptions
     outputs: Sequence[str] = ()
     state: Mapping[int, float] = field(default_factory=dict)
     varying: InputsOfTime | None = None
-    accuracy: float | None = None
-    budget: float | None = None
-    integrator: str | None = None
-    samples: int = 1001
-    max_step: float | None = None
-    works: bool = False
-    save: Sequence[str] = ()
-    guard: GuardMode | None = None
-    unstable: bool = False
-    estimate: bool = False
-    resume: EarlierRun | None = None
-    backend: Backend = "auto"
+
+    @property
+    def works(self) -> bool:
+        """Whether the works of effects are computed."""
+        return self.options.works or "works" in self.options.save
 
 
 def plan_run(
     scene: Scene,
     model: Model,
+    options: RunOptions,
     *,
-    outputs: Sequence[str] = (),
-    t_end: float | None = None,
-    integrator: str | None = None,
-    dt: float | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    accuracy: float | None = None,
-    budget: float | None = None,
-    parameters: Values | None = None,
-    state: Values | None = None,
-    inputs: Values | None = None,
+    constants: Values | None = None,
     varying: InputsOfTime | None = None,
-    samples: int = 1001,
-    max_step: float | None = None,
-    works: bool = False,
-    save: Sequence[str] = (),
-    guard: GuardMode | None = None,
-    unstable: bool = False,
-    estimate: bool = False,
-    resume: EarlierRun | None = None,
-    backend: Backend = "auto",
+    outputs: Sequence[str] = (),
     reporter: Reporter = SILENT,
 ) -> Plan:
-    """Check the arguments of `simulate`, which describes them, for a scene's model.
+    """Check the options of `simulate` for a scene's model. Raises `RunError`.
 
-    `inputs` are constants; `varying` are all of them if some are not, see `inputs.applied`.
-    `outputs` must be in the module. Raises `RunError` for an invalid argument.
+    Of inputs `constants` are constant; `varying` are all of them if some are not, see
+    `inputs.applied`. `outputs` must be in the module.
     """
-    bounds = {"rtol": rtol, "atol": atol, "dt": dt}
-    aims = [n for n, x in (("accuracy", accuracy), ("budget", budget)) if x is not None]
-    _check_aims(aims, bounds, resume, reporter)
+    bounds = {"rtol": options.rtol, "atol": options.atol, "dt": options.dt}
+    aims = [name for name in ("accuracy", "budget") if getattr(options, name) is not None]
+    _check_aims(aims, bounds, options.resume, reporter)
     if not model.states:  # all is given by the time, and no step makes an error
-        accuracy, budget, aims = None, None, []
-    parameters, inputs = values_of(model, parameters, inputs, reporter)
-    if guard not in (None, "stop", "repair"):
-        raise RunError(f"{reporter.argument('guard')}: '{guard}' is not one of stop, repair")
-    if backend not in ("auto", "numpy", "c"):
-        raise RunError(f"{reporter.argument('backend')}: '{backend}' is not one of auto, numpy, c")
-    if varying is not None and (
-        aims or estimate or guard is not None or resume is not None or backend == "c"
-    ):
-        raise RunError(
-            f"{reporter.argument('inputs')}: tables and functions of time do not go together with "
-            "a choice of method, an estimate, a guard, an earlier run or compiled code; give a "
-            "formula of t, or leave the other option out"
-        )
+        options, aims = replace(options, accuracy=None, budget=None), []
+    parameters, inputs = values_of(model, options.parameters, constants, reporter)
     setting = None
     if not aims:
-        setting = setting_of(scene.simulation, integrator, **bounds, reporter=reporter)
-    if varying is not None and setting and _takes_series(setting.integrator):
-        raise RunError(
-            f"{reporter.argument('inputs')}: Taylor series need constant inputs or formulas of t; "
-            "take --integrator DOP853 for tables and functions of time"
-        )
-    if unstable:
+        setting = setting_of(scene.simulation, options.integrator, **bounds, reporter=reporter)
+    if varying is not None:
+        _check_varying(options, aims, setting, reporter)
+    if options.unstable:
         check_unstable(setting, reporter)
-    works = works or "works" in save
-    saved = wanted_outputs(save, model, reporter)
-    more = (*(("effect_powers",) if works else ()), *_of_method(setting, model))
-    needed = (*model.outputs, *SHOWN, *saved, *more)
-    return Plan(
+    plan = Plan(
         scene,
-        replace(model, outputs=in_order(needed), closing=_closing(setting, model)),
+        model,
         setting,
-        scene.simulation.t_end if t_end is None else t_end,
+        scene.simulation.t_end if options.t_end is None else options.t_end,
         parameters,
         inputs,
+        options,
         outputs,
-        values_by_index(model, state, reporter),
+        values_by_index(model, options.state, reporter),
         varying,
-        accuracy=accuracy,
-        budget=budget,
-        integrator=integrator,
-        samples=samples,
-        max_step=max_step,
-        works=works,
-        save=save,
-        guard=guard,
-        unstable=unstable,
-        estimate=estimate,
-        resume=resume,
-        backend=backend,
     )
+    saved = wanted_outputs(options.save, model, reporter)
+    more = (*(("effect_powers",) if plan.works else ()), *_of_method(setting, model))
+    needed = in_order((*model.outputs, *SHOWN, *saved, *more))
+    return replace(plan, model=replace(model, outputs=needed, closing=_closing(setting, model)))
+
+
+def _check_varying(
+    options: RunOptions, aims: Sequence[str], setting: "Setting | None", reporter: Reporter
+) -> None:
+    """Raise `RunError` for what does not go together with tables and functions of time."""
+    argument = reporter.argument("inputs")
+    others = (options.estimate, options.guard, options.resume, options.backend == "c")
+    if aims or any(others):
+        raise RunError(
+            f"{argument}: tables and functions of time do not go together with a choice of "
+            "method, an estimate, a guard, an earlier run or compiled code; give a formula of t, "
+            "or leave the other option out"
+        )
+    if setting and _takes_series(setting.integrator):
+        raise RunError(
+            f"{argument}: Taylor series need constant inputs or formulas of t; take --integrator "
+            "DOP853 for tables and functions of time"
+        )
 
 
 def wanted_outputs(
@@ -173,7 +140,7 @@ def wanted_outputs(
 def _check_aims(
     aims: Sequence[str],
     bounds: Mapping[str, float | None],
-    resume: EarlierRun | None,
+    resume: object,
     reporter: Reporter,
 ) -> None:
     """Raise `RunError` for two aims, or for an aim with a tolerance, a step or an earlier run."""

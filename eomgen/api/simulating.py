@@ -1,18 +1,20 @@
 """Simulation of a scene: `simulate`, which calls `plan_run` and `run_plan`."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, model_of, overridden, read
-from eomgen.api.inputs import Inputs, applied
-from eomgen.api.planning import Backend, EarlierRun, GuardMode, Plan, plan_run
+from eomgen.api.given import model_of, overridden, read
+from eomgen.api.inputs import applied
+from eomgen.api.options import RunOptions
+from eomgen.api.planning import Plan, plan_run
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter, logger
 from eomgen.api.states import initial_with, origin_from, split
+from eomgen.base.options import taking
 from eomgen.model.elaborate import expanded
 from eomgen.model.model import Model
 from eomgen.results import Module, Run
@@ -20,7 +22,6 @@ from eomgen.run.inputs import ModuleWithInputs, with_corners
 from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.problem import Problem
 from eomgen.scene.appearance import appearance_of
-from eomgen.scene.schema import Form, Route
 from eomgen.study.diagnosis import problem_of
 from eomgen.study.observed import setup_of
 from eomgen.study.recording import recorded, unknown_forces
@@ -41,101 +42,27 @@ WATCHED = 6
 
 
 @public
-def simulate(
-    source: Source,
-    *,
-    t_end: float | None = None,
-    integrator: str | None = None,
-    dt: float | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    accuracy: float | None = None,
-    budget: float | None = None,
-    parameters: Values | None = None,
-    state: Values | None = None,
-    inputs: Inputs | None = None,
-    form: Form | None = None,
-    route: Route | None = None,
-    samples: int = 1001,
-    max_step: float | None = None,
-    works: bool = False,
-    save: Sequence[str] = (),
-    guard: GuardMode | None = None,
-    unstable: bool = False,
-    estimate: bool = False,
-    resume: EarlierRun | None = None,
-    backend: Backend = "auto",
-    follow: "Follow | None" = None,
-) -> Run:
+@taking(RunOptions)
+def simulate(options: RunOptions) -> Run:
     """Simulate a scene from its initial state.
-
-    t_end       end time, s; None: the scene's own
-    integrator  name of the method; None: the scene's own
-    dt          step of a fixed-step method, s; None: the scene's own
-    rtol, atol  relative and absolute tolerance of an adaptive method; None: the scene's own
-    accuracy    choose method and tolerances so that the error of the last state, relative to the
-                scale of the motion, is below this; they are found by trial runs of this scene
-    budget      choose the most accurate run that takes about this time, s
-    parameters  values that replace those of the scene, by name
-    state       values that replace those of the scene's initial state, by name; `<name>_deg` in
-                degrees
-    inputs      a mapping by name: constants; formulas of t, the motion and parameters, for example
-                "3*sin(t)", which become part of the module; or functions of t. Or a
-                DataFrame, or the path of a table of comma-separated values, with a column t and one
-                for each input, and any others; between these times inputs are linear. With tables
-                and functions nothing is compiled. Inputs that are not given have their defaults
-    form        state form; None: the scene's own
-    route       to the equations; None: the scene's own
-    samples     approximate number of rows to keep
-    max_step    longest step of an adaptive method, s
-    works       also compute the work of each effect, J
-    save        what to save beside the states: "energy", "points", "poses", "works", "inputs", or
-                outputs by name, for example "joint_forces"; see `Run.saved`
-    guard       check rounding errors at each step; where digits are lost, "stop" the run or
-                "repair" the step. By default runs stop there of scenes that may have fewer than
-                `WATCHED` digits of accelerations right, unless inputs are tables or functions
-    unstable    allow steps of an explicit fixed-step method that are too long for stability
-    estimate    estimate the error by a second run
-    resume      continue an earlier run: a `Run`, or its archive `.npz`
-    backend     "numpy": compute all in Python; "c": compute the derivative, the Jacobian and what
-                else the run evaluates in compiled C code, with the same bits, and make whole steps
-                of DOP853, rk4, euler and semi_implicit_euler there; "auto": do so if a library is
-                in the store, or if the run is longer than compiling takes and there is a compiler
-    follow      called with time and state after each step; a true result stops the run
 
     A run that cannot continue is returned with its rows so far: `finished` is false, and `outcome`
     says why and what to change. Warnings also go to the logger "eomgen", notes as level INFO.
     Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene, constants, varying = applied(read(source), inputs)
-    plan = plan_run(
-        scene,
-        overridden(model_of(scene, source), form=form, route=route),
-        t_end=t_end,
-        integrator=integrator,
-        dt=dt,
-        rtol=rtol,
-        atol=atol,
-        accuracy=accuracy,
-        budget=budget,
-        parameters=parameters,
-        state=state,
-        inputs=constants,
-        varying=varying,
-        samples=samples,
-        max_step=max_step,
-        works=works,
-        save=save,
-        guard=guard,
-        unstable=unstable,
-        estimate=estimate,
-        resume=resume,
-        backend=backend,
-    )
-    run = run_plan(plan, follow=follow)
+    run = run_plan(plan_of(options), follow=options.follow)
     for warning in run.warnings:
         logger().warning("%s: %s", run.model.name, warning)
     return run
+
+
+def plan_of(options: RunOptions, reporter: Reporter = SILENT) -> Plan:
+    """The plan of a run. Raises `SceneError` or `RunError`."""
+    source = options.source
+    scene, constants, varying = applied(read(source), options.inputs, reporter)
+    model = overridden(model_of(scene, source), form=options.form, route=options.route)
+    given: dict[str, Any] = {"constants": constants, "varying": varying}
+    return plan_run(scene, model, options, **given, reporter=reporter)
 
 
 def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter = SILENT) -> Run:
@@ -144,7 +71,7 @@ def run_plan(plan: Plan, *, follow: "Follow | None" = None, reporter: Reporter =
 
     Raises `RunError` if the run cannot start.
     """
-    states = _earlier(plan)[0].states if plan.resume is not None else None
+    states = _earlier(plan)[0].states if plan.options.resume is not None else None
     known = states is None or not plan.model.constraints
     if not known and states != compiled(plan.model, reporter=reporter)[1].STATES:
         plan = replace(plan, model=_other(plan.model))
@@ -187,11 +114,11 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         functions = cast(GeneratedModule, ModuleWithInputs(functions, plan.varying))
     values = (plan.parameters or None, plan.inputs or None)
     options: dict[str, Any] = {
-        "samples": plan.samples,
-        "max_step": plan.max_step,
+        "samples": plan.options.samples,
+        "max_step": plan.options.max_step,
         "rest_speed": plan.scene.simulation.rest_speed,
         "guard": _guard(plan, module, functions, values),
-        "unstable": plan.unstable,
+        "unstable": plan.options.unstable,
     }
     said: list[str] = []
     problem, model = _problem(plan, model, functions, values, _also(said.append, reporter))
@@ -203,7 +130,7 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         problem = start.problem
         options |= start.options
     moved = None
-    if plan.setting is None or plan.estimate:
+    if plan.setting is None or plan.options.estimate:
         from eomgen.study.accuracy.moved import moved_problem
 
         moved = moved_problem(functions, model, *values, start=began, compiled=made)
@@ -220,7 +147,7 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
     trajectory, estimate = trial.trajectory, None
     error, why = _error_of_choice(choice)
     warnings += why
-    if choice is None and plan.estimate and trajectory.finished:
+    if choice is None and plan.options.estimate and trajectory.finished:
         from eomgen.study.accuracy.estimate import by_second_run
 
         estimate = by_second_run(case, trial)
@@ -231,7 +158,7 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         reporter.note(notice)
     trajectory = replace(
         trajectory,
-        saved=recorded(plan.save, model, functions, trajectory, values),
+        saved=recorded(plan.options.save, model, functions, trajectory, values),
         setup=setup_of(plan.scene, model, plan.parameters, plan.inputs, varying=varying),
     )
     if notice := unknown_forces(trajectory):
@@ -316,12 +243,12 @@ def _accelerator(
     reporter: Reporter,
 ) -> "Accelerator | None":
     """The compiled steps and functions of a plan; None if it asks for none."""
-    if plan.backend == "numpy" or plan.varying:
+    if plan.options.backend == "numpy" or plan.varying:
         return None
     from eomgen.native.accelerator import Accelerator
 
     accelerator = Accelerator(plan.model, module, *values)
-    if plan.backend == "c":
+    if plan.options.backend == "c":
         with reporter.waiting(f"compiling {plan.model.name} …"):
             accelerator.compile()
     return accelerator
@@ -331,7 +258,7 @@ def _why_not_compiled(plan: Plan, accelerator: "Accelerator | None") -> str:
     """Why a run that is long, or was to be compiled, took nothing compiled; "" if it need not."""
     if accelerator and accelerator.notice:
         return f"the run was not compiled: {accelerator.notice}"
-    if accelerator and plan.backend == "c" and not accelerator.used:
+    if accelerator and plan.options.backend == "c" and not accelerator.used:
         return (
             "nothing was computed in C: a parameter, or a constant computed from them, is too "
             "small or too large"
@@ -349,9 +276,9 @@ def _run_case(
 
     choice = aimed(
         case,
-        accuracy=plan.accuracy,
-        budget=plan.budget,
-        integrator=plan.integrator,
+        accuracy=plan.options.accuracy,
+        budget=plan.options.budget,
+        integrator=plan.options.integrator,
         say=reporter.trial,
     )
     return made_again(case, choice, powers, follow), choice
@@ -365,23 +292,25 @@ def _guard(
 ) -> "Guard | None":
     """The guard against rounding errors, if the plan has one, or if few digits are right."""
     few = module.digits is not None and module.digits < WATCHED and not plan.varying
-    if plan.guard is None and not few:
+    if plan.options.guard is None and not few:
         return None
     from eomgen.store import program_of
     from eomgen.study.precision.guarding import guard_of
 
-    return guard_of(functions, program_of(plan.model), *values, repairs=plan.guard == "repair")
+    return guard_of(
+        functions, program_of(plan.model), *values, repairs=plan.options.guard == "repair"
+    )
 
 
 def _start(plan: Plan, problem: Problem) -> "Start | None":
     """Where the run continues an earlier one, if the plan names one."""
-    if plan.resume is None:
+    if plan.options.resume is None:
         return None
     from eomgen.run.resume import going_on
 
     assert plan.setting is not None
     ended, path = _earlier(plan)
-    limits = {"max_step": plan.max_step, "rest_speed": plan.scene.simulation.rest_speed}
+    limits = {"max_step": plan.options.max_step, "rest_speed": plan.scene.simulation.rest_speed}
     return going_on(ended, path, problem, plan.setting, **limits)
 
 
@@ -389,7 +318,7 @@ def _earlier(plan: Plan) -> "tuple[Trajectory, Path]":
     """The run that a plan continues, and where it is from."""
     from eomgen.run.trajectory import load_npz
 
-    assert plan.resume is not None
-    if isinstance(plan.resume, Run):
-        return plan.resume.trajectory, Path(f"the run of {plan.resume.model.name}")
-    return load_npz(Path(plan.resume)), Path(plan.resume)
+    assert plan.options.resume is not None
+    if isinstance(plan.options.resume, Run):
+        return plan.options.resume.trajectory, Path(f"the run of {plan.options.resume.model.name}")
+    return load_npz(Path(plan.options.resume)), Path(plan.options.resume)

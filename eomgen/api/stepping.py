@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, check, check_name, check_time
+from eomgen.api.given import Source, check, check_name
+from eomgen.api.options import BACKENDS, Backend, check_time
 from eomgen.api.public import public
 from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
@@ -24,7 +25,6 @@ from eomgen.run.sizes import mechanism_size
 from eomgen.store import bytecode_of, generated_code
 from eomgen.study.diagnosis import problem_of
 
-Backend = Literal["auto", "numpy", "c"]
 Set = Mapping[str, ArrayLike] | ArrayLike | None
 Mask = NDArray[np.bool_]
 NAMES = {"runge_kutta_4": "rk4"}
@@ -59,7 +59,7 @@ def stepper(
     method = NAMES.get(method, method)
     if lanes is not None and lanes < 1:
         raise RunError(f"lanes: {lanes} is not a positive number")
-    if backend not in ("auto", "numpy", "c"):
+    if backend not in BACKENDS:
         raise RunError(f"backend: '{backend}' is not one of auto, numpy, c")
     return _made(model, dt, method, lanes, backend)
 

@@ -3,24 +3,25 @@
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, Values, check_name, check_time, model_of, read, values_of
-from eomgen.api.inputs import Inputs, for_members
-from eomgen.api.planning import Backend
+from eomgen.api.given import Values, check_name, model_of, read, values_of
+from eomgen.api.inputs import for_members
+from eomgen.api.options import SweepOptions
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.api.settings import check_unstable, setting_of
 from eomgen.api.states import state_names
 from eomgen.base.errors import RunError
+from eomgen.base.options import taking
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.native import equal_steps
+from eomgen.results import Module
 from eomgen.run.checks import (
     check_no_step,
     check_samples,
@@ -31,7 +32,6 @@ from eomgen.run.checks import (
 from eomgen.run.inputs import InputsOfTime
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.fixed_step import count_steps
-from eomgen.run.problem import FloatArray
 from eomgen.scene.schema import Scene
 from eomgen.study.accuracy.trial import Setting
 from eomgen.sweep.design import Design, Law, grid, in_radians, listed, sampled
@@ -56,7 +56,16 @@ MOST_STEPS = 10_000_000
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """Checked arguments of a sweep."""
+    """Checked options of a sweep.
+
+    model       with the outputs that are computed
+    design      the members, angles in radians
+    setting     method and tolerances or step
+    t_end       end time, s
+    parameters  values that are not the scene's own
+    inputs      constant inputs that are not their defaults
+    varying     all inputs, if some of them are tables
+    """
 
     scene: Scene
     model: Model
@@ -66,114 +75,53 @@ class SweepPlan:
     parameters: Mapping[str, float]
     inputs: Mapping[str, float]
     varying: InputsOfTime | None
-    outputs: tuple[str, ...]
-    samples: int
-    max_step: float | None
-    unstable: bool
-    backend: Backend
+    options: SweepOptions
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The functions of the module that are computed."""
+        return tuple(self.options.outputs)
 
 
 @public
-def ensemble(
-    source: Source,
-    vary: Design | Mapping[str, Sequence[float] | FloatArray],
-    *,
-    t_end: float | None = None,
-    integrator: str | None = None,
-    dt: float | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    parameters: Values | None = None,
-    inputs: Inputs | None = None,
-    outputs: Sequence[str] = (),
-    samples: int = 2,
-    max_step: float | None = None,
-    unstable: bool = False,
-    backend: Backend = "auto",
-    workers: int = 1,
-    scheduler: str = "",
-    folder: str | PathLike[str] | None = None,
-) -> Ensemble:
+@taking(SweepOptions)
+def ensemble(options: SweepOptions) -> Ensemble:
     """Run a scene many times, with other parameters, initial states or inputs.
-
-    vary        lists of values by name of a parameter, a state or an input, one for each member,
-                `<name>_deg` of an angle in degrees; or `grid(...)` or `sampled(...)`
-    t_end, integrator, dt, rtol, atol, max_step, unstable  as for `simulate`
-    parameters, inputs  values that all members have; inputs may also be formulas of t, the motion
-                and parameters, or the path of a table, as for `simulate`; with a table nothing is
-                compiled
-    outputs     functions of the module to compute: "kinetic_energy" for example
-    samples     approximate number of rows to keep; 2 keeps only the first and the last
-    backend     "numpy": run in Python; "c": compile at once; "auto": compile if that pays
-    workers     number of processes, or threads if members run together in compiled code. With more
-                than one, a script needs `if __name__ == "__main__":`
-    scheduler   address of a Dask scheduler whose workers run the members
-    folder      where finished members are kept, so that the same call continues a stopped sweep
 
     A member that stops or is refused is a row that says so. The results do not depend on backend,
     workers or scheduler. Raises `SceneError`, or `RunError` for an invalid argument.
     """
-    scene, constants, varying = for_members(read(source), inputs)
-    design = vary if isinstance(vary, Design) else listed(vary)
-    plan = plan_sweep(
-        scene,
-        model_of(scene, source),
-        design,
-        t_end=t_end,
-        integrator=integrator,
-        dt=dt,
-        rtol=rtol,
-        atol=atol,
-        parameters=parameters,
-        inputs=constants,
-        varying=varying,
-        outputs=outputs,
-        samples=samples,
-        max_step=max_step,
-        unstable=unstable,
-        backend=backend,
-    )
-    kept = None if folder is None else Path(folder)
-    return run_sweep(plan, workers=workers, scheduler=scheduler, folder=kept)
+    scene, constants, varying = for_members(read(options.source), options.inputs)
+    model = model_of(scene, options.source)
+    return run_sweep(plan_sweep(scene, model, options, constants=constants, varying=varying))
 
 
 def plan_sweep(
     scene: Scene,
     model: Model,
-    design: Design,
+    options: SweepOptions,
     *,
-    t_end: float | None = None,
-    integrator: str | None = None,
-    dt: float | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    parameters: Values | None = None,
-    inputs: Values | None = None,
+    constants: Values | None = None,
     varying: InputsOfTime | None = None,
-    outputs: Sequence[str] = (),
-    samples: int = 2,
-    max_step: float | None = None,
-    unstable: bool = False,
-    backend: Backend = "auto",
     reporter: Reporter = SILENT,
 ) -> SweepPlan:
-    """Check the arguments of `ensemble`, which describes them. Raises `RunError`."""
-    argument = reporter.argument
-    check_samples(samples)
-    t_end = scene.simulation.t_end if t_end is None else t_end
-    check_time(t_end, argument("t_end"))
-    if backend not in ("auto", "numpy", "c"):
-        raise RunError(f"{argument('backend')}: '{backend}' is not one of auto, numpy, c")
-    for name in outputs:
-        check_name(name, [n for n in OUTPUTS if n not in DYNAMICS], argument("outputs"), "output")
-    setting = setting_of(
-        scene.simulation, integrator, dt=dt, rtol=rtol, atol=atol, reporter=reporter
-    )
-    if unstable:
+    """Check the options of `ensemble` for a scene's model. Raises `RunError`.
+
+    Of inputs `constants` are constant; `varying` are all of them if some are tables.
+    """
+    argument, vary = reporter.argument, options.vary
+    check_samples(options.samples)
+    known = [n for n in OUTPUTS if n not in DYNAMICS]
+    for name in options.outputs:
+        check_name(name, known, argument("outputs"), "output")
+    steps = {"dt": options.dt, "rtol": options.rtol, "atol": options.atol}
+    setting = setting_of(scene.simulation, options.integrator, **steps, reporter=reporter)
+    if options.unstable:
         check_unstable(setting, reporter)
-    fixed = values_of(model, parameters, inputs, reporter)
+    fixed = values_of(model, options.parameters, constants, reporter)
+    design = vary if isinstance(vary, Design) else listed(vary)
     design = in_radians(design, _degrees(model))
-    if varying is not None and backend == "c":
+    if varying is not None and options.backend == "c":
         raise RunError(
             f"{argument('inputs')}: with a table nothing is compiled; give a formula of t, or "
             "leave the backend out"
@@ -184,17 +132,13 @@ def plan_sweep(
             raise RunError(f"{argument('vary')}: {name} is also given a fixed value; leave one out")
     return SweepPlan(
         scene,
-        replace(model, outputs=in_order((*model.outputs, *outputs))),
+        replace(model, outputs=in_order((*model.outputs, *options.outputs))),
         design,
         setting,
-        t_end,
+        scene.simulation.t_end if options.t_end is None else options.t_end,
         *fixed,
         varying,
-        tuple(outputs),
-        samples,
-        max_step,
-        unstable,
-        backend,
+        options,
     )
 
 
@@ -206,36 +150,59 @@ def _degrees(model: Model) -> dict[str, str]:
     return {name: name.removesuffix("_deg") for name in angles if name not in others}
 
 
-def run_sweep(
-    plan: SweepPlan,
-    *,
-    workers: int = 1,
-    scheduler: str = "",
-    folder: Path | None = None,
-    reporter: Reporter = SILENT,
-) -> Ensemble:
+def run_sweep(plan: SweepPlan, *, reporter: Reporter = SILENT) -> Ensemble:
     """Run a plan. Raises `RunError` if it cannot begin, or if workers fail."""
-    if workers < 1:
-        raise RunError(
-            f"{reporter.argument('workers')}: {workers} is not a number of processes; give 1 or "
-            "more"
-        )
-    model = plan.model
+    model, options = plan.model, plan.options
     module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
-    state_names: tuple[str, ...] = functions.STATES
+    task = _task(plan, module, functions, reporter)
+    layout, members = layout_of(task), len(plan.design.values)
+    size = chunk_size(members, task.together, bytes_each(layout))
+    with ExitStack() as open_ones:
+        kept: Memory | Storage = (
+            Memory(layout, members, size)
+            if options.folder is None
+            else open_ones.enter_context(
+                opened(Path(options.folder), task, plan.design, layout, size)
+            )
+        )
+        progress = open_ones.enter_context(reporter.progress(f"sweeping {model.name}"))
+        execute(
+            *(task, plan.design, kept, size),
+            workers=options.workers,
+            scheduler=options.scheduler,
+            progress=progress,
+        )
+        found, messages = kept.results()
+    return Ensemble(
+        model.name,
+        plan.design,
+        functions.STATES,
+        found["final"],
+        found["t"],
+        found["status"],
+        worded(messages, members),
+        np.array(task.times),
+        found.get("rows"),
+        {name: found[name] for name in plan.outputs},
+        {**functions.UNITS, **UNITS},
+    )
+
+
+def _task(plan: SweepPlan, module: Module, functions: Any, reporter: Reporter) -> Task:
+    """What each member runs, with its kernels compiled if that pays."""
+    setting, names = plan.setting, plan.design.names
     times, dt, every = _times(plan)
     in_c = _compiles(plan, reporter)
-    many = plan.backend == "c" or len(plan.design.values) >= MANY
-    together = in_c and many and _run_together(plan.setting.integrator, functions)
+    many = in_c and (plan.options.backend == "c" or len(plan.design.values) >= MANY)
     task = Task(
-        model=model,
+        model=plan.model,
         source=module.source,
         compiled=in_c,
-        at_once=in_c and many,
-        together=together,
-        threads=in_c and many and _mostly_in_c(plan.setting.integrator, functions),
-        names=plan.design.names,
-        kinds=tuple(_kind(name, model, state_names, reporter) for name in plan.design.names),
+        at_once=many,
+        together=many and _run_together(setting.integrator, functions),
+        threads=many and _mostly_in_c(setting.integrator, functions),
+        names=names,
+        kinds=tuple(_kind(name, plan.model, functions.STATES, reporter) for name in names),
         parameters=plan.parameters,
         inputs=plan.inputs,
         varying=plan.varying,
@@ -243,47 +210,17 @@ def run_sweep(
         t_end=plan.t_end,
         times=times,
         settings={
-            "integrator": plan.setting.integrator,
-            "dt": plan.setting.dt,
-            **plan.setting.tolerances,
-            "max_step": plan.max_step,
-            "unstable": plan.unstable,
+            "integrator": setting.integrator,
+            "dt": setting.dt,
+            **setting.tolerances,
+            "max_step": plan.options.max_step,
+            "unstable": plan.options.unstable,
             "rest_speed": plan.scene.simulation.rest_speed,
         },
         dt=dt,
         every=every,
     )
-    if not scheduler:
-        task = _built(task, plan, reporter)
-    layout, members = layout_of(task), len(plan.design.values)
-    size = chunk_size(members, task.together, bytes_each(layout))
-    with ExitStack() as open_ones:
-        kept: Memory | Storage = (
-            Memory(layout, members, size)
-            if folder is None
-            else open_ones.enter_context(opened(folder, task, plan.design, layout, size))
-        )
-        progress = open_ones.enter_context(reporter.progress(f"sweeping {model.name}"))
-        execute(
-            *(task, plan.design, kept, size),
-            workers=workers,
-            scheduler=scheduler,
-            progress=progress,
-        )
-        found, messages = kept.results()
-    return Ensemble(
-        model.name,
-        plan.design,
-        state_names,
-        found["final"],
-        found["t"],
-        found["status"],
-        worded(messages, members),
-        np.array(times),
-        found.get("rows"),
-        {name: found[name] for name in plan.outputs},
-        {**functions.UNITS, **UNITS},
-    )
+    return task if plan.options.scheduler else _built(task, plan, reporter)
 
 
 def _times(plan: SweepPlan) -> tuple[tuple[float, ...], float, int]:
@@ -295,9 +232,9 @@ def _times(plan: SweepPlan) -> tuple[tuple[float, ...], float, int]:
         check_no_step(plan.setting.integrator, plan.setting.dt)
         assert plan.setting.rtol is not None
         check_tolerances(method, plan.setting.rtol, plan.setting.atol)
-        longest_steps(plan.max_step, plan.t_end)
-        return tuple(np.linspace(0.0, plan.t_end, plan.samples).tolist()), 0.0, 1
-    given = (plan.setting.integrator, plan.t_end, plan.setting.dt, plan.samples, MOST_STEPS)
+        longest_steps(plan.options.max_step, plan.t_end)
+        return tuple(np.linspace(0.0, plan.t_end, plan.options.samples).tolist()), 0.0, 1
+    given = (plan.setting.integrator, plan.t_end, plan.setting.dt, plan.options.samples, MOST_STEPS)
     dt, every = check_steps(*given)
     steps = int(count_steps(plan.t_end, dt))
     return (*(i * dt for i in range(0, steps, every)), plan.t_end), dt, every
@@ -318,15 +255,15 @@ def _compiles(plan: SweepPlan, reporter: Reporter) -> bool:
     """Whether members run in compiled code where that pays."""
     from eomgen.native.compiler import find_compiler
 
-    if plan.backend == "numpy" or plan.varying is not None:
+    if plan.options.backend == "numpy" or plan.varying is not None:
         return False
-    if plan.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
+    if plan.options.backend == "c" and not find_integrator(plan.setting.integrator).compiled:
         method = plan.setting.integrator
         reporter.note(f"steps of {method} are not compiled, but their derivatives are")
     try:
         find_compiler()
     except RunError as error:
-        if plan.backend == "c":
+        if plan.options.backend == "c":
             raise
         reporter.note(f"the sweep is not compiled: {error}")
         return False
@@ -364,7 +301,7 @@ def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:
     try:
         build(task)
     except RunError as error:
-        if plan.backend == "c":
+        if plan.options.backend == "c":
             raise
         reporter.note(f"the sweep is not compiled: {error}")
         return replace(task, compiled=False, at_once=False, together=False, threads=False)

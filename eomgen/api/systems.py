@@ -8,11 +8,13 @@ import numpy as np
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import Source, Values, check, values_of
-from eomgen.api.inputs import Inputs, constant_inputs
-from eomgen.api.linearising import Linearised, Place, Point, linearisable, linearised_at
+from eomgen.api.inputs import constant_inputs
+from eomgen.api.linearising import Linearised, linearisable, linearised_at
+from eomgen.api.options import SpaceOptions
 from eomgen.api.public import public
 from eomgen.api.states import state_names
 from eomgen.base.errors import RunError, nearest
+from eomgen.base.options import taking
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
 from eomgen.program.tape import TIME
@@ -28,36 +30,23 @@ NEEDED = "control: python-control is not installed; run: pip install 'eomgen[con
 
 
 @public
-def state_space(
-    source: Source,
-    *,
-    outputs: Sequence[str] = (),
-    at: Place = "equilibrium",
-    state: Values | None = None,
-    parameters: Values | None = None,
-    inputs: Inputs | None = None,
-    hold: Sequence[str] = (),
-    trim: Sequence[str] = (),
-) -> Any:
+@taking(SpaceOptions)
+def state_space(options: SpaceOptions) -> Any:
     """The linearised scene as a `control.StateSpace`: ẋ = A x + B u, y = C x + D u.
 
-    outputs  states, outputs of the module or their components, by name, for example "theta",
-             "point_positions.tip.x" or "kinetic_energy"; (): all states
-
-    `at`, `state`, `parameters`, `inputs`, `hold` and `trim` are those of `linearise`, whose
-    `reduced` system it is, so with three states for a quaternion, and only independent ones with
-    constraints. Signals have the names of the scene, components with _ for each dot. C and D are
-    exact derivatives. Raises `SceneError`, or `RunError` as `linearise`, for an unknown output, or
-    if python-control is not installed.
+    It is the `reduced` system of `linearise`, so with three states for a quaternion, and only
+    independent ones with constraints. Signals have the names of the scene, components with _ for
+    each dot. C and D are exact derivatives. Raises `SceneError`, or `RunError` as `linearise`, for
+    an unknown output, or if python-control is not installed.
     """
     control = library()
-    model = linearisable(check(source))
+    model, outputs = linearisable(check(options.source)), options.outputs
     wanted = _outputs_of(outputs, _states(model))
     model = replace(model, outputs=(*model.outputs, *wanted))
-    found = linearised_at(model, Point(at, state, parameters, inputs, hold, trim))
+    found = linearised_at(model, options)
     linear, least = found.linearisation, found.linearisation.reduced()
     if outputs:
-        values = values_of(model, parameters, constant_inputs(inputs))[0]
+        values = values_of(model, options.parameters, constant_inputs(options.inputs))[0]
         names, by_state, by_input = _observed(model, found, outputs, values)
         C, D = by_state @ linear.basis, by_input
     else:

@@ -1,15 +1,15 @@
 """Comparison of the generated module with independent solvers: `verify`, `horizon`."""
 
 import hashlib
-import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from eomgen.api.given import Source, check_states, check_time, model_of, read
+from eomgen.api.given import Source, model_of, read
 from eomgen.api.inputs import Inputs, all_in_formulas
+from eomgen.api.options import VerifyOptions, check_time
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.base.errors import RunError
+from eomgen.base.options import taking
 from eomgen.model.model import Model
 from eomgen.run.module import load_module
 from eomgen.scene.schema import Simulation
@@ -19,35 +19,17 @@ if TYPE_CHECKING:
     from eomgen.study.verification.horizon import Horizon
     from eomgen.study.verification.verify import Verified
 
-MOST_STATES = 10_000
-
 
 @public
-def verify(
-    source: Source,
-    *,
-    states: int | None = None,
-    seed: int = 0,
-    bound: float | None = None,
-    inputs: Inputs | None = None,
-) -> "Verified":
+@taking(VerifyOptions)
+def verify(options: VerifyOptions) -> "Verified":
     """Compare the generated module with an independent solver and with 60 digits.
 
-    `missed` of the result lists the bounds that were exceeded.
-
-    states  number of states of each kind; None: as many as are quick
-    seed    of the random states
-    bound   greatest error of v̇, units in the last place; None: the effect of errors of half a unit
-            in the data
-    inputs  constants, formulas or a table in place of inputs, as for `simulate`; others are
-            sampled, and 0 in the scene's own run
-
-    Raises `SceneError`, or `RunError` for an invalid argument.
+    `missed` of the result lists the bounds that were exceeded. Raises `SceneError`, or `RunError`
+    for an invalid argument.
     """
-    scene = all_in_formulas(read(source), inputs)
-    return verified_model(
-        model_of(scene, source), scene.simulation, states=states, seed=seed, bound=bound
-    )
+    scene = all_in_formulas(read(options.source), options.inputs)
+    return verified_model(model_of(scene, options.source), scene.simulation, options)
 
 
 @public
@@ -61,42 +43,25 @@ def horizon(source: Source, *, seconds: float = 60.0, inputs: Inputs | None = No
     return horizon_of(model_of(scene, source), scene.simulation, seconds=seconds)
 
 
-def check_verification(
-    *,
-    states: int | None = None,
-    seed: int = 0,
-    bound: float | None = None,
-    horizon: float | None = None,
-    reporter: Reporter = SILENT,
-) -> None:
-    """Raise `RunError` for an invalid argument of `verify` or `horizon`."""
-    check_states(states, seed, MOST_STATES, reporter)
-    if bound is not None and not 0.5 <= bound < math.inf:
-        argument = reporter.argument("bound")
-        raise RunError(f"{argument}: {bound:g} ulps is not a bound; give 0.5 or more")
-    if horizon is not None:
-        check_time(horizon, reporter.argument("horizon"))
-
-
 def verified_model(
     model: Model,
     simulation: Simulation,
+    options: VerifyOptions,
     *,
-    states: int | None = None,
-    seed: int = 0,
-    bound: float | None = None,
     name: str = "",
     reporter: Reporter = SILENT,
 ) -> "Verified":
     """The result of `verify` for a model; `name` is the name of the scene in it."""
     from eomgen.study.verification.verify import verify as verified  # imports extended precision
 
-    check_verification(states=states, seed=seed, bound=bound, reporter=reporter)
     name = name or model.name
+    wanted: dict[str, Any] = {
+        "states": options.states,
+        "seed": options.seed,
+        "bound": options.bound,
+    }
     with reporter.located(), reporter.progress(f"verifying {name}") as progress:
-        found = verified(
-            model, simulation, states=states, seed=seed, bound=bound, progress=progress
-        )
+        found = verified(model, simulation, **wanted, progress=progress)
     return replace(found, name=name)
 
 
@@ -111,7 +76,7 @@ def horizon_of(
     """The result of `horizon` for a model; `name` is the name of the scene in messages."""
     from eomgen.study.verification.horizon import horizon as found
 
-    check_verification(horizon=seconds, reporter=reporter)
+    check_time(seconds, reporter.argument("horizon"))
     model = replace(model, form="velocity")
     with reporter.located(), reporter.progress(f"horizon of {name or model.name}") as progress:
         module = load_module(generated_code(model).module, model.name)

@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from eomgen.api.accuracy import arithmetic_of, check_arithmetic
+from eomgen.api.accuracy import arithmetic_of
+from eomgen.api.options import ArithmeticOptions
 from eomgen.base.files import check_folder, check_writable
 from eomgen.commands.shared import Arguments, assignments, print_wrapped, reporter_of
+from eomgen.commands.usage import taken
 from eomgen.model.model import Model
 from eomgen.scene.schema import Simulation
 
@@ -24,7 +26,7 @@ def check_files(given: Arguments, name: str) -> None:
     """Raise `RunError` for invalid options, or files that cannot be written."""
     from eomgen.show.style import check_figure
 
-    check_arithmetic(given.states, given.seed, reporter_of(given, given.scene))
+    taken(ArithmeticOptions, given, source=given.scene)
     check_folder(given.output)
     check_figure(given.output / f"{name}_arithmetic.png", force=given.force)
     check_writable(given.output / f"{name}_arithmetic.csv", force=given.force)
@@ -36,13 +38,11 @@ def print_arithmetic(given: Arguments, model: Model, simulation: Simulation, nam
     from eomgen.show.arithmetic import save_figure, save_table
 
     check_files(given, name)
-    model = model.with_parameters(assignments(given.set, model.defaults, "--set"))
+    model = model.with_parameters(assignments(given.parameters, model.defaults, "--set"))
     found = arithmetic_of(
         model,
         simulation,
-        states=given.states,
-        seed=given.seed,
-        single=given.float32,
+        taken(ArithmeticOptions, given, source=given.scene),
         name=name,
         reporter=reporter_of(given, given.scene),
     )

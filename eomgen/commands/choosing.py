@@ -1,11 +1,9 @@
 """Output of `simulate` for `--accuracy`, `--budget`, `--estimate`, and on energy errors."""
 
 import math
-import re
 import sys
 from typing import TYPE_CHECKING
 
-from eomgen.base.errors import RunError
 from eomgen.commands.shared import Arguments
 from eomgen.results import Run
 
@@ -13,25 +11,12 @@ if TYPE_CHECKING:
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
 
-SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0}
 DRIFTED = 2e-3
 """Energy error that is warned of, relative to the greatest kinetic energy.
 
 The relative error of speeds is half of it, which after a few swings is a different motion.
 """
 BETTER = "take tighter tolerances or a shorter step, or let --accuracy 1e-3 choose"
-
-
-def seconds_of(text: str) -> float:
-    """Read a time such as 2s, 500ms, 1.5min or 2, in s. Raises `RunError` for anything else."""
-    found = re.fullmatch(r"\s*([0-9.eE+-]+)\s*(s|ms|min|)\s*", text)
-    try:
-        value = float(found[1]) * SECONDS[found[2]] if found else math.nan
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise RunError(f"--budget {text}: is not a computing time; give e.g. 2s, 500ms or 1.5min")
-    return value
 
 
 def print_choice(choice: "Choice", given: Arguments) -> str:

@@ -3,6 +3,7 @@
 import argparse
 
 from eomgen.base.errors import RunError
+from eomgen.commands.usage import path
 from eomgen.scene.built_in import built_in_names
 
 _PREAMBLE = {
@@ -36,7 +37,7 @@ def completion(given: argparse.Namespace) -> int:
             }
         elif action.dest == "output":
             action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
-        elif action.type is not None and action.type not in (int, float):
+        elif action.type is path:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
     preamble = _PREAMBLE.get(given.shell, "").replace("NAMES", names)
     print(shtab.complete(given.parser, given.shell, preamble=preamble))

@@ -1,21 +1,22 @@
 """The command `effects`."""
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from eomgen.api.effects import bill_of, check_motion
+from eomgen.api.effects import bill_of
 from eomgen.api.inputs import all_in_formulas
-from eomgen.api.reporter import Reporter
+from eomgen.api.options import EffectsOptions
 from eomgen.base.errors import InterruptedRunError
 from eomgen.base.files import check_folder
 from eomgen.commands.shared import (
-    OPTIONS,
     Arguments,
     print_wrapped,
     read_whole,
     reporter_of,
     scene_with_inputs,
 )
+from eomgen.commands.usage import taken
 
 if TYPE_CHECKING:
     from eomgen.study.cost.bill import Bill, Item
@@ -29,7 +30,7 @@ def effects(given: Arguments) -> int:
     from eomgen.show.bill import save_bill
     from eomgen.show.style import check_figure
 
-    check_motion(given.motion_time, Reporter(argument=OPTIONS.__getitem__))
+    options = taken(EffectsOptions, given, source=given.scene)
     reporter = reporter_of(given, given.scene)
     tables = all_in_formulas(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, tables)
@@ -38,8 +39,7 @@ def effects(given: Arguments) -> int:
     check_figure(path, force=given.force)
     found = bill_of(
         scene.replaced(route=model.route),
-        each=given.each,
-        motion=None if given.no_motion else given.motion_time,
+        replace(options, motion=None) if given.no_motion else options,
         name=name,
         reporter=reporter,
     )

@@ -9,13 +9,13 @@ from eomgen.api.exhibiting import (
     gallery_paths,
     save_index,
 )
+from eomgen.api.options import RunOptions
 from eomgen.base.errors import EomgenError, InterruptedRunError, report_refusal
 from eomgen.commands.shared import Arguments, reporter_of
+from eomgen.commands.usage import taken
 from eomgen.run.progress import rough_time
 from eomgen.scene.built_in import built_in_names
 from eomgen.show.gallery import Exhibit, megabytes
-
-OPTIONS = ("t_end", "integrator", "dt", "rtol", "atol", "max_step", "samples", "backend")
 
 
 def gallery(given: Arguments) -> int:
@@ -26,7 +26,6 @@ def gallery(given: Arguments) -> int:
     names = given.scene or built_in_names()
     scenes = chosen_scenes(names)
     paths = gallery_paths(given.output, scenes, force=given.force)
-    options = {name: getattr(given, name) for name in OPTIONS}
     left, done, refused = forecast(scenes), list[Exhibit](), False
     try:
         for k, (name, scene) in enumerate(zip(names, scenes, strict=True), 1):
@@ -34,11 +33,11 @@ def gallery(given: Arguments) -> int:
             try:
                 shown = exhibited(
                     scene,
+                    taken(RunOptions, given, source=scene),
                     paths[scene.name],
                     live=given.live,
                     force=given.force,
                     reporter=reporter,
-                    **options,
                 )
             except EomgenError as error:
                 report_refusal(error)

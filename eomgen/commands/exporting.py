@@ -1,21 +1,19 @@
 """The command `export`."""
 
 from eomgen.api.exporting import exported
+from eomgen.api.options import ExportOptions
 from eomgen.commands.shared import Arguments, note, read_whole, reporter_of
-from eomgen.exports import Number, Options
+from eomgen.commands.usage import taken
 
 
 def export(given: Arguments) -> int:
     """Write a scene's equations in the format of another tool."""
     scene, model, name = read_whole(given.scene, given)
-    number: Number = "float" if given.float else "double"
     paths = exported(
         model,
-        given.format,
-        given.output,
-        Options(number=number, integrator=given.integrator, simulation=scene.simulation),
+        scene.simulation,
+        taken(ExportOptions, given, source=scene, format=given.format),
         name=name,
-        force=given.force,
         reporter=reporter_of(given, given.scene),
         remark=lambda text: note(given, text),
     )

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from eomgen.api.linearising import Point, linearisable, linearised_at
+from eomgen.api.linearising import linearisable, linearised_at
+from eomgen.api.options import PointOptions
 from eomgen.api.states import state_names
 from eomgen.base.errors import RunError
 from eomgen.base.files import check_writable
@@ -20,6 +21,7 @@ from eomgen.commands.shared import (
     reporter_of,
     shortened,
 )
+from eomgen.commands.usage import taken
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
@@ -36,15 +38,16 @@ def linearise(given: Arguments) -> int:
     """Print the linearisation, its modes, stability and controllability; write A and B."""
     model, _ = read_model(given.scene, given)
     model = linearisable(model)
-    parameters = assignments(given.set, model.defaults, "--set")
+    parameters = assignments(given.parameters, model.defaults, "--set")
     if given.output is not None:
         check_writable(given.output, force=given.force)
         if given.output.suffix not in (".npz", ".csv"):
             raise RunError(f"{given.output}: give a name that ends in .npz or .csv")
     with located(given.scene):
         state = assignments(given.state, state_names(model), "--state")
-    inputs = given_inputs(given.input, [i.name for i in model.inputs])
-    point = Point(given.at, state, parameters, inputs, given.hold, given.trim)
+    inputs = given_inputs(given.inputs, [i.name for i in model.inputs])
+    own = {"parameters": parameters, "state": state, "inputs": inputs}
+    point = taken(PointOptions, given, source=given.scene, **own)
     found = linearised_at(model, point, reporter_of(given, given.scene))
     linearisation = found.linearisation
     reduced = linearisation.reduced()

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from eomgen.api.accuracy import Accuracy, measure, plan_measurement
 from eomgen.api.inputs import in_formulas
+from eomgen.api.options import AccuracyOptions
 from eomgen.base.files import check_folder, check_writable
 from eomgen.commands.arithmetic import check_files, print_arithmetic
 from eomgen.commands.shared import (
@@ -16,6 +17,7 @@ from eomgen.commands.shared import (
     reporter_of,
     scene_with_inputs,
 )
+from eomgen.commands.usage import taken
 from eomgen.model.model import Model
 from eomgen.run.progress import terminal_line
 from eomgen.scene.schema import Simulation
@@ -52,21 +54,16 @@ def _runs(
     from eomgen.study.accuracy.reference import save as save_reference
 
     reporter = reporter_of(given, given.scene)
-    parameters = assignments(given.set, model.defaults, "--set")
-    plan = plan_measurement(
-        model,
-        simulation,
-        methods=given.methods,
-        quick=given.quick,
-        t_end=given.t_end,
-        run_time=given.run_time,
-        time=given.time,
-        parameters=parameters,
-        inputs=inputs,
-        reporter=reporter,
-    )
     paths = {kind: given.output / f"{name}_accuracy.{kind}" for kind in ("csv", "png")}
     paths["npz"] = given.output / f"{name}_reference.npz"
+    options = taken(
+        AccuracyOptions,
+        given,
+        source=given.scene,
+        parameters=assignments(given.parameters, model.defaults, "--set"),
+        table=paths["csv"],
+    )
+    plan = plan_measurement(model, simulation, options, inputs, reporter)
     check_folder(given.output)
     check_figure(paths["png"], force=given.force)
     for kind in ("csv", "npz"):
@@ -81,8 +78,6 @@ def _runs(
     with terminal_line() as say:
         measurement = measure(
             plan,
-            table=paths["csv"],
-            fresh=given.fresh,
             force=given.force,
             name=name,
             notice=notice,

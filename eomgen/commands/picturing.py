@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from eomgen.api.options import RunOptions
 from eomgen.api.planning import plan_run
 from eomgen.api.reopening import load_run
 from eomgen.api.simulating import run_plan
@@ -14,8 +15,10 @@ from eomgen.commands.shared import (
     read_whole,
     reporter_of,
 )
+from eomgen.commands.usage import taken
 from eomgen.results import Run
 from eomgen.run.progress import terminal_notice, terminal_progress
+from eomgen.show.filming import FilmOptions
 
 SAVED = (".npz", ".csv")
 """Suffixes of files that `simulate` writes and from which a run comes back."""
@@ -65,17 +68,8 @@ def film(given: Arguments) -> int:
         pixels_of(given.size, "--size")
     run = _run_of(given)
     with terminal_progress(f"filming {run.model.name}") as progress:
-        made = filmed(
-            run.trajectory,
-            run.motion,
-            target,
-            given.fps,
-            given.speed,
-            (given.start, given.end),
-            given.size,
-            given.force,
-            progress,
-        )
+        options = taken(FilmOptions, given)
+        made = filmed(run.trajectory, run.motion, target, options, progress)
     size = f"{made.size[0]} x {made.size[1]} pixels"
     lasts = made.frames / made.fps
     print(f"{run.model.name}: {made.frames} frames of {size}, {lasts:.3g} s at {made.fps:.4g} fps")
@@ -93,23 +87,21 @@ def _target(given: Arguments, ending: str) -> Path:
 def _run_of(given: Arguments) -> Run:
     """The run in a file, or that of a scene, which is simulated."""
     if Path(given.scene).suffix.lower() in SAVED:
-        if given.t_end is not None or given.set or given.samples is not None:
+        if given.t_end is not None or given.parameters or given.samples is not None:
             raise RunError(
                 f"--t-end, --samples, --set: are for a scene, and {given.scene} is a run; drop them"
             )
         return load_run(given.scene)
     reporter = reporter_of(given, given.scene)
     scene, model, _ = read_whole(given.scene, given)
-    parameters = assignments(given.set, model.defaults, "--set")
-    plan = plan_run(
-        scene,
-        model,
-        t_end=given.t_end,
-        parameters=parameters,
+    options = taken(
+        RunOptions,
+        given,
+        source=scene,
+        parameters=assignments(given.parameters, model.defaults, "--set"),
         samples=given.samples or (MANY if getattr(given, "poincare", "") else ROWS),
-        reporter=reporter,
     )
-    run = run_plan(plan, reporter=reporter)
+    run = run_plan(plan_run(scene, model, options, reporter=reporter), reporter=reporter)
     if not run.finished:
         raise RunError(f"{run.model.name}: {run.message}")
     print(f"{run.model.name}: simulated {run.t[-1]:g} s by {run.trajectory.integrator}")

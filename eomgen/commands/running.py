@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from eomgen.api.inputs import applied
+from eomgen.api.options import RunOptions
 from eomgen.api.planning import plan_run
 from eomgen.api.saving import output_paths, save_run
 from eomgen.api.simulating import run_plan
 from eomgen.api.states import state_names
 from eomgen.base.errors import InterruptedRunError, RunError
-from eomgen.commands.choosing import print_choice, print_estimate, seconds_of, warn_of_energy
+from eomgen.commands.choosing import print_choice, print_estimate, warn_of_energy
 from eomgen.commands.shared import (
     Arguments,
     assignments,
@@ -26,6 +27,7 @@ from eomgen.commands.shared import (
     scene_with_inputs,
     shortened,
 )
+from eomgen.commands.usage import taken
 from eomgen.results import Run
 from eomgen.run.parquet import check_parquet
 from eomgen.run.trajectory import Trajectory
@@ -44,33 +46,16 @@ def simulate(given: Arguments) -> int:
     reporter = reporter_of(given, given.scene)
     applied_to = applied(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, applied_to[0])
-    parameters = assignments(given.set, model.defaults, "--set")
+    parameters = assignments(given.parameters, model.defaults, "--set")
     with reporter.located():
         state = assignments(given.state, state_names(model), "--state")
     plan = plan_run(
         scene,
         model,
-        outputs=required(given, model),
-        t_end=given.t_end,
-        integrator=given.integrator,
-        dt=given.dt,
-        rtol=given.rtol,
-        atol=given.atol,
-        accuracy=given.accuracy,
-        budget=None if given.budget is None else seconds_of(given.budget),
-        parameters=parameters,
-        state=state,
-        inputs=applied_to[1],
+        taken(RunOptions, given, source=scene, parameters=parameters, state=state),
+        constants=applied_to[1],
         varying=applied_to[2],
-        samples=given.samples,
-        max_step=given.max_step,
-        works=given.works,
-        save=tuple(filter(None, (word.strip() for word in given.save.split(",")))),
-        guard=given.guard,
-        unstable=given.unstable,
-        estimate=given.estimate,
-        resume=given.resume,
-        backend=given.backend,
+        outputs=required(given, model),
         reporter=reporter,
     )
     if given.parquet:

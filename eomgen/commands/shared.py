@@ -10,6 +10,7 @@ from pathlib import Path
 
 from eomgen.api.given import Outputs, check_name, check_outputs, modelled
 from eomgen.api.inputs import Given, read_table
+from eomgen.api.options import FLAGS
 from eomgen.api.overlaps import overlaps_at_start
 from eomgen.api.reporter import Reporter
 from eomgen.base.errors import RunError
@@ -25,15 +26,6 @@ from eomgen.scene.schema import Scene
 
 Arguments = argparse.Namespace
 
-OPTIONS = {
-    "inputs": "--input",
-    "state": "--state",
-    "motion": "--motion-time",
-    "number": "--float",
-    "parameters": "--set",
-    "resume": "--from",
-}
-"""Options that are not named after the argument of the public function."""
 FEW = 40
 """Longer lists are shortened."""
 
@@ -52,7 +44,7 @@ def read_whole(
     The name ends in the form and the route if these are not the scene's own.
     """
     reporter = reporter_of(given, scene)
-    outputs = named_outputs(given)
+    outputs: Outputs | None = getattr(given, "outputs", None)
     if outputs is not None:
         check_outputs(outputs, reporter)
     tables = read_scene(scene) if tables is None else tables
@@ -66,17 +58,9 @@ def read_whole(
     return tables, model, name
 
 
-def named_outputs(given: Arguments) -> Outputs | None:
-    """The outputs of `--outputs a,b,c` or `--outputs all`; None without the option."""
-    text: str | None = getattr(given, "outputs", None)
-    if text is None or text == "all":
-        return "all" if text else None
-    return [name.strip() for name in text.split(",")]
-
-
 def required(given: Arguments, model: Model) -> Sequence[str]:
     """Outputs that the command line lists, with those they need."""
-    return () if named_outputs(given) in (None, "all") else model.outputs
+    return () if given.outputs in (None, "all") else model.outputs
 
 
 def reporter_of(given: Arguments, scene: str) -> Reporter:
@@ -135,7 +119,7 @@ def assignments(
 def scene_with_inputs(given: Arguments) -> tuple[Scene, dict[str, Given]]:
     """The scene, and the inputs that `--input` gives."""
     scene = read_scene(given.scene)
-    return scene, given_inputs(given.input, [i.name for i in all_inputs(scene)])
+    return scene, given_inputs(given.inputs, [i.name for i in all_inputs(scene)])
 
 
 def given_inputs(texts: list[str], known: Sequence[str]) -> dict[str, Given]:
@@ -153,7 +137,8 @@ def given_inputs(texts: list[str], known: Sequence[str]) -> dict[str, Given]:
 
 
 def _option(name: str) -> str:
-    return OPTIONS.get(name, f"--{name.replace('_', '-')}")
+    flags = FLAGS.get(name, "").split()
+    return flags[-1] if flags else f"--{name.replace('_', '-')}"
 
 
 def overlap_lines(model: Model) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from eomgen.api.generating import compiled
 from eomgen.api.inputs import for_members
+from eomgen.api.options import SweepOptions
 from eomgen.api.reporter import Reporter
 from eomgen.api.saving import save_statistics, save_sweep
 from eomgen.api.sweeping import (
@@ -23,15 +24,16 @@ from eomgen.api.sweeping import (
 )
 from eomgen.base.errors import InterruptedRunError, RunError, nearest
 from eomgen.base.files import check_folder, check_writable
+from eomgen.commands.options import Members
 from eomgen.commands.shared import (
     Arguments,
     assignments,
-    named_outputs,
     read_whole,
     reporter_of,
     scene_with_inputs,
     shortened,
 )
+from eomgen.commands.usage import taken
 from eomgen.language.base import identifier
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import terminal_progress
@@ -44,46 +46,33 @@ FEW = 5
 
 def sweep(given: Arguments) -> int:
     """Run the members; write a table and a figure; keep what has run in a folder."""
-    outputs = named_outputs(given)
+    outputs, given.outputs = given.outputs, None  # those of the model are the scene's own
     if outputs == "all":
         raise RunError("--outputs: name the functions to compute, kinetic_energy for example")
-    given.outputs = None
     reporter = reporter_of(given, given.scene)
     tables, inputs, varying = for_members(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, tables)
-    parameters = assignments(given.set, model.defaults, "--set")
-    plan = plan_sweep(
-        scene,
-        model,
-        _design(given),
-        t_end=given.t_end,
-        integrator=given.integrator,
-        dt=given.dt,
-        rtol=given.rtol,
-        atol=given.atol,
-        parameters=parameters,
-        inputs=inputs,
-        varying=varying,
-        outputs=outputs or (),
-        samples=given.samples,
-        max_step=given.max_step,
-        unstable=given.unstable,
-        backend=given.backend,
-        reporter=reporter,
+    folder = given.output / f"{name}_sweep"
+    options = taken(
+        SweepOptions,
+        given,
+        source=scene,
+        vary=_design(given),
+        parameters=assignments(given.parameters, model.defaults, "--set"),
+        outputs=outputs,
+        workers=os.cpu_count() or 1 if given.workers is None else given.workers,
+        folder=folder,
     )
+    plan = plan_sweep(scene, model, options, constants=inputs, varying=varying, reporter=reporter)
     of = _shown(given, plan, reporter)
     table, figure = (given.output / f"{name}_sweep.{kind}" for kind in ("csv", "png"))
     check_folder(given.output)
     statistics = given.output / f"{name}_sweep_statistics.csv"
     for path in (table, figure, *([statistics] if given.statistics else [])):
         check_writable(path, force=given.force)
-    folder = given.output / f"{name}_sweep"
     counting = replace(reporter, progress=partial(terminal_progress, countdown=True))
-    workers = os.cpu_count() or 1 if given.workers is None else given.workers
     try:
-        found = run_sweep(
-            plan, workers=workers, scheduler=given.scheduler, folder=folder, reporter=counting
-        )
+        found = run_sweep(plan, reporter=counting)
     except KeyboardInterrupt:
         raise InterruptedRunError(
             f"{model.name}: interrupted; {kept_members(folder)} of {len(plan.design.values)} "
@@ -121,8 +110,7 @@ def _design(given: Arguments) -> Design:
         return grid({name: _axis(name, text) for name, text in parts.items()})
     if not 0 < given.sample <= MOST:
         raise RunError(f"--sample: {given.sample} is not a number from 1 to {MOST}")
-    if given.seed < 0:
-        raise RunError(f"--seed: {given.seed} is negative; give 0, 1, 2, …")
+    taken(Members, given)
     return sampled({n: _law(n, text) for n, text in parts.items()}, given.sample, given.seed)
 
 

@@ -3,11 +3,13 @@
 import argparse
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pkgutil import resolve_name
 from typing import Literal
 
-from eomgen.commands import code_options, run_options, study_options
-from eomgen.commands.options import add_code, add_form, add_route
+from eomgen.api import options as api
+from eomgen.commands import options as own
+from eomgen.commands.usage import add_options
 
 Arguments = argparse.Namespace
 AddOptions = Callable[[argparse.ArgumentParser], None]
@@ -36,7 +38,7 @@ class Command:
     about    what it does
     example  a line that can be typed
     takes    its first argument: a scene, several, a run, or nothing
-    options  functions that add its options to a parser
+    options  records of its options, or functions that add them to a parser
     kept     what an interrupt leaves, if the command does not say so itself
     """
 
@@ -45,7 +47,7 @@ class Command:
     about: str
     example: str
     takes: Takes = "scene"
-    options: tuple[AddOptions, ...] = ()
+    options: tuple[type | AddOptions, ...] = ()
     kept: str = ""
 
     def run(self, given: Arguments) -> int:
@@ -58,8 +60,15 @@ class Command:
         if self.takes:
             name, metavar, count, text = TAKEN[self.takes]
             parser.add_argument(name, metavar=metavar, nargs=count, help=text)
-        for add in self.options:
-            add(parser)
+        for options in self.options:
+            if isinstance(options, type):
+                add_options(parser, options)
+            else:
+                options(parser)
+
+
+EACH_SCENE = ("t_end", "integrator", "dt", "rtol", "atol", "max_step", "samples", "backend")
+"""The options of a run that `gallery` takes for all scenes."""
 
 
 _ALL = (
@@ -71,14 +80,14 @@ _ALL = (
         "write a small scene with comments, to begin with",
         "eomgen new swing",
         "",
-        (code_options.add_new,),
+        (own.New,),
     ),
     Command(
         "copy",
         "scene_files:copy",
         "copy a scene to a file of your own",
         "eomgen copy cart_pole my_cart",
-        options=(code_options.add_copy,),
+        options=(own.Copy,),
     ),
     Command(
         "import",
@@ -86,7 +95,7 @@ _ALL = (
         "write a robot file, URDF or MJCF, as a scene",
         "eomgen import robot.urdf -o robot.toml",
         "",
-        (code_options.add_import,),
+        (own.Imported,),
     ),
     Command(
         "completion",
@@ -94,7 +103,7 @@ _ALL = (
         "print the completion of commands for a shell",
         "eomgen completion bash > ~/.local/share/bash-completion/completions/eomgen",
         "",
-        (code_options.add_completion,),
+        (own.Shell,),
     ),
     Command(
         "schema",
@@ -109,21 +118,21 @@ _ALL = (
         "print the keys of joints and effects",
         "eomgen reference contact",
         "",
-        (code_options.add_reference,),
+        (own.Type,),
     ),
     Command(
         "check",
         "describing:check",
         "validate a scene and print its parts",
         "eomgen check two_body",
-        options=(code_options.add_check, add_form),
+        options=(own.Check, api.Formed),
     ),
     Command(
         "derive",
         "deriving:derive",
         "print the derivation, step by step",
         "eomgen derive two_body -o two_body.html",
-        options=(code_options.add_derivation,),
+        options=(own.Derivation,),
         kept=DERIVED,
     ),
     Command(
@@ -132,21 +141,21 @@ _ALL = (
         "write the module of a scene",
         "eomgen generate two_body pendulum -o modules",
         "scenes",
-        (add_form, add_code, code_options.add_generation),
+        (api.Formed, own.Coded, own.Generation),
     ),
     Command(
         "export",
         "exporting:export",
         "write the equations of a scene in the format of another tool",
         "eomgen export cart_pole --fmu -o cart_pole.fmu",
-        options=(add_form, add_code, code_options.add_export),
+        options=(own.add_formats, api.ExportOptions),
     ),
     Command(
         "simulate",
         "running:simulate",
         "integrate, and write trajectory, figure and page",
         "eomgen simulate cart_pole --set l=0.4 --state theta=0.3 --input push=3*sin(t)",
-        options=(add_form, add_code, run_options.add_simulation),
+        options=(api.RunOptions, own.Coded, own.RunFiles),
         kept=DERIVED,
     ),
     Command(
@@ -154,7 +163,7 @@ _ALL = (
         "running:view",
         "integrate, and open the animated page",
         "eomgen view double_pendulum",
-        options=(add_form, add_code, run_options.add_simulation),
+        options=(api.RunOptions, own.Coded, own.RunFiles),
         kept=DERIVED,
     ),
     Command(
@@ -163,7 +172,7 @@ _ALL = (
         "draw a figure of a run for a paper: PNG, SVG or PDF",
         "eomgen plot out/cart_pole.npz --of theta,theta_dot,energy,joint_forces.pin -o run.pdf",
         "run",
-        (run_options.add_plot,),
+        (own.Plot,),
         DERIVED,
     ),
     Command(
@@ -172,7 +181,7 @@ _ALL = (
         "make a film of a run: GIF, or MP4 with ffmpeg",
         "eomgen film out/cart_pole.npz --speed 0.5 -o cart_pole.gif",
         "run",
-        (run_options.add_film,),
+        (own.Film,),
         DERIVED,
     ),
     Command(
@@ -181,21 +190,21 @@ _ALL = (
         "write a folder of live pages, and one that shows them all with a picture and a sentence",
         "eomgen gallery -o course --scene pendulum two_body",
         "",
-        (run_options.add_gallery,),
+        (partial(add_options, record=api.RunOptions, names=EACH_SCENE), own.Gallery),
     ),
     Command(
         "sweep",
         "sweeping:sweep",
         "run a scene many times, with other parameters, initial states or inputs",
         "eomgen sweep cart_pole --vary m_pole=0.1:0.5:20 --of theta",
-        options=(add_form, add_route, run_options.add_sweep),
+        options=(api.Formed, own.Members, api.SweepOptions, own.InFolder),
     ),
     Command(
         "verify",
         "verifying:verify",
         "compare the module with an independent solver and 60 digits",
         "eomgen verify two_body --states 20",
-        options=(add_route, study_options.add_verification),
+        options=(api.Routed, api.VerifyOptions, own.Evidence),
         kept=DERIVED,
     ),
     Command(
@@ -203,7 +212,7 @@ _ALL = (
         "measuring:accuracy",
         "measure time against error of all methods, and rounding errors of all routes",
         "eomgen accuracy pendulum --quick",
-        options=(add_form, add_route, study_options.add_accuracy),
+        options=(api.AccuracyOptions, api.ArithmeticOptions, own.Halves),
         kept="the runs made so far are in the table, and the same command continues",
     ),
     Command(
@@ -211,7 +220,7 @@ _ALL = (
         "costing:effects",
         "measure the cost of each effect, and the change of the motion without it",
         "eomgen effects ragdoll --each",
-        options=(add_route, study_options.add_costing),
+        options=(api.EffectsOptions, own.Costing),
         kept=DERIVED,
     ),
     Command(
@@ -219,7 +228,7 @@ _ALL = (
         "linearising:linearise",
         "compute A, B and modes about an equilibrium",
         "eomgen linearise cart_pole --state theta_deg=180 -o cart_pole.npz",
-        options=(study_options.add_linearisation,),
+        options=(api.PointOptions, api.Routed, own.Matrices),
         kept=DERIVED,
     ),
 )

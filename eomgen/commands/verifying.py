@@ -1,10 +1,12 @@
 """The command `verify`."""
 
 from eomgen.api.inputs import all_in_formulas
-from eomgen.api.reporter import Reporter
-from eomgen.api.verifying import check_verification, digest, horizon_of, verified_model
+from eomgen.api.options import VerifyOptions
+from eomgen.api.verifying import digest, horizon_of, verified_model
 from eomgen.base.errors import InterruptedRunError, RunError
+from eomgen.commands.options import Evidence
 from eomgen.commands.shared import Arguments, read_whole, reporter_of, scene_with_inputs
+from eomgen.commands.usage import taken
 
 
 def verify(given: Arguments) -> int:
@@ -12,15 +14,14 @@ def verify(given: Arguments) -> int:
     # Imported here: it imports extended precision.
     from eomgen.study.verification import evidence
 
-    options = {"states": given.states, "seed": given.seed, "bound": given.bound}
-    reporter = Reporter(argument=lambda name: f"--{name}")
-    check_verification(**options, horizon=given.horizon, reporter=reporter)
+    options = taken(VerifyOptions, given, source=given.scene)
+    taken(Evidence, given)
     reporter = reporter_of(given, given.scene)
     tables = all_in_formulas(*scene_with_inputs(given), reporter)
     scene, model, name = read_whole(given.scene, given, tables)
     if given.save is not None:
         evidence.paths(given.save, name, force=given.force)
-    found = verified_model(model, scene.simulation, **options, name=name, reporter=reporter)
+    found = verified_model(model, scene.simulation, options, name=name, reporter=reporter)
     horizon = None
     if given.horizon is not None and not found.stopped:
         settings = scene.simulation

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from eomgen.base.options import taking
 from eomgen.run import events
 from eomgen.run.calls import Calls, Count
 from eomgen.run.checks import check_repairs
@@ -17,90 +18,28 @@ from eomgen.run.integrators import EndedRunError, FixedStep, StepFailure
 from eomgen.run.integrators.interface import Adaptive, Advance, Resume
 from eomgen.run.integrators.stability import UnstableStepError
 from eomgen.run.margins import Seen
+from eomgen.run.options import Wanted
 from eomgen.run.passage import Passage
 from eomgen.run.problem import Explanation, FloatArray, Problem
-from eomgen.run.progress import Progress, throttled
+from eomgen.run.progress import throttled
 from eomgen.run.projection import Violations
 from eomgen.run.rows import Record, all_finite
 from eomgen.run.shaking import Shaken
 from eomgen.run.singular import watched
 from eomgen.run.stepping import Asked, Steps, begun, can_go_on, steps_of
-from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Event, Outcome, Trajectory
-from eomgen.run.works import Account, Powers
+from eomgen.run.works import Account
 
 
-def integrate(
-    problem: Problem,
-    integrator: str,
-    t_end: float,
-    *,
-    t_start: float = 0.0,
-    dt: float | None = None,
-    rtol: float = 1e-9,
-    atol: float | None = None,
-    samples: int | None = None,
-    progress: Progress | None = None,
-    max_step: float | None = None,
-    max_steps: int = 10_000_000,
-    rest_speed: float | None = None,
-    powers: Powers | None = None,
-    resume: Resume | None = None,
-    guard: Guard | None = None,
-    unstable: bool = False,
-    tally: Tally | None = None,
-) -> Trajectory:
+@taking(Wanted)
+def integrate(wanted: Wanted) -> Trajectory:
     """Return the trajectory of `problem` from `t_start` to `t_end` > `t_start`, in s.
-
-    integrator  a name in `eomgen.tables.integrators.INTEGRATORS`
-    dt          step in s of the fixed-step methods, which need it; the last one is shortened
-    rtol, atol  tolerances for the error of each step of the adaptive methods. The default of atol
-                is 1e-12 of each state's size in `problem.sizes`, less if rtol is below 1e-9
-    samples     number of rows to keep: for fixed steps every k-th one such that there are about
-                this many (default: all), for adaptive methods this many equally spaced times
-                (default: 1001); the first and the last are always kept
-    progress    called with the fraction done, at most about ten times a second
-    max_step    longest step in s of the adaptive methods; by default only the error bounds it. If
-                the derivative has corners, a step that has passed over a contact or a pulse is
-                repeated (`run.branches`); if that cannot be detected, steps are at most 1/1000 of
-                the run
-    rest_speed  contacts that close more slowly than this, in m/s or rad/s, do not bounce; those
-                that then neither open nor close are held, so that bouncing comes to an end. By
-                default it is √(1e-7 a size), with a the acceleration of the gaps without contact
-                forces: slower contacts would rise by less than 5e-8 of the mechanism's size
-    powers      given to compute the works of effects
-    resume      `Trajectory.resume` of an earlier run, from which this one continues; `t_start` and
-                `problem.initial` are ignored. The result has the same bytes as if that run had not
-                ended, if problem, method and step or tolerances are the same
-    guard       checks the rounding errors of the derivative at every step, and stops the run where
-                digits are lost, or repairs it (`run.guard`); it does not change other steps
-    unstable    whether an explicit method with equal steps may run with steps too long for
-                stability; else the run stops there and says how long they may be
-    tally       updated at every step; may end the run
 
     Raises `RunError` for an invalid argument. An error after the run has begun, Ctrl-C included,
     ends it early instead: the trajectory then holds the finite rows up to there, is not `finished`,
     and its `message` says where it stopped, why, and what to change.
     """
-    asked, problem = Asked.of(
-        problem,
-        t_start,
-        resume,
-        integrator=integrator,
-        t_end=float(t_end),
-        dt=dt,
-        rtol=rtol,
-        atol=atol,
-        samples=samples,
-        max_step=max_step,
-        max_steps=max_steps,
-        rest_speed=rest_speed,
-        powers=powers,
-        guard=guard,
-        unstable=unstable,
-        tally=tally,
-        progress=progress,
-    )
+    asked, problem = Asked.of(wanted)
     plan = _planned(asked, problem)
     run, advances = plan.run(), plan.advances()
     outcome, trouble = _follow(plan, run, advances)

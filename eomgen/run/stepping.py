@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -23,15 +23,12 @@ from eomgen.run.checks import (
     numbers,
 )
 from eomgen.run.compiled import Compiled, Strikes, Touched
-from eomgen.run.guard import Guard
 from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
 from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume
 from eomgen.run.integrators.stability import StabilityMonitor
+from eomgen.run.options import Wanted
 from eomgen.run.problem import FloatArray, Problem
-from eomgen.run.progress import Progress
-from eomgen.run.tally import Tally
-from eomgen.run.works import Powers
 
 Rows = Callable[[float, float], Sequence[float]]
 """(a, b) -> the times of the rows of a run after a, up to b, s."""
@@ -42,29 +39,16 @@ ANEW = "anew"
 
 
 @dataclass(frozen=True)
-class Asked:
-    """The arguments of `integrate`; `grid`, s, is the time from which equal steps are counted.
+class Asked(Wanted):
+    """These arguments for a run that may continue another one: from its state and its time, and
+    without a `resume` of one that made no whole step. `grid`, s, is the time from which equal steps
+    are counted.
 
     Raises `RunError` for arguments that are invalid for every method.
     """
 
-    integrator: str
-    t_start: float
-    t_end: float
+    _: KW_ONLY
     grid: float
-    resume: Resume | None
-    dt: float | None
-    rtol: float
-    atol: float | None
-    samples: int | None
-    max_step: float | None
-    max_steps: int
-    rest_speed: float | None
-    powers: Powers | None
-    guard: Guard | None
-    unstable: bool
-    tally: Tally | None
-    progress: Progress | None
 
     def __post_init__(self) -> None:
         check_times(self.t_start, self.t_end)
@@ -73,18 +57,19 @@ class Asked:
         check_rest_speed(self.rest_speed)
 
     @classmethod
-    def of(
-        cls, problem: Problem, t_start: float, resume: Resume | None, **given: Any
-    ) -> tuple["Asked", Problem]:
-        """What is asked, and the problem of a run that may continue another one."""
-        grid = t_start = float(t_start)
-        if resume is not None:
-            t_start = float(resume["t"])
-            grid = float(resume.get("grid", t_start))
-            problem = replace(problem, initial=resume["y"])
-            if ANEW in resume:  # that run made no whole step
-                resume = None
-        return cls(t_start=t_start, grid=grid, resume=resume, **given), problem
+    def of(cls, wanted: Wanted) -> tuple["Asked", Problem]:
+        """What is asked, and the problem of the run."""
+        given, earlier = vars(wanted), wanted.resume
+        grid = t_start = float(wanted.t_start)
+        problem = wanted.problem
+        if earlier is not None:
+            t_start = float(earlier["t"])
+            grid = float(earlier.get("grid", t_start))
+            problem = replace(problem, initial=earlier["y"])
+            if ANEW in earlier:
+                given = {**given, "resume": None}
+        times = {"t_start": t_start, "t_end": float(wanted.t_end), "grid": grid}
+        return cls(**{**given, **times}), problem
 
     @cached_property
     def method(self) -> FixedStep | Adaptive:

@@ -9,6 +9,7 @@ import numpy as np
 
 from eomgen.base.errors import RunError
 from eomgen.run.trajectory import Trajectory
+from eomgen.show.filming import FilmOptions
 from eomgen.show.motion import Array, Motion, thinned
 from eomgen.show.plots import (
     draw_phase,
@@ -176,24 +177,20 @@ def filmed(
     trajectory: Trajectory,
     motion: Motion,
     path: Path,
-    fps: float,
-    speed: float,
-    times: tuple[float | None, float | None],
-    size: str,
-    force: bool,
+    options: FilmOptions,
     progress: "Progress | None" = None,
 ) -> Filmed:
-    """Write the film of a run; the arguments are those of `Run.film`."""
+    """Write the film of a run, as `Run.film` does."""
     from eomgen.show.film import check_film, film_times, frame_rate, pixels_of, save_film
 
-    check_film(path, force=force)
-    pixels = pixels_of(size) if size else None
-    if not 0 < fps <= 100:
-        raise RunError(f"fps: {fps:g} is not a number from 1 to 100")
-    fps = frame_rate(path, fps)
+    check_film(path, force=options.force)
+    pixels = pixels_of(options.size) if options.size else None
+    if not 0 < options.fps <= 100:
+        raise RunError(f"fps: {options.fps:g} is not a number from 1 to 100")
+    fps, speed = frame_rate(path, options.fps), options.speed
     first, last = float(trajectory.t[0]), float(trajectory.t[-1])
-    start = first if times[0] is None else times[0]
-    end = last if times[1] is None else times[1]
+    start = first if options.start is None else options.start
+    end = last if options.end is None else options.end
     if not first <= start < end <= last:
         raise RunError(f"from, to: give times within the run, {first:g} s to {last:g} s")
     t = film_times(start, end, fps, speed)
@@ -203,5 +200,7 @@ def filmed(
     shown = _at(run, motion, fine, between(run))
     rows = range(0, len(fine), SMOOTH)
     ignored = progress or (lambda share: None)
-    drawn = save_film(shown, rows, path, fps=fps, size=pixels, force=force, progress=ignored)
+    drawn = save_film(
+        shown, rows, path, fps=fps, size=pixels, force=options.force, progress=ignored
+    )
     return Filmed(path, len(t), fps, drawn)

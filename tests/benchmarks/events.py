@@ -14,7 +14,8 @@ import numpy as np
 
 from eomgen.api.generating import compiled
 from eomgen.api.given import check, read
-from eomgen.api.simulating import plan_run
+from eomgen.api.options import RunOptions
+from eomgen.api.planning import plan_run
 from eomgen.native.accelerator import Accelerator
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators.strides import Strides
@@ -42,7 +43,7 @@ def timed(problem: Problem, rtol: float, t_end: float) -> tuple[float, Trajector
 
 def measure(scene: str, rtol: float, t_end: float) -> str:
     """A line of the table."""
-    model = plan_run(read(scene), check(scene)).model
+    model = plan_run(read(scene), check(scene), RunOptions(scene)).model
     module = compiled(model)[1]
     python = problem_of(module, None, None, model)
     accelerator = Accelerator(model, module, None, None)

@@ -11,6 +11,7 @@ from test_compiled_steps import FALL, assert_same, both, compiler
 import eomgen
 from eomgen.api.generating import compiled as generated
 from eomgen.api.given import check, read
+from eomgen.api.options import RunOptions
 from eomgen.api.planning import plan_run
 from eomgen.codegen import jacobians
 from eomgen.codegen.backends import c, c_directions
@@ -112,7 +113,7 @@ def test_parameters_that_are_too_large_are_said() -> None:
 
 def prepared(scene: str) -> tuple[Model, GeneratedModule, Problem]:
     """The model of a scene, its module and its problem, whose functions are Python's."""
-    model = plan_run(read(scene), check(scene)).model
+    model = plan_run(read(scene), check(scene), RunOptions(scene)).model
     module = generated(model)[1]
     return model, module, problem_of(module, None, None, model)
 

@@ -192,14 +192,13 @@ def _ends(ladder: Ladder, climbed: Sequence[Work], fixed: bool) -> bool:
     )
 
 
-def methods_named(text: str | None) -> Sequence[str]:
-    """The methods in `--methods A,B`, in the order of `INTEGRATORS`; if None, all.
+def methods_named(names: Sequence[str] | None) -> Sequence[str]:
+    """The methods of these names, in the order of `INTEGRATORS`; if None, all.
 
     Raises `RunError` for an unknown name, or if there is none.
     """
-    if text is None:
+    if names is None:
         return tuple(INTEGRATORS)
-    names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
         raise RunError(f"--methods: names no integrator; known: {', '.join(INTEGRATORS)}")
     for name in names:
