@@ -75,7 +75,7 @@ class Records:
     states: Annotated[Matrix, "most", "STATES"]
     slopes: Annotated[Matrix, "most", "STATES"]
     losses: Annotated[Matrix, "most", "STATES"]
-    terms: Annotated[Matrix, "most", "STATES"]
+    terms: Annotated[Matrix, "7 * most", "STATES"]
     times: Annotated[Vector, "count"]
     rows: Annotated[Matrix, "count", "STATES"]
     count: int

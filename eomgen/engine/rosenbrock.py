@@ -311,20 +311,18 @@ def rodas_many(
     state: Annotated[Vector, "STATES"],
     kept: RodasRecords,
 ) -> int:
-    """Up to `kept.most` steps from a state at the time `begun`; up to `smooth` no branch of the
-    derivative begins or ends. They end before one that reaches the end, or that anything is unusual
-    in. Returns why.
+    """Up to `kept.most` steps from a state at the time `begun` to the end, or before one that
+    anything is unusual in, or that ends after `smooth`: up to there no branch of the derivative
+    begins or ends. Returns why.
     """
     t = begun
     y = copy(state)
     place = zeros(len(y))
     passed = 0
-    while kept.made < kept.most:
+    while kept.made < kept.most and t < run.t_bound:
         length = min(run.h_abs, run.longest)
         if not length >= 10.0 * abs(next_after(t) - t):
             return UNUSUAL
-        if not t + length < run.t_bound:
-            return AT_END
         held.clear()
         if not rodas_step(system, run, factors, t, y) or held.is_raised():
             return UNUSUAL

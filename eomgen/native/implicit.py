@@ -26,8 +26,10 @@ from eomgen.native.checked import Function, FunctionStructure
 from eomgen.native.constrained import address, constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import constants_of
+from eomgen.native.memory import room
 from eomgen.native.module import Kernels
-from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Watched
+from eomgen.native.strides import stride
+from eomgen.run.compiled import Array, EqualSteps, Steps, Stretch, Stride
 from eomgen.run.integrators.implicit_stages import projected_of, stages_of
 from eomgen.run.integrators.rodas_5p import rodas
 from eomgen.run.problem import Problem
@@ -205,66 +207,33 @@ def _rodas_5p(
     system: System,
     functions: Mapping[str, Function],
     inputs: Array | None,
-    t: float,
-    y: Array,
-    memory: Mapping[str, float | Array],
-    *,
-    t_end: float,
-    rtol: float,
-    atol: Array,
-    longest: float,
-    times: Array,
-    most: int,
-    watched: Watched | None = None,
-    sizes: Array | None = None,
-    dense: bool = False,
-    constrained: Constrained | None = None,
+    stretch: Stretch,
 ) -> Stride:
-    """Steps of Rodas5P, with the arguments of `run.compiled.Steps`, of which `watched` may have
-    switching functions of time alone only, and there are no `sizes`; none if they are to be
-    `dense`.
+    """Steps of Rodas5P, which may be watched with switching functions of time alone only, and have
+    no `sizes`; none if they are to be `dense`.
     """
-    assert sizes is None and not (watched and watched.ends)
-    most = 0 if dense else most
-    ny = system.states
-    run = rodas(ny, atol, (t_end, longest, rtol), system.positions, bool(system.timed))
-    run.h_abs, run.h_last, run.error = (float(memory[x]) for x in ("h_abs", "h_last", "error"))
-    run.lost[:] = memory["lost"]
-    margins = made_margins(constrained, most)
-    ends, lengths, last_lengths, errors = np.empty((4, most))
-    states, losses = np.empty((2, most, ny))
-    derivatives, jacobians, factorisations, sampled = np.empty((4, most), np.int64)
-    rows = np.empty((len(times), ny))
-    arrays = ends, lengths, last_lengths, errors, states, losses, margins[1:]
-    counts = derivatives, jacobians, factorisations, sampled
-    kept = RodasRecords(*arrays, *counts, times, rows, len(times), most)
-    keeps = constraints(functions, constrained, inputs, ny)
-    left, start = filled(kept), np.ascontiguousarray(y)
+    watched, solver, held = stretch.watched, stretch.solver, stretch.constrained
+    assert stretch.sizes is None and not (watched and watched.ends)
+    ny, most = system.states, 0 if stretch.dense else stretch.most
+    limits = stretch.until, stretch.longest, stretch.rtol
+    run = rodas(ny, stretch.atol, limits, system.positions, bool(system.timed))
+    run.h_abs, run.h_last, run.error = solver.h_abs, solver.h_last, solver.error
+    run.lost[:] = solver.lost
+    margins = made_margins(held, most)
+    sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
+    kept, records = room(
+        RodasRecords, rows=np.empty((len(stretch.times), ny)), margins=margins[1:], **sizes
+    )
+    keeps = constraints(functions, held, inputs, ny)
     factors, clear = plain_factors(ny), watched.clear if watched else math.inf
+    start = np.ascontiguousarray(solver.y)
     why = call(
         ctypes.byref(system),
         address(keeps),
         *(ctypes.byref(filled(record)) for record in (run, factors)),
-        *(t, clear, start.ctypes.data),
-        ctypes.byref(left),
+        *(solver.t, clear, start.ctypes.data),
+        ctypes.byref(records),
     )
-    take(kept, left)
-    n = kept.made
-    passed = int(sampled[n - 1]) if n else 0
-    memories = {"h_abs": lengths, "h_last": last_lengths, "error": errors, "lost": losses}
-    return Stride(
-        ends[:n],
-        states[:n],
-        {name: values[:n] for name, values in memories.items()},
-        derivatives[:n],
-        sampled[:n],
-        rows[:passed].copy(),  # the array for all rows to come is not kept with them
-        np.full(n, watched.switched if watched else -math.inf),
-        np.empty((n, 0)),
-        np.zeros(n, np.int64),
-        np.zeros(n, np.int64),
-        usual=why != UNUSUAL,
-        jacobians=jacobians[:n],
-        factorisations=factorisations[:n],
-        margins=margins[: n + 1] if constrained else None,
-    )
+    take(kept, records)
+    n, memory = kept.made, ("h_abs", "h_last", "error", "lost")
+    return stride(kept, n, memory, why != UNUSUAL, margins=margins[: n + 1] if held else None)

@@ -1,25 +1,36 @@
 """Memory that C writes to."""
 
-from collections.abc import Sequence
+import ctypes
 from math import prod
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eomgen.subset.structures import address as address
+from eomgen.subset.structures import address, fields_of, structure
+
+T = TypeVar("T")
 
 
-def placed(
-    shapes: Sequence[tuple[int, ...]], kind: type = np.float64
-) -> tuple[list[NDArray[Any]], list[int]]:
-    """Arrays of these shapes, of numbers of 8 bytes, in one block, and their addresses."""
-    sizes = [prod(shape) for shape in shapes]
-    block: NDArray[Any] = np.empty(sum(sizes), kind)
-    start, first = address(block), 0
-    arrays, addresses = [], []
-    for shape, size in zip(shapes, sizes, strict=True):
-        arrays.append(block[first : first + size].reshape(shape))
-        addresses.append(start + 8 * first)
-        first += size
-    return arrays, addresses
+def room(record: type[T], **given: Any) -> tuple[T, ctypes.Structure]:
+    """A record, and what C is given of it: as `subset.structures.with_room` and `filled` make them,
+    but its arrays lie in one block for each kind of number, and are not set to anything.
+    """
+    names, arrays = fields_of(record)  # type: ignore[arg-type]
+    made = {name: x for name, x in given.items() if name in names}
+    places = {name: address(x) if x.size else 0 for name, x in made.items() if hasattr(x, "size")}
+    for kind in (np.float64, np.int64):
+        own = [
+            (name, [(given[n] if n else 1) * factor for n, factor in sizes])
+            for name, sizes, of in arrays
+            if of is kind and name not in made
+        ]
+        block, first = np.empty(sum(prod(shape) for _, shape in own), kind), 0
+        start = address(block) if block.size else 0
+        for name, shape in own:
+            size = prod(shape)
+            made[name] = block[first : first + size].reshape(shape)
+            places[name] = start + 8 * first
+            first += size
+    whole = record(**made)
+    of_c: Any = structure(record)  # type: ignore[arg-type]
+    return whole, of_c(*(places.get(n, getattr(whole, n)) for n, _ in of_c._fields_))

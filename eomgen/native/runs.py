@@ -21,16 +21,17 @@ from eomgen.native.constrained import address as where
 from eomgen.native.constrained import constraints, made_margins
 from eomgen.native.constrained import context as of_constraints
 from eomgen.native.functions import restricted
-from eomgen.native.memory import address, placed
+from eomgen.native.memory import room
 from eomgen.native.module import Kernels, usual_constants
+from eomgen.native.strides import stride
 from eomgen.program.program import Program
 from eomgen.run import branches
-from eomgen.run.compiled import Array, Constrained, EqualSteps, Steps, Stride, Strikes, Watched
+from eomgen.run.compiled import Array, EqualSteps, Steps, Stretch, Stride, Strikes, Watched
 from eomgen.run.integrators.dormand_prince_8 import interpolated
 from eomgen.run.integrators.strides import OF_CONTACTS, OF_STATE
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
-from eomgen.subset.structures import filled, structure
+from eomgen.subset.structures import address, filled
 
 MAIN = "runs.c"
 CHECKS: list[equal_steps.Root] = [(name, {}) for name in ("passed_over", "end_at", "stay_apart")]
@@ -133,74 +134,53 @@ class CompiledSteps:
             return None
         return partial(contact_runs.strikes, self._library, self._checks, self._inputs)
 
-    def _dop853(
-        self,
-        t: float,
-        y: Array,
-        memory: Mapping[str, float | Array],
-        *,
-        t_end: float,
-        rtol: float,
-        atol: Array,
-        longest: float,
-        times: Array,
-        most: int,
-        watched: Watched | None = None,
-        sizes: Array | None = None,
-        dense: bool = False,
-        constrained: Constrained | None = None,
-    ) -> Stride:
-        """Steps of DOP853, with the arguments of `run.compiled.Steps`."""
-        ny = self._states
-        each, whole = (most,), (most, ny)
-        watch, found, *given = _Checked.of(watched, ny) if watched else self._unwatched
+    def _dop853(self, stretch: Stretch) -> Stride:
+        """Steps of DOP853."""
+        ny, most, watched, solver = self._states, stretch.most, stretch.watched, stretch.solver
+        seen = _Checked.of(watched, ny) if watched else self._unwatched
         functions = [self._checks.get(name) for name in (*OF_STATE, *OF_CONTACTS)]
-        (ends, lengths, states, slopes, losses, switched, values, terms), at_reals = placed(
-            [each, each, *[whole] * 3, each, (most, watch.many), (dense * most, 7, ny)]
-        )
-        (derivatives, sampled, switches, gap_checks), at_wholes = placed([each] * 4, np.int64)
-        rows, margins = np.empty((len(times), ny)), made_margins(constrained, most)
-        keeps = constraints(self._checks, constrained, self._inputs, ny)
-        start = [np.ascontiguousarray(array) for array in (y, memory["f"], memory["lost"])]
-        to_margins, to_times, to_rows, to_atol, *begun = map(
-            address, (margins[1:], times, rows, atol, *start)
-        )
+        sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
+        if not stretch.dense:
+            sizes["terms"] = np.empty((0, ny))
+        kept, records = room(Records, rows=np.empty((len(stretch.times), ny)), **sizes)
+        switched, values = np.empty(most), np.empty((most, seen.watch.many))
+        switches, gap_checks = np.empty((2, most), np.int64)
+        margins = made_margins(stretch.constrained, most)
+        keeps = constraints(self._checks, stretch.constrained, self._inputs, ny)
         system = equal_steps.System(*self._held)
-        run = structure(Bounds)(to_atol, rtol, longest, t_end, dense)
-        at = filled(Progress(t, length=float(memory["h_abs"])))
-        records = structure(Records)(
-            *(*at_reals[:2], *at_wholes[:2], *at_reals[2:5], at_reals[7], to_times, to_rows),
-            *(len(times), most),
+        run = filled(
+            Bounds(
+                stretch.atol,
+                stretch.rtol,
+                stretch.longest,
+                stretch.until,
+                stretch.dense,
+                stretch.reaches,
+            )
         )
+        at = filled(Progress(solver.t, length=float(solver.h_abs)))
         checks = _Checks(
             *(ctypes.addressof(each) for each in (system, run)),
-            *(where(keeps), *map(ctypes.addressof, given)),
+            *(where(keeps), *map(ctypes.addressof, seen[2:])),
             *(FunctionStructure(*each) if each else FunctionStructure() for each in functions),
-            *(None if sizes is None else address(sizes), watched.clear if watched else math.inf),
-            *(to_margins, *at_reals[5:7], *at_wholes[2:]),
+            None if stretch.sizes is None else address(stretch.sizes),
+            watched.clear if watched else math.inf,
+            *map(address, (margins[1:], switched, values, switches, gap_checks)),
         )
+        begun = [np.ascontiguousarray(array) for array in (solver.y, solver.f, solver.lost)]
         why = self._call(
             *(ctypes.addressof(each) for each in (system, checks, run, at)),
-            *begun,
+            *map(address, begun),
             ctypes.addressof(records),
         )
-        del watch, found, keeps, records
         n: int = at.made
-        passed = int(sampled[n - 1]) if n else 0
-        return Stride(
-            ends[:n],
-            states[:n],
-            {"h_abs": lengths[:n], "f": slopes[:n], "lost": losses[:n]},
-            derivatives[:n],
-            sampled[:n],
-            rows[:passed].copy(),  # the array for all rows to come is not kept with them
-            switched[:n],
-            values[:n],
-            switches[:n],
-            gap_checks[:n],
-            usual=why != UNUSUAL,
-            within=partial(_within, (t, y), ends, states, terms) if dense else None,
-            margins=margins[: n + 1] if constrained else None,
+        counts = {"switches": switches, "gap_checks": gap_checks}
+        return stride(
+            *(kept, n, ("h_abs", "f", "lost"), why != UNUSUAL, counts),
+            switched=switched[:n],
+            values=values[:n],
+            within=partial(_within, (solver.t, solver.y), kept) if stretch.dense else None,
+            margins=margins[: n + 1] if stretch.constrained else None,
         )
 
 
@@ -232,9 +212,8 @@ def _watch(watched: Watched | None, states: int) -> Watch:
     return made
 
 
-def _within(
-    begun: tuple[float, Array], ends: Array, states: Array, terms: Array, i: int, time: float
-) -> Array:
+def _within(begun: tuple[float, Array], kept: Records, i: int, time: float) -> Array:
     """The state at a time in step number i of those that begin at a time and a state."""
-    start, first = (float(ends[i - 1]), states[i - 1]) if i else begun
-    return interpolated(start, float(ends[i]) - start, first, terms[i], time)
+    start, first = (float(kept.ends[i - 1]), kept.states[i - 1]) if i else begun
+    terms = kept.terms[7 * i : 7 * i + 7]
+    return interpolated(start, float(kept.ends[i]) - start, first, terms, time)

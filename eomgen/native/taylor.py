@@ -12,18 +12,19 @@ from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.series import recurrences_of, series_functions
-from eomgen.engine.adaptive import AT_END, UNUSUAL, Bounds, Progress, Records
+from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
 from eomgen.engine.taylor import Terms, convolved, expanded
-from eomgen.native.memory import address, placed
+from eomgen.native.memory import room
+from eomgen.native.strides import stride
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 from eomgen.program.taylor import Recurrences
 from eomgen.program.taylor_text import SeriesText, series_text
-from eomgen.run.compiled import Array, Constrained, Series, Stride, Watched
+from eomgen.run.compiled import Array, Series, Stretch, Stride
 from eomgen.run.integrators.taylor import HIGHEST, order_of
 from eomgen.run.module import given_values
 from eomgen.scalars.floats import FloatScalars
-from eomgen.subset.structures import filled, structure
+from eomgen.subset.structures import address, filled
 
 MAIN = "taylor.c"
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -136,55 +137,22 @@ class CompiledTaylor:
         self._series(self._at, t, start.ctypes.data, order, rows.ctypes.data)
         return rows
 
-    def steps(
-        self,
-        t: float,
-        y: Array,
-        memory: Mapping[str, float | Array],
-        *,
-        t_end: float,
-        rtol: float,
-        atol: Array,
-        longest: float,
-        times: Array,
-        most: int,
-        watched: Watched | None = None,
-        sizes: Array | None = None,
-        dense: bool = False,
-        constrained: Constrained | None = None,
-    ) -> Stride:
-        """Steps, with the arguments of `run.compiled.Steps`. None are made if they must be checked
-        or keep constraints, or if states within them are wanted.
+    def steps(self, stretch: Stretch) -> Stride:
+        """Steps. None are made if they must be checked or keep constraints, or if states within
+        them are wanted.
         """
-        most = 0 if dense or watched or constrained or sizes is not None else most
-        ny = self._states
-        (ends, lengths, states, losses), reals = placed([(most,)] * 2 + [(most, ny)] * 2)
-        (derivatives, sampled), wholes = placed([(most,)] * 2, np.int64)
-        rows = np.empty((len(times), ny))
-        run = structure(Bounds)(address(atol), rtol, longest, t_end, False)
-        at = filled(Progress(t))
-        start = [np.ascontiguousarray(array) for array in (y, memory["lost"])]
-        kept = structure(Records)(
-            *(*reals[:2], *wholes, reals[2], None, reals[3], None, address(times), address(rows)),
-            *(len(times), most),
-        )
+        checked = stretch.watched or stretch.constrained or stretch.sizes is not None
+        most = 0 if stretch.dense or checked else stretch.most
+        ny, solver = self._states, stretch.solver
+        none = np.empty((0, ny))
+        sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
+        rows = np.empty((len(stretch.times), ny))
+        kept, records = room(Records, slopes=none, terms=none, rows=rows, **sizes)
+        run = filled(Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until))
+        at = filled(Progress(solver.t))
+        start = [np.ascontiguousarray(array) for array in (solver.y, solver.lost)]
         why = self._steps(
-            *(self._at, ctypes.addressof(run), order_of(rtol), ctypes.addressof(at)),
-            *(*map(address, start), ctypes.addressof(kept)),
+            *(self._at, ctypes.addressof(run), order_of(stretch.rtol), ctypes.addressof(at)),
+            *(*map(address, start), ctypes.addressof(records)),
         )
-        n: int = at.made
-        passed = int(sampled[n - 1]) if n else 0
-        return Stride(
-            ends[:n],
-            states[:n],
-            {"h_abs": lengths[:n], "lost": losses[:n]},
-            derivatives[:n],
-            sampled[:n],
-            rows[:passed].copy(),  # the array for all rows to come is not kept with them
-            np.full(n, -np.inf),
-            np.empty((n, 0)),
-            np.zeros(n, np.int64),
-            np.zeros(n, np.int64),
-            usual=why != UNUSUAL,
-            ended=why == AT_END,
-        )
+        return stride(kept, at.made, ("h_abs", "lost"), why != UNUSUAL)

@@ -4,8 +4,9 @@
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,18 +56,13 @@ class Stride:
     ends         (m,), their times, s
     states       (m, ny), the states there
     memory       what of the solver determines the next step, by name, for each step
-    derivatives  (m,), calls of the derivative so far
+    counts       (m,) each, what the steps have counted so far, by the names of `Advance`
     sampled      (m,), number of rows passed so far
     rows         (r, ny), the states at the times of these rows
-    switched     (m,), the time of the last switch so far, s
-    values       (m, ns), the switching functions at their ends
-    switches, gap_checks
-                 (m,), calls of switching functions, and of gaps and their rates, so far
     usual        whether the next step may be made so, too
-    jacobians, factorisations
-                 (m,), numbers of these so far; None if there are none
+    switched     (m,), the time of the last switch so far, s, and
+    values       (m, ns), the switching functions at their ends, if there are some of the state
     within       gives the state at a time in the step of a number; None if that was not asked for
-    ended        whether the last step reaches the end of the run
     margins      (m + 1,), the least margins of constraints at the start and at their ends; None if
                  there are none
     """
@@ -74,18 +70,13 @@ class Stride:
     ends: Array
     states: Array
     memory: Mapping[str, Array]
-    derivatives: NDArray[np.int64]
+    counts: Mapping[str, NDArray[np.int64]]
     sampled: NDArray[np.int64]
     rows: Array
-    switched: Array
-    values: Array
-    switches: NDArray[np.int64]
-    gap_checks: NDArray[np.int64]
     usual: bool
-    jacobians: NDArray[np.int64] | None = None
-    factorisations: NDArray[np.int64] | None = None
+    switched: Array = field(default_factory=partial(np.empty, 0))
+    values: Array = field(default_factory=partial(np.empty, 0))
     within: Callable[[int, float], Array] | None = None
-    ended: bool = False
     margins: Array | None = None
 
 
@@ -108,39 +99,40 @@ class Watched:
     angles: tuple[int, ...]
 
 
-class Steps(Protocol):
-    """Makes up to `most` steps from the state `y` at t, but none beyond `t_end`.
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """What steps of an adaptive method are wanted: up to `most` from where a solver is, but none
+    beyond `until`, s.
 
-    memory      of the solver, by name
+    solver      has the time t, the state y and the memory of the method, which determine the steps
+    reaches     whether one of them may be shorter because it ends at `until`; else they end before
+                that one
     rtol, atol  tolerances, atol (ny,)
     longest     the longest step, s
+    dense       whether states within the steps are wanted
     times       ascending times of the rows wanted, after t
     watched     given to make no step that may pass over a branch of the derivative
     sizes       given (nc,) to make no step in which a rigid contact, none of which is held, may
                 close; its gap is relative to its size
-    dense       whether states within the steps are wanted
     constrained the constraints to keep, if there are any
     """
 
-    def __call__(
-        self,
-        t: float,
-        y: Array,
-        memory: Mapping[str, float | Array],
-        *,
-        t_end: float,
-        rtol: float,
-        atol: Array,
-        longest: float,
-        times: Array,
-        most: int,
-        watched: Watched | None = None,
-        sizes: Array | None = None,
-        dense: bool = False,
-        constrained: Constrained | None = None,
-    ) -> Stride: ...
+    solver: Any
+    until: float
+    reaches: bool
+    rtol: float
+    atol: Array
+    longest: float
+    most: int
+    dense: bool
+    times: Array
+    watched: Watched | None
+    sizes: Array | None
+    constrained: Constrained | None
 
 
+Steps = Callable[[Stretch], Stride]
+"""Makes steps of an adaptive method."""
 Series = Callable[[float, Array, int], Array]
 """The Taylor coefficients (order + 1, ny) of the solution from a state y on: `(t, y, order)`."""
 

@@ -27,6 +27,7 @@ from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_s
 from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume
 from eomgen.run.integrators.stability import StabilityMonitor
+from eomgen.run.integrators.stepper import Bounds
 from eomgen.run.options import Wanted
 from eomgen.run.problem import FloatArray, Problem
 
@@ -177,7 +178,7 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
     if asked.resume is not None and asked.max_step is None:
         longest, unseen = float(asked.resume["longest"]), float(asked.resume["unseen"])
     atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
-    bounds = adaptive.Bounds(asked.rtol, atol, longest, unseen, asked.max_steps)
+    bounds = Bounds(asked.rtol, atol, longest, unseen, asked.max_steps)
     compiled = None if asked.guard else _compiled(problem)
 
     def begin(

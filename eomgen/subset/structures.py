@@ -34,7 +34,7 @@ def with_room(record: type[T], **given: Any) -> T:
     """A record with these numbers and arrays; its other arrays are of zeros, in the sizes that it
     states, of which those that are not its fields are given, too.
     """
-    names, arrays = _fields(record)  # type: ignore[arg-type]
+    names, arrays = fields_of(record)  # type: ignore[arg-type]
     made = {name: x for name, x in given.items() if name in names}
     for name, sizes, kind in arrays:
         if name not in made:
@@ -52,7 +52,7 @@ def arrays_of(record: Any) -> Iterator[tuple[str, bool, list[str]]]:
 
 
 @cache
-def _fields(record: Any) -> tuple[set[str], list[tuple[str, list[tuple[str, int]], Any]]]:
+def fields_of(record: Any) -> tuple[set[str], list[tuple[str, list[tuple[str, int]], Any]]]:
     """The names of a record's fields, and its arrays: their names, sizes, each a name times a
     number, and kinds.
     """
