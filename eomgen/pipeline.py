@@ -3,7 +3,7 @@
     Model ─choose▶ Choice ─record▶ System ─optimise▶ System ─render▶ Generated
 
 Before it, `scene.reader` reads a scene, `model.elaborate` makes a model of it, and
-`dynamics.assembly` gives it a start that meets its constraints. After it, `store`
+`dynamics.start.assembly` gives it a start that meets its constraints. After it, `store`
 keeps the generated code, and `run` loads and integrates it.
 """
 
@@ -20,8 +20,8 @@ from eomgen.codegen.interface import Interface, interface_of
 from eomgen.codegen.live import live_system
 from eomgen.codegen.series import with_series
 from eomgen.codegen.system import System, optimised
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.language.formula import Formula
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model

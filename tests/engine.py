@@ -10,7 +10,7 @@ import pytest
 
 from eomgen.codegen import jacobians
 from eomgen.codegen.system import System
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.language.formula import names_in
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model

@@ -9,8 +9,8 @@ import sympy as sp
 
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.steps import Equation, Step
-from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.start.constraint_equations import ConstraintEquations, newton
 from eomgen.exposition.derivation import used_bodies
 from eomgen.exposition.effects import DerivedEffect, derived_effects
 from eomgen.exposition.evaluate import Numbers, array, define, follow, number
@@ -42,7 +42,7 @@ def instant(model: Model, seed: int = 0, shake: float = 0.3, *, closed: bool = F
     inputs = {i.name: float(rng.normal()) for i in model.inputs}
     states = {x.name: float(rng.normal()) for x in model.extra}
     if closed:
-        found = newton(Closure.of(model), q, np.ones(len(v), dtype=bool))
+        found = newton(ConstraintEquations.of(model), q, np.ones(len(v), dtype=bool))
         assert found is not None
         q = found
     values = Values(model.defaults, inputs, q.tolist(), v.tolist(), states, 0.4)

@@ -8,10 +8,10 @@ from spatial_loops import Closed
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE
 
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.constraints import loads_of
 from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.loops.constraints import loads_of
 from eomgen.dynamics.reactions import reactions
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars

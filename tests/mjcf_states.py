@@ -13,8 +13,8 @@ from peer_frames import dynamics_at, expected_frames, frames, stand_in
 
 import eomgen
 from eomgen.base.errors import SceneError
-from eomgen.dynamics.assembly import assembled
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.importers import import_file

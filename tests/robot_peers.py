@@ -16,7 +16,7 @@ from numpy.linalg import norm
 from peer_frames import dynamics_at, expected_frames, frames, stand_in
 
 import eomgen
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.scene.importers.names import identifiers
 
 SMOOTH = 0.01

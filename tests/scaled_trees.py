@@ -13,7 +13,7 @@ from spatial_trees import random_spatial_tree
 from eomgen.base.errors import SceneError
 from eomgen.codegen.system import System
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model

@@ -12,9 +12,9 @@ from scaled_trees import apart, found, size_of, taken
 from spatial_loops import random_loops
 
 from eomgen.base.errors import SceneError
-from eomgen.dynamics.closed_positions import regular_positions
-from eomgen.dynamics.closure import Closure, newton
 from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.start.constraint_equations import ConstraintEquations, newton
+from eomgen.dynamics.start.walks import regular_positions
 from eomgen.language.formula import Constant
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
@@ -104,7 +104,7 @@ def _errors(
 def _states(model: Model, seed: int) -> list[State]:
     """q, v and inputs: the scene's start, and positions along its motion with seeded velocities."""
     rng = np.random.default_rng(seed)
-    mechanism = Closure.of(model)
+    mechanism = ConstraintEquations.of(model)
     everything = np.ones(len(model.velocities), dtype=bool)
     near = (newton(mechanism, q, everything) for q in regular_positions(model)[::7])
     positions = [q for q in near if q is not None]

@@ -6,10 +6,10 @@ linearisation of the built-in scene `bicycle` on the manifold of its constraints
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from eomgen.dynamics import constraints
-from eomgen.dynamics.clusters import jacobian_of
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.mechanism_state import Values
+from eomgen.dynamics.loops import constraints
+from eomgen.dynamics.loops.clusters import jacobian_of
+from eomgen.dynamics.tree.mechanism_state import Values
 from eomgen.model.model import Model
 from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.extended import MP, Digits

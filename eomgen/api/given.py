@@ -13,8 +13,8 @@ from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.base.displays import DISPLAYS
 from eomgen.base.errors import RunError, SceneError, nearest
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.language.base import identifier
 from eomgen.model.elaborate import available_in, elaborate, outputs_for
 from eomgen.model.model import Model

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from eomgen.dynamics.diagnostics import initial_overlaps
+from eomgen.dynamics.start.diagnostics import initial_overlaps
 from eomgen.model.model import Model, dofs_of
 
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 from eomgen.base.errors import SceneError
 from eomgen.codegen.derive import Derived, derive, record
+from eomgen.codegen.digits import ALL, Route, digits_lost, digits_lost_by_kind
 from eomgen.derivation.supported import why_not_closed, why_not_tried
-from eomgen.dynamics.assur import with_closed_form
-from eomgen.dynamics.closed_positions import with_safe_pivots
-from eomgen.dynamics.digits import ALL, Route, digits_lost, digits_lost_by_kind
-from eomgen.dynamics.linkage import make_linkage
-from eomgen.dynamics.mechanism_state import Values
-from eomgen.dynamics.mixed import well_conditioned
+from eomgen.dynamics.orthogonal.mixed import well_conditioned
+from eomgen.dynamics.start.assur import with_closed_form
+from eomgen.dynamics.start.walks import with_safe_pivots
+from eomgen.dynamics.tree.linkage import make_linkage
+from eomgen.dynamics.tree.mechanism_state import Values
 from eomgen.model.model import Model
 from eomgen.program.passes import optimise
 from eomgen.program.program import Program, cost, interpreter

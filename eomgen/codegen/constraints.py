@@ -2,8 +2,8 @@
 
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes
-from eomgen.dynamics import constraints
-from eomgen.dynamics.clusters import jacobian_of
+from eomgen.dynamics.loops import constraints
+from eomgen.dynamics.loops.clusters import jacobian_of
 from eomgen.program.tape import Node
 from eomgen.scene.effects.base import Load
 

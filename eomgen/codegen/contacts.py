@@ -6,7 +6,7 @@ from itertools import chain
 from eomgen.codegen.system import ContactLabel, OutputNodes, names_of_inputs
 from eomgen.dynamics.dynamics import Dynamics, Forward
 from eomgen.dynamics.impulses import pressed, rough, struck
-from eomgen.dynamics.loads import generalised, scaled
+from eomgen.dynamics.tree.loads import generalised, scaled
 from eomgen.program.differentiate import tangent
 from eomgen.program.tape import Node, Stage, Tape, total
 from eomgen.scene.effects.base import Contact, JointLoad

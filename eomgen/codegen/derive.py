@@ -10,7 +10,7 @@ from eomgen.codegen.recording import Recording
 from eomgen.codegen.stand_ins import with_stand_ins
 from eomgen.codegen.system import System
 from eomgen.derivation.supported import why_not_closed, why_not_momenta, why_not_pins
-from eomgen.dynamics.kinematics import Axes
+from eomgen.dynamics.tree.kinematics import Axes
 from eomgen.model.model import Model
 from eomgen.program.passes import optimise
 from eomgen.program.program import Output, Program, cost, finish

@@ -7,9 +7,9 @@ that determine them: no arc tangent is taken where nothing but these is used.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from eomgen.dynamics.closing import Turn, angle_of, from_middle, solved
-from eomgen.dynamics.dyads import Arrow, turned, turned_back
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.loops.dependent_coordinates import Turn, angle_of, from_middle, solved
+from eomgen.dynamics.loops.dyads import Arrow, turned, turned_back
 from eomgen.program.differentiate import substituted
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import Node, Tape

@@ -17,11 +17,11 @@ from eomgen.codegen.system import (
     output_shape,
     recorded,
 )
-from eomgen.dynamics import observables
-from eomgen.dynamics.composite import full
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.dynamics.reactions import reactions
-from eomgen.dynamics.vectors import Vec, in_space, zeros
+from eomgen.dynamics.tree import observables
+from eomgen.dynamics.tree.composite import full
+from eomgen.dynamics.tree.vectors import Vec, in_space, zeros
 from eomgen.language.formula import is_zero
 from eomgen.model.states import initial_state, velocity_states
 from eomgen.program import differentiate

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import LARGEST_JACOBIAN, OutputNodes, names_of_inputs
-from eomgen.dynamics.composite import Entries, solved
-from eomgen.dynamics.sensitivity import sensitivity
-from eomgen.dynamics.vectors import sub, zeros
+from eomgen.dynamics.tree.composite import Entries, solved
+from eomgen.dynamics.tree.sensitivity import sensitivity
+from eomgen.dynamics.tree.vectors import sub, zeros
 from eomgen.program.differentiate import jacobian, substituted, tangent
 from eomgen.program.tape import Node, Stage
 from eomgen.tables.outputs import DERIVATIVES

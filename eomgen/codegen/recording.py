@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from eomgen.codegen.following import Following, positions
-from eomgen.dynamics.constraints import position_rates
 from eomgen.dynamics.dynamics import Forward, Values
-from eomgen.dynamics.kinematics import Axes
+from eomgen.dynamics.loops.constraints import position_rates
 from eomgen.dynamics.regrouping import RegroupedDynamics
+from eomgen.dynamics.tree.kinematics import Axes
 from eomgen.model.model import Model
 from eomgen.program.scalars import TapeScalars
 from eomgen.program.tape import TIME, Node, Stage, Tape

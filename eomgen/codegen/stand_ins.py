@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from eomgen.codegen.recording import Recording
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.vectors import add, cross, in_space, torque_in_space, zeros
+from eomgen.dynamics.tree.vectors import add, cross, in_space, torque_in_space, zeros
 from eomgen.language.formula import ZERO, Name
 from eomgen.language.quantity import Parameter
 from eomgen.model.dependence import is_plain

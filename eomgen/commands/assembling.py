@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from eomgen.commands.shared import print_listed, print_wrapped
-from eomgen.dynamics.closure import Closure
+from eomgen.dynamics.start.constraint_equations import ConstraintEquations
 from eomgen.model.model import Model
 
 
@@ -16,7 +16,7 @@ def print_assembly(model: Model) -> None:
     if not model.constraints:
         print("assembly    no loops and no constraints: nothing is assembled")
         return
-    closure, q = Closure.of(model), np.array(model.initial_q)
+    equations, q = ConstraintEquations.of(model), np.array(model.initial_q)
     for label, known, values in (
         ("start       ", model.coordinates, model.initial_q),
         ("velocities  ", model.velocities, model.initial_v),
@@ -29,10 +29,10 @@ def print_assembly(model: Model) -> None:
             ]
             if found:
                 print_listed(f"{label}{word}: ", found)
-    off = np.abs(closure.residuals(q))
+    off = np.abs(equations.residuals(q))
     worst = int(off.argmax())
     name, unit = model.rows[worst]
-    size, length = (closure.size, "m") if unit == "N" else (1.0, "rad")
+    size, length = (equations.size, "m") if unit == "N" else (1.0, "rad")
     print_wrapped("residual    ", f"at most {off[worst] * size:.2g} {length}, of {name}")
     names = [c.name for c in model.velocities]
     dependent = [names[column] for _, column in model.pivots]
@@ -42,7 +42,7 @@ def print_assembly(model: Model) -> None:
     print_listed("dropped     ", list(model.dropped))
     rows, columns = (list(part) for part in zip(*sorted(model.pivots), strict=True))
     order = sorted(columns)
-    determinant = np.linalg.det(closure.jacobian(q)[np.ix_(sorted(rows), order)])
+    determinant = np.linalg.det(equations.jacobian(q)[np.ix_(sorted(rows), order)])
     sign = "+" if determinant > 0 else "-"
     print_wrapped(
         "branch      ",

@@ -16,11 +16,17 @@ import math
 from collections.abc import Sequence
 from functools import cached_property
 
-from eomgen.dynamics import constraints
-from eomgen.dynamics import forces as fc
-from eomgen.dynamics.applied import AppliedLoads
-from eomgen.dynamics.articulated import Pivots, articulate, respond
-from eomgen.dynamics.composite import (
+from eomgen.dynamics.loops import constraints
+from eomgen.dynamics.loops.embedding import Embedded
+from eomgen.dynamics.loops.least_constraint import LeastConstraint
+from eomgen.dynamics.loops.null_space import NullSpace
+from eomgen.dynamics.loops.range_space import Forward, RangeSpace, Response
+from eomgen.dynamics.orthogonal.elimination import Elimination
+from eomgen.dynamics.orthogonal.mixed import well_conditioned
+from eomgen.dynamics.tree import forces as fc
+from eomgen.dynamics.tree.applied import AppliedLoads
+from eomgen.dynamics.tree.articulated import Pivots, articulate, respond
+from eomgen.dynamics.tree.composite import (
     Entries,
     Factors,
     ancestors,
@@ -28,25 +34,19 @@ from eomgen.dynamics.composite import (
     mass_entries,
     solved,
 )
-from eomgen.dynamics.embedding import Embedded
-from eomgen.dynamics.frames import Linkage
-from eomgen.dynamics.kinematics import TreeKinematics
-from eomgen.dynamics.least_constraint import LeastConstraint
-from eomgen.dynamics.linkage import make_linkage
-from eomgen.dynamics.mechanism_state import Values
-from eomgen.dynamics.mixed import well_conditioned
-from eomgen.dynamics.motion import (
+from eomgen.dynamics.tree.frames import Linkage
+from eomgen.dynamics.tree.kinematics import TreeKinematics
+from eomgen.dynamics.tree.linkage import make_linkage
+from eomgen.dynamics.tree.mechanism_state import Values
+from eomgen.dynamics.tree.motion import (
     Acceleration,
     Twist,
     accelerations,
     kinetic_energy,
     velocities,
 )
-from eomgen.dynamics.null_space import NullSpace
-from eomgen.dynamics.orthogonal import Elimination
-from eomgen.dynamics.range_space import Forward, RangeSpace, Response
-from eomgen.dynamics.solids import Solid, centres, ranked, solids
-from eomgen.dynamics.vectors import no_matrix, sub, zeros
+from eomgen.dynamics.tree.solids import Solid, centres, ranked, solids
+from eomgen.dynamics.tree.vectors import no_matrix, sub, zeros
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.effects import Effect

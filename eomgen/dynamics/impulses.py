@@ -18,7 +18,7 @@ friction, and leaves the slip -e u_n A_tn / A_nn.
 from collections.abc import Sequence
 
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.loads import AnyLoad, generalised, scaled
+from eomgen.dynamics.tree.loads import AnyLoad, generalised, scaled
 from eomgen.scalars.protocol import Scalar, Scalars
 from eomgen.scene.effects.base import Contact, Load
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from eomgen.dynamics import observables
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.forces import Wrench
-from eomgen.dynamics.vectors import (
+from eomgen.dynamics.tree import observables
+from eomgen.dynamics.tree.forces import Wrench
+from eomgen.dynamics.tree.vectors import (
     Vec,
     add,
     cross,

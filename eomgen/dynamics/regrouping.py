@@ -16,12 +16,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
-from eomgen.dynamics.composite import shifted
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.dynamics.frames import Frame, Linkage, Rigid, joined
-from eomgen.dynamics.kinematics import Axes, TreeKinematics, still_rotation, tree_kinematics
-from eomgen.dynamics.linkage import make_linkage
-from eomgen.dynamics.vectors import (
+from eomgen.dynamics.tree.composite import shifted
+from eomgen.dynamics.tree.frames import Frame, Linkage, Rigid, joined
+from eomgen.dynamics.tree.kinematics import Axes, TreeKinematics, still_rotation, tree_kinematics
+from eomgen.dynamics.tree.linkage import make_linkage
+from eomgen.dynamics.tree.vectors import (
     ENTRIES,
     Symmetric,
     no_matrix,

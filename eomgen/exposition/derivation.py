@@ -27,7 +27,7 @@ from eomgen.derivation.supported import (
 )
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
-from eomgen.dynamics.assur import with_closed_form
+from eomgen.dynamics.start.assur import with_closed_form
 from eomgen.exposition.composite import composite_steps
 from eomgen.exposition.constraints import DerivedConstraint, derived_constraints, tree_of
 from eomgen.exposition.effects import DerivedEffect, derived_effects, equations_of, with_symbols

@@ -2,9 +2,9 @@
 
     q = γ(independent coordinates),    v = K u,    v̇ = K u̇ + κ
 
-with u the independent velocities. Positions are those of `dynamics.closing`, the same closed forms
-as in programs, run over symbols; velocities and accelerations follow from g differentiated twice,
-one polygon after another. What is left has one equation for each freedom:
+with u the independent velocities. Positions are those of `dynamics.loops.dependent_coordinates`,
+the same closed forms as in programs, run over symbols; velocities and accelerations follow from g
+differentiated twice, one polygon after another. What is left has one equation for each freedom:
 
     M̂ u̇ + V̂ + Ĝ = F̂,    M̂ = KᵀM K,    V̂ = Kᵀ(V + M κ),    Ĝ = KᵀG,    F̂ = KᵀF
 """
@@ -19,8 +19,8 @@ from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
-from eomgen.dynamics.closing import Turn, angle_of, solved
-from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.dynamics.loops.dependent_coordinates import Turn, angle_of, solved
+from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
 from eomgen.exposition.constraints import DerivedConstraint, DerivedRow
 from eomgen.exposition.frames import frames_of
 from eomgen.exposition.poses import poses

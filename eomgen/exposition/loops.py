@@ -9,7 +9,7 @@ from eomgen.derivation.matrices import Matrices
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation, Step
 from eomgen.derivation.symbols import Expr
-from eomgen.dynamics.closed_positions import safely_dependent
+from eomgen.dynamics.start.walks import safely_dependent
 from eomgen.exposition.constraints import DerivedConstraint, DerivedRow
 from eomgen.exposition.effects import equations_of
 from eomgen.exposition.embedding import Embedding, Polygon, projected, solved_for

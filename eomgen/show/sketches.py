@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
 from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Body, Model
 from eomgen.scalars.floats import FloatScalars

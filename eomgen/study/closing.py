@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from eomgen.dynamics.assembly import closed_start
+from eomgen.dynamics.start.assembly import closed_start
 from eomgen.model.model import Model
 from eomgen.run.problem import FloatArray
 

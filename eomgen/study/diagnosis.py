@@ -8,8 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.dynamics.diagnostics import constraint_trouble, effect_sizes, is_singular, values_at
-from eomgen.dynamics.singularity import relative_pivots, why_unresisted
+from eomgen.dynamics.start.diagnostics import (
+    constraint_trouble,
+    effect_sizes,
+    is_singular,
+    values_at,
+)
+from eomgen.dynamics.start.singularity import relative_pivots, why_unresisted
 from eomgen.model.model import Model, dofs_of
 from eomgen.run.module import GeneratedModule, as_problem, given_values
 from eomgen.run.origin import START, UNITS, Origin

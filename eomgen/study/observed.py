@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.base.errors import RunError
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import available_in, elaborate, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.run.module import load_module

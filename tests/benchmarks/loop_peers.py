@@ -35,7 +35,7 @@ sys.path.append(str(Path(__file__).parent.parent))
 
 import planar_linkages as linkages
 
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.native.accelerator import Accelerator
 from eomgen.run.integrate import integrate

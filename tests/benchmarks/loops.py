@@ -26,7 +26,7 @@ sys.path.append(str(Path(__file__).parent.parent))
 from planar_linkages import four_bars
 
 from eomgen.codegen.derive import derive
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import generate

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, python_module
 from eomgen.program.extended import evaluator

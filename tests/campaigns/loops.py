@@ -38,7 +38,7 @@ from test_loop_runs import four_bar
 from test_loops import CLOSE, CONDITION, WELL, left_out
 
 import eomgen
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.native.accelerator import Accelerator
 from eomgen.run.integrate import integrate

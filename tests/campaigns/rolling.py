@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import test_rolling as rolling
 from whipple import SPEEDS, TABLE, linearised
 
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem

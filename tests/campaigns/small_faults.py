@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from gmpy2 import mpfr
 
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.run.module import load_module

@@ -16,7 +16,7 @@ from eomgen.base.errors import SceneError
 from eomgen.codegen.backends.javascript import mechanism
 from eomgen.codegen.interface import interface_of
 from eomgen.commands.main import main
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import generate
 from eomgen.scene.reader import parse_scene

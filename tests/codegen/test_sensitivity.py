@@ -13,7 +13,7 @@ from engine import Engine, along, apart, engine, exact, varied
 from mechanisms import random_tree
 from spatial_trees import random_spatial_tree
 
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, python_module
 from eomgen.program.extended import evaluator

@@ -26,7 +26,7 @@ from eomgen.derivation.projected.simplify import gathered, sum_of_squares
 from eomgen.derivation.projected.steps import projected_steps
 from eomgen.derivation.projected.symbols import Ledger, make_symbols, rate
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_model, compile_program

@@ -14,10 +14,10 @@ from followed import Instant, instant
 
 import eomgen
 from eomgen.derivation.dots import dotted
-from eomgen.dynamics import constraints as solved
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.assur import with_closed_form
-from eomgen.dynamics.clusters import accelerations_at_rest, jacobian_of
+from eomgen.dynamics.loops import constraints as solved
+from eomgen.dynamics.loops.clusters import accelerations_at_rest, jacobian_of
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.dynamics.start.assur import with_closed_form
 from eomgen.exposition.constraints import DerivedConstraint, derived_constraints
 from eomgen.exposition.derivation import exposition_of
 from eomgen.exposition.evaluate import Numbers, array, define, number

@@ -12,8 +12,8 @@ from followed import LookedUp, instant
 
 import eomgen
 from eomgen.derivation.dots import dotted
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.assur import with_closed_form
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.dynamics.start.assur import with_closed_form
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.built_in import built_in_names

@@ -17,9 +17,9 @@ from campaign import some
 
 from eomgen.base.errors import SceneError
 from eomgen.codegen.choice import ENOUGH, FEWEST
-from eomgen.dynamics.digits import Route, digits_lost
+from eomgen.codegen.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_program, generate
 from eomgen.program.program import interpreter

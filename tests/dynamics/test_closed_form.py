@@ -16,10 +16,10 @@ from eomgen.api.given import check
 from eomgen.base.errors import SceneError
 from eomgen.codegen.derive import derive, record
 from eomgen.codegen.system import optimised
-from eomgen.dynamics import constraints
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.assur import completed, with_closed_form
 from eomgen.dynamics.dynamics import Dynamics, Values
+from eomgen.dynamics.loops import constraints
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.dynamics.start.assur import completed, with_closed_form
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import python_module

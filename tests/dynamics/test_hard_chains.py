@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from campaign import some
 
-from eomgen.dynamics.diagnostics import values_at
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.start.diagnostics import values_at
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module

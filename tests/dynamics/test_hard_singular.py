@@ -10,7 +10,7 @@ import pytest
 from campaign import some
 
 from eomgen.base.errors import SceneError
-from eomgen.dynamics.singularity import check_nonsingular, relative_pivots
+from eomgen.dynamics.start.singularity import check_nonsingular, relative_pivots
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module

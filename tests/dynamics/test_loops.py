@@ -18,12 +18,12 @@ from spatial_loops import Closed, random_loops
 from spatial_trees import PLANE, SPACE
 
 from eomgen.base.errors import SceneError
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.closure import Closure
-from eomgen.dynamics.constraints import rates, residuals
-from eomgen.dynamics.digits import Route, digits_lost
+from eomgen.codegen.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.loops.constraints import rates, residuals
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.dynamics.start.constraint_equations import ConstraintEquations
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
@@ -371,10 +371,12 @@ def test_a_loop_joint_that_is_there_twice_is_dropped_and_named() -> None:
 @pytest.mark.parametrize("dimensions", [PLANE, SPACE])
 def test_recorded_constraints_are_those_of_floats(dimensions: int) -> None:
     """The same bits, so that walks along closed positions are what they were."""
-    closure = Closure.of(model_of(random_loops(3, dimensions, 4, 1)))
+    equations = ConstraintEquations.of(model_of(random_loops(3, dimensions, 4, 1)))
     rng = np.random.default_rng(1)
     for _ in range(5):
-        q = np.array(closure.model.initial_q) + rng.uniform(-1.0, 1.0, len(closure.model.initial_q))
-        found, matrix = closure.both(q)
-        assert np.array_equal(found, closure.residuals(q))
-        assert np.array_equal(matrix, closure.jacobian(q))
+        q = np.array(equations.model.initial_q) + rng.uniform(
+            -1.0, 1.0, len(equations.model.initial_q)
+        )
+        found, matrix = equations.both(q)
+        assert np.array_equal(found, equations.residuals(q))
+        assert np.array_equal(matrix, equations.jacobian(q))

@@ -10,9 +10,9 @@ from eomgen.base.errors import SceneError
 from eomgen.codegen.choice import choose
 from eomgen.codegen.derive import derive
 from eomgen.dynamics.dynamics import Dynamics, Values
-from eomgen.dynamics.mixed import well_conditioned
-from eomgen.dynamics.orthogonal import Elimination
-from eomgen.dynamics.solids import ranked
+from eomgen.dynamics.orthogonal.elimination import Elimination
+from eomgen.dynamics.orthogonal.mixed import well_conditioned
+from eomgen.dynamics.tree.solids import ranked
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.program import cost

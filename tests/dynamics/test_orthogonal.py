@@ -18,9 +18,9 @@ from campaign import some
 from engine import MP, Digits, apart, engine
 
 from eomgen.codegen.derive import derive
+from eomgen.codegen.digits import Route, digits_lost
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
-from eomgen.dynamics.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.language.formula import Constant
 from eomgen.model.elaborate import elaborate

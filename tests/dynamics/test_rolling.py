@@ -16,9 +16,9 @@ from scipy.special import ellipj, ellipk
 from whipple import PRINTED, SPEEDS, TABLE, appendix, linearised, matrices
 
 from eomgen.base.errors import SceneError
-from eomgen.dynamics import constraints
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.mechanism_state import MechanismState, Values
+from eomgen.dynamics.loops import constraints
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import generate

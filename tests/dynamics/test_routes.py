@@ -21,10 +21,10 @@ from mechanisms import compiled, random_tree
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
-from eomgen.dynamics import observables
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.reactions import reactions
 from eomgen.dynamics.regrouping import RegroupedDynamics
+from eomgen.dynamics.tree import observables
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import generate

@@ -12,7 +12,7 @@ from engine import engine
 
 from eomgen.base.errors import RunError
 from eomgen.commands.main import main
-from eomgen.dynamics.diagnostics import effect_sizes, is_singular, values_at
+from eomgen.dynamics.start.diagnostics import effect_sizes, is_singular, values_at
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
 from eomgen.run.module import as_problem

@@ -14,7 +14,7 @@ import eomgen
 from eomgen.api.given import check
 from eomgen.base.errors import RunError, SceneError
 from eomgen.commands.main import main
-from eomgen.dynamics.assembly import closed_start
+from eomgen.dynamics.start.assembly import closed_start
 from eomgen.run.crossing import crossing
 from eomgen.run.margins import stays_away
 from eomgen.run.module import as_problem

@@ -15,7 +15,7 @@ from gmpy2 import mpfr
 
 from eomgen.base.errors import RunError
 from eomgen.commands.main import main
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.model.elaborate import elaborate, in_order
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.base.errors import RunError
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program
 from eomgen.run.problem import FloatArray

@@ -10,8 +10,8 @@ from functools import partial
 from math import inf
 
 from eomgen.codegen.choice import routes_of, why_not_compared
-from eomgen.dynamics.assembly import assembled
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module

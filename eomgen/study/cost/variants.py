@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from eomgen.dynamics.assembly import assembled
+from eomgen.dynamics.start.assembly import assembled
 from eomgen.language.base import Table
 from eomgen.language.formula import Apply, Constant, Name, names_in
 from eomgen.language.rates import with_rates

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eomgen.dynamics.closed_positions import closed_positions
+from eomgen.dynamics.start.walks import walked_positions
 from eomgen.model.model import Model
 from eomgen.run.failure import StepFailure
 from eomgen.run.module import GeneratedModule, as_problem
@@ -84,7 +84,7 @@ def closed_states(
     """
     problem, found, nq = as_problem(module), [], len(model.coordinates)
     seen, held = viewed(module, model), problem.projection or problem.closed_form
-    positions = closed_positions(model) or (np.array(model.initial_q),)
+    positions = walked_positions(model) or (np.array(model.initial_q),)
     for index, kind in enumerate(CLOSED):
         for number in range(count):
             rng = np.random.default_rng([seed, index, number])

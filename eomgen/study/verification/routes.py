@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from eomgen.base.errors import EomgenError
 from eomgen.codegen.choice import routes_of, why_not_compared, why_not_loops
 from eomgen.codegen.system import System
-from eomgen.dynamics.closed_positions import with_safe_pivots
+from eomgen.dynamics.start.walks import with_safe_pivots
 from eomgen.model.model import Model
 from eomgen.pipeline import compile_program, python_module
 from eomgen.run.module import GeneratedModule, load_module

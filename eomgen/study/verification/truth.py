@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.codegen.recording import Recording
-from eomgen.dynamics.diagnostics import values_at
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.start.diagnostics import values_at
 from eomgen.model.model import Model
 from eomgen.model.states import velocity_states
 from eomgen.program.extended import evaluator

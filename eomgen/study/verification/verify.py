@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from eomgen.base.errors import RunError
-from eomgen.dynamics.singularity import check_nonsingular
+from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule, as_problem, load_module

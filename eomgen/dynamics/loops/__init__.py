@@ -1,0 +1,1 @@
+"""Constraints: their rows, and the formulations that solve for accelerations under them."""

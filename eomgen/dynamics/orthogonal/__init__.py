@@ -1,0 +1,1 @@
+"""Orthogonal elimination on Gauss's principle, along a tree."""

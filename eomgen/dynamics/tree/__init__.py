@@ -1,0 +1,1 @@
+"""A tree of frames and the recursions over it: kinematics, Newton-Euler, M, articulated bodies."""
