@@ -29,8 +29,7 @@ def environment(options: EnvironmentOptions) -> Any:
 
     A seed determines an episode. A state that is not finite ends an episode, and
     `info["diverged"]` says so. Raises `SceneError`; `RunError` for an unknown name, a formula that
-    cannot be read, for rigid contacts, whose impacts such steps do not have, or if Gymnasium is not
-    installed.
+    cannot be read, or if Gymnasium is not installed.
     """
     if find_spec("gymnasium") is None:
         raise RunError(NEEDED)

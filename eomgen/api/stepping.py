@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from eomgen.api.generating import compiled
-from eomgen.api.given import Source, check, check_name
+from eomgen.api.given import Source, check_name, model_of, read
 from eomgen.api.options import BACKENDS, Backend, check_time
 from eomgen.api.public import public
 from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.native.lanes import columns_of
-from eomgen.native.stepper import METHODS, CompiledSteps
+from eomgen.native.stepper import METHODS, CompiledSteps, Limits
 from eomgen.run.columns import ColumnSteps, Given, check_columns, module_for_columns
+from eomgen.run.contacts import nothing_held, sizes_of
 from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.module import GeneratedModule
@@ -49,23 +50,33 @@ def stepper(
     backend  "c": compiled now, a state in each lane of vector registers; "numpy": columns in NumPy,
              with the same bits; "auto": "c" if there is a compiler
 
-    Forces of springs, friction, soft contacts, controllers and all other effects, driven joints and
-    loops are a part of the steps. Raises `SceneError`; `RunError` for an unknown method, for one
-    that the scene's motion does not allow, for rigid contacts, whose impacts such steps do not
-    have, or with "c" if there is no compiler.
+    Forces of springs, friction, contacts, controllers and all other effects, driven joints and
+    loops are a part of the steps. Rigid contacts strike at their time within a step. Raises
+    `SceneError`; `RunError` for an unknown method, for one that the scene's motion does not allow,
+    or with "c" if there is no compiler.
     """
-    model = check(source)
+    scene = read(source)
+    model = model_of(scene, source)
     check_time(dt, "dt")
     method = NAMES.get(method, method)
     if lanes is not None and lanes < 1:
         raise RunError(f"lanes: {lanes} is not a positive number")
     if backend not in BACKENDS:
         raise RunError(f"backend: '{backend}' is not one of auto, numpy, c")
-    return _made(model, dt, method, lanes, backend)
+    return _made(model, dt, method, lanes, backend, scene.simulation.rest_speed)
 
 
-def _made(model: Model, dt: float, method: str, lanes: int | None, backend: Backend) -> "Stepper":
-    """The same of a model, for arguments that are known to be right."""
+def _made(
+    model: Model,
+    dt: float,
+    method: str,
+    lanes: int | None,
+    backend: Backend,
+    rest: float | None,
+) -> "Stepper":
+    """The same of a model, for arguments that are known to be right; `rest` is the speed below
+    which rigid contacts do not bounce, or None.
+    """
     _, plain = compiled(model)
     problem = problem_of(plain, model=model)
     check_columns(problem, method, METHODS)
@@ -79,21 +90,30 @@ def _made(model: Model, dt: float, method: str, lanes: int | None, backend: Back
     kernels, notice = None, ""
     if backend != "numpy":
         try:
-            kernels = _compiled(model, plain, problem, method, dt)
+            kernels = _compiled(model, plain, problem, method, dt, rest)
         except RunError as error:
             if backend == "c":
                 raise
             notice = str(error)
-    in_python = ColumnSteps(module, problem, change, dt, size)
-    asked = (model, dt, method, lanes, backend)
+    in_python = ColumnSteps(module, problem, change, dt, size, rest)
+    asked = (model, dt, method, lanes, backend, rest)
     return Stepper(asked, module, problem.initial, notice, in_python, kernels)
 
 
 def _compiled(
-    model: Model, module: GeneratedModule, problem: Problem, method: str, dt: float
+    model: Model,
+    module: GeneratedModule,
+    problem: Problem,
+    method: str,
+    dt: float,
+    rest: float | None,
 ) -> CompiledSteps:
     rates = np.ascontiguousarray(split_of(problem).rates) if method.startswith("leapfrog") else None
-    return CompiledSteps(model, module, method, dt, rates, problem.projection)
+    limits: Limits = ((), ())
+    if problem.contacts:
+        held = nothing_held(problem.contacts, len(problem.states), rest)
+        limits = (sizes_of(problem.contacts).tolist(), held.rest.tolist())
+    return CompiledSteps(model, module, method, dt, rates, problem.projection, limits)
 
 
 class Stepper:
@@ -111,7 +131,7 @@ class Stepper:
 
     def __init__(
         self,
-        asked: tuple[Model, float, str, int | None, Backend],
+        asked: tuple[Model, float, str, int | None, Backend, float | None],
         module: GeneratedModule,
         initial: FloatArray,
         notice: str,
@@ -120,7 +140,7 @@ class Stepper:
     ) -> None:
         self.states, self.inputs = tuple(module.STATES), tuple(module.INPUTS)
         self.parameters = tuple(module.PARAMETERS)
-        _, self.dt, self.method, self.lanes, _ = self._asked = asked
+        _, self.dt, self.method, self.lanes, *_ = self._asked = asked
         self.compiled, self.notice = kernels is not None, notice
         self.module, self._in_python, self._kernels = module, in_python, kernels
         self._initial = initial[:, None]

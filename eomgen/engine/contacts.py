@@ -116,18 +116,22 @@ def begin(
 ) -> None:
     """Begin a run of `span` s: nothing is held.
 
-    `alpha` is ALPHA times the rate of the motion at its start, the greatest of √a and v of the
-    gaps, and 1/span.
+    `alpha` is ALPHA times the rate of the motion at its start, and at least 1/span.
     """
+    rate = started(law, now, t, y)
+    now.alpha = ALPHA * max(rate, 1.0 / span)
+
+
+def started(law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES"]) -> float:
+    """Hold nothing. The rate of the motion, 1/s: the greatest of √a and v of the gaps."""
     free = zeros(len(now.slack))
     accelerations(law, t, y, free)
     rate = law.rates(t, y)
-    pull = sqrt(largest(len(free), free))
     now.fastest = largest(len(free), rate)
-    now.alpha = ALPHA * max(max(pull, now.fastest), 1.0 / span)
     for c in range(len(free)):
         now.holds[c] = 0
         now.slack[c] = 0.0
+    return max(sqrt(largest(len(free), free)), now.fastest)
 
 
 def deepest(law: ContactLaw, t: float, y: Annotated[Vector, "STATES"]) -> int:

@@ -12,6 +12,7 @@ from eomgen.engine import (
     branches,
     complementarity,
     contact_runs,
+    contact_steps,
     contact_times,
     contacts,
     crossings,
@@ -44,6 +45,8 @@ Root = tuple[str, Mapping[str, Any]]
 Roots = Iterable[Root]
 CONTACTS: Roots = [(name, {}) for name in "begin deepest press strike release settle taken".split()]
 """What is called for rigid contacts."""
+CONTACT_STEPS: Roots = [("through", {})]
+"""A step of given length through the events in it."""
 EQUAL: Mapping[str, Root] = {
     "euler": ("runge_kutta", {"method": explicit.EULER}),
     "semi_implicit_euler": ("semi_implicit_euler", {}),
@@ -106,7 +109,7 @@ def text() -> Text:
     steps = (adaptive, differences, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, separable, symmetric)
-    checks = (branches, contacts, contact_times, contact_runs, crossings)
+    checks = (branches, contacts, contact_times, contact_runs, contact_steps, crossings)
     return Text.of(*steps, *solved, *checks, *held, taylor, system)
 
 

@@ -31,16 +31,17 @@ class Events(ctypes.Structure):
     kept: Any
 
 
+def sizes(interface: Interface) -> dict[str, int]:
+    """The number of contacts, and that of the results of `held`."""
+    shapes = {function.name: function.shape for function in interface.functions}
+    many = len(interface.contacts)
+    return {"contacts": many, "pressed": shapes["held"][0] if many else 0}
+
+
 def context(interface: Interface) -> dict[str, Any]:
     """The values of the template."""
-    shapes = {function.name: function.shape for function in interface.functions}
-    return {
-        "contacts": len(interface.contacts),
-        "pressed": shapes["held"][0] if interface.contacts else 0,
-        "whole": contact_runs.WHOLE,
-        "opened": contact_runs.OPENED,
-        "event": equal_steps.EVENT,
-    }
+    codes = {"whole": contact_runs.WHOLE, "opened": contact_runs.OPENED}
+    return {**sizes(interface), **codes, "event": equal_steps.EVENT}
 
 
 def events(functions: Mapping[str, Function], touched: Touched, inputs: Array) -> Events:

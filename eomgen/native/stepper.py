@@ -5,7 +5,7 @@ raises a flag of the floating-point unit is left to that.
 """
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c, c_lanes
 from eomgen.codegen.interface import Interface
-from eomgen.engine.printed import c_source
+from eomgen.engine.contacts import TOLERANCE
+from eomgen.engine.printed import CONTACT_STEPS, c_source
 from eomgen.model.model import Model
-from eomgen.native import checked, constrained, equal_steps, functions
+from eomgen.native import checked, constrained, contact_runs, equal_steps, functions
 from eomgen.native.accelerator import library_key
 from eomgen.native.compiler import NOT_JOINED, find_compiler
 from eomgen.native.lanes import FLAGS, Columns, Lanes, columns_of, width
@@ -36,28 +37,42 @@ METHODS = ("rk4", *(name for name in equal_steps.METHODS if name != "rk4"))
 _POINTER, _LONG, _REAL, _WHOLE = ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_int64
 
 
+Limits = tuple[Sequence[float], Sequence[float]]
+"""Of rigid contacts: the sizes of their gaps, and the speeds below which they do not bounce, in
+these; negative if not given."""
 FEW, SMALL = 16, 100
 """Below this number of states, two vectors of each are stepped together; below this number of
 operations, the derivative is a part of each stage."""
 
 
-def sources(program: Program, interface: Interface, method: str) -> Mapping[str, str]:
+def sources(
+    program: Program, interface: Interface, method: str, limits: Limits = ((), ())
+) -> Mapping[str, str]:
     """The C sources of the derivative and of a method of `METHODS` for columns, name to text."""
-    kept = ("derivative", "initial_state")
+    law = contact_runs.FUNCTIONS if interface.contacts else ()
+    kept = ("derivative", "initial_state", *law)
+    of_contacts = contact_runs.sizes(interface)
     program, interface = functions.restricted(program, interface, kept)
     program = ordered(program)
     context = c.context(program, interface)
     states = len(interface.states)
     own = equal_steps.context(interface)
     timed = any(step.value == TIME for step in program.steps if step.operation == "input")
-    together = 2 if states < FEW and method not in equal_steps.LEAPFROGS and not timed else 1
+    alone = method in equal_steps.LEAPFROGS or timed or interface.contacts
+    together = 2 if states < FEW and not alone else 1
     (derivative,) = (f["operations"] for f in context["kernels"] if f["name"] == "derivative")
     parts = method in ("leapfrog_4", "leapfrog_6")
     call = f"composed_{method}(m, t, y, h, step)" if parts else equal_steps.CALLS[method]
     values: dict[str, Any] = {
-        **c_lanes.columns(program, interface, context, c.VECTORS, ("derivative",), USUAL_LENGTH),
+        **c_lanes.columns(
+            program, interface, context, c.VECTORS, ("derivative", *law), USUAL_LENGTH
+        ),
         **constrained.context(),
-        "of_numbers": C.prelude + c_source([("normalised", {})]),
+        **of_contacts,
+        "gap_sizes": list(map(repr, limits[0])),
+        "rest": list(map(repr, limits[1])),
+        "tolerance": repr(TOLERANCE),
+        "of_numbers": C.prelude + c_source([("normalised", {}), *(CONTACT_STEPS if law else ())]),
         "engine": c_source(equal_steps.roots_of(method), VECTORS),
         "positions": [i + n * states for n in range(together) for i in own["positions"]],
         "others": [i + n * states for n in range(together) for i in own["others"]],
@@ -87,6 +102,7 @@ class CompiledSteps(Lanes):
 
     rates  the matrix by which velocities give the rates of positions, which leapfrog needs
     projection  of the module, or None
+    limits of its rigid contacts
 
     It has no state beside the library, so that threads may share it. Raises `RunError` if there is
     no compiler, or if it fails.
@@ -102,14 +118,15 @@ class CompiledSteps(Lanes):
         dt: float,
         rates: FloatArray | None,
         projection: Projection | None,
+        limits: Limits,
     ) -> None:
         compiler, lanes = find_compiler(), width()
         joined = tuple(flag for flag in compiler.tuning if flag == NOT_JOINED)
         flags = (f"-DWIDTH={lanes}", *FLAGS[lanes], *compiler.ordering, *joined)
-        about = f"{library_key(model, 'stepper')} {method} {flags}"
+        about = f"{library_key(model, 'stepper')} {method} {flags} {limits}"
 
         def texts() -> Mapping[str, str]:
-            return sources(*interfaced_program_of(model), method)
+            return sources(*interfaced_program_of(model), method, limits)
 
         self.library = compiled_library(about, texts, MAIN, *flags)
         sizes = (_LONG * 5).in_dll(self.library, "sizes")

@@ -13,6 +13,7 @@ import numpy as np
 
 from eomgen.base.errors import RunError, nearest
 from eomgen.engine.sums import Sum, add_compensated
+from eomgen.run.contact_columns import Lane, apart
 from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Change
 from eomgen.run.module import GeneratedModule, load_module
@@ -86,13 +87,20 @@ class ColumnSteps:
 
     problem  the module's, at the scene's parameters and inputs
     size     size of the mechanism, to which residuals of constraints are relative
+    rest     speed below which rigid contacts do not bounce; None for the default
     """
 
     def __init__(
-        self, module: GeneratedModule, problem: Problem, change: Change, dt: float, size: float
+        self,
+        module: GeneratedModule,
+        problem: Problem,
+        change: Change,
+        dt: float,
+        size: float,
+        rest: float | None,
     ) -> None:
         self._module, self._problem, self._change = module, problem, change
-        self._dt, self._size = dt, size
+        self._dt, self._size, self._rest = dt, size, rest
 
     def __call__(
         self, y: FloatArray, lost: FloatArray, given: Given, steps: int
@@ -112,14 +120,43 @@ class ColumnSteps:
             for i in range(steps):
                 t: Any = given.t + i * self._dt
                 change = self._change(problem, t, y, self._dt)
-                total = Sum(y, lost)
+                total = Sum(y.copy(), lost)
                 add_compensated(total, change)
-                y, lost = total.value, total.lost
                 end = Given(given.t + (i + 1) * self._dt, given.u, given.p)
-                y = self.projected(y, end)
+                last = self.projected(total.value, end)
+                if self._problem.contacts:
+                    self._lead(replace(given, t=t), end, y, lost, last, total.lost)
+                y, lost = last, total.lost
         wrong = ~np.isfinite(y).all(axis=0)
         y[:, wrong], lost[:, wrong] = np.nan, 0.0
         return y, lost
+
+    def _lead(
+        self,
+        given: Given,
+        end: Given,
+        y: FloatArray,
+        lost: FloatArray,
+        last: FloatArray,
+        left: FloatArray,
+    ) -> None:
+        """Make the steps of columns whose contacts touch, or may close, through all events: put
+        their ends in `last`, and what rounding took in `left`.
+        """
+        contacts, module = self._problem.contacts, self._module
+        assert contacts is not None
+        places = ((given.t, y, given.p, given.u), (end.t, last, given.p, given.u))
+        gaps, rates = zip(*((module.gaps(*x), module.gap_rates(*x)) for x in places), strict=True)  # type: ignore[attr-defined]
+        for i in np.flatnonzero(~apart(contacts, gaps, rates)).tolist():
+            one, until = given.of([i]), end.of(i)
+            t = float(given.of(i).t)
+
+            def placed(t: float, y: FloatArray, one: Given = one) -> FloatArray:
+                return self.projected(y, replace(one, t=np.array([t])))
+
+            lane = Lane(module, (one.p, one.u), self._problem, self._rest, self._change, placed)
+            made = lane.led(t, y[:, i], lost[:, i], self._dt, float(until.t))
+            last[:, i], left[:, i] = made or (np.nan, 0.0)
 
     def projected(self, y: FloatArray, given: Given) -> FloatArray:
         """The states with normalised quaternions, on the constraints if there are any; `y` is
@@ -153,11 +190,6 @@ def check_columns(problem: Problem, method: str, takes: Sequence[str]) -> None:
         raise RunError(
             f"method: no '{method}' with steps of equal length{nearest(method, takes)}; "
             f"known: {', '.join(takes)}"
-        )
-    if problem.contacts is not None:
-        raise RunError(
-            f"stepper: contact {problem.contacts.names[0]} is rigid, and these steps have no "
-            "impacts; give its effect a stiffness instead of a restitution"
         )
     if problem.projection is not None and method.startswith("leapfrog"):
         raise RunError(f"method: {method} with constraints solves equations; take rk4")

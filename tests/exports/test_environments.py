@@ -102,7 +102,6 @@ def test_what_diverges_ends_its_episode() -> None:
         ({"start": {"phi": ("uniform", 0, 1)}}, "start: no state 'phi'"),
         ({"dt": 0.0}, "dt: 0 s is not between"),
         ({"lanes": 0}, "give positive numbers"),
-        ({"source": "bouncing_two_body"}, "no impacts"),
     ],
 )
 def test_mistakes_are_a_line(change: dict[str, Any], said: str) -> None:

@@ -11,7 +11,7 @@ from languages import Given, results
 from eomgen.engine import complementarity, least_squares
 from eomgen.engine.contact_runs import Place
 from eomgen.engine.contacts import ALPHA, Touching
-from eomgen.engine.printed import CONTACTS, text
+from eomgen.engine.printed import CONTACT_STEPS, CONTACTS, text
 from eomgen.engine.roots import Search
 from eomgen.run.problem import FloatArray
 
@@ -119,6 +119,13 @@ class Stack:
         push = 0.5 * e * (y[3] - y[2])
         return np.array([y[0], y[1], y[2] + push, y[3] - push])
 
+    def go(self, t: float, y: FloatArray, length: float, end: float) -> bool:
+        """A step, which may fail."""
+        return bool(y[3] < 1.5)
+
+    def part(self) -> None:
+        """Nothing is forgotten."""
+
     def state(self, s: float) -> FloatArray:
         """Some seconds after the start of a step."""
         x = 0.3 - s + s * s * (3.0 - s)
@@ -130,7 +137,12 @@ STACK = Given(
     c="""
 enum { STATES = 4, CONTACTS = 2, PRESSED = 8 };
 typedef struct { int none; } ContactLaw;
-typedef ContactLaw Within;
+typedef ContactLaw Within, Way;
+static int64_t go(Way *way, double t, const double *y, double length, double end) {
+    (void)way, (void)t, (void)length, (void)end;
+    return y[3] < 1.5;
+}
+static void part(Way *way) { (void)way; }
 static void gaps(ContactLaw *law, double t, const double *y, double *to) {
     (void)law, (void)t;
     to[0] = y[0], to[1] = y[1] - y[0];
@@ -172,6 +184,8 @@ const system = {
     const push = 0.5 * e * (y[3] - y[2]);
     to.set(k === 0 ? [y[0], y[1], y[2] - e * y[2], y[3]] : [y[0], y[1], y[2] + push, y[3] - push]);
   },
+  go: (t, y, length, end) => y[3] < 1.5,
+  part: () => {},
   state: (s, to) => {
     const x = 0.3 - s + s * s * (3.0 - s);
     to.set([x, x + 0.2 - s * s, 6.0 * s - 3.0 * s * s - 1.0, 4.0 * s - 3.0 * s * s]);
@@ -203,11 +217,22 @@ def random_case(name: str) -> list[object]:
         "release": [STACK, known(holds), t, y, np.array([*holds[:1], 0])],
         "settle": [STACK, known(holds), t, y],
         "deepest": [STACK, t, y - 1e-9],
+        "through": [
+            STACK,
+            STACK,
+            STACK,
+            known(holds),
+            Search(),
+            at,
+            end - t,
+            end,
+            *np.zeros((2, 2)),
+        ],
         "taken": [STACK, STACK, known(holds), Search(), at, end, share],
     }[name]
 
 
-@pytest.mark.parametrize("name", [name for name, _ in CONTACTS])
+@pytest.mark.parametrize("name", [name for name, _ in (*CONTACTS, *CONTACT_STEPS)])
 @pytest.mark.every(3)
 def test_contacts_have_the_same_bits_in_three_languages(name: str) -> None:
     """Of two masses that fall on the ground and on each other."""

@@ -64,9 +64,10 @@ DIALECT = Dialect(
 )
 OURS_IN_VECTORS = (
     "V I N EACH LANES INLINE STATES INPUTS CONSTANTS WIDTH RAISED either size_of any root columns "
-    "times reduced bits_from sine_and_cosine put taken lanes_of beside begin unit suspicious l i "
-    "fused plus_product product_minus minus_product from_row to_row finite_lanes FUSED SUM VECTORS "
-    "AGAIN APART PLAIN CLEAR TOGETHER SIZE bits_of pair by_library unclear rounded slopes"
+    "times reduced_angle bits_from sine_and_cosine put loaded lanes_of beside begin unit "
+    "suspicious l i fused plus_product product_minus minus_product from_row to_row finite_lanes "
+    "FUSED SUM VECTORS AGAIN APART PLAIN CLEAR TOGETHER SIZE bits_of pair by_library unclear "
+    "rounded slopes"
 )
 VECTORS = replace(
     DIALECT,

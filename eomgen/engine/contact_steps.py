@@ -1,0 +1,101 @@
+"""A step of given length of a mechanism with rigid contacts, through all events in it.
+
+Nothing is known of the contacts but time and state: those that touch at its start strike or are
+held, as at the start of a run. So a step depends on nothing else.
+"""
+
+from typing import Annotated, Protocol
+
+from eomgen.engine.contact_runs import (
+    CLOSED,
+    ENDLESSLY,
+    NOT_KEPT,
+    OPENED,
+    WHOLE,
+    Place,
+    taken,
+)
+from eomgen.engine.contact_times import Within
+from eomgen.engine.contacts import (
+    ALPHA,
+    ENDLESS,
+    STRUCK,
+    TOLERANCE,
+    ContactLaw,
+    Touching,
+    started,
+    strike,
+)
+from eomgen.engine.roots import Search
+from eomgen.subset.words import Vector
+
+NO_STEP = 6
+"""A step whose state is not finite."""
+
+
+class Way(Protocol):
+    """Steps between events."""
+
+    def go(self, t: float, y: Annotated[Vector, "STATES"], length: float, end: float, /) -> bool:
+        """Make a step of a length from t and y to `end`; the states in it are those of `Within`.
+        False if there is none.
+        """
+        ...
+
+    def part(self) -> None:
+        """Take account of an event in the step that was made, which ends it."""
+        ...
+
+
+def through(
+    law: ContactLaw,
+    way: Way,
+    within: Within,
+    now: Touching,
+    search: Search,
+    at: Place,
+    length: float,
+    end: float,
+    speeds: Annotated[Vector, "CONTACTS"],
+    least: Annotated[Vector, "CONTACTS"],
+) -> int:
+    """Go to `end`, about a length from here. WHOLE, or why that is not possible."""
+    n = len(least)
+    now.alpha = ALPHA * started(law, now, at.t, at.y)
+    at.since = at.t
+    at.events = 0
+    touching = 0
+    gap = law.gaps(at.t, at.y)
+    for c in range(n):
+        at.closed[c] = 0
+        if gap[c] <= TOLERANCE:
+            at.closed[c] = 1
+            touching += 1
+    h = length
+    why = WHOLE
+    if touching > 0:
+        why = struck(law, now, at, speeds, least)
+    while why <= OPENED and at.t < end:
+        if not way.go(at.t, at.y, h, end):
+            return NO_STEP
+        why = taken(law, within, now, search, at, end, 1.0)
+        if why != WHOLE:
+            way.part()
+        if why == CLOSED:
+            why = struck(law, now, at, speeds, least)
+        h = end - at.t
+    return why if why > OPENED else WHOLE
+
+
+def struck(
+    law: ContactLaw,
+    now: Touching,
+    at: Place,
+    speeds: Annotated[Vector, "CONTACTS"],
+    least: Annotated[Vector, "CONTACTS"],
+) -> int:
+    """Let contacts strike that have closed. WHOLE, or why that is not possible."""
+    answer = strike(law, now, at.t, at.y, at.closed, speeds, least)
+    if answer == STRUCK:
+        return WHOLE
+    return ENDLESSLY if answer == ENDLESS else NOT_KEPT
