@@ -14,6 +14,7 @@ const makeClosure = (mechanism, steps, size, { positions, others, kinds, quatern
   };
   const held = {
     mechanism, n, nv, rows, quaternions,
+    margin: 0, // how far the last state that was placed is from singular positions, at most 1
     residuals_at: (t, y, out) => written(mechanism.constraintResiduals(t, y, ...given()), out),
     move_closer(t, y, near) {
       mechanism.projectPosition(t, y, ...given()).forEach((x, i) => (near[positions[i]] = x));
@@ -21,7 +22,8 @@ const makeClosure = (mechanism, steps, size, { positions, others, kinds, quatern
       return true;
     },
     hold_velocities(t, y) {
-      if (Math.min(...mechanism.constraintMargins(t, y, ...given())) < 1e-9) {
+      held.margin = Math.min(...mechanism.constraintMargins(t, y, ...given()));
+      if (held.margin < 1e-9) {
         throw new Error("the mechanism is singular here, as at a dead point: take another start");
       }
       mechanism.projectVelocity(t, y, ...given()).forEach((x, i) => (y[others[i]] = x));

@@ -14,6 +14,7 @@ const makeEngine = (mechanism, data) => {
   const PULL = 20; // rate at which a pulled point follows the pointer, rad/s
   const LIFTED = 0.3; // part of the whole mass that a pull moves at least as quickly
   const STRONG = 30; // acceleration that the strongest pull gives the whole mass at least, m/s²
+  const [SAFE, FASTEST] = [0.01, 1e3]; // margin of constraints, and greatest entry of states, to go back to
   const SHARE = 0.02; // part of the mean cost of a step that the last one has
 
   const all = [...methods, ...adaptive];
@@ -37,6 +38,7 @@ const makeEngine = (mechanism, data) => {
   let [start, goal, cost] = [0, 0, NaN];
   let [regular, closed] = [true, []];
   let [law, change] = [null, null];
+  let safe = null; // the last state from which the mechanism moves on by itself
 
   // ---- The problem ----
 
@@ -134,11 +136,14 @@ const makeEngine = (mechanism, data) => {
     renew();
   }
 
+  const isSafe = () => !(held?.margin <= SAFE) && engine.y.every((x) => Math.abs(x) < FASTEST);
+
   // The chosen method failed: go on by the adaptive one, if it was not the user who chose.
   function helped(error) {
     if (engine.grip && mechanism.projectPosition) {
-      // Pulled to where the loops do not move on: let go there, at rest.
+      // Pulled to where the loops do not move on: let go before, at rest.
       engine.release();
+      if (safe) engine.y.set(safe);
       engine.remark = `let go at ${Number(engine.t.toPrecision(4))} s, where the loops do not move on`;
       for (const i of others) if (kinds[i] === "velocity") engine.y[i] = 0;
       start = engine.t;
@@ -146,6 +151,7 @@ const makeEngine = (mechanism, data) => {
       return;
     }
     if (!engine.automatic || engine.method === "DOP853") throw error;
+    if (safe && !isSafe()) engine.y.set(safe); // steps had become unstable
     engine.remark = `${engine.method} fails at ${Number(engine.t.toPrecision(4))} s, DOP853 goes on`;
     engine.method = "DOP853";
     change = all.find((m) => m.name === "DOP853").make(free);
@@ -230,6 +236,7 @@ const makeEngine = (mechanism, data) => {
     const end = mark();
     try {
       while (engine.t < end) makeStep();
+      if (isSafe()) safe = engine.y.slice();
     } catch (error) {
       helped(error);
     }
@@ -280,6 +287,7 @@ const makeEngine = (mechanism, data) => {
   engine.reset = (y = null, t = 0) => {
     engine.error = null;
     engine.release();
+    safe = null;
     engine.events.length = 0;
     guarded(() => {
       engine.t = t;

@@ -556,3 +556,29 @@ def test_a_stored_page_is_the_derived_one(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert live_code(model) == first
     entry.write_bytes(entry.read_bytes()[:-3])
     assert live_code(model) == first
+
+
+HARD_PULLS = [("rattleback", 7920), ("four_bar", 261328), ("rattleback", 380113)]
+PULLED = """
+let seed = given.seed;
+const random = () => (seed = (seed * 16807) % 2147483647) / 2147483647;
+const { size, bodies, dimensions } = given.data;
+const point = (far) => [...Array(dimensions)].map(() => (random() - 0.5) * far * size);
+const engine = makeEngine(mechanism, given.data);
+for (let k = 0; k < 20 && !engine.error; k += 1) {
+  engine.pull(Math.floor(random() * bodies.length), point(0.5), point(4));
+  engine.advance(0.3);
+  if (random() < 0.5) engine.release();
+}
+return { error: engine.error, t: engine.t, y: Array.from(engine.y) };
+"""
+
+
+@pytest.mark.every(2)
+@pytest.mark.parametrize(("name", "seed"), HARD_PULLS)
+def test_hard_pulls_do_not_end_the_page(name: str, seed: int) -> None:
+    """Where steps become unstable or loops do not move on, it goes back to before that."""
+    code, table = page_of(name)
+    found = run_in_node(code.source, PULLED, {"data": table, "seed": seed})
+    assert found["error"] is None and found["t"] > 5.9
+    assert np.abs(found["y"]).max() < 1e4
