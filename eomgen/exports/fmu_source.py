@@ -1,6 +1,7 @@
 """The C sources of a unit for co-simulation."""
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from eomgen.base.templating import render, templates_folder
@@ -20,6 +21,10 @@ from eomgen.run.integrators.taylor import HIGHEST
 from eomgen.subset.languages import C
 
 HEADERS = ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h")
+_VENDORED = templates_folder() / "fmu" / "vendor" / "fmi3"
+_NOTHING_TO_DO = (
+    *("fmi3EnterConfigurationMode", "fmi3ExitConfigurationMode", "fmi3EvaluateDiscreteStates"),
+)
 MAIN = "fmi3-unit.c"
 """The source to compile, which includes the others. No scene has a - in its name."""
 DRIFT = 1e-9
@@ -32,10 +37,9 @@ def sources_of(unit: Unit, method: Method) -> tuple[Mapping[str, str], str]:
     """The sources of a unit by name, whose steps a method makes, and its instantiation token, which
     is a digest of them.
     """
-    folder = templates_folder() / "fmu" / "vendor" / "fmi3"
     others = {
         **c.files(unit.program, unit.interface),
-        **{name: (folder / name).read_text("utf-8") for name in HEADERS},
+        **{name: (_VENDORED / name).read_text("utf-8") for name in HEADERS},
     }
     digest = hashlib.sha256("".join((_main(unit, "", method), *others.values())).encode())
     token = f"{{{digest.hexdigest()[:32]}}}"
@@ -81,7 +85,25 @@ def _main(unit: Unit, token: str, method: Method) -> str:
         "parts": method.parts(interface, unit.series),
         "timed": _timed(unit),
     }
-    return render("fmu", "unit.c.jinja", context)
+    source = render("fmu", "unit.c.jinja", context)
+    return "\n".join((source, *_without(source), ""))
+
+
+def _without(source: str) -> Iterator[str]:
+    """C of the functions of FMI 3.0 that a unit's source lacks: it has nothing of what they do."""
+    yield "/* What this unit has nothing of. */"
+    header = (_VENDORED / "fmi3FunctionTypes.h").read_text("utf-8")
+    for result, name, given in re.findall(r"typedef (\w+) (fmi3\w+)TYPE\s*\(([^)]*)\);", header):
+        if f" {name}(" in source:
+            continue
+        unused = re.findall(r"(\w+)(?:\[\])?\s*(?:,|$)", given)
+        value = "nValueReferences ? fmi3Error : fmi3OK"
+        if "nValueReferences" not in unused:
+            value = "fmi3OK" if name in _NOTHING_TO_DO else "fmi3Error"
+        value = "NULL" if result == "fmi3Instance" else value
+        arguments = " ".join(given.split())
+        ignored = ", ".join(f"(void){each}" for each in unused)
+        yield f"\n{result} {name}({arguments}) {{\n    {ignored};\n    return {value};\n}}"
 
 
 def _more(unit: Unit, method: Method) -> Iterator[Root]:
