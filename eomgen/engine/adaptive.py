@@ -10,6 +10,7 @@ Slopes k (16, STATES) and terms (7, STATES) have the sizes of DOP853.
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
+from eomgen.engine.sums import round_off
 from eomgen.engine.system import System
 from eomgen.subset.words import (
     Known,
@@ -264,17 +265,6 @@ def within(
     for i in unrolled(range(6, -1, -1)):
         found = (found + terms[i]) * (rest if i % 2 else x)
     place[:] = found + y
-
-
-def round_off(
-    y: Annotated[Vector, "STATES"],
-    raw: Annotated[Vector, "STATES"],
-    change: Annotated[Vector, "STATES"],
-    lost: Annotated[Vector, "STATES"],
-) -> None:
-    """What rounding took from y + change, which is `raw` (Knuth's two-sum)."""
-    rest = raw - y
-    lost[:] = (y - (raw - rest)) + (change - rest)
 
 
 def made_many(

@@ -158,7 +158,7 @@ def record_of_pages(kind: type) -> str:
 @cache
 def steps_of_few(states: int) -> Callable[..., bool]:
     """`adaptive.made` of DOP853 for few states, as Python's own numbers."""
-    source = Text.of(adaptive, system)
+    source = Text.of(adaptive, sums, system)
     printed: Callable[..., bool] = unrolled_functions(
         source, [("made", {"method": DOP853})], states
     ).made_DOP853

@@ -24,6 +24,7 @@ from eomgen.engine.rodas_5p_coefficients import (
     NODES,
     PLACES,
 )
+from eomgen.engine.sums import round_off
 from eomgen.engine.system import StiffSystem
 from eomgen.subset.words import (
     Matrix,
@@ -201,8 +202,7 @@ def rodas_step(
             run.h_abs = length * next_factor(run, h, error, rejected)
             run.h_last = h
             run.error = max(LEAST_ERROR, error)
-            rest = run.last - y
-            run.lost[:] = (y - (run.last - rest)) + (run.change - rest)
+            round_off(y, run.last, run.change, run.lost)
             return True
         if error < inf:
             length *= max(SMALLEST, SAFETY / fifth_root(error))

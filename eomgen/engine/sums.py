@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from eomgen.subset.words import Vector, zeros
+from eomgen.subset.words import Vector, copy, zeros
 
 
 @dataclass(slots=True)
@@ -14,12 +14,24 @@ class Sum:
     lost: Annotated[Vector, "STATES"] = field(default_factory=lambda: zeros(0))
 
 
+def round_off(
+    y: Annotated[Vector, "STATES"],
+    raw: Annotated[Vector, "STATES"],
+    change: Annotated[Vector, "STATES"],
+    lost: Annotated[Vector, "STATES"],
+) -> None:
+    """What rounding took from y + change, which is `raw`, exactly (Knuth's two-sum)."""
+    rest = raw - y
+    lost[:] = (y - (raw - rest)) + (change - rest)
+
+
 def add_compensated(of: Sum, change: Annotated[Vector, "STATES"]) -> None:
-    """Add a change. The rounding error of the sum is found exactly (Knuth's two-sum) and added to
-    the next change: Hairer, Lubich, Wanner, Geometric Numerical Integration, VIII.5.
+    """Add a change; what rounding takes from it is added to the next one: Hairer, Lubich, Wanner,
+    Geometric Numerical Integration, VIII.5.
     """
     step = change + of.lost
     total = of.value + step
-    rest = total - of.value
-    of.lost = (of.value - (total - rest)) + (step - rest)
+    lost = copy(step)
+    round_off(of.value, total, step, lost)
+    of.lost = lost
     of.value = total

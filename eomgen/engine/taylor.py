@@ -24,8 +24,8 @@ from eomgen.engine.adaptive import (
     Checks,
     Progress,
     Records,
-    round_off,
 )
+from eomgen.engine.sums import round_off
 from eomgen.subset.words import (
     Matrix,
     Vector,

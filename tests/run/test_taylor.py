@@ -14,7 +14,7 @@ from languages import Given, results
 import eomgen
 from eomgen.base.errors import RunError
 from eomgen.base.loading import load_source
-from eomgen.engine import adaptive
+from eomgen.engine import adaptive, sums
 from eomgen.engine import taylor as engine
 from eomgen.engine.taylor import expanded
 from eomgen.model.elaborate import elaborate
@@ -200,7 +200,7 @@ def test_the_engine_in_three_languages() -> None:
         f"enum {{ {', '.join(f'{n} = {x}' for n, x in sizes.items())} }};\n",
         "".join(f"const {n} = {x};\n" for n, x in sizes.items()) + "const system = {};\n",
     )
-    text = Text.of(adaptive, engine)
+    text = Text.of(adaptive, sums, engine)
     factors = [[k, *rng.normal(size=(2, 9, 8)), np.zeros(8)] for k in range(1, 9)]
     changes = [[0.3, order, rng.normal(size=(9, 4)), np.zeros(4)] for order in range(2, 9)]
     for name, cases in (("convolved", factors), ("change_after", changes)):

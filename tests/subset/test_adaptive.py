@@ -8,14 +8,14 @@ import pytest
 from campaign import some
 from languages import Given, results
 
-from eomgen.engine import adaptive, system
+from eomgen.engine import adaptive, sums, system
 from eomgen.engine.adaptive import Bounds, Progress, Records
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import steps_of_few
 from eomgen.subset.expander import NotInSubsetError, Text
 from eomgen.subset.unrolled import unrolled_functions
 
-TEXT = Text.of(adaptive, system)
+TEXT = Text.of(adaptive, sums, system)
 KNOWN = {"method": DOP853}
 C = """
 #define STATES {states}

@@ -19,10 +19,10 @@ from eomgen.engine.adaptive import (
     first_length,
     interpolate,
     made,
-    round_off,
     within,
 )
 from eomgen.engine.embedded import DOP853
+from eomgen.engine.sums import round_off
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.problem import FloatArray
 

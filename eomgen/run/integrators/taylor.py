@@ -11,7 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from eomgen.engine.adaptive import Bounds, round_off
+from eomgen.engine.adaptive import Bounds
+from eomgen.engine.sums import round_off
 from eomgen.engine.taylor import change_after, reach
 from eomgen.run.compiled import Series
 from eomgen.run.integrators.dormand_prince_8 import TOO_SHORT, DormandPrince8
