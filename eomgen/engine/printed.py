@@ -2,10 +2,9 @@
 
 import re
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import fields
 from functools import cache
-from typing import Any
 
 from eomgen.engine import (
     adaptive,
@@ -34,38 +33,17 @@ from eomgen.engine import (
     taylor,
 )
 from eomgen.engine.embedded import DOP853
+from eomgen.engine.methods import EQUAL, Root, Roots
 from eomgen.subset.expander import Text
 from eomgen.subset.languages import JAVASCRIPT, C, Language
 from eomgen.subset.printing import printed
 from eomgen.subset.structures import arrays_of
 from eomgen.subset.unrolled import unrolled_functions
 
-Root = tuple[str, Mapping[str, Any]]
-"""A function of the engine, with the values of its `Known` parameters."""
-Roots = Iterable[Root]
 CONTACTS: Roots = [(name, {}) for name in "begin deepest press strike release settle taken".split()]
 """What is called for rigid contacts."""
 CONTACT_STEPS: Roots = [("through", {})]
 """A step of given length through the events in it."""
-EQUAL: Mapping[str, Root] = {
-    "euler": ("runge_kutta", {"method": explicit.EULER}),
-    "semi_implicit_euler": ("semi_implicit_euler", {}),
-    "leapfrog": ("leapfrog", {}),
-    "leapfrog_4": ("composed", {"of": explicit.LEAPFROG_4}),
-    "leapfrog_6": ("composed", {"of": explicit.LEAPFROG_6}),
-    "rk4": ("runge_kutta", {"method": explicit.RUNGE_KUTTA_4}),
-    "implicit_midpoint": ("implicit_change", {"method": implicit.IMPLICIT_MIDPOINT}),
-    "gauss_4": ("implicit_change", {"method": implicit.GAUSS_4}),
-    "gauss_6": ("implicit_change", {"method": implicit.GAUSS_6}),
-}
-"""What makes a step of given length, by the names of methods."""
-METHODS: Mapping[str, Root] = {
-    **EQUAL,
-    "DOP853": ("made", {"method": DOP853}),
-    "taylor": ("expanded", {}),
-    "Rodas5P": ("rodas_step", {}),
-}
-"""What makes a step, by the names of all methods of the engine."""
 ON_PAGES: tuple[Root, ...] = (
     *EQUAL.values(),
     *(("projected_change", known) for name, known in EQUAL.values() if name == "implicit_change"),

@@ -10,7 +10,8 @@ from eomgen.codegen.series import series_functions
 from eomgen.engine import contact_runs, contacts
 from eomgen.engine.crossings import MOST_PARTS
 from eomgen.engine.embedded import DOP853
-from eomgen.engine.printed import CONTACTS, Root, text
+from eomgen.engine.methods import Root
+from eomgen.engine.printed import CONTACTS, text
 from eomgen.exports.fmu_unit import Observed, Unit
 from eomgen.exports.steps import Method, step_of
 from eomgen.native.functions import restricted

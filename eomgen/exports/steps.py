@@ -14,7 +14,7 @@ from eomgen.codegen.series import FIXED
 from eomgen.engine import projection
 from eomgen.engine.elimination import Factors
 from eomgen.engine.implicit import Stages
-from eomgen.engine.printed import METHODS, Root, Roots
+from eomgen.engine.methods import METHODS, Root, Roots
 from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import Rodas
 from eomgen.engine.symmetric import Projected

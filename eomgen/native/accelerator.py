@@ -144,11 +144,11 @@ class Accelerator:
         symmetric = implicit.SYMMETRIC if problem.projection else ()
         problem = self._compilable(module, origin).problem(problem)
 
-        def once(needed: tuple[str, ...], make: Callable[[Libraries], Any], name: str = "") -> Any:
+        def once(needed: tuple[str, ...], make: Callable[[Libraries], Any]) -> Any:
             """What is made of libraries, as soon as they are there."""
-            if (name, needed) not in made and (libraries := self._found(needed)):
-                made[name, needed] = make(libraries)
-            return made.get((name, needed))
+            if needed not in made and (libraries := self._found(needed)):
+                made[needed] = make(libraries)
+            return made.get(needed)
 
         def explicit_steps(more: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
             def make(of: Libraries) -> runs.CompiledSteps:
@@ -162,27 +162,34 @@ class Accelerator:
         def series() -> taylor.CompiledTaylor | None:
             return self._taylor(module)
 
-        def implicit_steps(more: tuple[str, ...] = ()) -> implicit.CompiledImplicit | None:
-            def make(of: Libraries) -> implicit.CompiledImplicit:
-                return implicit.CompiledImplicit(problem, module, of, *self._values, origin)
+        def implicit_steps(
+            name: str, more: tuple[str, ...] = ()
+        ) -> implicit.CompiledImplicit | None:
+            library = implicit.library_of(name, bool(more))
 
-            needed = (*implicit.NEEDED, *projects, *more, implicit.METHODS_LIBRARY)
-            found: implicit.CompiledImplicit | None = once(needed, make)
+            def make(of: Libraries) -> implicit.CompiledImplicit:
+                given = problem, module, of[library], of, *self._values, origin
+                return implicit.CompiledImplicit(*given)
+
+            found: implicit.CompiledImplicit | None = once(
+                (*implicit.NEEDED, *projects, *more, library), make
+            )
             return found
 
         def rattle_steps(name: str) -> EqualSteps | None:
-            def make(of: Libraries) -> EqualSteps | None:
-                return rattle.steps(name, problem, module, of, *self._values)
+            library = implicit.library_of(name, True)
 
-            needed = (*rattle.NEEDED, implicit.METHODS_LIBRARY)
-            found: EqualSteps | None = once(needed, make, name)
+            def make(of: Libraries) -> EqualSteps | None:
+                return rattle.steps(name, problem, module, of[library], of, *self._values)
+
+            found: EqualSteps | None = once((*rattle.NEEDED, library), make)
             return found
 
         def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
             if name == "taylor":  # its steps are not checked
                 return of.steps if not needed and (of := series()) else None
-            if name in implicit.METHODS:
-                other = None if set(needed) - set(projects) else implicit_steps()
+            if name == "Rodas5P":
+                other = None if set(needed) - set(projects) else implicit_steps(name)
                 found = other.named(name) if other else None
             else:
                 found = held.named(name, needed) if (held := explicit_steps(needed)) else None
@@ -195,7 +202,7 @@ class Accelerator:
             if problem.projection and name in equal_steps.LEAPFROGS:
                 found = rattle_steps(name)
             elif name in implicit.GAUSS:
-                found = other.equal(name) if (other := implicit_steps(symmetric)) else None
+                found = other.equal(name) if (other := implicit_steps(name, symmetric)) else None
             else:
                 needed = (*projects, *(contact_runs.FUNCTIONS if problem.contacts else ()))
                 found = held.equal(name, problem) if (held := explicit_steps(needed)) else None
@@ -271,8 +278,8 @@ class Accelerator:
         compiling them will; None before that, and if there are none.
         """
         begun = self._begun = self._begun or time.perf_counter()
-        of_methods = implicit.METHODS_LIBRARY in names
-        if of_methods and not all(hasattr(self._module, name) for name in names[:-1]):
+        of_method = names[-1].startswith(implicit.LIBRARY)
+        if of_method and not all(hasattr(self._module, name) for name in names[:-1]):
             return None
         needed = {name: self._library(name) for name in names}
         missing = [library for library in needed.values() if library.is_missing]
@@ -284,17 +291,19 @@ class Accelerator:
         return there if len(there) == len(needed) else None
 
     def _library(self, name: str) -> _Library:
-        """That of a function, or that of implicit methods, which is the same for all models."""
+        """That of a function, or that of an implicit method, which many models share."""
         with self._lock:
             if name not in self._libraries:
                 self._libraries[name] = self._made(name)
             return self._libraries[name]
 
     def _made(self, name: str) -> _Library:
-        if name == implicit.METHODS_LIBRARY:
-            price = STARTING + AN_OPERATION * implicit.OPERATIONS
-            about = f"implicit methods {package_digest()}"
-            return _Library(about, implicit.sources, implicit.MAIN, price, self._fail)
+        if name.startswith(implicit.LIBRARY):
+            states = len(self._module.STATES)
+            price = STARTING + AN_OPERATION * implicit.OPERATIONS[states >= implicit.MANY]
+            about = f"{name} {states} {package_digest()}"
+            make = partial(implicit.sources, name, states)
+            return _Library(about, make, implicit.MAIN, price, self._fail)
         return _Library(
             library_key(self._model, name),
             partial(self._sources, name),

@@ -13,7 +13,7 @@ import numpy as np
 
 from eomgen.codegen.interface import Interface
 from eomgen.engine.equal_steps import Course, Kept
-from eomgen.engine.explicit import EULER, LEAPFROG_4, LEAPFROG_6, RUNGE_KUTTA_4
+from eomgen.engine.methods import EQUAL, Root
 from eomgen.engine.sums import Sum
 from eomgen.native import contact_runs
 from eomgen.native.checked import Function
@@ -23,33 +23,29 @@ from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.problem import Problem
 from eomgen.subset.structures import filled, take
 
-COMPOSITIONS = (LEAPFROG_4, LEAPFROG_6)
-LEAPFROGS = {"leapfrog": 1, **{each.name: len(each.parts) for each in COMPOSITIONS}}
-_TABLEAUS = (EULER, RUNGE_KUTTA_4)
-METHODS = {**{each.name: each.stages for each in _TABLEAUS}, "semi_implicit_euler": 2, **LEAPFROGS}
+LEAPFROGS = {
+    name: len(known["of"].parts) if known else 1
+    for name, (what, known) in EQUAL.items()
+    if what in ("leapfrog", "composed")
+}
+"""The steps of leapfrog in a step of a method."""
+METHODS = {
+    name: known["method"].stages if known else 2
+    for name, (what, known) in EQUAL.items()
+    if what in ("runge_kutta", "semi_implicit_euler")
+} | LEAPFROGS
 """The derivatives in a step, by the name of the method."""
-Root = tuple[str, Mapping[str, Any]]
-"""A function of the engine, with the values of its `Known` parameters."""
-COMPOSED: list[Root] = [("composed", {"of": each}) for each in COMPOSITIONS]
-STEPS: list[Root] = [
-    *(("runge_kutta", {"method": each}) for each in _TABLEAUS),
-    *(("semi_implicit_euler", {}), ("leapfrog", {}), *COMPOSED, ("equal_steps", {})),
-]
 
 
-def roots_of(name: str) -> list[Root]:
-    """What of the engine's text a method is."""
-    composed = [root for root in COMPOSED if root[1]["of"].name == name]
-    tableau = [
-        root for root in STEPS if root[0] == "runge_kutta" and root[1]["method"].name == name
-    ]
-    return [*composed, ("leapfrog", {})] if composed else tableau or [(name, {})]
+def roots_of(*names: str) -> list[Root]:
+    """What of the engine's text methods are."""
+    return [*(EQUAL[name] for name in names), *[EQUAL["leapfrog"]] * (names[0] in LEAPFROGS)]
 
 
 _POINTER, _REAL = ctypes.c_void_p, ctypes.c_double
 _AT, _SPLIT = "t, y, h, step", "(int64_t *)positions, (int64_t *)others, m->system->rates"
 CALLS = {
-    **{each.name: f"runge_kutta_{each.name}(m->system, {_AT})" for each in _TABLEAUS},
+    **{name: f"runge_kutta_{name}(m->system, {_AT})" for name in ("euler", "rk4")},
     "semi_implicit_euler": f"semi_implicit_euler(m->system, positions, {_AT})",
     "leapfrog": f"leapfrog(m->system, &(Split){{ {_SPLIT} }}, {_AT})",
 }

@@ -1,7 +1,7 @@
 """Whole steps of implicit methods in compiled code, with the bits of the same steps in Python.
 
-The library of the methods serves all scenes: it calls the compiled derivative and Jacobian of the
-scene, which are libraries of their own.
+The library of a method serves all scenes with as many states: it calls the compiled derivative and
+Jacobian of the scene, which are libraries of their own.
 """
 
 import ctypes
@@ -17,7 +17,8 @@ from eomgen.codegen.backends import c
 from eomgen.engine.adaptive import UNUSUAL
 from eomgen.engine.elimination import Factors
 from eomgen.engine.few import plain_factors
-from eomgen.engine.implicit import GAUSS_4, GAUSS_6, IMPLICIT_MIDPOINT, Stages
+from eomgen.engine.implicit import Stages
+from eomgen.engine.methods import EQUAL, Root
 from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import RodasRecords
 from eomgen.engine.symmetric import Projected
@@ -39,8 +40,7 @@ from eomgen.subset.structures import filled, take
 MAIN = "implicit.c"
 NEEDED = ("derivative", "jacobian")
 """The functions that the methods call."""
-EQUAL_STEPS = (*equal_steps.COMPOSED, ("equal_steps", {}))
-"""What of the engine's text this library has."""
+EQUAL_STEPS: Root = ("equal_steps", {})
 SYMMETRIC = ("constraint_jacobian", "constraint_rates")
 """Further functions for symmetric projection."""
 LINKED = {
@@ -51,35 +51,47 @@ LINKED = {
     "drift": "constraint_rates",
 }
 """The functions of `Linkage` in C, and those of a module that they are."""
-METHODS = ("rodas_5p",)
-CHANGES = ("implicit_change", "projected_change")
-GAUSS = {method.name: method for method in (IMPLICIT_MIDPOINT, GAUSS_4, GAUSS_6)}
-"""The methods of adaptive and of equal steps, by the names of their compiled steps."""
-ROOTS = [
-    *((name, {"method": method}) for name in CHANGES for method in GAUSS.values()),
-    ("rattle", {}),
-    ("rodas_many", {}),
-]
-"""The functions of the engine that are printed."""
-METHODS_LIBRARY = "methods"
-"""The name of the library of the methods among the others."""
-OPERATIONS = 5500
-"""The methods take as long to compile as a function of about this many operations."""
+GAUSS = {
+    name: known["method"] for name, (what, known) in EQUAL.items() if what == "implicit_change"
+}
+"""The methods of equal steps."""
+LIBRARY = "implicit"
+"""The first word of a name of a method's library among the others."""
+OPERATIONS = 1200, 5000
+"""A method takes as long to compile as a function of about this many operations, for few and for
+many states."""
+MANY = 16
+"""From so many states on loops over them gain from vectors."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
-def sources() -> Mapping[str, str]:
-    """The C source of the methods."""
+def library_of(name: str, constrained: bool) -> str:
+    """The name of a method's library."""
+    return f"{LIBRARY} {name}{' constrained' * constrained}"
+
+
+def sources(library: str, states: int) -> Mapping[str, str]:
+    """The C source of a method for a number of states."""
     # Imported here because runs whose library is in the store do without the printer.
     from eomgen.engine.printed import c_source
     from eomgen.subset.languages import C
 
+    _, name, *constrained = library.split()
+    roots: list[Root] = [("rodas_many", {})]
+    if name in EQUAL:
+        roots = [EQUAL[name], *[("rattle", {})] * (name in equal_steps.LEAPFROGS), EQUAL_STEPS]
+        if constrained and name in GAUSS:
+            roots[0] = ("projected_change", EQUAL[name][1])
+        elif name == "leapfrog":
+            del roots[0]
     context = {
         **of_constraints(),
-        "engine": C.prelude + c_source([*EQUAL_STEPS, *ROOTS]),
-        "compositions": [each.name for each in equal_steps.COMPOSITIONS],
+        "engine": C.prelude + c_source(roots),
+        "name": name,
+        "root": roots[0][0],
+        "states": states,
+        "many": states >= MANY,
         "linked": [*LINKED],
-        "gauss": [*GAUSS],
     }
     return {MAIN: render(c.TEMPLATES, "implicit.c.jinja", context)}
 
@@ -135,7 +147,8 @@ def solver(
 class CompiledImplicit:
     """The compiled steps of a problem of a module at given parameters and inputs.
 
-    libraries  those of the methods, of the functions `NEEDED` and of those that keep constraints
+    methods    the library of the method
+    libraries  those of the functions `NEEDED` and of those that keep constraints
     origin     the module that had the constants of its parameters, if this one has perturbed ones
     """
 
@@ -143,6 +156,7 @@ class CompiledImplicit:
         self,
         problem: Problem,
         module: Any,
+        methods: ctypes.CDLL,
         libraries: Mapping[str, ctypes.CDLL],
         p: Any,
         u: Any,
@@ -153,7 +167,7 @@ class CompiledImplicit:
         others = constants_of(Kernels(module, libraries["jacobian"]), "jacobian", p, origin)
         inputs = kernels.given(u)
         self._problem = problem
-        self._methods, self._system = libraries[METHODS_LIBRARY], None
+        self._methods, self._system = methods, None
         beside = {name: libraries[name] for name in libraries.keys() & {*PROJECTS, *SYMMETRIC}}
         self._functions, self._inputs = checked.functions(module, beside, p), inputs
         if constants is None or others is None or inputs is None:
@@ -177,9 +191,9 @@ class CompiledImplicit:
 
     def named(self, name: str) -> Steps | None:
         """The steps of a method; None if there are none for it, these parameters or inputs."""
-        if self._system is None or name not in METHODS:
+        if self._system is None or name != "Rodas5P":
             return None
-        call = self._methods.rodas_5p
+        call = self._methods.steps
         call.restype = ctypes.c_int64
         call.argtypes = [*[_POINTER] * 4, _REAL, _REAL, _POINTER, _POINTER]
         return partial(_rodas_5p, call, self._system, self._functions, self._inputs)
@@ -197,7 +211,7 @@ class CompiledImplicit:
             sizes = room.n, room.nv, room.rows
             factors = [plain_factors(k) for k in (n, 2 * room.rows)]
         given = solver(system, self._functions, sizes, stages, newton, room, factors)
-        call = self._methods[f"steps_{name}"]
+        call = self._methods.steps
         held = given, self._inputs, self._functions, self._quaternions
         return EqualSteps(partial(equal_steps.made, call, *held), many, iterates=True)
 

@@ -1,6 +1,6 @@
 """Whole steps of RATTLE in compiled code, with the bits of the same steps in Python.
 
-The step itself lies in the library of implicit methods, which calls the functions of the scene.
+The step itself lies in a library of implicit methods, which calls the functions of the scene.
 """
 
 import ctypes
@@ -10,7 +10,7 @@ from typing import Any
 
 from eomgen.engine.few import plain_factors
 from eomgen.native import checked, equal_steps
-from eomgen.native.implicit import METHODS_LIBRARY, System, solver
+from eomgen.native.implicit import System, solver
 from eomgen.native.module import Kernels
 from eomgen.run.compiled import EqualSteps
 from eomgen.run.integrators.rattle import linked, sizes_of
@@ -27,6 +27,7 @@ def steps(
     name: str,
     problem: Problem,
     module: Any,
+    methods: ctypes.CDLL,
     libraries: Mapping[str, ctypes.CDLL],
     p: Any,
     u: Any,
@@ -43,6 +44,6 @@ def steps(
     room, factors = linked(n, rows), [plain_factors(k) for k in (n, n, rows)]
     given = solver(system, functions, (n, n, rows), room=room, factors=factors)
     given.libraries = libraries, inputs
-    call = libraries[METHODS_LIBRARY][f"steps_{name}"]
+    call = methods.steps
     count = DERIVATIVES * equal_steps.LEAPFROGS[name]
     return EqualSteps(partial(equal_steps.made, call, given, inputs, functions, ()), count)

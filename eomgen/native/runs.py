@@ -15,6 +15,7 @@ from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
 from eomgen.engine.branches import Switches
 from eomgen.engine.crossings import Watch
 from eomgen.engine.embedded import DOP853
+from eomgen.engine.methods import Root
 from eomgen.native import checked, contact_runs, equal_steps
 from eomgen.native.checked import FunctionStructure
 from eomgen.native.constrained import address as where
@@ -34,9 +35,7 @@ from eomgen.run.projection import PROJECTS
 from eomgen.subset.structures import address, filled
 
 MAIN = "runs.c"
-CHECKS: list[equal_steps.Root] = [(name, {}) for name in ("passed_over", "end_at", "stay_apart")]
-METHODS = ("dop853", *equal_steps.METHODS)
-"""The methods whose steps this library makes."""
+CHECKS: list[Root] = [(name, {}) for name in ("passed_over", "end_at", "stay_apart")]
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
@@ -48,14 +47,15 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
 
     of_contacts = contact_runs.context(interface)
     program, interface = restricted(program, interface, ("derivative",))
-    more = contact_runs.ROOTS if of_contacts["contacts"] else []
+    roots = [*equal_steps.roots_of(*equal_steps.METHODS), ("equal_steps", {})]
+    roots += [("made_many", {"method": DOP853}), *CHECKS]
+    roots += contact_runs.ROOTS if of_contacts["contacts"] else []
     context = {
         "prefix": interface.name,
         "main": c.MAIN,
         "states": len(interface.states),
         "quaternions": interface.quaternions,
-        "engine": C.prelude + c_source(equal_steps.STEPS),
-        "steps": c_source([("made_many", {"method": DOP853}), *CHECKS, *more]),
+        "engine": C.prelude + c_source(roots),
         **of_contacts,
         **of_constraints(),
         **equal_steps.context(interface),
@@ -111,7 +111,7 @@ class CompiledSteps:
         """The steps of a method that are checked with some functions; None if there are none for
         it, for these functions, parameters or inputs.
         """
-        if self._constants is None or self._inputs is None or name != "dop853":
+        if self._constants is None or self._inputs is None or name != "DOP853":
             return None
         if not set(needed) <= self._checks.keys():
             return None

@@ -10,7 +10,7 @@ from firmware import Firmware
 
 import eomgen
 from eomgen.base.errors import RunError
-from eomgen.engine.printed import EQUAL
+from eomgen.engine.methods import EQUAL
 from eomgen.exports import Number
 from eomgen.exports.firmware import ERRORS, FARTHEST
 

@@ -17,7 +17,7 @@ from importer import begun, exchanged, instance
 import eomgen
 from eomgen.base.errors import RunError, SceneError
 from eomgen.commands.main import main
-from eomgen.engine.printed import METHODS
+from eomgen.engine.methods import METHODS
 from eomgen.exports.fmu_unit import ENERGIES
 from eomgen.exports.units import exponents, rate_of
 from eomgen.native import compiler

@@ -130,5 +130,5 @@ def interpolated(
 
 
 INTEGRATOR = Adaptive(
-    DormandPrince8, memory=("h_abs", "f", "lost"), compiled="dop853", smallest_rtol=1e-16
+    DormandPrince8, memory=("h_abs", "f", "lost"), compiled="DOP853", smallest_rtol=1e-16
 )

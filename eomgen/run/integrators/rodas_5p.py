@@ -112,6 +112,6 @@ INTEGRATOR = Adaptive(
     uses_jacobian=True,
     asks_more=True,
     memory=("h_abs", "h_last", "error", "lost"),
-    compiled="rodas_5p",
+    compiled="Rodas5P",
     smallest_rtol=1e-15,
 )
