@@ -27,7 +27,7 @@ from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_s
 from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume
 from eomgen.run.integrators.stability import StabilityMonitor
-from eomgen.run.integrators.stepper import Bounds
+from eomgen.run.integrators.stepper import Bounds, Settings
 from eomgen.run.options import Wanted
 from eomgen.run.problem import FloatArray, Problem
 
@@ -180,36 +180,18 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
     atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
     bounds = Bounds(asked.rtol, atol, longest, unseen, asked.max_steps)
     compiled = None if asked.guard else _compiled(problem)
-
-    def begin(
-        problem: Problem,
-        t: float,
-        made: int,
-        resume: Resume | None = None,
-        touched: Touched | None = None,
-    ) -> Iterator[Advance]:
-        return adaptive.advances(
-            method,
-            problem,
-            t,
-            asked.t_end,
-            bounds=bounds,
-            times=times,
-            made=made,
-            remark=remark,
-            resume=resume,
-            steps=compiled.steps if compiled and problem.compiled else None,
-            touched=touched,
-            each=bool(asked.tally or asked.powers),
-            dense=asked.powers is not None,
-        )
+    settings = Settings(
+        *(method, bounds, asked.t_end, times, remark, compiled.steps if compiled else None),
+        each=bool(asked.tally or asked.powers),
+        dense=asked.powers is not None,
+    )
 
     def rows(a: float, b: float) -> list[float]:
         first, last = np.searchsorted(times, (a, b), side="right")
         return cast(list[float], times[first:last].tolist())
 
     kept = {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
-    return Steps(begin, rows, kept)
+    return Steps(partial(adaptive.advances, settings), rows, kept)
 
 
 def _spaced(start: float, end: float, count: int) -> FloatArray:

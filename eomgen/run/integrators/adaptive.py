@@ -7,16 +7,16 @@ The implicit ones are given the problem's exact Jacobian, except `Radau_differen
 `BDF_differences`, which approximate it by differences of derivatives that count as derivatives.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
-from eomgen.run.compiled import Steps, Touched
+from eomgen.run.compiled import Touched
 from eomgen.run.failure import StepFailure
-from eomgen.run.integrators.interface import Adaptive, Advance, Remark, Resume
+from eomgen.run.integrators.interface import Advance, Resume
 from eomgen.run.integrators.stability import UnstableStepError, stiffness
-from eomgen.run.integrators.stepper import Bounds, Stepper
+from eomgen.run.integrators.stepper import Settings, Stepper
 from eomgen.run.integrators.strides import Strides
-from eomgen.run.problem import FloatArray, Problem
+from eomgen.run.problem import Problem
 
 _CHECK_STIFFNESS, _MANY_MORE = 10_000, 20
 """After this many steps, an explicit method that needs `_MANY_MORE` times as many is checked for
@@ -27,40 +27,31 @@ _CHECK_PACE = 100_000
 
 
 def advances(
-    method: Adaptive,
+    settings: Settings,
     problem: Problem,
     t_start: float,
-    t_end: float,
-    *,
-    bounds: Bounds,
-    times: FloatArray,
     made: int,
-    remark: Remark,
     resume: Resume | None = None,
-    steps: Callable[[str, tuple[str, ...]], Steps | None] | None = None,
     touched: Touched | None = None,
-    each: bool = True,
-    dense: bool = True,
 ) -> Iterator[Advance]:
-    """Yield the steps of `method`, each with samples at those of `times` (ascending) within it.
+    """Yield steps, each with samples at those of the times wanted that are within it.
 
     Samples within a step come from the method's dense output. There is no sample at `t_start`.
     Quaternions are normalised in every state that is yielded; one-step methods continue from there,
     multistep methods from their own history. A step that passed over a branch of the derivative is
     repeated up to there: see `eomgen.run.branches`.
 
-    made    number of earlier steps, which count towards `bounds.most`
-    remark  called with what SciPy would warn of
-    steps   see `run.compiled.Compiled`
-    touched   what is known of rigid contacts; gaps below 0 end compiled steps
-    each    whether each compiled step is yielded, or many at once
-    dense   whether compiled steps give the states within them
+    made     number of earlier steps, which count towards the most that are allowed
+    touched  what is known of rigid contacts; gaps below 0 end compiled steps
 
-    Raises `StepFailure` if the method fails, or after `bounds.most` steps.
+    Raises `StepFailure` if the method fails, or after the most steps allowed.
     """
-    stepper = Stepper(method, problem, t_end, bounds, times, remark)
+    method, bounds = settings.method, settings.bounds
+    stepper = Stepper(settings, problem)
     stepper.begin(t_start, resume)
-    compiled = Strides(stepper, steps, dense) if steps and method.compiled else None
+    compiled = None
+    if settings.steps and method.compiled and problem.compiled:
+        compiled = Strides(stepper, settings.steps)
     left, here = bounds.most - made, 0
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
@@ -71,7 +62,7 @@ def advances(
         if portion is None:  # the step must be repeated
             here += 1
             continue
-        yield from portion.advances(each)
+        yield from portion.advances(settings.each)
         n = len(portion.ends)
         here += n
         if stepper.ended:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.run.branches import BranchMonitor, Retry, Step
+from eomgen.run.compiled import Steps
 from eomgen.run.failure import NOT_FINITE, StepFailure
 from eomgen.run.integrators.interface import Adaptive, Remark, Resume
 from eomgen.run.integrators.portions import Portion
@@ -41,23 +42,37 @@ class Bounds:
         return self.atol + self.rtol * np.abs(y)
 
 
-class Stepper:
-    """The solver of a run up to `t_end`, s, restarted where steps must be repeated.
+@dataclass(frozen=True)
+class Settings:
+    """How the steps of a run by an adaptive method are made.
 
-    Rows are wanted at `times` (ascending); `sampled` is the number of those so far.
+    t_end   the end, s
+    times   those of the rows wanted, ascending, s
+    remark  called with what SciPy would warn of
+    steps   see `run.compiled.Compiled`; None if there are none
+    each    whether each compiled step is yielded, or many at once
+    dense   whether compiled steps give the states within them
     """
 
-    def __init__(
-        self,
-        method: Adaptive,
-        problem: Problem,
-        t_end: float,
-        bounds: Bounds,
-        times: FloatArray,
-        remark: Remark,
-    ) -> None:
-        self.method, self.t_end, self.problem, self.bounds = method, t_end, problem, bounds
-        self.times, self.sampled, self._remark = times, 0, remark
+    method: Adaptive
+    bounds: Bounds
+    t_end: float
+    times: FloatArray
+    remark: Remark
+    steps: Callable[[str, tuple[str, ...]], Steps | None] | None
+    each: bool
+    dense: bool
+
+
+class Stepper:
+    """The solver of a run, restarted where steps must be repeated; `sampled` is the number of rows
+    so far.
+    """
+
+    def __init__(self, settings: Settings, problem: Problem) -> None:
+        self.settings, self.problem, self.sampled = settings, problem, 0
+        method, bounds = self.method, self.bounds = settings.method, settings.bounds
+        self.t_end, self.times = settings.t_end, settings.times
         self.longest, self.branches = bounds.longest, None
         scrutiny = problem.scrutiny
         if problem.switching or (scrutiny and scrutiny.localised):
@@ -105,7 +120,7 @@ class Stepper:
             self.problem.derivative, t, y.copy(), bound, max_step=self.longest, **options
         )
         if hasattr(self.solver, "remark"):
-            self.solver.remark = self._remark
+            self.solver.remark = self.settings.remark
         self.solver.t_bound = until
         self.until = until
         for name in self.method.memory if memory else ():

@@ -20,21 +20,15 @@ OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates")
 
 
 class Strides:
-    """The compiled steps of a run, for its stepper, with states at any time if they are `dense`.
-
-    `steps` is asked for them each time.
-    """
+    """The compiled steps of a run, for its stepper; `steps` is asked for them each time."""
 
     def __init__(
-        self,
-        stepper: Stepper,
-        steps: Callable[[str, tuple[str, ...]], Steps | None],
-        dense: bool,
+        self, stepper: Stepper, steps: Callable[[str, tuple[str, ...]], Steps | None]
     ) -> None:
         problem = stepper.problem
         switching, contacts, self._looked = problem.switching, problem.contacts, problem.closed_form
         self._stepper, self._steps = stepper, steps
-        self._dense = dense or self._looked is not None
+        self._dense = stepper.settings.dense or self._looked is not None
         self._atol = np.zeros(problem.initial.shape) + stepper.bounds.atol
         self._needed = (
             *(OF_STATE if switching and switching.of_state else ()),
