@@ -1,10 +1,9 @@
 """Where the steps and functions of a run are computed: in Python or in compiled code.
 
-The rule: in compiled code if its libraries are in the store, or once the run has taken as long as
-compiling them will. Then they are compiled, all that it needs together. So a run never takes more
-than about twice as long as it would with the better of the two from the start on. `_found` is
-the rule for steps, which runs ask before each portion of these; both places make the same steps.
-For a single function, `_Library.beyond` compares the time that Python has spent on it.
+The rule, `pays`: in compiled code if its libraries are in the store, or once Python has taken as
+long as compiling them will. Then they are compiled, all that it needs together. So a run never
+takes more than about twice as long as it would with the better of the two from the start on. Runs
+ask for steps before each portion of these; both places make the same ones.
 """
 
 import ctypes
@@ -43,6 +42,13 @@ Libraries = Mapping[str, ctypes.CDLL]
 """Libraries by the names of their functions."""
 
 
+def pays(spent: float, price: float) -> bool:
+    """Whether to compile what takes `price` s to compile: once Python has taken as long. For steps
+    this is the time of the run so far, for a single function what Python has spent on it.
+    """
+    return spent > price
+
+
 class _Library:
     """A library that is taken from the store, or compiled when that pays.
 
@@ -78,7 +84,7 @@ class _Library:
         the time of all runs counts.
         """
         self._spent += more
-        if self.is_missing and self._spent > self.price:
+        if self.is_missing and pays(self._spent, self.price):
             with suppress(RunError):
                 self.compile()
         return self.found
@@ -284,7 +290,8 @@ class Accelerator:
         needed = {name: self._library(name) for name in names}
         missing = [library for library in needed.values() if library.is_missing]
         price = sum(library.price for library in missing)
-        if missing and (self._at_once or time.perf_counter() - begun > price):
+        spent = math.inf if self._at_once else time.perf_counter() - begun
+        if missing and pays(spent, price):
             with suppress(RunError):
                 self._compile(missing)
         there = {name: x.found for name, x in needed.items() if x.found is not None}

@@ -1,7 +1,7 @@
 """The steps of a run, from its arguments."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple, cast
@@ -22,10 +22,10 @@ from eomgen.run.checks import (
     longest_steps,
     numbers,
 )
-from eomgen.run.compiled import Compiled, Strikes, Touched
+from eomgen.run.compiled import Compiled, Strikes
 from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
 from eomgen.run.integrators.fixed_step import Grid
-from eomgen.run.integrators.interface import Adaptive, Advance, Begin, Remark, Resume
+from eomgen.run.integrators.interface import Adaptive, Begin, Remark, Resume
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.integrators.stepper import Bounds, Settings
 from eomgen.run.options import Wanted
@@ -128,28 +128,12 @@ def _equal_steps(
     plain = not (asked.guard or asked.powers)
     compiled = _compiled(whole) if plain and method.compiled else None
     ahead = plain and not whole.projection
-
-    def begin(
-        problem: Problem,
-        t: float,
-        made: int,
-        resume: Resume | None = None,
-        touched: Touched | None = None,
-    ) -> Iterator[Advance]:
-        return fixed_step.advances(
-            method,
-            change,
-            problem,
-            t,
-            grid,
-            checked=None if unchecked else problem if problem.contacts else whole,
-            resume=resume,
-            compiled=partial(compiled.equal, method.compiled) if compiled else None,
-            calls=calls if ahead else None,
-            each=bool(asked.tally),
-            monitor=monitor,
-            touched=touched,
-        )
+    settings = fixed_step.Settings(
+        *(method, change, grid, None if unchecked else whole),
+        *(partial(compiled.equal, method.compiled) if compiled else None, calls if ahead else None),
+        each=bool(asked.tally),
+        monitor=monitor,
+    )
 
     def rows(a: float, b: float) -> list[float]:
         first, last = (math.floor((t - asked.grid) / dt) for t in (a, b))
@@ -157,10 +141,9 @@ def _equal_steps(
         found = [mark for mark in marks if a < mark <= b and mark < asked.t_end]
         return [*found, b] if b == asked.t_end else found
 
-    settings = _settings(asked, dt)
-    return (
-        Steps(begin, rows, settings, compiled.strikes) if compiled else Steps(begin, rows, settings)
-    )
+    strikes = [compiled.strikes] if compiled else []
+    begin = partial(fixed_step.advances, settings)
+    return Steps(begin, rows, _settings(asked, dt), *strikes)
 
 
 def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Remark) -> Steps:

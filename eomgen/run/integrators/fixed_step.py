@@ -68,41 +68,55 @@ class Grid:
         return self.t_end, mark if abs(mark - self.t_end) <= 4 * math.ulp(self.t_end) else None
 
 
-def advances(
-    method: FixedStep,
-    change: Change,
-    problem: Problem,
-    t: float,
-    grid: Grid,
-    *,
-    checked: Problem | None = None,
-    resume: Resume | None = None,
-    compiled: Callable[[], EqualSteps | None] | None = None,
-    calls: Calls | None = None,
-    each: bool = True,
-    monitor: StabilityMonitor | None = None,
-    touched: Touched | None = None,
-) -> Iterator[Advance]:
-    """Yield the steps of a method from time `t` on, of which `change` is one.
+@dataclass(frozen=True)
+class Settings:
+    """How the steps of a run by a method of equal steps are made.
 
-    If `t` lies between the ends of steps, the first one is shorter. Quaternions are normalised
-    after every step. The state within a step is that after a shorter step. Sums are compensated.
-
-    checked   the problem by whose Jacobian the stability of steps is checked; None for no check
-    resume    what an `Advance` of an earlier run gave
+    change    makes one
+    whole     the problem by whose Jacobian the stability of steps is checked, unless there are
+              rigid contacts, which may be held; None for no check
     compiled  the steps in compiled code, which it is asked for before each portion of steps; None
               if there are none. They have the same bits. Python makes the first step and the last,
               and those that are not usual
     calls     counts the calls of the problem's functions; given if steps may be made before the
               earlier ones have been looked at
     each      whether each step is yielded, or many at once
-    monitor   of stability, that of the steps before an event if they continue those
+    monitor   of stability, if steps after an event continue those before it
+    """
+
+    method: FixedStep
+    change: Change
+    grid: Grid
+    whole: Problem | None
+    compiled: Callable[[], EqualSteps | None] | None
+    calls: Calls | None
+    each: bool
+    monitor: StabilityMonitor | None
+
+
+def advances(
+    settings: Settings,
+    problem: Problem,
+    t: float,
+    made: int,
+    resume: Resume | None = None,
+    touched: Touched | None = None,
+) -> Iterator[Advance]:
+    """Yield the steps from time `t` on; how many were `made` before follows from that.
+
+    If `t` lies between the ends of steps, the first one is shorter. Quaternions are normalised
+    after every step. The state within a step is that after a shorter step. Sums are compensated.
+
+    resume    what an `Advance` of an earlier run gave
     touched   what compiled steps are given of rigid contacts; they then end with the part of one up
               to an event, of which `touched` says when the part is yielded
 
     Raises `StepFailure` where there is no step, or if steps are too long for stability.
     """
-    monitor = monitor or StabilityMonitor(change, method.stability)
+    method, change, grid = settings.method, settings.change, settings.grid
+    compiled, calls, each = settings.compiled, settings.calls, settings.each
+    checked = problem if settings.whole and problem.contacts else settings.whole
+    monitor = settings.monitor or StabilityMonitor(change, method.stability)
     own = InPython(change, problem, checked, monitor, calls)
     regular, y, steps = t == grid.t_start or resume is not None, problem.initial, grid.steps
     lost = np.zeros_like(y) if resume is None else resume["lost"]
@@ -144,9 +158,8 @@ def advances(
             within = partial(_within, change, problem, (t, y), kept)
             resumes = partial(_continuation, kept, mark) if mark is not None else None
             rows = _rows(kept, n, i, grid)
-            made = (kept.ends[:n], kept.states[:n], *rows, counts, within, resumes, margins)
-            whole = touched is not None
-            yield from Portion(problem, t, *made, whole).advances(each or near)
+            of = kept.ends[:n], kept.states[:n], *rows, counts, within, resumes, margins
+            yield from Portion(problem, t, *of, touched is not None).advances(each or near)
             i, regular, own_most = i + n, True, min(2 * own_most, ahead)
             t, y, lost = float(kept.ends[n - 1]), kept.states[n - 1], kept.losses[n - 1]
             if shaken:
