@@ -192,9 +192,8 @@ def add_formats(parser: argparse.ArgumentParser) -> None:
     """The formats of `export`."""
     group = parser.add_mutually_exclusive_group(required=True)
     for name, found in FORMATS.items():
-        group.add_argument(
-            f"--{name}", dest="format", action="store_const", const=name, help=found.about
-        )
+        flag = f"--{name.replace('_', '-')}"
+        group.add_argument(flag, dest="format", action="store_const", const=name, help=found.about)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -78,6 +78,7 @@ FORMATS: dict[str, Format] = {
     "firmware": Format("a folder with C99 for firmware", options=("number", "integrator")),
     "javascript": Format("an ES module with steps, in a folder", options=("integrator",)),
     "wasm": Format("a module of WebAssembly", ".wasm", ("integrator",)),
+    "wasm_page": Format("a page that computes by WebAssembly", ".html", ("integrator",)),
     "matlab": Format("a folder with functions for MATLAB and Octave"),
 }
 

@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from browser import chromium, missing
 from firmware import Firmware
 from live import NODE, run_in_node
 
 import eomgen
+from eomgen.api.given import model_of, read
 from eomgen.base.errors import RunError, SceneError
 
 STEPS = """
@@ -70,6 +72,28 @@ def test_the_page_of_firmware_shows_how(tmp_path: Path) -> None:
     native = Firmware("cart_pole", "double", "", "-ffp-contract=off")
     start = np.array([0.0, 0.1, 0.0, 0.0])
     assert json.loads(run.stdout) == native.stepped(start, np.zeros(1), 0.01, 1).tolist()
+
+
+@zig
+@pytest.mark.skipif(bool(missing()), reason=missing())
+def test_a_page_steps_as_firmware_does(tmp_path: Path) -> None:
+    """In a browser: to the same bits, with an input that is set there, and it plays."""
+    (path,) = eomgen.export("cart_pole", "wasm_page", tmp_path / "made.html")
+    native = Firmware("cart_pole", "double", "", "-ffp-contract=off")
+    with chromium() as browser:
+        page, errors = browser.new_page(), []
+        page.on("pageerror", lambda error: errors.append(error))
+        page.goto(path.as_uri())
+        (force,) = (i.name for i in model_of(read("cart_pole"), "cart_pole").inputs)
+        page.fill(f"#inputs-{force}", "0.5")
+        start, end = page.evaluate(
+            "() => { const y = [...eomgen.y]; eomgen.step(200); return [y, [...eomgen.y]]; }"
+        )
+        page.click("#play")
+        page.wait_for_function("eomgen.t > 2.1")
+        assert page.inner_text("#play") == "Pause" and not errors
+    dt = read("cart_pole").simulation.dt
+    assert end == native.stepped(np.array(start), np.array([0.5]), dt, 200).tolist()
 
 
 @zig
