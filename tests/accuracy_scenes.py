@@ -374,10 +374,7 @@ def _kepler_end(eccentricity: float, periods: int) -> list[mpf]:
 
 
 def _bounced(
-    q: list[float],
-    v: list[float],
-    t_end: float,
-    walls: list[tuple[list[float], float, float]],
+    q: list[float], v: list[float], t_end: float, walls: list[tuple[list[float], float, float]]
 ) -> list[mpf]:
     """A ball's end among walls (normal, offset, restitution), which strike without friction; those
     it does not leave again it slides along.

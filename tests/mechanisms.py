@@ -32,8 +32,7 @@ class Scene:
     `numbers` turns parameter values and inputs, by name, into a mechanism. `bodies`, `pins` (the
     joint of each body that has one) and `coordinates` are names in the mechanism's order, `angles`
     the coordinates that are angles; `defaults` are the parameters, `positive` those that make a
-    mass or an inertia. `text` is TOML, or None for a scene that comes with eomgen. `points` turns
-    parameter values into the named points: a body, and a place from its centre of mass.
+    mass or an inertia. `text` is TOML, or None for a scene that comes with eomgen.
     """
 
     name: str
@@ -46,7 +45,6 @@ class Scene:
     positive: frozenset[str]
     numbers: Callable[[Mapping[str, float], Mapping[str, float]], Mechanism]
     text: str | None = None
-    points: Callable[[Mapping[str, float]], tuple[tuple[int, list[float]], ...]] = lambda p: ()
 
     def motion(
         self,
@@ -188,17 +186,36 @@ _TWO_BODIES = Scene(
 )
 REPORTED = {
     "two_body": _TWO_BODIES,
-    "two_body_forced": replace(_TWO_BODIES, name="two_body_forced", inputs=("f_A_x", "f_A_y",
-     "f_B_x", "f_B_y", "tau"), defaults={**_HANDOUT, "d_A": -0.6, "d_B": 0.5},
-     numbers=_two_body_forced),
-    "pendulum": Scene(name="pendulum", bodies=("bob",), pins=("pivot",), coordinates=("theta"),
-     angles=("theta",), inputs=(), defaults={"bob_mass": 1.0, "pivot_r_child_x": -1.0,
-     "gravity_g": 9.81}, positive=frozenset({"bob_mass"}), numbers=_pendulum),
-    "double_pendulum": Scene(name="double_pendulum", bodies=("upper", "lower"), pins=("shoulder",
-     "elbow"), coordinates=("theta_1", "theta_2"), angles=("theta_1", "theta_2"), inputs=(),
-     defaults={"m_1": 1.0, "m_2": 1.0, "l_1": 1.0, "l_2": 1.0, "g": 9.81},
-     positive=frozenset({"m_1", "m_2"}), numbers=_double_pendulum),
-}  # fmt: skip
+    "two_body_forced": replace(
+        _TWO_BODIES,
+        name="two_body_forced",
+        inputs=("f_A_x", "f_A_y", "f_B_x", "f_B_y", "tau"),
+        defaults={**_HANDOUT, "d_A": -0.6, "d_B": 0.5},
+        numbers=_two_body_forced,
+    ),
+    "pendulum": Scene(
+        name="pendulum",
+        bodies=("bob",),
+        pins=("pivot",),
+        coordinates=("theta",),
+        angles=("theta",),
+        inputs=(),
+        defaults={"bob_mass": 1.0, "pivot_r_child_x": -1.0, "gravity_g": 9.81},
+        positive=frozenset({"bob_mass"}),
+        numbers=_pendulum,
+    ),
+    "double_pendulum": Scene(
+        name="double_pendulum",
+        bodies=("upper", "lower"),
+        pins=("shoulder", "elbow"),
+        coordinates=("theta_1", "theta_2"),
+        angles=("theta_1", "theta_2"),
+        inputs=(),
+        defaults={"m_1": 1.0, "m_2": 1.0, "l_1": 1.0, "l_2": 1.0, "g": 9.81},
+        positive=frozenset({"m_1", "m_2"}),
+        numbers=_double_pendulum,
+    ),
+}
 
 # Random trees.
 
@@ -266,8 +283,7 @@ def random_tree(seed: int, most: int = 4) -> Scene:
 
     Chains and branches, one tree or several, on the world or floating; pins at points with one, two
     or no nonzero components; numbers bare, shared by name and by formula; with chance gravity, a
-    motor, a force from outside, and up to two named points. The scene lists bodies and joints in
-    any order.
+    motor and a force from outside. The scene lists bodies and joints in any order.
     """
     rng = np.random.default_rng([seed, most])
     writer = _Writer(rng)
@@ -354,17 +370,8 @@ def random_tree(seed: int, most: int = 4) -> Scene:
         )
 
     tables = [*rng.permutation(bodies), *rng.permutation(joints), *effects]
-    marked: list[tuple[int, list[Value]]] = []
-    for i in range(int(rng.integers(3))):
-        body = int(rng.integers(n))
-        at, value = writer.point(f"p{i}_at")
-        marked.append((body, value))
-        tables.append(f'[[points]]\nname = "p{i}"\nbody = "b{body}"\nat = {at}\n')
     head = f'name = "tree_{seed}"\noutputs = "all"\n\n[parameters]\n'
     head += "".join(f"{name} = {value}\n" for name, value in writer.shared.items())
-
-    def points(p: Mapping[str, float]) -> tuple[tuple[int, list[float]], ...]:
-        return tuple((body, [x(p) for x in place]) for body, place in marked)
 
     return Scene(
         name=f"tree_{seed}",
@@ -377,7 +384,6 @@ def random_tree(seed: int, most: int = 4) -> Scene:
         positive=frozenset(writer.positive),
         numbers=numbers,
         text="\n".join([head, *tables]),
-        points=points,
     )
 
 

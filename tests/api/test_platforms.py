@@ -104,10 +104,7 @@ def test_a_sweep_is_locked_by_windows_too(tmp_path: Path, monkeypatch: pytest.Mo
     with storage._alone(path):
         ((_, place),) = held
         assert place >= path.stat().st_size, "nobody could read what is locked"
-        with (
-            pytest.raises(RunError, match="another process runs this sweep"),
-            storage._alone(path),
-        ):
+        with pytest.raises(RunError, match="another process runs this sweep"), storage._alone(path):
             pass
 
 
@@ -119,6 +116,7 @@ def test_what_windows_lacks_is_done_without(tmp_path: Path) -> None:
     assert "4 finished" in done.stdout and (tmp_path / "out" / "pendulum.npz").is_file()
 
 
+@pytest.mark.full
 def test_a_script_without_its_guard_is_told_so(tmp_path: Path) -> None:
     """Each process imports the script, and would start its own."""
     path = tmp_path / "script.py"

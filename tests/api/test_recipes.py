@@ -75,7 +75,7 @@ EDITS = {
     "a route": {
         "eomgen/tables/routes.py": [
             ('    "aba": ', '    "twin": RouteSpec("as aba", "articulated", trees=True),')
-        ],
+        ]
     },
     "a backend": {
         "eomgen/codegen/backends/listing.py": OURS / "listing.py",
@@ -137,7 +137,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the package with one of each added, and two scenes that use them."""
     root = tmp_path_factory.mktemp("house")
     for name in ("eomgen", "templates"):
-        shutil.copytree(ROOT / name, root / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / name, root / name)
     for edits in EDITS.values():
         for path, change in edits.items():
             if isinstance(change, Path):

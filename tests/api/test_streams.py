@@ -57,10 +57,7 @@ FAULTS = {
     "both full": ("> /dev/full 2>&1", 1), "input closed": ("<&-", 0),
 }  # fmt: skip
 """What the shell does to the streams, and the exit code of a command that writes and goes well."""
-FEW = (
-    ("check", "both full"),
-    ("check", "errors closed"),
-)
+FEW = (("check", "both full"), ("check", "errors closed"))
 
 
 def environment(**changes: str) -> dict[str, str]:

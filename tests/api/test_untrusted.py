@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import some
 
 from eomgen.base.errors import RunError, SceneError
 from eomgen.base.files import read_plain
@@ -175,7 +176,7 @@ def test_text_of_a_scene_is_never_shown_as_it_is(
     scene = tmp_path / "scene.toml"
     text = (BUILT_IN / "cart_pole.toml").read_text("utf-8")
     refused, put = 0, quoted(hostile)
-    for begin, end in places(text):
+    for begin, end in [*places(text)][:: some(2, 1)]:
         scene.write_text(text[:begin] + put + text[end:], "utf-8")
         refused += main(["check", str(scene)])
         said = capsys.readouterr()
@@ -186,7 +187,7 @@ def test_text_of_a_scene_is_never_shown_as_it_is(
         assert all(
             re.match(r"eomgen: scene\.toml(:\d+)?: ", line) for line in said.err.splitlines()
         )
-    assert refused > 30
+    assert refused > some(15, 30)
 
 
 @pytest.mark.every(2)

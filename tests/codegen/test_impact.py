@@ -6,15 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from engine import MP, Engine, along, exact
-from striking import (
-    MATERIAL,
-    Balls,
-    Limit,
-    dense_impact,
-    normals,
-    striking,
-    touching_velocities,
-)
+from striking import MATERIAL, Balls, Limit, dense_impact, normals, striking, touching_velocities
 
 FREE = """\
 [[bodies]]

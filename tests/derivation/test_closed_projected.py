@@ -218,8 +218,7 @@ def test_furuta_pendulum_as_published() -> None:
     """
     equations = scene("furuta_pendulum")
     m1, l1, m2, l2, rotor, gear, g, tau, phi, w1, w2 = named(
-        equations,
-        "m_arm l_arm m_pendulum l_pendulum J_rotor gear g tau phi theta_dot phi_dot",
+        equations, "m_arm l_arm m_pendulum l_pendulum J_rotor gear g tau phi theta_dot phi_dot"
     )
     sin, cos = sp.sin(phi), sp.cos(phi)
     arm = m1 * l1**2 / 3 + rotor * gear**2  # Ĵ₁
@@ -227,10 +226,7 @@ def test_furuta_pendulum_as_published() -> None:
     root = arm + m2 * l1**2  # Ĵ₀
     half = l2 / 2
     M = sp.Matrix(
-        [
-            [root + pendulum * sin**2, m2 * l1 * half * cos],
-            [m2 * l1 * half * cos, pendulum],
-        ]
+        [[root + pendulum * sin**2, m2 * l1 * half * cos], [m2 * l1 * half * cos, pendulum]]
     )
     V = sp.Matrix(
         [

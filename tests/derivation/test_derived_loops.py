@@ -33,84 +33,36 @@ MIXED = """
 name = "mixed"
 dimensions = 3
 parameters = { a = 0.5, k = 0.3 }
-[initial]
-q = { swing = 0.2 }
-[[bodies]]
-name = "arm"
-mass = 1.3
-inertia_com = [0.1, 0.2, 0.15]
-[[bodies]]
-name = "bar"
-mass = 0.7
-inertia_com = [0.05, 0.03, 0.04]
-[[bodies]]
-name = "slider"
-mass = 0.9
-inertia_com = [0.02, 0.03, 0.04]
-[[bodies]]
-name = "post"
-mass = 0.4
-inertia_com = [0.02, 0.03, 0.02]
-[[joints]]
-name = "pin"
-type = "revolute"
-parent = "world"
-child = "arm"
-axis = [0.6, 0.0, 0.8]
-r_child = [0, "-a", 0.1]
-coordinate = "swing"
-[[joints]]
-name = "wrist"
-type = "ball"
-parent = "arm"
-child = "bar"
-r_parent = [0.0, "a", 0.0]
-r_child = [-0.3, 0.0, 0.0]
-[[joints]]
-name = "base"
-type = "free"
-child = "slider"
-[[joints]]
-name = "rail"
-type = "prismatic"
-parent = "world"
-child = "post"
-axis = [0, 0, 1]
-r_parent = [1.0, 0.0, 0.0]
-coordinate = "lift"
-[[joints]]
-name = "{type}_loop"
-type = "{type}"
-loop = true
-parent = "bar"
-child = "slider"
-r_parent = [0.3, 0.1, 0.0]
-r_child = [0.0, 0.0, 0.2]
-{more}
-[[constraints]]
-type = "distance"
-name = "rod"
-body_1 = "post"
-at_1 = [0.0, 0.0, 0.1]
-body_2 = "slider"
-at_2 = [0.1, 0.0, 0.0]
-length = 1.1
-[[constraints]]
-type = "coupling"
-name = "screw"
-coordinate = "lift"
-equals = "k*sin(swing)"
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "motor"
-name = "drive"
-joint = "pin"
-torque = "input"
+initial = { q = { swing = 0.2 } }
+bodies = [
+    { name = "arm", mass = 1.3, inertia_com = [0.1, 0.2, 0.15] },
+    { name = "bar", mass = 0.7, inertia_com = [0.05, 0.03, 0.04] },
+    { name = "slider", mass = 0.9, inertia_com = [0.02, 0.03, 0.04] },
+    { name = "post", mass = 0.4, inertia_com = [0.02, 0.03, 0.02] },
+]
+joints = [
+    { name = "pin", type = "revolute", parent = "world", child = "arm", axis = [0.6, 0.0, 0.8], \
+r_child = [0, "-a", 0.1], coordinate = "swing" },
+    { name = "wrist", type = "ball", parent = "arm", child = "bar", r_parent = [0.0, "a", 0.0], \
+r_child = [-0.3, 0.0, 0.0] },
+    { name = "base", type = "free", child = "slider" },
+    { name = "rail", type = "prismatic", parent = "world", child = "post", axis = [0, 0, 1], \
+r_parent = [1.0, 0.0, 0.0], coordinate = "lift" },
+    { name = "{type}_loop", type = "{type}", loop = true, parent = "bar", child = "slider", \
+r_parent = [0.3, 0.1, 0.0], r_child = [0.0, 0.0, 0.2]{more} },
+]
+constraints = [
+    { type = "distance", name = "rod", body_1 = "post", at_1 = [0.0, 0.0, 0.1], body_2 = "slider", \
+at_2 = [0.1, 0.0, 0.0], length = 1.1 },
+    { type = "coupling", name = "screw", coordinate = "lift", equals = "k*sin(swing)" },
+]
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "motor", name = "drive", joint = "pin", torque = "input" },
+]
 """
-LOOPS = {"revolute": "axis = [0, 1, 0]", "universal": "", "cylindrical": "axis = [0, 0.6, 0.8]",
-         "planar": "", "ball": "", "prismatic": "axis = [1, 0, 0]", "weld": ""}  # fmt: skip
+LOOPS = {"revolute": ", axis = [0, 1, 0]", "universal": "", "cylindrical": ", axis = [0, 0.6, 0.8]",
+         "planar": "", "ball": "", "prismatic": ", axis = [1, 0, 0]", "weld": ""}  # fmt: skip
 MIXTURES = {kind: MIXED.replace("{type}", kind).replace("{more}", more)
             for kind, more in LOOPS.items()}  # fmt: skip
 SMALL = ("four_bar", "slider_crank")

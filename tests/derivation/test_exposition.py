@@ -144,65 +144,25 @@ def test_driven_and_locked_joints(seed: int) -> None:
 
 CLOSED = """\
 name = "closed"
-[[bodies]]
-name = "a"
-mass = 1.1
-inertia_com = 0.3
-[[bodies]]
-name = "b"
-mass = 0.7
-inertia_com = 0.12
-[[joints]]
-name = "root"
-type = "free"
-child = "a"
-[[joints]]
-name = "hinge"
-type = "{}"
-parent = "a"
-child = "b"
-r_parent = [0.3, 0.1]
-r_child = [-0.2, 0.05]
-coordinate = "c"
-{}
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "spring"
-name = "tie"
-body_1 = "world"
-body_2 = "b"
-at_2 = [0.1, 0.2]
-stiffness = 40.0
-damping = 2.0
-rest_length = 0.3
-[[effects]]
-type = "drag"
-name = "air"
-bodies = "all"
-quadratic = 0.4
-turning_linear = 0.1
-[[effects]]
-type = "pid"
-name = "servo"
-joint = "hinge"
-target = "0.3*sin(t)"
-stiffness = 8.0
-integral_gain = 2.0
-limit = 3.0
-lag = 0.1
-[[effects]]
-type = "contact"
-name = "floor"
-law = "hunt_crossley"
-bodies = "all"
-radius = 0.4
-offset = -0.1
-stiffness = 300.0
-dissipation = 0.2
-friction = 0.4
-slip_speed = 0.1
+bodies = [
+    {{ name = "a", mass = 1.1, inertia_com = 0.3 }},
+    {{ name = "b", mass = 0.7, inertia_com = 0.12 }},
+]
+joints = [
+    {{ name = "root", type = "free", child = "a" }},
+    {{ name = "hinge", type = "{}", parent = "a", child = "b", r_parent = [0.3, 0.1], \
+r_child = [-0.2, 0.05], coordinate = "c"{} }},
+]
+effects = [
+    {{ type = "gravity", g = 9.81 }},
+    {{ type = "spring", name = "tie", body_1 = "world", body_2 = "b", at_2 = [0.1, 0.2], \
+stiffness = 40.0, damping = 2.0, rest_length = 0.3 }},
+    {{ type = "drag", name = "air", bodies = "all", quadratic = 0.4, turning_linear = 0.1 }},
+    {{ type = "pid", name = "servo", joint = "hinge", target = "0.3*sin(t)", stiffness = 8.0, \
+integral_gain = 2.0, limit = 3.0, lag = 0.1 }},
+    {{ type = "contact", name = "floor", law = "hunt_crossley", bodies = "all", radius = 0.4, \
+offset = -0.1, stiffness = 300.0, dissipation = 0.2, friction = 0.4, slip_speed = 0.1 }},
+]
 """
 
 
@@ -218,7 +178,7 @@ turning_quadratic = 0.1
 """
 BY = {
     "the handout's steps": CLOSED.format("revolute", ""),
-    "Kane's method": CLOSED.format("prismatic", "axis = [0.6, 0.8]"),
+    "Kane's method": CLOSED.format("prismatic", ", axis = [0.6, 0.8]"),
     "Kane's method in space": (BUILT_IN / "spinning_top.toml").read_text("utf-8") + TOP,
 }
 

@@ -13,10 +13,7 @@ from eomgen.pipeline import compile_program
 from eomgen.scene.built_in import BUILT_IN
 from eomgen.scene.reader import parse_scene
 
-AT_THE_JOINT = {
-    "joint_friction": "viscous = 0.1",
-    "joint_spring": "stiffness = 2.0\nrest = 0.3",
-}
+AT_THE_JOINT = {"joint_friction": "viscous = 0.1", "joint_spring": "stiffness = 2.0\nrest = 0.3"}
 ARM = (BUILT_IN / "chain.toml").read_text("utf-8").replace("count = 10", "count = 2")
 OF_TIME = 'type = "external_{0}"\nname = "pull"\nbody = "link_2"\n{0} = {1}\n'
 HOLD = 'type = "controller"\nname = "hold"\nstates = {{ z = {{ rate = "link_joint_2_angle" }} }}\n'

@@ -27,36 +27,15 @@ joints = [
     {{ name = "hinge", type = "revolute", parent = "world", child = "rod", r_child = ["-a", 0], motor_inertia = "J" }},
     {{ name = "wrist", type = "revolute", parent = "rod", child = "bob", r_parent = ["a", 0], r_child = ["-a/b", 0] }},
 ]
-[[effects]]
-type = "joint_spring"
-name = "k"
-joint = "hinge"
-stiffness = "k"
-damping = "d"
-[[effects]]
-type = "joint_stop"
-name = "stop"
-joint = "hinge"
-low = "low"
-high = "high"
-stiffness = "k"
-damping = "d"
-[[effects]]
-type = "spring"
-name = "band"
-body_1 = "rod"
-body_2 = "world"
-stiffness = "k"
-rest_length = "s"
-[[effects]]
-type = "pid"
-name = "holds"
-joint = "wrist"
-target = 0
-stiffness = "k + 1"
-damping = "d"
-integral_gain = "i"
-limit = "2*most"
+effects = [
+    {{ type = "joint_spring", name = "k", joint = "hinge", stiffness = "k", damping = "d" }},
+    {{ type = "joint_stop", name = "stop", joint = "hinge", low = "low", high = "high", \
+stiffness = "k", damping = "d" }},
+    {{ type = "spring", name = "band", body_1 = "rod", body_2 = "world", stiffness = "k", \
+rest_length = "s" }},
+    {{ type = "pid", name = "holds", joint = "wrist", target = 0, stiffness = "k + 1", \
+damping = "d", integral_gain = "i", limit = "2*most" }},
+]
 """  # noqa: E501
 HELD = {
     "m": 1.0, "I": 0.1, "m_bob": 0.0, "I_bob": 0.0, "a": 0.5, "b": 2.0, "J": 0.01, "k": 3.0,
@@ -74,17 +53,10 @@ joints = [
     {{ name = "flight", type = "free", child = "nut" }},
     {{ name = "other", type = "free", child = "bolt" }},
 ]
-[[effects]]
-type = "contact"
-name = "ground"
-body = "nut"
-law = "impact"
-against = "ball"
-radius = "r"
-other_radius = "R"
-restitution = "e"
-friction = "f"
-slip_speed = "s"
+effects = [
+    {{ type = "contact", name = "ground", body = "nut", law = "impact", against = "ball", \
+radius = "r", other_radius = "R", restitution = "e", friction = "f", slip_speed = "s" }},
+]
 """
 THROWN = {
     "m": 1.0, "A": 2.0, "B": 2.5, "C": 3.0, "D": 0.1, "E": 0.2, "F": -0.1, "r": 0.0, "R": 0.5,

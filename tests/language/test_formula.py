@@ -43,39 +43,15 @@ REFUSED = [
     *(
         (text, NO.format(word, column))
         for text, word, column in (
-            ("m.real", ".real", 2),
-            ("x[0]", "[", 2),
-            ("[x for x in y]", "[", 1),
-            ("{1}", "{", 1),
-            ("lambda: 1", "lambda", 1),
-            ("(x:=1)", ":=", 3),
-            ("'a'", "'", 1),
-            ('b"a"', '"', 2),
-            ("f'{x}'", "'", 2),
-            ("x # y", "#", 3),
-            ("x;y", ";", 2),
-            ("x\n+1", "\n", 2),
-            ("\tx", "\t", 1),
-            ("x\0", "\0", 2),
-            ("x\\\n+1", "\\", 2),
-            ("sin(x=1)", "=", 6),
-            ("await x", "await", 1),
-            ("x in y", "in", 3),
-            ("x is y", "is", 3),
-            ("yield", "yield", 1),
-            ("True", "True", 1),
-            ("1 - None", "None", 5),
-            ("...", "...", 1),
-            ("x!", "!", 2),
-            ("x // 2", "//", 3),
-            ("x % 2", "%", 3),
-            ("x @ y", "@", 3),
-            ("x << y", "<<", 3),
-            ("~x", "~", 1),
-            ("$x", "$", 1),
-            ("  x.y", ".y", 4),
-            ("a + `b`", "`", 5),
-            ("x?", "?", 2),
+            ("m.real", ".real", 2), ("x[0]", "[", 2), ("[x for x in y]", "[", 1), ("{1}", "{", 1),
+            ("lambda: 1", "lambda", 1), ("(x:=1)", ":=", 3), ("'a'", "'", 1), ('b"a"', '"', 2),
+            ("f'{x}'", "'", 2), ("x # y", "#", 3), ("x;y", ";", 2), ("x\n+1", "\n", 2),
+            ("\tx", "\t", 1), ("x\0", "\0", 2), ("x\\\n+1", "\\", 2), ("sin(x=1)", "=", 6),
+            ("await x", "await", 1), ("x in y", "in", 3), ("x is y", "is", 3),
+            ("yield", "yield", 1), ("True", "True", 1), ("1 - None", "None", 5), ("...", "...", 1),
+            ("x!", "!", 2), ("x // 2", "//", 3), ("x % 2", "%", 3), ("x @ y", "@", 3),
+            ("x << y", "<<", 3), ("~x", "~", 1), ("$x", "$", 1), ("  x.y", ".y", 4),
+            ("a + `b`", "`", 5), ("x?", "?", 2),
         )
     ),
     *(
@@ -87,23 +63,16 @@ REFUSED = [
             ("x ^ 2", "^", 3, "; write ** for a power"),
             ("x == y", "==", 3, "; compare with <, <=, > or >="),
             ("x != y", "!=", 3, "; compare with <, <=, > or >="),
-            ("1_000", "1_000", 1, NUMBERS),
-            ("0x10", "0x10", 1, NUMBERS),
-            ("1j", "1j", 1, NUMBERS),
-            ("a + 2m", "2m", 5, NUMBERS),
-            ("1.5.2", "1.5.2", 1, NUMBERS),
-            ("1if x<0 else 2", "1if", 1, NUMBERS),
-            ("1e", "1e", 1, NUMBERS),
+            ("1_000", "1_000", 1, NUMBERS), ("0x10", "0x10", 1, NUMBERS), ("1j", "1j", 1, NUMBERS),
+            ("a + 2m", "2m", 5, NUMBERS), ("1.5.2", "1.5.2", 1, NUMBERS),
+            ("1if x<0 else 2", "1if", 1, NUMBERS), ("1e", "1e", 1, NUMBERS),
         )
     ),
     *(
         (text, f"has {word!r} at column {column}" + NAMES)
         for text, word, column in (
-            ("__import__(x)", "__import__", 1),
-            ("_x", "_x", 1),
-            ("x + x__y", "x__y", 5),
-            (" x_", "x_", 2),
-            ("_", "_", 1),
+            ("__import__(x)", "__import__", 1), ("_x", "_x", 1), ("x + x__y", "x__y", 5),
+            (" x_", "x_", 2), ("_", "_", 1),
         )
     ),
     # Calls.
@@ -127,12 +96,7 @@ REFUSED = [
     *(
         (text, POWER.format(column))
         for text, column in (
-            ("x**-1", 4),
-            ("  x**0.5", 6),
-            ("x**17", 4),
-            ("2**3**2", 4),
-            ("x**y", 4),
-            ("x**pi", 4),
+            ("x**-1", 4), ("  x**0.5", 6), ("x**17", 4), ("2**3**2", 4), ("x**y", 4), ("x**pi", 4),
         )
     ),
     # Numbers and characters that are none.
@@ -141,32 +105,22 @@ REFUSED = [
     *(
         (text, f"has a character at column {column} that is not plain ASCII")
         for text, column in (
-            ("\u0430 + 1", 1),
-            ("2*\uff11", 3),
-            ("x \u2212 1", 3),
-            ("x\u200b", 2),
-            ("\u03c0", 1),
-            ("x\u00b2", 2),
-            ("x\u00a0+1", 2),
+            ("\u0430 + 1", 1), ("2*\uff11", 3), ("x \u2212 1", 3), ("x\u200b", 2), ("\u03c0", 1),
+            ("x\u00b2", 2), ("x\u00a0+1", 2),
         )
     ),
     # No formula, or too much of one.
     *(
         (text, f"is not a formula{where}; write for example '2*m_A' or 'l_A/2'")
         for text, where in (
-            ("", ""),
-            ("  ", ""),
-            ("m*", " at column 3"),
-            ("  (m", " at column 3"),
-            ("m + / 2", " at column 5"),
-            ("x y", " at column 3"),
-            ("x))", " at column 2"),
+            ("", ""), ("  ", ""), ("m*", " at column 3"), ("  (m", " at column 3"),
+            ("m + / 2", " at column 5"), ("x y", " at column 3"), ("x))", " at column 2"),
         )
     ),
     ("(" * 160 + "x" + ")" * 160, "is nested deeper than 150 at column 151"),
     ("-" * 400 + "x", "is nested deeper than 150 at column 152"),
     ("x" * 501, "is longer than 500 characters"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "message"), REFUSED)

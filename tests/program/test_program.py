@@ -540,17 +540,11 @@ def assert_module_is(text: str, mechanism: Mechanism, joints: list[str]) -> Modu
     ("formula", "value"),
     [
         ("l/3 + 1/8", lambda r: r / 3 + 1 / 8),
-        ("2*l**3 - l**0", lambda r: 2 * r**3 - 1),
         ("-sin(l)*cos(2*l)", lambda r: -sin(r) * cos(2 * r)),
         ("sin(l)/cos(l) - tan(l/2)", lambda r: math.tan(r) - math.tan(r / 2)),
-        ("1/tan(l)", lambda r: 1 / math.tan(r)),
-        ("sqrt(2)*sqrt(l)/l", lambda r: sqrt(2 / r)),
-        ("sqrt(l**2 + 1)", lambda r: sqrt(r**2 + 1)),
         ("sqrt(l**3)", lambda r: sqrt(r**3)),
         ("sqrt(l**2)", abs),
-        ("sqrt(sqrt(l))", lambda r: r**0.25),
         ("pi*l/4 + 1e-3", lambda r: math.pi * r / 4 + 1e-3),
-        ("cos(pi/3)", lambda r: 0.5),
     ],
 )
 def test_formulas(formula: str, value: Callable[[float], float]) -> None:

@@ -77,6 +77,8 @@ EVERYTHING = """
 </mujoco>
 """
 
+HERE = pytest.mark.usefixtures("mujoco_in_this_process")
+
 
 def written(folder: Path, text: str, name: str = "robot.xml") -> Path:
     """A file."""
@@ -85,6 +87,7 @@ def written(folder: Path, text: str, name: str = "robot.xml") -> Path:
     return path
 
 
+@HERE
 def test_accelerations_are_those_of_mujoco(tmp_path: Path) -> None:
     """All kinds of joints, references, springs, dampers, rotors, actuators; by three routes."""
     comparison = Comparison.of(written(tmp_path, EVERYTHING))
@@ -126,6 +129,7 @@ COUPLED = """
 """
 
 
+@HERE
 def test_states_of_a_module_as_those_of_mujoco(tmp_path: Path) -> None:
     """What follows and what is held are there; accelerations are rates of velocities; columns."""
     robot = eomgen.import_robot(written(tmp_path, COUPLED))
@@ -161,6 +165,7 @@ def test_what_a_conversion_refuses(tmp_path: Path) -> None:
         to.state(np.ones(14), np.zeros(12), hip=1.0)
 
 
+@HERE
 def test_what_is_left_out_is_remarked(tmp_path: Path) -> None:
     """Each in a sentence; and the file of the scene gives the same scene."""
     imported = import_file(written(tmp_path, EVERYTHING))
@@ -183,6 +188,7 @@ def test_what_is_left_out_is_remarked(tmp_path: Path) -> None:
     assert (start["t_joint"], start["roll"], start["heavy_1_z"]) == (0.2, 0.4, 2.0)
 
 
+@HERE
 def test_limits_are_stops_on_wish(tmp_path: Path) -> None:
     """Of hinges and slides that follow no others; a tendon may have the name of a joint."""
     text = EVERYTHING.replace('name="elastic"', 'name="roll"')
@@ -193,6 +199,7 @@ def test_limits_are_stops_on_wish(tmp_path: Path) -> None:
     elaborate(read_tables(imported.tables))
 
 
+@HERE
 def test_nothing_starts_inside_a_stop(tmp_path: Path) -> None:
     """A joint whose pose in the file is beyond its limits starts between them; without stops it
     starts where MuJoCo starts it.
@@ -238,6 +245,7 @@ CLOSED = """
 """
 
 
+@HERE
 def test_equality_constraints_are_exact(tmp_path: Path) -> None:
     """M v̇ - f of MuJoCo is a combination of the rows of its constraints, and these stay met."""
     comparison = Comparison.of(written(tmp_path, CLOSED), equalities=True)
@@ -249,6 +257,7 @@ def test_equality_constraints_are_exact(tmp_path: Path) -> None:
         assert found.growth < 100, found.growth
 
 
+@HERE
 def test_welds_are_poses(tmp_path: Path) -> None:
     """A weld with a pose of its own, and one of sites, close loops that are met as in MuJoCo."""
     text = CLOSED.replace(

@@ -13,22 +13,11 @@ from robot_files import KINDS, Kind
 
 from eomgen.base.text import LONGEST_LINE
 from eomgen.commands.main import main
-from eomgen.scene.importers.mjcf import compiled
-from eomgen.scene.importers.mjcf.compiler import compile_file
 
 MUTANTS = some(40, 5000)
 
 
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """MuJoCo compiles here, which takes a tenth of the time of a process for each file."""
-
-    def compile_here(path: Path) -> tuple[int, bytes, list[str]]:
-        code, data, message = compile_file(str(path.absolute()))
-        return code, data, [message] if message else []
-
-    monkeypatch.setattr(compiled, "_compile", compile_here)
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log here
+pytestmark = pytest.mark.usefixtures("mujoco_in_this_process")
 
 
 def outcome(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from campaign import some
 from robot_files import GOOD_URDF
 
 import eomgen
@@ -126,7 +127,7 @@ def test_states_are_in_the_order_of_the_file(tmp_path: Path) -> None:
     assert [body.name for body in model.bodies] == ["base", "arm", "hand", "leg", "foot", "toe"]
 
 
-@pytest.mark.parametrize("axis", ["0 0 1", "1 0 0", "1 -2 0.5"])
+@pytest.mark.parametrize("axis", some(["1 -2 0.5"], ["0 0 1", "1 0 0", "1 -2 0.5"]))
 def test_a_planar_joint_is_two_slides_and_a_hinge(tmp_path: Path, axis: str) -> None:
     """Perpendicular to its axis, and about it."""
     one = written(

@@ -231,7 +231,7 @@ def test_rows_are_compared_at_their_own_times() -> None:
     assert errors(run, truth) == (0.0, 0.0)
 
 
-def test_quaternions_are_measured_before_they_are_scaled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_quaternions_are_measured_before_they_are_scaled() -> None:
     """Euler's step leaves the sphere by (h w / 2)² / 2, every time."""
 
     def derivative(t: float, y: FloatArray) -> FloatArray:
@@ -260,14 +260,6 @@ def test_quaternions_are_measured_before_they_are_scaled(monkeypatch: pytest.Mon
         assert work.quaternion_defect == pytest.approx(math.hypot(1, 3 * h) - 1, rel=1e-9)
     adaptive = measure(found, Rung("RK45", rtol=1e-6, atol=1e-9), 60.0)
     assert 0 < adaptive.quaternion_defect < 1e-5
-    monkeypatch.setattr(
-        work_precision, "ONCE", 1.0
-    )  # where it is repeated, rows between do not count
-    again = measure(found, Rung("RK45", rtol=1e-6, atol=1e-9), 60.0)
-    ends = replace(found, reference=replace(truth, t=truth.t[[0, -1]], y=truth.y[[0, -1]]))
-    steps = measure(ends, Rung("RK45", rtol=1e-6, atol=1e-9), 60.0)
-    assert again.repeats >= 2
-    assert again.quaternion_defect == steps.quaternion_defect < adaptive.quaternion_defect
     assert math.isnan(measure(bench(), Rung("euler", dt=0.02), 60.0).quaternion_defect)
 
 
@@ -401,7 +393,7 @@ def test_scenes_by_form(
 ) -> None:
     """Redundant forms have gaps in their joints; driven scenes account for works."""
     monkeypatch.setattr(truths, "reference", partial(truths.reference, seconds=0.0))
-    quick = "--quick --no-arithmetic --t-end 0.3 --methods rk4 --run-time 0.5".split()
+    quick = "--quick --no-arithmetic --t-end 0.3 --methods rk4 --run-time 1000".split()
     assert main(["accuracy", "two_body", "--form", "redundant", *quick, "-o", str(tmp_path)]) == 0
     rows = cells(tmp_path / "two_body_redundant_accuracy.csv")
     gaps = [float(row["joint_gap_m"]) for row in rows]

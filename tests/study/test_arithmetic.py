@@ -25,13 +25,7 @@ from eomgen.run.module import load_module
 from eomgen.scalars.functions import BY_MATH, FUNCTIONS
 from eomgen.scene.schema import Simulation
 from eomgen.study import timing
-from eomgen.study.cost.arithmetic import (
-    BASELINE,
-    Arithmetic,
-    Solver,
-    arithmetic,
-    solve_operations,
-)
+from eomgen.study.cost.arithmetic import BASELINE, Arithmetic, Solver, arithmetic, solve_operations
 from eomgen.study.cost.single import Single, in_single, kernel_in_single
 from eomgen.study.verification import sampled as sampling
 from eomgen.study.verification.sampled import sampled

@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -97,6 +98,7 @@ def in_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(timing, "TIMING", 0.0)
 
 
+@cache
 def costed(text: str, *, motion: float = 10.0, each: bool = False) -> Bill:
     """The bill of a scene's text."""
     scene = parse_scene(text)
@@ -295,7 +297,7 @@ def test_interrupted(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("eomgen.run.integrate.all_finite", interrupt)
-    found = costed(STONE)
+    found = costed.__wrapped__(STONE)
     assert found.stopped and found.extent is None and found.operations > 0
     assert all(item.change is None for item in found.items)
     assert main(["effects", "pendulum", "-o", str(tmp_path)]) == 130

@@ -183,9 +183,7 @@ class Clock:
             return value
 
         return replace(
-            problem,
-            derivative=ticking(problem.derivative),
-            jacobian=ticking(problem.jacobian),
+            problem, derivative=ticking(problem.derivative), jacobian=ticking(problem.jacobian)
         )
 
     def case(self, scene: str) -> Case:
@@ -194,9 +192,7 @@ class Clock:
         twin = case.moved
         assert twin is not None
         return replace(
-            case,
-            problem=self.counting(case.problem),
-            moved=lambda way: self.counting(twin(way)),
+            case, problem=self.counting(case.problem), moved=lambda way: self.counting(twin(way))
         )
 
 
@@ -241,10 +237,7 @@ FORCED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("scene", "cheapest", "targets"),
-    thinned(FORCED, 4),
-)
+@pytest.mark.parametrize(("scene", "cheapest", "targets"), thinned(FORCED, 4))
 def test_the_accuracy_holds_whichever_method_is_the_cheapest(
     monkeypatch: pytest.MonkeyPatch, scene: str, cheapest: str, targets: tuple[float, ...]
 ) -> None:

@@ -176,10 +176,7 @@ def test_messages() -> None:
     cart, top = module_of("cart_pole"), module_of("spinning_top")
     falling = module_of("two_body")
     cases = [
-        (
-            lambda: equilibrium(falling, falling.initial_state()),
-            "y_A_dot still changes by -9.8",
-        ),
+        (lambda: equilibrium(falling, falling.initial_state()), "y_A_dot still changes by -9.8"),
         (lambda: equilibrium(cart, cart.initial_state(), hold=("thta",)), "did you mean 'theta'"),
         (lambda: equilibrium(cart, cart.initial_state(), trim=("pus",)), "did you mean 'push'"),
         (lambda: equilibrium(cart, cart.initial_state(), {"push": 1.0}), "no equilibrium"),
