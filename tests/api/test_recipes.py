@@ -90,6 +90,11 @@ EDITS = {
             ('    "euler": ', '    "heun": IntegratorSpec("Heun", "explicit", "heun:HEUN"),')
         ],
     },
+    "an option": {
+        "eomgen/api/options.py": [
+            ("    works: bool = op", '    laps: int = option(1, "laps that are run", check=at_most(9))')
+        ],
+    },
 }
 """Of each thing to add the files to touch: a new one, or which line to write before which words."""
 FEW = ["check boat.toml", "list", "generate boat.toml --backend listing -o out"]
@@ -167,6 +172,31 @@ def test_what_is_added_by_hand_is_ours(house: Path) -> None:
     said = used(house, "-c", RUN, *FEW)
     assert "telescope" in said and "buoyancy" in said
     assert (house / "out" / "boat.txt").read_text("utf-8").splitlines()[1] == "sea_up m"
+
+
+ASKED = """
+import sys
+import eomgen, pages
+from eomgen.commands.main import main
+assert eomgen.simulate("boat.toml", t_end=0.01, laps=2).finished
+try:
+    eomgen.simulate("boat.toml", laps=12)
+except eomgen.RunError as error:
+    print(error)
+assert "laps        laps that are run" in eomgen.simulate.__doc__
+assert "laps=1" in pages.functions_page()
+assert "| `--laps N` | laps that are run |" in pages.commands_page()
+for line in ("simulate boat.toml --t-end 0.01 --laps 2 -o out", "completion bash"):
+    assert main(line.split()) == 0
+assert main("simulate boat.toml --laps 12 -o out".split()) == 1
+"""
+
+
+def test_an_option_is_one_entry(house: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The functions, the commands, their completion, messages and the reference have it."""
+    monkeypatch.setenv("TOOLS", str(ROOT / "tools"))
+    said = used(house, "-c", f"import os, sys; sys.path.append(os.environ['TOOLS'])\n{ASKED}")
+    assert "laps: 12 is not a number from 1 to 9" in said and "--laps" in said
 
 
 @pytest.mark.full
