@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from eomgen.study.accuracy.search import Choice
     from eomgen.study.accuracy.trial import Case, Tried
 
+Given = tuple[Mapping[str, float] | None, Mapping[str, float] | None]
+"""Values of parameters and constant inputs."""
 WATCHED = 6
 """Runs of a module with fewer correct digits of accelerations have a guard."""
 
@@ -101,15 +103,32 @@ def _other(model: Model) -> Model:
     return without_dead_points(model)
 
 
-def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
-    """Run a plan with the coordinates of its model."""
+@dataclass(frozen=True, eq=False)
+class _Ready:
+    """What a plan runs.
+
+    model        with the initial state of the plan
+    functions    of its module, at `values` of parameters and constant inputs
+    accelerator  its compiled steps and functions, if it may have some
+    start        where it continues an earlier run
+    said         what was noted of it
+    """
+
+    model: Model
+    functions: GeneratedModule
+    values: Given
+    case: "Case"
+    accelerator: "Accelerator | None"
+    start: "Start | None"
+    said: tuple[str, ...]
+
+
+def _ready(plan: Plan, module: Module, functions: GeneratedModule, reporter: Reporter) -> _Ready:
+    """What a plan runs, with the coordinates of its model."""
     # Imported here: plans are checked without SciPy.
     from eomgen.native.accelerator import without_compiler
-    from eomgen.show.observe import observe
     from eomgen.study.accuracy.trial import Case
 
-    model = plan.model
-    module, functions = compiled(model, asked=plan.outputs, reporter=reporter)
     if plan.varying:
         functions = cast(GeneratedModule, ModuleWithInputs(functions, plan.varying))
     values = (plan.parameters or None, plan.inputs or None)
@@ -121,49 +140,55 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         "unstable": plan.options.unstable,
     }
     said: list[str] = []
-    problem, model = _problem(plan, model, functions, values, _also(said.append, reporter))
+    hearing = _also(said.append, reporter)
+    problem, model = _problem(plan, plan.model, functions, values, hearing)
     accelerator = _accelerator(plan, functions, values, reporter)
     made = accelerator.of if accelerator else without_compiler(model, functions, values)
-    problem = made(problem)
-    began, start = problem.initial, _start(plan, problem)
-    if start is not None:
-        problem = start.problem
-        options |= start.options
-    moved = None
+    problem, moved = made(problem), None
     if plan.setting is None or plan.options.estimate:
         from eomgen.study.accuracy.moved import moved_problem
 
-        moved = moved_problem(functions, model, *values, start=began, compiled=made)
+        moved = moved_problem(functions, model, *values, start=problem.initial, compiled=made)
+    start = _start(plan, problem)
+    if start is not None:
+        problem = start.problem
+        options |= start.options
     if plan.setting is None:
         from eomgen.study.accuracy.localised import under_scrutiny
 
         problem = under_scrutiny(problem, model, functions, *values)
     case = Case(problem, plan.t_end, functions.UNITS, options, reporter.progress, moved)
-    powers = as_powers(functions, *values) if plan.works else None
+    return _Ready(model, functions, values, case, accelerator, start, tuple(said))
+
+
+def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
+    """Run a plan with the coordinates of its model."""
+    from eomgen.show.observe import observe
+
+    module, functions = compiled(plan.model, asked=plan.outputs, reporter=reporter)
+    ready = _ready(plan, module, functions, reporter)
+    model, functions, accelerator = ready.model, ready.functions, ready.accelerator
+    powers = as_powers(functions, *ready.values) if plan.works else None
     if powers and accelerator:
         powers = accelerator.powers(powers)
-    warnings = [*model.notices, *module.notices, *said]
-    trial, choice = _run_case(plan, case, powers, follow, reporter)
+    trial, choice = _run_case(plan, ready.case, powers, follow, reporter)
     trajectory, estimate = trial.trajectory, None
     error, why = _error_of_choice(choice)
-    warnings += why
     if choice is None and plan.options.estimate and trajectory.finished:
         from eomgen.study.accuracy.estimate import by_second_run
 
-        estimate = by_second_run(case, trial)
+        estimate = by_second_run(ready.case, trial)
         error = estimate.last
     varying = plan.varying(trajectory.t).T if plan.varying else None
-    if notice := _why_not_compiled(plan, accelerator):
-        warnings.append(notice)
-        reporter.note(notice)
     trajectory = replace(
         trajectory,
-        saved=recorded(plan.options.save, model, functions, trajectory, values),
+        saved=recorded(plan.options.save, model, functions, trajectory, ready.values),
         setup=setup_of(plan.scene, model, plan.parameters, plan.inputs, varying=varying),
     )
-    if notice := unknown_forces(trajectory):
-        warnings.append(notice)
+    notices = [_why_not_compiled(plan, accelerator), unknown_forces(trajectory)]
+    for notice in filter(None, notices):
         reporter.note(notice)
+    every = (*model.notices, *module.notices, *ready.said, *why, *filter(None, notices))
     model = model.with_parameters(plan.parameters)
     # What varies is not 0.
     pushing = dict.fromkeys(plan.varying.given, 1.0) if plan.varying else plan.inputs
@@ -174,10 +199,10 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         observe(model, functions, trajectory, appearance_of(expanded(plan.scene)), pushing),
         trial.setting.options,
         error,
-        tuple(warnings),
+        every,
         choice=choice,
         estimate=estimate,
-        begun=start.reported(trajectory) if start else "",
+        begun=ready.start.reported(trajectory) if ready.start else "",
         compiled=accelerator is not None and accelerator.used,
         simulation=plan.scene.simulation,
         inputs=plan.inputs,
@@ -201,7 +226,7 @@ def _problem(
     plan: Plan,
     model: Model,
     module: GeneratedModule,
-    values: tuple[Mapping[str, float] | None, Mapping[str, float] | None],
+    values: Given,
     reporter: Reporter,
 ) -> tuple[Problem, Model]:
     """The problem of a plan, and its model with the initial state of the plan."""
@@ -239,7 +264,7 @@ def _also(hear: Callable[[str], None], reporter: Reporter) -> Reporter:
 def _accelerator(
     plan: Plan,
     module: GeneratedModule,
-    values: tuple[Mapping[str, float] | None, ...],
+    values: Given,
     reporter: Reporter,
 ) -> "Accelerator | None":
     """The compiled steps and functions of a plan; None if it asks for none."""
@@ -288,7 +313,7 @@ def _guard(
     plan: Plan,
     module: Module,
     functions: GeneratedModule,
-    values: tuple[Mapping[str, float] | None, ...],
+    values: Given,
 ) -> "Guard | None":
     """The guard against rounding errors, if the plan has one, or if few digits are right."""
     few = module.digits is not None and module.digits < WATCHED and not plan.varying

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -116,6 +116,13 @@ def _compiled(
     return CompiledSteps(model, module, method, dt, rates, problem.projection, limits)
 
 
+class _Reset(NamedTuple):
+    """The lanes that begin again, and the states that they begin with."""
+
+    again: Mask | None
+    first: FloatArray
+
+
 class Stepper:
     """Steps of equal length of a scene: see `stepper`.
 
@@ -204,9 +211,10 @@ class Stepper:
         if out is not None and out is not before and np.may_share_memory(made, y):
             y = y.copy()
         memory = None if lost is None else self._place(lost, "lost")
-        left = self._make(y, made, given, int(steps), memory, again, start)
+        begun = _Reset(again, start)
+        left = self._make(y, made, given, int(steps), memory, begun)
         if left is None or left.size:
-            self._finish(left, y, made, given, int(steps), memory, again, start)
+            self._finish(left, y, made, given, int(steps), memory, begun)
         return made.reshape(self.shape) if out is None else out
 
     def projected(self, y: FloatArray, *, t: float | FloatArray = 0.0) -> FloatArray:
@@ -226,8 +234,7 @@ class Stepper:
         given: Given,
         steps: int,
         lost: FloatArray | None,
-        again: Mask | None,
-        first: FloatArray,
+        begun: "_Reset",
     ) -> NDArray[np.intp] | None:
         """Make steps in compiled code; the columns that are left, or None for all."""
         kernels = self._kernels
@@ -240,8 +247,8 @@ class Stepper:
             (t,) = columns_of(times)
         if given.u is not None:
             (u,) = columns_of(given.u if given.u.ndim == 2 else given.u[:, None])
-        if again is not None and first is not self._initial:
-            (start,) = columns_of(first)
+        if begun.again is not None and begun.first is not self._initial:
+            (start,) = columns_of(begun.first)
         sound = kernels(
             y,
             out,
@@ -251,7 +258,7 @@ class Stepper:
             p=given.p,
             steps=steps,
             lost=lost,
-            again=again,
+            again=begun.again,
             first=start,
         )
         return np.empty(0, np.intp) if sound.all() else np.flatnonzero(sound == 0)
@@ -264,10 +271,10 @@ class Stepper:
         given: Given,
         steps: int,
         lost: FloatArray | None,
-        again: Mask | None,
-        first: FloatArray,
+        begun: "_Reset",
     ) -> None:
         """Make steps of the columns that are left, or of all, in NumPy."""
+        again, first = begun
         chosen: Any = slice(None) if left is None else left
         y = y[:, chosen].copy()
         memory = np.zeros_like(y) if lost is None else lost[:, chosen].copy()

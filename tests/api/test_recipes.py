@@ -92,7 +92,10 @@ EDITS = {
     },
     "an option": {
         "eomgen/api/options.py": [
-            ("    works: bool = op", '    laps: int = option(1, "laps that are run", check=at_most(9))')
+            (
+                "    works: bool = op",
+                '    laps: int = option(1, "laps that are run", check=at_most(9))',
+            )
         ],
     },
 }

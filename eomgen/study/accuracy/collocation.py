@@ -60,9 +60,7 @@ class Step:
 def advance(
     method: Gauss,
     precise: Precise,
-    problem: Problem,
     forecast: Forecast,
-    scale: FloatArray,
     t: Extended,
     y: ExtendedArray,
     h: Extended,
@@ -73,6 +71,7 @@ def advance(
     Raises `NoStep` if the corrections do not converge, `ArithmeticError` or `ValueError` where f is
     not defined.
     """
+    problem, scale = forecast.problem, forecast.scale
     times = [t + c * h for c in method.c]
     near = y.astype(float)
     node_times = np.array(times, dtype=float)
@@ -280,9 +279,7 @@ def rows(
             h = left / count if change is None else h + h * change.beyond
             method = gauss(current.stages)
             try:
-                step = advance(
-                    method, precise, problem, forecast, scale, current.t, current.y, h, tolerance
-                )
+                step = advance(method, precise, forecast, current.t, current.y, h, tolerance)
                 error = step.error
             except (ArithmeticError, ValueError):  # raised by f, by LU factors, or as `NoStep`
                 error = math.inf

@@ -38,7 +38,7 @@ class Forecast:
         self, problem: Problem, scale: FloatArray, t_end: float, check: Callable[[], None]
     ) -> None:
         self._check = check
-        self._problem, self._scale, self._t_end = problem, scale, t_end
+        self.problem, self.scale, self._t_end = problem, scale, t_end
         self._method: Any = LSODA
         self._tolerance, self._astray = FORECAST, ASTRAY * scale
         self._pieces: list[Any] = []
@@ -69,18 +69,18 @@ class Forecast:
 
     def _begin(self, t: float, y: FloatArray) -> None:
         self._pieces = []
-        noise = step_noise(self._problem.derivative, self._problem.jacobian, t, y, self._t_end)
-        atol = np.maximum(self._tolerance * self._scale, OF_NOISE * noise)
-        off = OF_NOISE * (atol + self._tolerance * self._scale)
-        self._astray = np.maximum(ASTRAY * self._scale, off)
+        noise = step_noise(self.problem.derivative, self.problem.jacobian, t, y, self._t_end)
+        atol = np.maximum(self._tolerance * self.scale, OF_NOISE * noise)
+        off = OF_NOISE * (atol + self._tolerance * self.scale)
+        self._astray = np.maximum(ASTRAY * self.scale, off)
         self._solver = self._method(
-            self._problem.derivative,
+            self.problem.derivative,
             t,
             y.copy(),
             self._t_end,
             rtol=self._tolerance,
             atol=atol,
-            jac=self._problem.jacobian,
+            jac=self.problem.jacobian,
         )
         self._go_on()
 

@@ -20,11 +20,10 @@ import numpy as np
 from eomgen.base.entries import Entries
 from eomgen.base.errors import RunError
 from eomgen.base.files import write_whole
-from eomgen.model.model import Model
+from eomgen.base.options import taking
 from eomgen.program.program import Program
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators.interface import SMALLEST_RTOL
-from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress, throttled
 from eomgen.run.tally import Tally
@@ -32,12 +31,11 @@ from eomgen.store import program_of
 from eomgen.study.accuracy import measure
 from eomgen.study.accuracy.collocation import Row, rows
 from eomgen.study.accuracy.gauss import ExtendedArray
+from eomgen.study.accuracy.options import ReferenceOptions
 from eomgen.study.diagnosis import problem_of
 from eomgen.study.precision.precise import BITS, digits, precise
 
 ROWS = 201
-SECONDS = 300.0
-"""Processor time that a reference in extended precision may take, s; one in doubles is extra."""
 TIGHT, LOOSE = ((6, 8, 10, 12), 1e-22), ((5, 7, 9, 11), 1e-20)
 """Numbers of stages, and the tolerance of a step relative to the scale: of the result that is kept,
 and of the other."""
@@ -104,91 +102,65 @@ def paced(problem: Problem, t_end: float, seconds: float, progress: Progress) ->
     return replace(problem, derivative=derivative)
 
 
-def reference(
-    model: Model | None,
-    module: GeneratedModule,
-    parameters: Any = None,
-    inputs: Any = None,
-    t_end: float = 10.0,
-    *,
-    progress: Progress | None = None,
-    seconds: float = SECONDS,
-    folder: Path | None = None,
-    doubles: bool = True,
-    rest_speed: float | None = None,
-) -> Reference:
+@taking(ReferenceOptions)
+def reference(wanted: ReferenceOptions) -> Reference:
     """The motion of a module from 0 to `t_end`, s, at given parameters and constant inputs.
-
-    model     what the module was made of, or None: then extended precision cannot be used
-    progress  called with the fraction done
-    seconds   processor time allowed in extended precision; 0 to use doubles at once
-    folder    where references are stored, so that none is computed twice; or None. One that is
-              not trusted or cannot be read or written (`eomgen.base.entries`) is ignored
-    doubles   whether doubles may be used if extended precision cannot
-    rest_speed  speed below which rigid contacts do not bounce; None: see `integrate`
 
     Raises `RunError` if the module refuses parameters or inputs, if the motion does not reach
     `t_end`, or if doubles would be needed but are not allowed.
     """
-    problem = problem_of(module, parameters, inputs, model)
-    report = progress or _ignore
-    key = _key(module, problem, parameters, inputs, t_end, seconds, rest_speed)
-    entries = folder and Entries(folder)
+    problem = problem_of(wanted.module, wanted.parameters, wanted.inputs, wanted.model)
+    key = _key(wanted, problem)
+    entries = wanted.folder and Entries(wanted.folder)
     kept = entries and _kept(entries.get(key))
     if kept:
-        report(1.0)
+        wanted.report(1.0)
         return kept
-    began = time.monotonic()
+    made = _made(wanted, problem)
+    if entries:
+        entries.put(key, _content(made))
+    return made
+
+
+def _made(wanted: ReferenceOptions, problem: Problem) -> Reference:
+    """The same, computed now."""
+    began, t_end, doubles = time.monotonic(), wanted.t_end, wanted.doubles
+    states, units = wanted.module.STATES, wanted.module.UNITS
     times = np.linspace(0.0, t_end, ROWS)
-    watched = problem if doubles else paced(problem, t_end, seconds, lambda _: report(0.0))
+    watched = problem
+    if not doubles:
+        watched = paced(problem, t_end, wanted.seconds, lambda _: wanted.report(0.0))
     try:
-        rough = _roughly(watched, t_end, rest_speed)
+        rough = _roughly(watched, t_end, wanted.rest_speed)
     except TooLongError as reason:
         raise RunError(f"no run of {t_end:g} s: {reason} already") from None
-    scale = measure.scales(module.STATES, module.UNITS, rough)
-    found = None
-    if problem.contacts is None and seconds > 0 and model is not None:
+    scale, found = measure.scales(states, units, rough), None
+    if problem.contacts is None and wanted.seconds > 0 and wanted.model is not None:
         try:
-            found = _in_long_numbers(
-                module,
-                program_of(model),
-                problem,
-                parameters,
-                inputs,
-                times,
-                scale,
-                seconds,
-                report,
-            )
+            found = _in_long_numbers(wanted, program_of(wanted.model), problem, times, scale)
         except (TooLongError, ArithmeticError, ValueError) as reason:
             why = str(reason)
     else:
         why = "rigid contacts" if problem.contacts else "as asked"
     if not (found or doubles):
         raise RunError(f"no run of {t_end:g} s in extended precision: {why}")
-    y, other, extent, origin = found or _in_doubles(problem, times, scale, rest_speed, why, report)
-    scale = measure.scales(module.STATES, module.UNITS, extent)
+    y, other, extent, origin = found or _in_doubles(wanted, problem, times, scale, why)
+    scale = measure.scales(states, units, extent)
     apart = np.max((np.abs(other - y) + np.spacing(np.abs(y))) / scale, axis=1)
     spent = time.monotonic() - began
-    made = Reference(times, y, scale, float(apart.max()), float(apart[-1]), origin, spent)
-    if entries:
-        entries.put(key, _content(made))
-    return made
+    return Reference(times, y, scale, float(apart.max()), float(apart[-1]), origin, spent)
 
 
 def _in_long_numbers(
-    module: GeneratedModule,
+    wanted: ReferenceOptions,
     program: Program,
     problem: Problem,
-    parameters: Any,
-    inputs: Any,
     times: FloatArray,
     scale: FloatArray,
-    seconds: float,
-    progress: Progress,
 ) -> _Found:
     """The motion by Gauss collocation. Raises `TooLongError` if it exceeds the time allowed."""
     began = time.process_time()
+    motion = (wanted.module, wanted.parameters, wanted.inputs, problem.initial)
 
     def run(
         stages: tuple[int, ...], tolerance: float, before: float, share: float
@@ -200,14 +172,15 @@ def _in_long_numbers(
             if next(calls) % SELDOM:  # checking the time takes as long as a step
                 return
             done = before + share * t / float(times[-1])
-            progress(done)
-            _check_pace(time.process_time() - began, done, seconds, "extended precision")
+            wanted.report(done)
+            spent = time.process_time() - began
+            _check_pace(spent, done, wanted.seconds, "extended precision")
 
-        exactly = precise(program, module, parameters, inputs, problem.initial, fix_branches=True)
+        exactly = precise(program, *motion, fix_branches=True)
         with digits():
             for row in rows(stages, exactly, problem, scale, times, tolerance, report):
                 found.append(row.y)
-        progress(before + share)
+        wanted.report(before + share)
         return np.array(found), row
 
     # The looser run goes first: if the time does not suffice, less of it is lost.
@@ -245,12 +218,7 @@ def _roughly(problem: Problem, t_end: float, rest_speed: float | None) -> FloatA
 
 
 def _in_doubles(
-    problem: Problem,
-    times: FloatArray,
-    scale: FloatArray,
-    rest_speed: float | None,
-    why: str,
-    progress: Progress,
+    wanted: ReferenceOptions, problem: Problem, times: FloatArray, scale: FloatArray, why: str
 ) -> _Found:
     """The motion by two methods in doubles."""
     found = []
@@ -258,7 +226,7 @@ def _in_doubles(
         tally = Tally()
 
         def report(done: float, i: int = i) -> None:
-            progress((i + done) / 2)
+            wanted.report((i + done) / 2)
 
         run = integrate(
             problem,
@@ -268,7 +236,7 @@ def _in_doubles(
             atol=0.1 * rtol * float(np.min(scale)),
             samples=len(times),
             progress=report,
-            rest_speed=rest_speed,
+            rest_speed=wanted.rest_speed,
             tally=tally,
         )
         if not run.finished:
@@ -283,22 +251,16 @@ def _in_doubles(
     )
 
 
-def _key(
-    module: Any,
-    problem: Problem,
-    parameters: Any,
-    inputs: Any,
-    t_end: float,
-    seconds: float,
-    rest_speed: float | None,
-) -> str:
+def _key(wanted: ReferenceOptions, problem: Problem) -> str:
     """A digest of everything that the reference depends on."""
+    module: Any = wanted.module
+    parameters, inputs = wanted.parameters, wanted.inputs
     source = module.__spec__.loader.get_source(module.__spec__.name) or ""
     given = [module.PARAMETERS if parameters is None else parameters]
     given += [module.INPUTS if inputs is None else inputs]
     values = [list(g.items()) if hasattr(g, "keys") else np.asarray(g).tolist() for g in given]
-    times = (float(t_end), float(seconds))
-    parts = (FORMAT, source, values, problem.initial.tolist(), times, rest_speed)
+    times = (float(wanted.t_end), float(wanted.seconds))
+    parts = (FORMAT, source, values, problem.initial.tolist(), times, wanted.rest_speed)
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
 
@@ -330,7 +292,3 @@ def _kept(content: bytes | None) -> Reference | None:
         error, final_error, seconds = members["errors"].tolist()
         y, scale, origin = members["y"], members["scale"], str(members["origin"])
         return Reference(members["t"], y, scale, error, final_error, origin, seconds)
-
-
-def _ignore(fraction: float) -> None:
-    """Ignore progress."""

@@ -161,23 +161,22 @@ def arithmetic(
     found = [
         Solver(route, "float64", None, None, None, (), words) for route, words in missing.items()
     ]
-    for precision in ("float64", "float32") if single else ("float64",):
-        progress(0.7 if precision == "float64" else 0.8)
-        if precision == "float32":
-            samples_in_it = [replace(s, t=_rounded(s.t), y=_rounded(s.y)) for s in samples]
-            truths = [truth(s.t, s.y) for s in samples_in_it]
-        else:
-            samples_in_it = samples
-        pairs = list(zip(samples_in_it, truths, strict=True))
-        found += [_judged(n, made, precision, pairs) for n, made in solvers.items()]
-        found.append(_judged(BASELINE, terms, precision, pairs))
+    every = {**solvers, BASELINE: terms}
+    progress(0.7)
+    pairs = list(zip(samples, truths, strict=True))
+    found += [_judged(name, made, "float64", pairs) for name, made in every.items()]
+    if single:
+        progress(0.8)
+        rounded = [replace(s, t=_rounded(s.t), y=_rounded(s.y)) for s in samples]
+        pairs = [(s, truth(s.t, s.y)) for s in rounded]
+        found += [_judged(name, made, "float32", pairs) for name, made in every.items()]
     progress(0.9)
     return Arithmetic(
         model.name,
         taken.route,
         solvers[taken.route].module.STATES,
         tuple(samples),
-        tuple(_timed(found, {**solvers, BASELINE: terms}, samples[0].y)),
+        tuple(_timed(found, every, samples[0].y)),
         agreed,
     )
 

@@ -10,7 +10,7 @@ from eomgen.model.model import Model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import EndedRunError
 from eomgen.run.module import GeneratedModule, as_powers
-from eomgen.run.problem import FloatArray
+from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import Simulation
@@ -67,18 +67,8 @@ def drift(
     momentum to the greatest sum over bodies.
     """
     problem = problem_of(module, model=model)
-    most = 1 + MOST_OPERATIONS // max(MOST_OPERATIONS // MOST_CALLS, _operations(module))
-    calls = 0
-
-    def derivative(t: float, y: FloatArray) -> FloatArray:
-        nonlocal calls
-        calls += 1
-        if calls > most:
-            raise EndedRunError(ENOUGH)
-        return problem.derivative(t, y)
-
     run = integrate(
-        replace(problem, derivative=derivative),
+        _short(problem, module),
         METHOD,
         min(wanted.t_end, MOST_TIME),
         rtol=RTOL,
@@ -111,6 +101,21 @@ def drift(
         unit = max(unit, float(np.max(np.abs(np.linalg.norm(run.y[:, indices], axis=1) - 1))))
     stopped = "" if run.outcome.kind in ("finished", "ended") else run.message
     return Drift(float(run.t[-1]), run.counts["steps"], stopped, keeps, lost, books, unit)
+
+
+def _short(problem: Problem, module: GeneratedModule) -> Problem:
+    """The problem, a run of which ends after a number of derivatives."""
+    most = 1 + MOST_OPERATIONS // max(MOST_OPERATIONS // MOST_CALLS, _operations(module))
+    calls = 0
+
+    def derivative(t: float, y: FloatArray) -> FloatArray:
+        nonlocal calls
+        calls += 1
+        if calls > most:
+            raise EndedRunError(ENOUGH)
+        return problem.derivative(t, y)
+
+    return replace(problem, derivative=derivative)
 
 
 def _beside_change(run: Trajectory, total: FloatArray, module: Any, model: Model) -> list[State]:

@@ -127,10 +127,7 @@ def verify(
     full, seen = viewed(full, model), modules[taken]
     bare = replace(model, outputs=())
     truth, count = Truth(bare), states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
-    if model.constraints:
-        asked = closed_states(model, module, count, seed, wanted.t_end)
-    else:
-        asked = hard_states(module, len(model.velocities), count, seed, wanted.t_end)
+    asked = _asked(model, module, count, seed, wanted.t_end)
     run = sampled(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
     asked += _states(run, module, model)
     found: list[Judged | None] = []
@@ -148,26 +145,15 @@ def verify(
         raise RunError("no finite acceleration in 60 digits at any state; change the scene")
     lawful, ran = list[Check](), None
     if not stopped:
-        firsts = [one for one in there if one.state.number == 0]
-        laws = [broken(bare, seen, roundings, one.state) for one in firsts if _has(one, taken)]
+        lawful = _laws(there, taken, truth, seen, roundings)
         progress(0.85)
-        shown = _of_conservation(there, firsts)
+        shown = _of_conservation(there)
         ran = drift(model, wanted, module, given, shown, lambda x: progress(0.88 + 0.12 * x))
-        slopes = {
-            one.state.label: worst_slope(bare, truth, seen, roundings, one.state)
-            for one in there
-            if _has(one, taken)
-        }
-        lawful = [*law_checks(bare, laws), *slope_checks(slopes), *drift_checks(ran)]
+        lawful += drift_checks(ran)
     ulps = {route: forward_ulps(there, route, bare) for route in modules}
     data = in_ulps(np.array([one.data for one in there]), there, bare)
-    checks = (
-        *forward_checks(there, ulps, data, taken, len(bare.velocities), bound),
-        *matrix_checks(there),
-        *loss_checks(there, taken),
-        *part_checks(there),
-        *lawful,
-    )
+    accurate = forward_checks(there, ulps, data, taken, len(bare.velocities), bound)
+    others = (*matrix_checks(there), *loss_checks(there, taken), *part_checks(there))
     notes = [f"route {route} is not available: {why}" for route, why in missing.items()]
     if form != "velocity":
         notes.append(f"form '{form}' is verified as 'velocity'")
@@ -178,7 +164,7 @@ def verify(
         states=seen.STATES,
         units=tuple(module.UNITS[state] for state in seen.STATES),
         judged=tuple(there),
-        checks=checks,
+        checks=(*accurate, *others, *lawful),
         notes=(*notes, *(_notes(ran, bare) if ran else (stopped,))),
         left_out=len(found) - len(there),
         until=run.until,
@@ -188,11 +174,35 @@ def verify(
     )
 
 
-def _of_conservation(there: Sequence[Judged], firsts: Sequence[Judged]) -> list[State]:
+def _asked(
+    model: Model, module: GeneratedModule, count: int, seed: int, t_end: float
+) -> list[State]:
+    """The seeded states, `count` of each kind."""
+    if model.constraints:
+        return closed_states(model, module, count, seed, t_end)
+    return hard_states(module, len(model.velocities), count, seed, t_end)
+
+
+def _laws(
+    there: Sequence[Judged],
+    taken: str,
+    truth: Truth,
+    module: GeneratedModule,
+    roundings: Roundings,
+) -> list[Check]:
+    """The checks of laws of mechanics, at the first state of each kind, and of Jacobians."""
+    model, known = truth.model, [one.state for one in there if _has(one, taken)]
+    laws = [broken(model, module, roundings, each) for each in known if each.number == 0]
+    slopes = {each.label: worst_slope(model, truth, module, roundings, each) for each in known}
+    return [*law_checks(model, laws), *slope_checks(slopes)]
+
+
+def _of_conservation(there: Sequence[Judged]) -> list[State]:
     """The states at which what motion conserves is determined. Effects that act only for a time, as
     contacts do, are found by the run alone.
     """
-    found = [one.state for one in firsts if one.state.kind in ("random", "still")]
+    kinds = ("random", "still")
+    found = [one.state for one in there if one.state.number == 0 and one.state.kind in kinds]
     return found + [one.state for one in there if one.state.kind == OWN]
 
 
