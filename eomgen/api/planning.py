@@ -14,8 +14,8 @@ from eomgen.model.elaborate import available_in, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.run.inputs import InputsOfTime
 from eomgen.scene.schema import SHOWN, Closing, Scene
-from eomgen.study.recording import GROUPS, SAVED
 from eomgen.tables.integrators import INTEGRATORS
+from eomgen.tables.outputs import GROUPS, SAVED
 
 if TYPE_CHECKING:
     from eomgen.study.accuracy.trial import Setting

@@ -41,16 +41,12 @@ from eomgen.sweep.layout import Memory, bytes_each, layout_of, worded
 from eomgen.sweep.members import Task
 from eomgen.sweep.storage import Storage, opened
 from eomgen.sweep.together import METHODS, build
-from eomgen.tables.outputs import OUTPUTS
+from eomgen.tables.outputs import DYNAMICS, OUTPUTS
 
 __all__ = ["Design", "Ensemble", "Law", "ensemble", "grid", "plan_sweep", "run_sweep", "sampled"]
 
 MANY = 20
 """Least number of members for which C steps are compiled that are not in the store."""
-DYNAMICS = ("forward_dynamics", "inverse_dynamics")
-"""Outputs that take more than a time and a state."""
-UNITS = {name: spec.units[0] for name, spec in OUTPUTS.items() if not spec.shape}
-"""Units of the outputs with one number."""
 MOST_STEPS = 10_000_000
 
 
@@ -184,7 +180,10 @@ def run_sweep(plan: SweepPlan, *, reporter: Reporter = SILENT) -> Ensemble:
         np.array(task.times),
         found.get("rows"),
         {name: found[name] for name in plan.outputs},
-        {**functions.UNITS, **UNITS},
+        {
+            **functions.UNITS,
+            **{n: OUTPUTS[n].unit("", 0) for n in plan.outputs if not OUTPUTS[n].shape},
+        },
     )
 
 

@@ -24,7 +24,7 @@ from eomgen.scalars.duals import Dual, Duals
 from eomgen.scalars.floats import ArrayScalars
 from eomgen.store import program_of
 from eomgen.study.quantities import components
-from eomgen.study.recording import SAVED
+from eomgen.tables.outputs import SAVED
 
 NEEDED = "control: python-control is not installed; run: pip install 'eomgen[control]'"
 

@@ -8,7 +8,7 @@ joint_forces.hinge.fx  one component; x is short for the first that ends in x
 works, inputs          what the run keeps of them
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,16 +19,10 @@ from eomgen.model.model import Model
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.study.observed import Observed
-from eomgen.study.recording import FOLLOWING, GROUPS, SAVED, held_rows, labels_of
+from eomgen.study.recording import FOLLOWING, all_of, held_rows, labels_of, unknown_where
 from eomgen.study.whole import following
-from eomgen.tables.outputs import OUTPUTS
+from eomgen.tables.outputs import GROUPS, OUTPUTS, SAVED, WORDS
 
-ENERGIES: Mapping[str, str] = {
-    "kinetic": "kinetic_energy",
-    "potential": "potential_energy",
-    "total": "",
-}
-WORDS = ("t", "energy", "works", "inputs", "points", "poses")
 MOST = 200
 """Greatest number of quantities in one figure."""
 
@@ -64,10 +58,9 @@ def outputs_of(names: Sequence[str], trajectory: Trajectory, argument: str) -> t
         head = name.partition(".")[0]
         if head in (*trajectory.states, *following_in(trajectory)):
             continue
-        if head in ("t", "energy", "works", "inputs"):
+        if head in WORDS and WORDS[head].unit + WORDS[head].title:  # the run or every module has it
             continue
-        known = (*GROUPS, *SAVED)
-        if head not in known:
+        if head not in (*GROUPS, *SAVED):
             near = (*trajectory.states, *WORDS, *SAVED)
             hint = nearest(head, near) or f"; states: {', '.join(trajectory.states[:12])}"
             raise RunError(f"{argument}: no state or output '{head}'{hint}")
@@ -115,7 +108,7 @@ def _found(
         size = float(np.abs(run.trajectory.saved[FOLLOWING].values[:, alike]).max())
         yield Quantity(name, name, "", units[name], rows[own.index(name)], size)
     elif name == "t":
-        yield Quantity(name, name, "", "s", t, float(np.abs(t).max()))
+        yield Quantity(name, name, "", WORDS[name].unit, t, float(np.abs(t).max()))
     elif head in states or head == "t":
         raise RunError(f"{argument}: {name}: a state has no components; take {head}")
     elif head == "energy":
@@ -130,11 +123,12 @@ def _found(
 def _energies(
     name: str, parts: list[str], run: Observed, t: FloatArray, y: FloatArray, argument: str
 ) -> Iterator[Quantity]:
-    values = {label: run.output(of, t, y) for label, of in ENERGIES.items() if of}
-    size = float(max(np.abs(each).max(initial=0.0) for each in values.values()))
-    values["total"] = values["kinetic"] + values["potential"]
-    for (label,) in _chosen(name, parts, [list(ENERGIES)], argument):
-        yield Quantity(f"energy.{label}", label, "energy", "J", values[label], size)
+    word = WORDS["energy"]
+    kinetic, potential = (run.output(output, t, y) for output in word.outputs)
+    size = float(max(np.abs(each).max(initial=0.0) for each in (kinetic, potential)))
+    values = dict(zip(word.parts, (kinetic, potential, kinetic + potential), strict=True))
+    for (label,) in _chosen(name, parts, [word.parts], argument):
+        yield Quantity(f"energy.{label}", label, word.title, word.unit, values[label], size)
 
 
 def _kept(
@@ -155,9 +149,10 @@ def _kept(
             raise RunError(f"{argument}: inputs: {trajectory.name} has none")
     for (label,) in _chosen(head, parts, [list(names)], argument):
         column = np.interp(t, trajectory.t, values[:, names.index(label)])
-        unit = "J" if head == "works" else run.functions.UNITS[label].partition(" | ")[0]
-        title = "work" if head == "works" else "input"
-        yield Quantity(f"{head}.{label}", label, title, unit, column, float(np.abs(values).max()))
+        unit = WORDS[head].unit or run.functions.UNITS[label].partition(" | ")[0]
+        yield Quantity(
+            f"{head}.{label}", label, WORDS[head].title, unit, column, float(np.abs(values).max())
+        )
 
 
 def _of_output(
@@ -169,11 +164,10 @@ def _of_output(
     spec = OUTPUTS[output]
     if spec.contacts and run.trajectory.events:
         rows = np.searchsorted(run.trajectory.t, t, side="right") - 1
-        held = held_rows(run.trajectory)[rows].reshape(-1, *[1] * (array.ndim - 1))
-        array = np.where(held, np.nan, array)
-    labels = _labels(output, array.shape[1:], run.model, run.functions)
+        array = unknown_where(held_rows(run.trajectory)[rows], array)
+    labels = labels_of(output, array.shape[1:], run.model, run.functions)
     columns = array.reshape(len(t), -1)
-    flat = _all(labels)
+    flat = all_of(labels)
     units = [spec.unit(entry[-1] if entry else "", run.model.dimensions) for entry in flat]
     largest = np.nan_to_num(np.abs(columns)).max(axis=0, initial=0.0)
     sizes = {unit: float(max(largest[[u == unit for u in units]])) for unit in dict.fromkeys(units)}
@@ -198,28 +192,10 @@ def components(
     each in the flat array, and its whole name. Raises `RunError` for an unknown component.
     """
     output, *parts = name.split(".")
-    labels = _labels(output, shape, model, functions)
-    flat = _all(labels)
+    labels = labels_of(output, shape, model, functions)
+    flat = all_of(labels)
     chosen = _chosen(output, parts, labels, argument)
     return [(flat.index(entry), ".".join((output, *entry))) for entry in chosen]
-
-
-def _labels(output: str, shape: tuple[int, ...], model: Model, functions: Any) -> list[list[str]]:
-    """The names along each axis of an output."""
-    axes = OUTPUTS[output].of(model.dimensions)[0]
-    last = len(shape) - 1
-    return [
-        list(labels_of(output, axis, count, model, functions, last=i == last))
-        for i, (axis, count) in enumerate(zip(axes, shape, strict=True))
-    ]
-
-
-def _all(labels: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
-    """All entries of an output by the names along its axes, row by row."""
-    found: list[tuple[str, ...]] = [()]
-    for names in labels:
-        found = [(*entry, name) for entry in found for name in names]
-    return found
 
 
 def _chosen(
@@ -237,7 +213,7 @@ def _chosen(
             raise RunError(f"{argument}: {name} has no component '{part}'{hint}")
         kept[axis] = [match]
         axis += 1
-    return _all(kept)
+    return all_of(kept)
 
 
 def _match(part: str, names: Sequence[str]) -> str | None:

@@ -1,26 +1,17 @@
 """What results hold beside states: energies, forces, points and other outputs along a run."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from eomgen.model.model import Model
+from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Saved, Trajectory
 from eomgen.study.whole import following
-from eomgen.tables.outputs import DERIVATIVES, OUTPUTS, Size
+from eomgen.tables.outputs import GROUPS, OUTPUTS, Size
 
-GROUPS: Mapping[str, tuple[str, ...]] = {
-    **{
-        word: tuple(name for name, spec in OUTPUTS.items() if spec.group == word)
-        for word in ("energy", "points", "poses")
-    },
-    "works": (),
-    "inputs": (),
-}
-"""Words for what is saved, with the outputs that they need; `works` are integrated with the run."""
-SAVED = tuple(name for name in OUTPUTS if not (name.endswith("_dynamics") or name in DERIVATIVES))
-"""The outputs that a state determines."""
 FOLLOWING = "following"
 """The name under which coordinates and velocities that follow from the states are kept."""
 
@@ -51,10 +42,9 @@ def recorded(
                 getattr(module, output)(trajectory.t, trajectory.y.T, *values), -1, 0
             )
             if OUTPUTS[output].contacts and trajectory.events:
-                array = np.where(
-                    held_rows(trajectory).reshape(-1, *[1] * (array.ndim - 1)), np.nan, array
-                )
-            found[output] = Saved(array, tuple(_columns(output, model, module, array.shape[1:])))
+                array = unknown_where(held_rows(trajectory), array)
+            entries = all_of(labels_of(output, array.shape[1:], model, module))
+            found[output] = Saved(array, tuple("_".join((output, *each)) for each in entries))
         if name == "energy":
             total = found["kinetic_energy"].values + found["potential_energy"].values
             found[name] = Saved(total, ("energy",))
@@ -92,17 +82,29 @@ def held_rows(trajectory: Trajectory) -> np.ndarray[Any, np.dtype[np.bool_]]:
     return held
 
 
-def _columns(output: str, model: Model, module: Any, shape: tuple[int, ...]) -> list[str]:
-    """A name for each entry of an output, row by row."""
-    axes, _ = OUTPUTS[output].of(model.dimensions)
-    names = [output]
-    for i, (axis, count) in enumerate(zip(axes, shape, strict=True)):
-        labels = labels_of(output, axis, count, model, module, last=i == len(shape) - 1)
-        names = [f"{name}_{label}" for name in names for label in labels]
-    return names
+def unknown_where(held: np.ndarray[Any, np.dtype[np.bool_]], array: FloatArray) -> FloatArray:
+    """An array (n, …) with nan in the rows in which a contact is held."""
+    return np.where(held.reshape(-1, *[1] * (array.ndim - 1)), np.nan, array)
 
 
 def labels_of(
+    output: str, shape: tuple[int, ...], model: Model, module: Any
+) -> list[Sequence[str]]:
+    """The names along each axis of an output of this shape."""
+    axes, _ = OUTPUTS[output].of(model.dimensions)
+    last = len(shape) - 1
+    return [
+        _names(output, axis, count, model, module, last=i == last)
+        for i, (axis, count) in enumerate(zip(axes, shape, strict=True))
+    ]
+
+
+def all_of(labels: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
+    """All entries of an output by the names along its axes, row by row."""
+    return list(product(*labels))
+
+
+def _names(
     output: str, axis: Size, count: int, model: Model, module: Any, *, last: bool
 ) -> Sequence[str]:
     """The names along an axis of an output, `count` of them; `last` if it is its last axis."""

@@ -208,12 +208,49 @@ OUTPUTS: Mapping[str, OutputSpec] = {
 }
 """All outputs, in the order in which a module has them."""
 
+
+@dataclass(frozen=True)
+class Word:
+    """What is named along a run beside states and outputs: the time, what the run keeps, or several
+    outputs at once.
+
+    unit, title  as those of an output
+    outputs      those that it needs
+    parts        the names of its own parts, if outputs do not give them
+    """
+
+    unit: str = ""
+    title: str = ""
+    outputs: tuple[str, ...] = ()
+    parts: tuple[str, ...] = ()
+
+
+def _of_group(word: str) -> tuple[str, ...]:
+    return tuple(name for name, spec in OUTPUTS.items() if spec.group == word)
+
+
+WORDS: Mapping[str, Word] = {
+    "t": Word("s"),
+    "energy": Word("J", "energy", _of_group("energy"), ("kinetic", "potential", "total")),
+    "points": Word(outputs=_of_group("points")),
+    "poses": Word(outputs=_of_group("poses")),
+    "works": Word("J", "work"),
+    "inputs": Word("", "input"),
+}
+"""All words; `works` are integrated with the run, and inputs have units of their own."""
+GROUPS = {name: word.outputs for name, word in WORDS.items() if name != "t"}
+"""The words for what is saved, with the outputs that they need."""
+
 JACOBIAN = OutputSpec(
     ("ny", "ny"), "Exact Jacobian of `derivative` with respect to the state.", by="state"
 )
 """The Jacobian, which every module has."""
 DERIVATIVES = ("jacobian", *(name for name, spec in OUTPUTS.items() if spec.by))
 """Names of the matrices of derivatives."""
+DYNAMICS = ("forward_dynamics", "inverse_dynamics")
+"""Outputs that take more than a time, a state, parameters and inputs."""
+SAVED = tuple(name for name in OUTPUTS if name not in (*DYNAMICS, *DERIVATIVES))
+"""The outputs that a state determines, and that are no derivatives."""
 
 
 def shape_of(name: str, dimensions: int, sizes: Mapping[str, int]) -> tuple[int, ...]:

@@ -15,7 +15,7 @@ from whipple import TABLE
 import eomgen
 from eomgen.api.given import check
 from eomgen.api.linearising import Point, linearisable, linearised_at
-from eomgen.study.recording import SAVED
+from eomgen.tables.outputs import SAVED
 
 SLED = """
 name = "sled"
