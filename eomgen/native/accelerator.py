@@ -24,7 +24,7 @@ from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.series import recurrences_of
 from eomgen.model.model import Model
-from eomgen.native import contact_runs, equal_steps, functions, implicit, rattle, runs, taylor
+from eomgen.native import contact_runs, equal_steps, functions, implicit, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
 from eomgen.program.program import Program
 from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps, Strikes
@@ -147,7 +147,6 @@ class Accelerator:
         origin, module = module and self._module, module or self._module
         made: dict[Any, Any] = {}
         projects = PROJECTS if problem.projection else ()
-        symmetric = implicit.SYMMETRIC if problem.projection else ()
         problem = self._compilable(module, origin).problem(problem)
 
         def once(needed: tuple[str, ...], make: Callable[[Libraries], Any]) -> Any:
@@ -168,35 +167,20 @@ class Accelerator:
         def series() -> taylor.CompiledTaylor | None:
             return self._taylor(module)
 
-        def implicit_steps(
-            name: str, more: tuple[str, ...] = ()
-        ) -> implicit.CompiledImplicit | None:
-            library = implicit.library_of(name, bool(more))
+        def implicit_steps(name: str) -> Any:
+            needed = implicit.needed(name, problem)
 
-            def make(of: Libraries) -> implicit.CompiledImplicit:
-                given = problem, module, of[library], of, *self._values, origin
-                return implicit.CompiledImplicit(*given)
+            def make(of: Libraries) -> Any:
+                given = problem, module, of[needed[-1]], of, self._values, origin
+                return implicit.steps(name, implicit.Given(*given))
 
-            found: implicit.CompiledImplicit | None = once(
-                (*implicit.NEEDED, *projects, *more, library), make
-            )
-            return found
-
-        def rattle_steps(name: str) -> EqualSteps | None:
-            library = implicit.library_of(name, True)
-
-            def make(of: Libraries) -> EqualSteps | None:
-                return rattle.steps(name, problem, module, of[library], of, *self._values)
-
-            found: EqualSteps | None = once((*rattle.NEEDED, library), make)
-            return found
+            return once(needed, make)
 
         def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
             if name == "taylor":  # its steps are not checked
                 return of.steps if not needed and (of := series()) else None
             if name == "Rodas5P":
-                other = None if set(needed) - set(projects) else implicit_steps(name)
-                found = other.named(name) if other else None
+                found = None if set(needed) - set(projects) else implicit_steps(name)
             else:
                 found = held.named(name, needed) if (held := explicit_steps(needed)) else None
             self.used = self.used or found is not None
@@ -205,10 +189,9 @@ class Accelerator:
         def equal(name: str) -> EqualSteps | None:
             if problem.contacts and (problem.projection or name in implicit.GAUSS):
                 return None
-            if problem.projection and name in equal_steps.LEAPFROGS:
-                found = rattle_steps(name)
-            elif name in implicit.GAUSS:
-                found = other.equal(name) if (other := implicit_steps(name, symmetric)) else None
+            found: EqualSteps | None
+            if name in implicit.GAUSS or (problem.projection and name in equal_steps.LEAPFROGS):
+                found = implicit_steps(name)
             else:
                 needed = (*projects, *(contact_runs.FUNCTIONS if problem.contacts else ()))
                 found = held.equal(name, problem) if (held := explicit_steps(needed)) else None

@@ -8,7 +8,7 @@ import ctypes
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,8 @@ from eomgen.native.functions import constants_of
 from eomgen.native.memory import room
 from eomgen.native.module import Kernels
 from eomgen.native.strides import stride
-from eomgen.run.compiled import Array, EqualSteps, Steps, Stretch, Stride
+from eomgen.run.compiled import Array, EqualSteps, Stretch, Stride
+from eomgen.run.integrators import rattle
 from eomgen.run.integrators.implicit_stages import projected_of, stages_of
 from eomgen.run.integrators.rodas_5p import rodas
 from eomgen.run.problem import Problem
@@ -43,6 +44,10 @@ NEEDED = ("derivative", "jacobian")
 EQUAL_STEPS: Root = ("equal_steps", {})
 SYMMETRIC = ("constraint_jacobian", "constraint_rates")
 """Further functions for symmetric projection."""
+RATTLE = ("derivative", "mass_matrix", "kinetic_slopes", "constraint_jacobian")
+"""The functions that a step of RATTLE calls, beside those that keep constraints."""
+DERIVATIVES = 2
+"""Derivatives in such a step."""
 LINKED = {
     "rates": "derivative",
     "inertia": "mass_matrix",
@@ -105,6 +110,7 @@ class System(ctypes.Structure):
         ("quaternions", _POINTER),
         *((name, _WHOLE) for name in ("count", "states", "positions", "timed")),
     )
+    kept: Any
 
 
 class Solver(ctypes.Structure):
@@ -144,76 +150,86 @@ def solver(
     return made
 
 
-class CompiledImplicit:
-    """The compiled steps of a problem of a module at given parameters and inputs.
+class Given(NamedTuple):
+    """A problem of a module at given parameters and inputs, and compiled code for it.
 
-    methods    the library of the method
-    libraries  those of the functions `NEEDED` and of those that keep constraints
+    library    that of the method
+    functions  those of the functions that it needs
     origin     the module that had the constants of its parameters, if this one has perturbed ones
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        module: Any,
-        methods: ctypes.CDLL,
-        libraries: Mapping[str, ctypes.CDLL],
-        p: Any,
-        u: Any,
-        origin: Any,
-    ) -> None:
-        kernels = Kernels(module, libraries["derivative"])
-        constants = constants_of(kernels, "derivative", p, origin)
-        others = constants_of(Kernels(module, libraries["jacobian"]), "jacobian", p, origin)
-        inputs = kernels.given(u)
-        self._problem = problem
-        self._methods, self._system = methods, None
-        beside = {name: libraries[name] for name in libraries.keys() & {*PROJECTS, *SYMMETRIC}}
-        self._functions, self._inputs = checked.functions(module, beside, p), inputs
-        if constants is None or others is None or inputs is None:
-            return
-        if len(self._functions) < len(beside):
-            return
-        self._quaternions = sum(problem.quaternions, ())
-        quaternions = np.array(problem.quaternions, np.int64)
-        self._kept = constants, others, inputs, quaternions, libraries
-        self._system = System(
-            *(ctypes.cast(libraries[name][f"{module.NAME}_{name}"], _POINTER) for name in NEEDED),
-            ctypes.cast(constants, _POINTER),
-            ctypes.cast(others, _POINTER),
-            inputs.ctypes.data,
-            quaternions.ctypes.data,
-            len(problem.quaternions),
-            len(problem.states),
-            problem.leading_positions,
-            problem.timed,
-        )
+    problem: Problem
+    module: Any
+    library: ctypes.CDLL
+    functions: Mapping[str, ctypes.CDLL]
+    values: tuple[Any, Any]
+    origin: Any
 
-    def named(self, name: str) -> Steps | None:
-        """The steps of a method; None if there are none for it, these parameters or inputs."""
-        if self._system is None or name != "Rodas5P":
-            return None
-        call = self._methods.steps
-        call.restype = ctypes.c_int64
-        call.argtypes = [*[_POINTER] * 4, _REAL, _REAL, _POINTER, _POINTER]
-        return partial(_rodas_5p, call, self._system, self._functions, self._inputs)
 
-    def equal(self, name: str) -> EqualSteps | None:
-        """The same for methods with equal steps."""
-        if self._system is None or name not in GAUSS:
-            return None
-        many, problem, system = len(GAUSS[name].b), self._problem, self._system
-        n, positions = system.states, system.positions
-        stages, newton = stages_of(many, n, positions), plain_factors(many * n)
-        room, factors, sizes = None, list[Factors](), (0, 0, 0)
-        if problem.projection:
-            room = projected_of(many, problem)
-            sizes = room.n, room.nv, room.rows
-            factors = [plain_factors(k) for k in (n, 2 * room.rows)]
-        given = solver(system, self._functions, sizes, stages, newton, room, factors)
-        call = self._methods.steps
-        held = given, self._inputs, self._functions, self._quaternions
-        return EqualSteps(partial(equal_steps.made, call, *held), many, iterates=True)
+def needed(name: str, problem: Problem) -> tuple[str, ...]:
+    """The names of the libraries of functions that a method needs, and last that of its own."""
+    projects = PROJECTS if problem.projection else ()
+    if name in equal_steps.LEAPFROGS:
+        return (*RATTLE, *projects, library_of(name, True))
+    held = bool(projects) and name in GAUSS
+    return (*NEEDED, *projects, *(SYMMETRIC if held else ()), library_of(name, held))
+
+
+def steps(name: str, given: Given) -> Any:
+    """The steps of a method, or those of leapfrog with constraints: `Steps` of Rodas5P, and
+    `EqualSteps`; None if there are none for these parameters or inputs.
+    """
+    problem, module, libraries, (p, u) = given.problem, given.module, given.functions, given.values
+    leaps = equal_steps.LEAPFROGS.get(name, 0)
+    called = (*PROJECTS, *(RATTLE if leaps else SYMMETRIC))
+    names = [name for name in libraries if name in called]
+    functions = checked.functions(module, {name: libraries[name] for name in names}, p)
+    kernels, call = Kernels(module, libraries["derivative"]), given.library.steps
+    inputs = kernels.given(u)
+    if len(functions) < len(names) or inputs is None:
+        return None
+    if leaps:
+        n, rows = rattle.sizes_of(problem)
+        system = System(inputs=inputs.ctypes.data, states=len(problem.states), positions=n)
+        room, factors = rattle.linked(n, rows), [plain_factors(k) for k in (n, n, rows)]
+        with_room = solver(system, functions, (n, n, rows), room=room, factors=factors)
+        with_room.libraries = given, inputs
+        held = with_room, inputs, functions, ()
+        return EqualSteps(partial(equal_steps.made, call, *held), DERIVATIVES * leaps)
+    constants = constants_of(kernels, "derivative", p, given.origin)
+    others = constants_of(Kernels(module, libraries["jacobian"]), "jacobian", p, given.origin)
+    if constants is None or others is None:
+        return None
+    quaternions = np.array(problem.quaternions, np.int64)
+    system = System(
+        *(ctypes.cast(libraries[name][f"{module.NAME}_{name}"], _POINTER) for name in NEEDED),
+        *(ctypes.cast(each, _POINTER) for each in (constants, others)),
+        *(inputs.ctypes.data, quaternions.ctypes.data),
+        *(len(problem.quaternions), len(problem.states)),
+        *(problem.leading_positions, problem.timed),
+    )
+    system.kept = constants, others, inputs, quaternions, given
+    if name in GAUSS:
+        return _gauss(name, problem, call, system, (inputs, functions))
+    call.restype = ctypes.c_int64
+    call.argtypes = [*[_POINTER] * 4, _REAL, _REAL, _POINTER, _POINTER]
+    return partial(_rodas_5p, call, system, functions, inputs)
+
+
+def _gauss(
+    name: str, problem: Problem, call: Any, system: System, given: tuple[Array, Any]
+) -> EqualSteps:
+    """Steps of a Gauss method, with inputs and functions that keep constraints."""
+    many, n = len(GAUSS[name].b), system.states
+    stages, newton = stages_of(many, n, system.positions), plain_factors(many * n)
+    room, factors, sizes = None, list[Factors](), (0, 0, 0)
+    if problem.projection:
+        room = projected_of(many, problem)
+        sizes = room.n, room.nv, room.rows
+        factors = [plain_factors(k) for k in (n, 2 * room.rows)]
+    held = solver(system, given[1], sizes, stages, newton, room, factors)
+    of = held, *given, sum(problem.quaternions, ())
+    return EqualSteps(partial(equal_steps.made, call, *of), many, iterates=True)
 
 
 def _rodas_5p(
