@@ -26,12 +26,12 @@ def tangent(outputs: Sequence[Node], directions: Mapping[int, Node]) -> list[Nod
         return []
     tape = outputs[0].tape
     zero = tape.constant(0.0)
-    slopes = dict(directions)
+    slopes = {i: node.index for i, node in directions.items()}
     for i in _between(tape, outputs, slopes):
         step = tape.steps[i]
-        if any(o in slopes for o in step.operands):
+        if any(o in slopes for o in step[1]):
             slopes[i] = _slope(tape, i, step, slopes)
-    return [slopes.get(node.index, zero) for node in outputs]
+    return [Node(tape, slopes.get(node.index, zero.index)) for node in outputs]
 
 
 def substituted(outputs: Sequence[Node], replacements: Mapping[int, Node]) -> list[Node]:
@@ -63,24 +63,32 @@ def _between(tape: Tape, outputs: Sequence[Node], inputs: Collection[int]) -> li
     return sorted(needed)
 
 
-def _slope(tape: Tape, i: int, step: Step, slopes: Mapping[int, Node]) -> Node:
-    zero, two = tape.constant(0.0), tape.constant(2.0)
-    value = Node(tape, i)
-    nodes = [Node(tape, o) for o in step.operands]
-    d = [slopes.get(o, zero) for o in step.operands]
-    match step.operation:
-        case "add":
-            return d[0] + d[1]
-        case "sub":
-            return d[0] - d[1]
-        case "mul":
-            if step.operands[0] == step.operands[1]:
-                return two * (nodes[0] * d[0])
-            return d[0] * nodes[1] + nodes[0] * d[1]
-        case "div":
-            return (d[0] - value * d[1]) / nodes[1]
-        case "neg":
-            return -d[0]
-        case function:
-            changed: Node = slope(function, value, nodes, d, TapeScalars(tape))
-            return changed
+def _slope(tape: Tape, i: int, step: Step, slopes: Mapping[int, int]) -> int:
+    """The slope of step i; a slope of 0 that is not there takes no steps."""
+    operation, operands, _, _ = step
+    combined, two = tape.combined, tape.number(2.0)
+    if operation == "mul":
+        a, b = operands
+        if a == b:
+            return combined("mul", two, combined("mul", a, slopes[a]))
+        left = combined("mul", slopes[a], b) if a in slopes else None
+        if b not in slopes:
+            assert left is not None
+            return left
+        right = combined("mul", a, slopes[b])
+        return right if left is None else combined("add", left, right)
+    if operation == "add" or operation == "sub":
+        a, b = operands
+        if b not in slopes:
+            return slopes[a]
+        if a in slopes:
+            return combined(operation, slopes[a], slopes[b])
+        return slopes[b] if operation == "add" else tape.applied("neg", slopes[b])
+    d = [slopes[o] if o in slopes else tape.number(0.0) for o in operands]
+    if operation == "div":
+        return combined("div", combined("sub", d[0], combined("mul", i, d[1])), operands[1])
+    if operation == "neg":
+        return tape.applied("neg", d[0])
+    nodes, slope_nodes = ([Node(tape, k) for k in ks] for ks in (operands, d))
+    made: Node = slope(operation, Node(tape, i), nodes, slope_nodes, TapeScalars(tape))
+    return made.index
