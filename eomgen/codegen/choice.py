@@ -115,9 +115,10 @@ def without_dead_points(model: Model) -> Model:
     model = replace(model, closing="projected")
     if model.route not in ("auto", *BY_INDEPENDENT):
         return model
-    candidates = choose(replace(model, route="auto"), closed=False).candidates
+    # Without pivots the routes are tried that take no velocities as independent.
+    candidates = choose(replace(model, route="auto", pivots=()), closed=False).candidates
     others = [c for c in _accepted(candidates) if c.route not in BY_INDEPENDENT]
-    last = next(name for name, spec in ROUTES.items() if spec.last)
+    last = next(name for name in routes_for(loops=True) if ROUTES[name].last)
     best = min(others, key=lambda c: c.operations or 0).route if others else last
     return replace(model, route=best)
 
@@ -233,11 +234,15 @@ def _attempts(model: Model, closed: bool) -> tuple[list[Candidate], dict[str, _A
             attempts[name] = _symbolic(derive(model, name))
             candidates.append(_candidate(name, _operations(attempts[name].alone)))
     least, fewest = least_factoring(model), math.inf
-    # Routes that factor M come last, because a lower bound of their operations is known.
+    # Routes that factor M come last, because a lower bound of their operations is known; those for
+    # loops first, because where `independent` holds the range-space method gains nothing.
     there = {name: ROUTES[name] for name in routes_for(bool(model.constraints))}
     others = [name for name, spec in there.items() if not (spec.symbolic or spec.last)]
-    for name in sorted(others, key=_factors):
-        if words := why_not_loops(model, name):
+    for name in sorted(others, key=lambda name: (_factors(name), not ROUTES[name].loops)):
+        words = why_not_loops(model, name)
+        if model.constraints and "independent" in attempts and not ROUTES[name].loops:
+            words = "not tried: independent takes fewer operations on almost all loops"
+        if words:
             candidates.append(Candidate(name, None, words))
             continue
         if _factors(name) and least > fewest:

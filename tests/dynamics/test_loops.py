@@ -18,6 +18,7 @@ from spatial_loops import Closed, random_loops
 from spatial_trees import PLANE, SPACE
 
 from eomgen.base.errors import SceneError
+from eomgen.codegen.choice import choose
 from eomgen.codegen.digits import Route, digits_lost
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.loops.constraints import rates, residuals
@@ -28,7 +29,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
 from eomgen.scalars.floats import ArrayScalars, FloatScalars
-from eomgen.scene.reader import parse_scene
+from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.tables.outputs import OUTPUTS
 
 CASES = [(PLANE, 5, 0), (PLANE, 7, 1), (PLANE, 8, 3), (SPACE, 5, 1), (SPACE, 6, 2), (SPACE, 6, 3)]
@@ -380,3 +381,10 @@ def test_recorded_constraints_are_those_of_floats(dimensions: int) -> None:
         found, matrix = equations.both(q)
         assert np.array_equal(found, equations.residuals(q))
         assert np.array_equal(matrix, equations.jacobian(q))
+
+
+@pytest.mark.parametrize("name", ["four_bar", "car_suspension"])
+def test_the_range_space_is_tried_where_no_velocities_are_independent(name: str) -> None:
+    model = assembled(elaborate(read_scene(name)))
+    tried = {c.route: c.operations is not None for c in choose(model).candidates}
+    assert tried["independent"] != tried["aba"] == tried["ldl"]
