@@ -18,9 +18,10 @@ from functools import cached_property
 
 from eomgen.dynamics.loops import constraints
 from eomgen.dynamics.loops.embedding import Embedded
+from eomgen.dynamics.loops.freedoms import Formulation, Forward, Response
 from eomgen.dynamics.loops.least_constraint import LeastConstraint
 from eomgen.dynamics.loops.null_space import NullSpace
-from eomgen.dynamics.loops.range_space import Forward, RangeSpace, Response
+from eomgen.dynamics.loops.range_space import RangeSpace
 from eomgen.dynamics.orthogonal.elimination import Elimination
 from eomgen.dynamics.orthogonal.mixed import well_conditioned
 from eomgen.dynamics.tree import forces as fc
@@ -197,13 +198,13 @@ class Dynamics(AppliedLoads):
         found: Forward = getattr(self, f"{ROUTES[route].recursion}_forward")
         return found
 
-    def constrained(self, route: str) -> RangeSpace | NullSpace:
+    def constrained(self, route: str) -> Formulation:
         """The constraints, solved with the recursion of a route."""
         if route not in self._constrained:
             self._constrained[route] = self._solver(ROUTES[route].recursion)
         return self._constrained[route]
 
-    def _solver(self, recursion: str) -> RangeSpace | NullSpace:
+    def _solver(self, recursion: str) -> Formulation:
         if recursion == "independent":
             return self.by_independent_velocities
         if recursion == "embedded":
@@ -248,7 +249,7 @@ class Dynamics(AppliedLoads):
         return [needed - applied for needed, applied in pairs]
 
     @cached_property
-    def _constrained(self) -> dict[str, RangeSpace | NullSpace]:
+    def _constrained(self) -> dict[str, Formulation]:
         return {}
 
     def response(self, route: str) -> Response:

@@ -1,8 +1,7 @@
 """Constraints at a state: their rows, what they take for the accelerations, and factored matrices.
 
 J is the matrix of the constraints' rates by the velocities: ġ = J v + drift and g̈ = J v̇ + β, where
-β is what g̈ is at v̇ = 0. Two formulations solve M v̇ + h = F + Jᵀ λ with g̈ = 0: `range_space` and
-`null_space`.
+β is what g̈ is at v̇ = 0. Each `freedoms.Formulation` solves M v̇ + h = F + Jᵀ λ with g̈ = 0.
 """
 
 from collections.abc import Sequence

@@ -12,13 +12,10 @@ from eomgen.dynamics.loops.clusters import Cluster, accelerations_at_rest, clust
 from eomgen.dynamics.loops.constraints import (
     Symmetric,
     inner,
-    position_rates,
-    rates,
     relative,
-    residuals,
 )
 from eomgen.dynamics.loops.embedded import Articulated, Response, articulate, respond
-from eomgen.dynamics.loops.null_space import NullSpace
+from eomgen.dynamics.loops.freedoms import Freedoms
 from eomgen.dynamics.tree.forces import Wrench, no_wrench
 from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.scalars.protocol import Scalar
@@ -26,7 +23,7 @@ from eomgen.scalars.protocol import Scalar
 Forces = Callable[[Sequence[Scalar] | None], list[Scalar]]
 
 
-class Embedded(NullSpace):
+class Embedded(Freedoms):
     """The constraints of a mechanism at a state.
 
     forces  generalised forces of the effects at joints with further ones
@@ -43,8 +40,8 @@ class Embedded(NullSpace):
         beyond: Callable[[Sequence[Scalar]], list[Scalar]],
         fall: Sequence[Scalar],
     ) -> None:
-        super().__init__(d, {}, forces, fall)
-        self._biases, self._beyond = biases, beyond
+        super().__init__(d, fall)
+        self._forces, self._biases, self._beyond = forces, biases, beyond
         self._names = [name for name, _ in d.model.rows]
 
     @cached_property
@@ -104,7 +101,7 @@ class Embedded(NullSpace):
             self._joints,
             self._columns,
             self._biases(),
-            self._right(tau),
+            self._forces(tau),
             self._bend,
             self._scalars,
         )
@@ -156,16 +153,6 @@ class Embedded(NullSpace):
             for j, x in zip(joint.velocities, change, strict=True):
                 found[j] = x
         return found
-
-    def position(self) -> list[Scalar]:
-        """q after one Newton step towards g = 0, within each cluster."""
-        change = position_rates(self._d, self._towards(residuals(self._d)))
-        return [x + dx for x, dx in zip(self._d.values.q, change, strict=True)]
-
-    def velocity(self) -> list[Scalar]:
-        """v with ġ = 0, changed within each cluster."""
-        change = self._towards(rates(self._d))
-        return [v + dv for v, dv in zip(self._d.values.v, change, strict=True)]
 
     def margins(self) -> list[Scalar]:
         """What of each row is independent of others, relative to the rows of its kind."""

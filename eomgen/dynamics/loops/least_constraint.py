@@ -18,7 +18,7 @@ from functools import cached_property
 from eomgen.dynamics.loops.cluster_motion import motions
 from eomgen.dynamics.loops.clusters import Cluster
 from eomgen.dynamics.loops.constraints import inner, relative
-from eomgen.dynamics.loops.null_space import NullSpace
+from eomgen.dynamics.loops.freedoms import Freedoms
 from eomgen.dynamics.tree.forces import Wrench
 from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.dynamics.tree.motion import Acceleration, moment_about_centre
@@ -50,7 +50,7 @@ Rates = Sequence[Acceleration]
 Wrenches = Sequence[Wrench]
 
 
-class LeastConstraint(NullSpace):
+class LeastConstraint(Freedoms):
     """The constraints of a mechanism at a state.
 
     solids   bodies on each frame as one, in the frames' axes; `scene` are those of the scene's own
@@ -72,7 +72,7 @@ class LeastConstraint(NullSpace):
         scales: Sequence[float],
     ) -> None:
         self._scales = list(map(d.scalars.number, scales))
-        super().__init__(d, {}, lambda tau: [], fall)
+        super().__init__(d, fall)
         self._solids, self._scene, self._applied = solids, scene, applied
         self._beyond = beyond
         self._everything = Cluster(-1, tuple(range(len(d.kinematics.links))))

@@ -10,26 +10,17 @@ where the dependent velocities do not follow from the independent ones, as at a 
 """
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 
-from eomgen.dynamics.loops.clusters import accelerations_at_rest, jacobian_of
-from eomgen.dynamics.loops.constraints import (
-    Square,
-    factored,
-    inner,
-    position_rates,
-    rates,
-    relative,
-    residuals,
-    triangular,
-)
+from eomgen.dynamics.loops.constraints import factored, inner, relative
+from eomgen.dynamics.loops.freedoms import Freedoms
 from eomgen.dynamics.tree.composite import Entries
 from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.scalars.protocol import Scalar
 
 
-class NullSpace:
-    """The constraints of a mechanism at a state.
+class NullSpace(Freedoms):
+    """The constraints of a mechanism at a state; independent coordinates and velocities keep their
+    values where a state is put on the constraints.
 
     mass   the entries of M
     right  F - h with further generalised forces, without the weight of trees on a free joint
@@ -43,56 +34,8 @@ class NullSpace:
         right: Callable[[Sequence[Scalar] | None], list[Scalar]],
         fall: Sequence[Scalar],
     ) -> None:
-        self._d, self._mass, self._right, self._fall = d, mass, right, fall
-        self._scalars, self._zero = d.scalars, d.scalars.number(0.0)
-        self._order = [row for row, _ in d.model.pivots]
-        self._dependent = [column for _, column in d.model.pivots]
-        self._independent = [j for j in range(d.nv) if j not in self._dependent]
-
-    @cached_property
-    def _jacobian(self) -> list[list[Scalar]]:
-        """J with its rows in the order of elimination."""
-        return [self._rows[i] for i in self._order]
-
-    @cached_property
-    def _rows(self) -> list[list[Scalar]]:
-        """J."""
-        return jacobian_of(self._d)
-
-    @cached_property
-    def _factors(self) -> Square:
-        """Those of the columns of J that belong to dependent velocities."""
-        square = [[row[j] for j in self._dependent] for row in self._jacobian]
-        names = [self._d.model.rows[i][0] for i in self._order]
-        return triangular(square, names, self._scalars, self._d.model.blocks)
-
-    def dependents(self, along: Sequence[Scalar]) -> list[Scalar]:
-        """Velocities (nv,) with J v = -`along`, where independent ones are 0."""
-        found = [self._zero] * self._d.nv
-        ordered = [-along[i] for i in self._order]
-        for j, x in zip(self._dependent, self._factors.solved(ordered), strict=True):
-            found[j] = x
-        return found
-
-    @cached_property
-    def _basis(self) -> list[list[Scalar]]:
-        """The columns (nv,) of N, one for each independent velocity."""
-        columns = []
-        for k in self._independent:
-            solution = self._factors.solved([-row[k] for row in self._jacobian])
-            column = [self._zero] * self._d.nv
-            column[k] = self._scalars.number(1.0)
-            for j, x in zip(self._dependent, solution, strict=True):
-                column[j] = x
-            columns.append(column)
-        return columns
-
-    @cached_property
-    def _bend(self) -> list[Scalar]:
-        """γ (nv,) without `fall`."""
-        rest = accelerations_at_rest(self._d)
-        pairs = zip(self._rows, rest, strict=True)
-        return self.dependents([b + inner(row, self._fall, self._scalars) for row, b in pairs])
+        super().__init__(d, fall)
+        self._mass, self._right = mass, right
 
     def _times_mass(self, v: Sequence[Scalar]) -> list[Scalar]:
         """M v."""
@@ -148,27 +91,6 @@ class NullSpace:
     def response(self, impulse: Sequence[Scalar]) -> list[Scalar]:
         """The change of the velocities by generalised impulses; the constraints stay met."""
         return self._independent_solution(impulse)
-
-    def position(self) -> list[Scalar]:
-        """q after one Newton step towards g = 0; independent coordinates keep their values."""
-        change = self.dependents(residuals(self._d))
-        pairs = zip(self._d.values.q, position_rates(self._d, change), strict=True)
-        return [x + dx for x, dx in pairs]
-
-    def velocity(self) -> list[Scalar]:
-        """v with ġ = 0; independent velocities keep their values."""
-        change = self.dependents(rates(self._d))
-        return [v + dv for v, dv in zip(self._d.values.v, change, strict=True)]
-
-    def carried_along(self) -> list[Scalar]:
-        """The same by N: v = N v_i, and what time alone moves."""
-        own = self._d.values.v
-        found = list(own)
-        for k, column in zip(self._independent, self._basis, strict=True):
-            for j in self._dependent:
-                if not self._scalars.is_zero(column[j]):
-                    found[j] = found[j] + column[j] * own[k]
-        return found
 
 
 def first_of(pair: tuple[int, Scalar]) -> int:

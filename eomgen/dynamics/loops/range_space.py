@@ -7,7 +7,7 @@ the tree's mass matrix is not needed. A has a row for each constraint. It is sym
 definite if these are independent; its factors L D Lᵀ are written out.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 from eomgen.dynamics.loops.clusters import accelerations_at_rest, jacobian_of
@@ -20,13 +20,9 @@ from eomgen.dynamics.loops.constraints import (
     relative,
     residuals,
 )
+from eomgen.dynamics.loops.freedoms import Forward, Response
 from eomgen.dynamics.tree.mechanism_state import MechanismState
 from eomgen.scalars.protocol import Scalar
-
-Forward = Callable[[Sequence[Scalar] | None], list[Scalar]]
-"""v̇ (nv,) under the effects and further generalised forces (nv,), or None for none."""
-Response = Callable[[Sequence[Scalar]], list[Scalar]]
-"""M⁻¹ f (nv,) of generalised forces f."""
 
 
 class RangeSpace:
