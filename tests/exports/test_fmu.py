@@ -57,6 +57,7 @@ effects = [
 """
 SCENES = {
     "ball": BALL,
+    "contacts": "bouncing_two_body",
     "stiff": STIFF,
     "pendulum": "pendulum",
     "top": "spinning_top",
@@ -117,7 +118,7 @@ def test_each_method_moves_as_our_own_run(
     scene: str, method: str, tmp_path: Path, quickly: None
 ) -> None:
     """Impacts, a stiff motion, a quaternion, a loop, rolling; equal steps to the bit."""
-    source, t_end = SCENES[scene], {"ball": 1.6, "rolling": 0.04}.get(scene, 0.2)
+    source, t_end = SCENES[scene], {"ball": 1.6, "contacts": 0.9, "rolling": 0.04}.get(scene, 0.2)
     try:
         path = eomgen.export(source, "fmu", tmp_path / "unit.fmu", integrator=method)[0]
         refused = ""
