@@ -73,7 +73,7 @@ class _Checks(ctypes.Structure):
         ("sizes", _POINTER),
         ("clear", _REAL),
         *((name, _POINTER) for name in ("margins", "switched", "values")),
-        *((name, _POINTER) for name in ("switches", "gap_checks")),
+        *((name, _POINTER) for name in ("switches", "gap_checks", "helds")),
         *((name, _WHOLE) for name in ("switching_calls", "gap_calls")),
         *((name, _POINTER) for name in ("at", "y", "raw", "last", "k", "terms")),
         ("sound", _WHOLE),
@@ -144,10 +144,13 @@ class CompiledSteps:
             sizes["terms"] = np.empty((0, ny))
         kept, records = room(Records, rows=np.empty((len(stretch.times), ny)), **sizes)
         switched, values = np.empty(most), np.empty((most, seen.watch.many))
-        switches, gap_checks = np.empty((2, most), np.int64)
+        switches, gap_checks, helds = np.zeros((3, most), np.int64)
         margins = made_margins(stretch.constrained, most)
         keeps = constraints(self._checks, stretch.constrained, self._inputs, ny)
-        system = equal_steps.System(*self._held)
+        system, ends = equal_steps.System(*self._held), None
+        if stretch.touched and self._inputs is not None:
+            ends = contact_runs.events(self._checks, stretch.touched, self._inputs)
+            system.events = ctypes.addressof(ends)
         run = filled(
             Bounds(
                 stretch.atol,
@@ -165,7 +168,7 @@ class CompiledSteps:
             *(FunctionStructure(*each) if each else FunctionStructure() for each in functions),
             None if stretch.sizes is None else address(stretch.sizes),
             watched.clear if watched else math.inf,
-            *map(address, (margins[1:], switched, values, switches, gap_checks)),
+            *map(address, (margins[1:], switched, values, switches, gap_checks, helds)),
         )
         begun = [np.ascontiguousarray(array) for array in (solver.y, solver.f, solver.lost)]
         why = self._call(
@@ -174,7 +177,7 @@ class CompiledSteps:
             ctypes.addressof(records),
         )
         n: int = at.made
-        counts = {"switches": switches, "gap_checks": gap_checks}
+        counts = {"switches": switches, "gap_checks": gap_checks, "held": helds}
         return stride(
             *(kept, n, ("h_abs", "f", "lost"), why != UNUSUAL, counts),
             switched=switched[:n],

@@ -112,8 +112,9 @@ class Stretch:
     dense       whether states within the steps are wanted
     times       ascending times of the rows wanted, after t
     watched     given to make no step that may pass over a branch of the derivative
-    sizes       given (nc,) to make no step in which a rigid contact, none of which is held, may
-                close; its gap is relative to its size
+    sizes       given (nc,) to make no step in which a rigid contact may close; its gap is relative
+                to its size
+    touched     given if rigid contacts are held, to make no step in which one opens
     constrained the constraints to keep, if there are any
     """
 
@@ -128,6 +129,7 @@ class Stretch:
     times: Array
     watched: Watched | None
     sizes: Array | None
+    touched: "Touched | None"
     constrained: Constrained | None
 
 

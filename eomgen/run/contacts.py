@@ -132,16 +132,14 @@ def not_taken(
 def restrained(
     problem: Problem, holding: Holding | None, counted: Callable[[Rate], Rate]
 ) -> Problem:
-    """The problem while contacts are held; its Jacobian is then computed by differences, and its
-    steps are not compiled.
+    """The problem while contacts are held; its Jacobian is then computed by differences, and it has
+    no series.
 
     `counted` wraps a function so that its calls count as derivatives.
     """
     if holding is None:
         return problem
-    made = replace(
-        problem, derivative=counted(holding.derivative), timed=True, compiled=None, series={}
-    )
+    made = replace(problem, derivative=counted(holding.derivative), timed=True, series={})
     sizes = np.array(problem.sizes or np.ones(len(problem.states)))
 
     def jacobian(t: float, y: FloatArray) -> FloatArray:

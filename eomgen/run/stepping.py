@@ -174,7 +174,10 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
         return cast(list[float], times[first:last].tolist())
 
     kept = {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
-    return Steps(partial(adaptive.advances, settings), rows, kept)
+    begin = partial(adaptive.advances, settings)
+    if compiled and not asked.powers and method.compiled == "DOP853":
+        return Steps(begin, rows, kept, compiled.strikes)
+    return Steps(begin, rows, kept)
 
 
 def _spaced(start: float, end: float, count: int) -> FloatArray:

@@ -11,6 +11,7 @@ import pytest
 from campaign import FULL, some
 from scipy.optimize import brentq
 from test_compiled_steps import assert_same, both, compiler
+from test_stepper import BLOCK
 
 import eomgen
 from eomgen.engine.printed import text
@@ -128,6 +129,14 @@ def test_the_bits_are_those_of_python(scene: str, rtol: float, made: list[int]) 
     end = min(ENDS.get(scene, 2.0), read_scene(scene).simulation.t_end)
     run = alike(scene, t_end=end, rtol=rtol, samples=237)
     assert sum(made) > 0.3 * run.trajectory.counts["steps"]
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-10])
+def test_contacts_are_held_in_c(rtol: float, made: list[int]) -> None:
+    """Steps of a block on two feet, on one and on none; Python makes those in which events are."""
+    run = alike(BLOCK, t_end=2.0, rtol=rtol, samples=100)
+    assert [event.kind for event in run.trajectory.events][-1] == "rest"
+    assert sum(made) > 0.8 * run.trajectory.counts["steps"]
 
 
 @pytest.mark.every(2)

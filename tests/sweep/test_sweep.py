@@ -120,7 +120,9 @@ def test_members_that_run_together(asked: Any, tmp_path: Path) -> None:
 def test_compiled_members_run_in_threads(
     scene: str, name: str, asked: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By stiff methods, with loops, and with rigid contacts; once compiled, the program is not read again."""
+    """By stiff methods, with loops, and with rigid contacts; once compiled, the program is not read
+    again.
+    """
     asked = {"t_end": 0.2, "backend": "c", **asked}
     vary = {name: np.linspace(0.5, 1.5, 6)}
     one = eomgen.ensemble(scene, vary, **asked)

@@ -50,8 +50,8 @@ def advances(
     stepper = Stepper(settings, problem)
     stepper.begin(t_start, resume)
     compiled = None
-    if settings.steps and method.compiled and problem.compiled:
-        compiled = Strides(stepper, settings.steps)
+    if settings.steps and method.compiled:
+        compiled = Strides(stepper, settings.steps, touched)
     left, here = bounds.most - made, 0
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)

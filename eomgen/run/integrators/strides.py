@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.run.branches import BranchMonitor
-from eomgen.run.compiled import Array, Steps, Stretch, Stride, Watched
+from eomgen.run.compiled import Array, Steps, Stretch, Stride, Touched, Watched
 from eomgen.run.integrators.interface import Resume
 from eomgen.run.integrators.portions import Portion, Size
 from eomgen.run.integrators.stepper import Stepper, continuation
@@ -17,22 +17,30 @@ from eomgen.run.rows import Rows
 
 OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates")
 """Functions of a module that steps are checked with."""
+OF_HELD = ("held", "impact")
+"""Those that are called for rigid contacts which are held, beside those."""
 
 
 class Strides:
     """The compiled steps of a run, for its stepper; `steps` is asked for them each time."""
 
     def __init__(
-        self, stepper: Stepper, steps: Callable[[str, tuple[str, ...]], Steps | None]
+        self,
+        stepper: Stepper,
+        steps: Callable[[str, tuple[str, ...]], Steps | None],
+        touched: Touched | None,
     ) -> None:
         problem = stepper.problem
         switching, contacts, self._looked = problem.switching, problem.contacts, problem.closed_form
         self._stepper, self._steps = stepper, steps
         self._dense = stepper.settings.dense or self._looked is not None
         self._atol = np.zeros(problem.initial.shape) + stepper.bounds.atol
+        held = touched and touched.now.holds.any()
+        self._touched = touched if held else None
         self._needed = (
             *(OF_STATE if switching and switching.of_state else ()),
             *(OF_CONTACTS if contacts else ()),
+            *(OF_HELD if held else ()),
             *(PROJECTS if problem.projection else ()),
         )
         self._sizes = None
@@ -61,7 +69,8 @@ class Strides:
         along = solver, *until, bounds.rtol, self._atol, stepper.longest, most, self._dense
         held = constrained_by(stepper.problem.projection)
         times = stepper.times[stepper.sampled :]
-        stride = steps(Stretch(*along, times, watched, self._sizes, held))
+        touched = self._touched and self._touched.copy(solver.t, solver.y, 1)
+        stride = steps(Stretch(*along, times, watched, self._sizes, touched, held))
         if not len(stride.ends):
             return None
         if branches and features and not self._size.fits(_are_tame(branches, solver, stride)):
