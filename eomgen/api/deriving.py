@@ -1,33 +1,44 @@
 """The equations as SymPy matrices, with their derivation: `derive`."""
 
+from dataclasses import replace
+
 from eomgen.api.given import Source, checked, modelled, read
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
 from eomgen.equations import Derivation
 from eomgen.model.model import Model
 from eomgen.scene.schema import Form
+from eomgen.tables.details import Detail
 
 
 @public
-def derive(source: Source, *, form: Form | None = None) -> Derivation:
+def derive(source: Source, *, form: Form | None = None, detail: Detail = "steps") -> Derivation:
     """Derive M v̇ + V + G = F, and the steps to it, ending in the time derivative of a state.
 
     form  "velocity" for [q, v], "momentum" or "redundant" for the handout's states; by default the
           scene's. Trees of pins and free bodies in the plane have all three.
+    detail  "summary": state, equations and solution; "steps": all that leads to them; "all": the
+          forces in joints and constraints, too, and other ways to write the equations
 
     Small mechanisms have their equations and solution as SymPy matrices. Larger ones are derived as
     the articulated-body algorithm with their own bodies and joints. Raises `SceneError` for a form
     that the mechanism does not have.
     """
-    return derivation_of(modelled(read(source)), form=form)
+    return derivation_of(modelled(read(source)), form=form, detail=detail)
 
 
 def derivation_of(
-    model: Model, reporter: Reporter = SILENT, *, form: Form | None = None
+    model: Model,
+    reporter: Reporter = SILENT,
+    *,
+    form: Form | None = None,
+    detail: Detail = "steps",
 ) -> Derivation:
     """The derivation of a model. Raises `SceneError` as `derive` does."""
     from eomgen.exposition.derivation import exposition_of  # imports SymPy
+    from eomgen.exposition.levels import at_detail
 
     with reporter.located(), reporter.waiting(f"deriving {model.name} …"):
         checked(model)
-        return Derivation(model, exposition_of(model, form))
+        found = exposition_of(model, form)
+        return Derivation(model, replace(found, steps=at_detail(found.steps, detail)))

@@ -15,7 +15,8 @@ def derive(given: Arguments) -> int:
     model, _ = read_model(given.scene, given)
     if given.output is not None:
         check_writable(given.output, force=given.force)
-    found = derivation_of(model, reporter_of(given, given.scene), form=given.state_form)
+    reporter = reporter_of(given, given.scene)
+    found = derivation_of(model, reporter, form=given.state_form, detail=given.detail)
     if kind == "text":
         text = found.text(encoding="utf-8" if given.output else sys.stdout.encoding)
     else:

@@ -10,6 +10,7 @@ from eomgen.api.options import FORMS, OWN, Forced, check_seed, check_time, outpu
 from eomgen.base.options import option
 from eomgen.exports import FORMATS
 from eomgen.show.filming import FilmOptions
+from eomgen.tables.details import DETAILS
 
 if TYPE_CHECKING:
     from eomgen.api.given import Outputs
@@ -210,6 +211,12 @@ class Derivation(Forced):
         "state whose time derivative is written out: [q, v]; the handout's 8 numbers, or 12",
         flag="--form",
         choices=FORMS,
+    )
+    detail: str = option(
+        "steps",
+        "summary: the equations and their solution; steps: all that leads to them; all: forces in "
+        "joints and constraints, too, and other ways to write the equations",
+        choices=DETAILS,
     )
     output: Path | None = _file("write it to a file")
 

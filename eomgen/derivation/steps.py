@@ -62,7 +62,7 @@ def handout_steps(equations: Equations) -> tuple[Step, ...]:
 
 NOT_SYMMETRIC = (
     "Not symmetric: its rows are torques about the bodies' own centres. `mass_matrix()` of the "
-    "generated module is the symmetric one of (39)."
+    "generated module is the symmetric one."
 )
 Pairs = list[tuple[Expr, Expr]]
 """Left and right sides, in the derivation's own symbols."""
@@ -93,7 +93,9 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
     yield (
         "(12)-(17)",
         "Free bodies",
-        "The same for the accelerations: three scalar equations for each body.",
+        f"The same for the accelerations: {_count(3 * len(model.bodies))} scalar equations in "
+        f"{_count(3 * len(model.bodies) + 2 * len(held))} unknowns, the accelerations and the "
+        "joint forces. What the joints say of the accelerations is missing.",
         list(equations.free_bodies.equations),
     )
     arms = []
@@ -111,8 +113,9 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
     yield (
         "(20), (21)",
         "Constraint",
-        "The two bodies share the joint: x_child = x_parent + r_parent - r_child.",
-        [pair for k in held for pair in zip((s.x[k], s.y[k]), kin.position[k], strict=True)],
+        "The two bodies share the joint: x_parent + r_parent = x_child + r_child. This gives the "
+        "place of the child.",
+        [pair for k in held for pair in (*_shared(equations, k), *_placed(equations, k))],
     )
     yield (
         "(22), (23)",
@@ -125,6 +128,29 @@ def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
             for pair in zip((s.xdd[k], s.ydd[k]), kin.acceleration[k], strict=True)
         ],
     )
+
+
+def _count(n: int) -> str:
+    words = "zero one two three four five six seven eight nine ten eleven twelve".split()
+    return words[n] if n < len(words) else str(n)
+
+
+def _shared(equations: Equations, k: int) -> Pairs:
+    """The place of a joint, by the parent and by the child (20)."""
+    s, body = equations.symbols, equations.model.bodies[k]
+    arms = {
+        word: [sp.Symbol(f"r_{body.joint.name},{word},{axis}") for axis in "xy"]
+        for word in ("parent", "child")
+    }
+    above = (s.x[body.parent], s.y[body.parent]) if body.parent >= 0 else (sp.S.Zero, sp.S.Zero)
+    own = (s.x[k], s.y[k])
+    return [(above[i] + arms["parent"][i], own[i] + arms["child"][i]) for i in range(2)]
+
+
+def _placed(equations: Equations, k: int) -> Pairs:
+    """The place of a child (21)."""
+    s = equations.symbols
+    return list(zip((s.x[k], s.y[k]), equations.kinematics.position[k], strict=True))
 
 
 def _momenta(equations: Equations, k: int) -> Pairs:

@@ -6,8 +6,9 @@ what depends on the motion enters the derivation as forces with names, and each 
 forces are.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import sympy as sp
 
@@ -44,8 +45,9 @@ from eomgen.exposition.loops import (
 )
 from eomgen.exposition.mechanism import NamingMechanism, Notes
 from eomgen.exposition.poses import poses
-from eomgen.exposition.reading import numbered, read_all, reading_names
+from eomgen.exposition.reading import numbered, read_all, reading_names, renumbered
 from eomgen.exposition.recursion import recursive_steps
+from eomgen.exposition.simplified import simplified, solved_directly, tidied
 from eomgen.exposition.state_forms import form_step, momentum_form, plain_form, velocity_form
 from eomgen.language.formula import names_in
 from eomgen.language.rates import with_rates
@@ -63,20 +65,11 @@ HANDOUT = (
     "beside (29) to (36). Numbers from (37) on are not in the handout: it leaves the solution to "
     "the computer."
 )
-PROJECTED = (
-    'The handout "CS229 Dynamics Handout" derives two rigid bodies in the plane with one '
-    "rotational "
-    "joint. This mechanism is a different one, so the steps have their own numbers. The equations "
-    "M dv/dt + V + G = F have the handout's form (24), (36); M is symmetric here, the same as that "
-    "of `mass_matrix()` in the generated module."
-)
 RECURSIVE = (
     "The equations of this mechanism written out would be too long to read, so they are given as "
-    "an algorithm: named quantities, one frame after another, each computed from those before. It "
-    "solves "
-    'M dv/dt + V + G = F, the handout\'s (24) with (36) ("CS229 Dynamics Handout"), without '
-    "forming "
-    "M. The symmetric M is what `mass_matrix()` of the generated module returns."
+    "an algorithm: named quantities, one frame after another, each computed from those before. "
+    "They are M dv/dt + V + G = F, with the symmetric M that `mass_matrix()` of the generated "
+    "module returns."
 )
 SYMMETRIC = (
     "There are two ways to write (24). Its rows above are torques about the bodies' own centres "
@@ -88,15 +81,13 @@ SYMMETRIC = (
     "the rows of all bodies that a joint turns. T has an inverse, so both systems have the same "
     "solution."
 )
+SOLVED = "The equations solved for the accelerations."
 PRESCRIBED = (
     "Driven coordinates follow the formulas above, and their rates are the derivatives of these; "
     "locked coordinates are constant. Neither is a state; the forces on them are whatever this "
     "requires."
 )
-ALREADY = (
-    "With the rows above M is symmetric already: it is the matrix that `mass_matrix()` of the "
-    "generated module returns."
-)
+SYMMETRIC_TITLE = "The symmetric mass matrix, that of kinetic energy"
 
 
 @dataclass(frozen=True)
@@ -150,30 +141,66 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
 
 def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
     equations = derive(bare)
+    equations = replace(
+        equations,
+        collected=_each(equations.collected, tidied),
+        symmetric=_each(equations.symmetric, simplified),
+    )
     names = _names(model, readable(equations))
     names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
     figures = {"(1)": "mechanism", "(2)-(11)": "bodies"}
     steps = [
-        replace(step, figure=figures.get(step.number, "")) for step in handout_steps(equations)
+        replace(_renamed(step, names), figure=figures.get(step.number, ""))
+        for step in handout_steps(equations)
     ]
     place = next(i for i, step in enumerate(steps) if step.number == "(37)")
     written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
+    s, rows = equations.symbols, equations.symmetric
+    direct = solved_directly(rows.M, rows.F - rows.V - rows.G) if form == "velocity" else None
+    if direct is not None:
+        lines = [Equation(x, e) for x, e in zip(s.a, direct, strict=True)]
+        shown = readable(equations)
+        steps[place] = replace(
+            steps[place],
+            words=SOLVED,
+            equations=tuple(
+                Equation(x.left.xreplace(shown), x.right.xreplace(shown)) for x in lines
+            ),
+        )
+        steps[place] = _renamed(steps[place], names)
+        written = plain_form(model, direct)
     last = form_step(model, form, written, parts.effects)
-    ends = [_symmetry(equations), *impact_steps(model, parts.effects), last]
+    ends = [*_symmetry(equations), *impact_steps(model, parts.effects), last]
     inner = _numbered_within(_effect_steps(model, parts), "36")
     steps = [
-        Step("", "The handout", HANDOUT, ()),
         *steps[:place],
         *(_renamed(step, names) for step in inner),
         *steps[place:],
         *(_renamed(step, names) for step in numbered(ends, 39)),
     ]
-    return Exposition(tuple(steps), _whole(of_pins(equations), model, parts), parts.loads)
+    whole = _whole(of_pins(equations), model, parts)
+    if not is_of_handout(model):
+        return Exposition(renumbered(steps), whole, parts.loads)
+    return Exposition((Step("", "The handout", HANDOUT, ()), *steps), whole, parts.loads)
+
+
+def is_of_handout(model: Model) -> bool:
+    """Whether a mechanism is the handout's: two bodies with one pin, free in the plane."""
+    if len(model.bodies) != 2 or model.dimensions != 2:
+        return False
+    first, second = model.bodies
+    return not first.joint.holds and second.parent == 0
+
+
+def _each(found: Any, change: Callable[[Expr], Expr]) -> Any:
+    """M, V, G and F changed."""
+    return replace(found, **{x: change(getattr(found, x)) for x in "MVGF"})
 
 
 def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
     tied = bool(parts.constraints)
     equations = derive_projected(bare, solving=not tied)
+    equations = replace(equations, balance=_each(equations.balance, simplified))
     names = reading_names(model)
     found = [_renamed(step, names) for step in projected_steps(equations)]
     titles = [step.title for step in found]
@@ -189,6 +216,12 @@ def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
     if tied:
         return _of_tied(model, parts, start, found[joints:], of_projected(equations))
     place = titles.index("Closed form")
+    tree = of_projected(equations)
+    direct = solved_directly(tree.M, tree.F - tree.V - tree.G)
+    if direct is not None:
+        lines = tuple(Equation(x, e) for x, e in zip(tree.a, direct, strict=True))
+        said = {**names, **{s.name: text for s, text in tree.formulas.items()}}
+        found[place] = _renamed(replace(found[place], words=SOLVED, equations=lines), said)
     solved = {line.left.name: line.right for line in found[place].equations}
     rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
     form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
@@ -200,7 +233,7 @@ def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
         *found[place:],
         *(_renamed(step, names) for step in ends),
     ]
-    return _told(model, PROJECTED, steps, _whole(of_projected(equations), model, parts), parts)
+    return _told("", steps, _whole(tree, model, parts), parts)
 
 
 def _of_tied(
@@ -221,7 +254,7 @@ def _of_tied(
     names = reading_names(model)
     names |= {s.name: text for s, text in tree.formulas.items()}
     before, ends = ([_renamed(step, names) for step in x] for x in (before, ends))
-    return _told(model, PROJECTED, [*start, *before, *balance, *ends], matrices, parts)
+    return _told("", [*start, *before, *balance, *ends], matrices, parts)
 
 
 def _recursive(model: Model, parts: Parts) -> Exposition:
@@ -251,7 +284,7 @@ def _recursive(model: Model, parts: Parts) -> Exposition:
         steps += elimination_steps(model, parts.constraints)
     steps += [*impact_steps(model, parts.effects), _last(model, parts)]
     names = reading_names(model)
-    return _told(model, RECURSIVE, [_renamed(step, names) for step in steps], None, parts)
+    return _told(RECURSIVE, [_renamed(step, names) for step in steps], None, parts)
 
 
 def _last(model: Model, parts: Parts) -> Step:
@@ -260,13 +293,11 @@ def _last(model: Model, parts: Parts) -> Step:
     return form_step(model, "velocity", form, parts.effects)
 
 
-def _told(
-    model: Model, intro: str, steps: list[Step], matrices: Matrices | None, parts: Parts
-) -> Exposition:
-    """Steps with an introduction, numbered from one."""
+def _told(intro: str, steps: list[Step], matrices: Matrices | None, parts: Parts) -> Exposition:
+    """Steps numbered from one, after an introduction if there is one."""
     whole = numbered([replace(step, number="") for step in steps])
-    first = Step("", "Compared with the handout", intro, ())
-    return Exposition((first, *whole), matrices, parts.loads)
+    first = (Step("", "An algorithm", intro, ()),) if intro else ()
+    return Exposition((*first, *whole), matrices, parts.loads)
 
 
 def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterator[Step]:
@@ -355,12 +386,12 @@ def _free_words(model: Model) -> str:
     return words + (" " + PRESCRIBED if model.prescribed else "")
 
 
-def _symmetry(equations: Equations) -> Step:
+def _symmetry(equations: Equations) -> Iterator[Step]:
     """How the handout's M becomes the symmetric one of the generated module."""
     n, s = len(equations.symbols.a), equations.symmetric
     by = symmetric(equations.model, equations.symbols, equations.kinematics, sp.eye(n))
     if by == sp.eye(n):
-        return Step("", "One M", ALREADY, ())
+        return
     own = (("M", s.M), ("V", s.V), ("G", s.G), ("F", s.F))
     lines = [Equation(sp.MatrixSymbol("T", n, n), by)]
     transform = sp.MatrixSymbol("T", n, n)
@@ -369,7 +400,7 @@ def _symmetry(equations: Equations) -> Step:
         name = sp.MatrixSymbol(f"{letter}_sym", n, columns)
         lines.append(Equation(name, sp.MatMul(transform, sp.MatrixSymbol(letter, n, columns))))
         lines.append(Equation(name, whole))
-    return Step("", "One M: from the handout's to the symmetric one", SYMMETRIC, tuple(lines))
+    yield Step("", SYMMETRIC_TITLE, SYMMETRIC, tuple(lines))
 
 
 def _names(model: Model, shown: dict[Expr, Expr]) -> dict[str, str]:

@@ -59,8 +59,9 @@ class DerivedEffect:
 
     @property
     def words(self) -> str:
-        """What the effect is: the description of its type."""
-        return inspect.cleandoc(type(self.effect).__doc__ or "")
+        """What the effect is, in a sentence or two, without the keys of its table."""
+        kind = type(self.effect)
+        return kind.told or inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
 
 
 def derived_effects(model: Model) -> tuple[DerivedEffect, ...]:

@@ -89,14 +89,13 @@ def polygon_steps(model: Model, found: Embedding) -> Iterator[Step]:
 
 def _where(model: Model, constraint: object, polygon: Polygon) -> str:
     loop = next((loop for loop in model.loops if loop is constraint), None)
-    names = " and ".join(symbol.name for symbol, _ in polygon.positions)
     if loop is None:
-        words = f"g is what the constraint keeps at 0. It determines {names}."
+        words = "g is what the constraint keeps at 0. It determines what follows."
     else:
         words = (
             f"The {loop.joint.type} joint between `{loop.joint.parent}` and `{loop.joint.child}` "
-            f"closes a "
-            f"loop: g is the distance of its two ends, kept at 0. The polygon determines {names}."
+            "closes a "
+            "loop: g is the distance of its two ends, kept at 0. The polygon gives what follows."
         )
     if polygon.lengths:
         words += (

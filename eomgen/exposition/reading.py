@@ -1,6 +1,8 @@
 """The names of a scene as they are read: a dot over a rate, a subscript for what it belongs to."""
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import sympy as sp
 
@@ -27,10 +29,15 @@ def reading_names(model: Model) -> dict[str, str]:
                 prefix, _, axis = c.name.rpartition("_w")
                 names[c.name] = f"omega_{prefix},{axis}"
                 names[c.acceleration] = dotted(f"omega_{prefix},{axis}")
-        for ending, letter in (("mass", "m"), ("inertia_com", "I")):
-            brief = f"{letter}_{body.name}"
-            if f"{body.name}_{ending}" in taken and brief not in taken:
-                names[f"{body.name}_{ending}"] = brief
+        own, joint = body.name, body.joint.name
+        brief = {f"{own}_mass": f"m_{own}", f"{own}_inertia_com": f"I_{own}"}
+        for axis in "xyz":
+            brief[f"{joint}_r_parent_{axis}"] = f"b_{joint},{axis}"
+            brief[f"{joint}_r_child_{axis}"] = f"c_{joint},{axis}"
+        names |= {long: x for long, x in brief.items() if long in taken and x not in taken}
+    for effect in model.effects:
+        if effect.uniform and f"{effect.name}_g" in taken and "g" not in taken:
+            names[f"{effect.name}_g"] = "g"
     return names
 
 
@@ -62,3 +69,22 @@ def numbered(steps: Sequence[Step], start: int = 1) -> tuple[Step, ...]:
         found.append(Step(f"({n})", step.title, step.words, step.equations, step.figure))
         n += 1
     return tuple(found)
+
+
+def renumbered(steps: Sequence[Step]) -> tuple[Step, ...]:
+    """Steps numbered from one instead of as in the handout, references in their words too."""
+    of: dict[int, int] = {}
+    for i, step in enumerate(steps, 1):
+        ends = [int(x) for x in re.findall(r"\((\d+)\)", step.number)]
+        for n in range(ends[0], ends[-1] + 1) if ends else ():
+            of.setdefault(n, i)
+
+    def said(match: re.Match[str]) -> str:
+        found = sorted({of[int(x)] for x in re.findall(r"\d+", match[0]) if int(x) in of})
+        return " and ".join(f"({i})" for i in found) or match[0]
+
+    pattern = re.compile(r"\(\d+\)(?:(?:, | to | and )\(\d+\))*")
+    return tuple(
+        replace(step, number=f"({i})", words=pattern.sub(said, step.words))
+        for i, step in enumerate(steps, 1)
+    )

@@ -5,15 +5,20 @@ of sines and cosines as functions of sums of angles, and each with what its term
 """
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 
 import sympy as sp
 
 from eomgen.derivation.projected.simplify import canonical
 from eomgen.derivation.symbols import Expr, tidy
 
-LONGEST = 250
+LONGEST = 90
 """Operations of an expression up to which it is simplified."""
-MOST_TERMS = 60
+MOST_FACTORED = 8
+"""Terms of a sum up to which it is factored as a polynomial."""
+MOST_SOLVED = 64
+"""The size of equations up to which their solution is written in one line for each unknown."""
+MOST_TERMS = 24
 """Terms of an expanded sum up to which it is collected."""
 
 
@@ -25,21 +30,86 @@ def simplified(e: Expr) -> Expr:
         return e
     if e.has(sp.Piecewise) or isinstance(e, sp.Function):
         return e
-    return min(_forms(e), key=lambda form: (size(form), len(sp.Add.make_args(form))))
+    forms = (_with_signs(form) for form in _forms(e))
+    return min(forms, key=lambda form: (size(form), _minus(form), len(sp.Add.make_args(form))))
+
+
+def _minus(e: Expr) -> int:
+    """The minus signs between terms."""
+    return sum(bool(x.could_extract_minus_sign()) for add in e.atoms(sp.Add) for x in add.args)
+
+
+def _with_signs(e: Expr) -> Expr:
+    """Minus signs in front of products instead of in all terms of a factor, and the reverse."""
+    return e.replace(lambda x: x.is_Mul and any(f.is_Add for f in x.args), _signed)
+
+
+def _signed(product: Expr) -> Expr:
+    factors = []
+    minus = product.could_extract_minus_sign() and -1 in product.args
+    for x in product.args:
+        negative = sum(t.could_extract_minus_sign() for t in x.args) if x.is_Add else 0
+        turned = x.is_Add and (negative == len(x.args) or (minus and 2 * negative >= len(x.args)))
+        if turned:
+            minus = not minus
+        factors.append(-x if turned else x)
+    plain = [x for x in factors if x != -1]
+    return sp.Mul(-1 if minus else 1, *plain)
+
+
+def tidied(e: Expr) -> Expr:
+    """An expression or a matrix simplified where that makes it shorter by a fifth: for equations
+    whose terms are to be seen.
+    """
+    if isinstance(e, sp.MatrixBase):
+        return e.applyfunc(tidied)
+    found = simplified(e)
+    return found if 5 * size(found) <= 4 * size(e) else e
+
+
+def solved_directly(M: Expr, right: Expr) -> list[Expr] | None:
+    """M⁻¹ right for one or two unknowns, simplified; None for more, or if that is long."""
+    if M.rows == 1:
+        found = [simplified(right[0] / M[0, 0])]
+    elif M.rows == 2 and sum(map(size, (*M, *right))) <= MOST_SOLVED:
+        (a, b), (c, d) = M.tolist()
+        whole = simplified(a * d - b * c)
+        p, q = right
+        tops = [simplified(d * p - b * q), simplified(a * q - c * p)]
+        found = [min((top / whole, simplified(top / whole)), key=size) for top in tops]
+    else:
+        return None
+    return found if sum(map(size, found)) <= MOST_SOLVED else None
 
 
 def size(e: Expr) -> int:
-    """The symbols, numbers and signs of a formula."""
+    """The symbols, numbers and signs of a formula; brackets around sines and cosines, and
+    fractions in denominators, are hard to read and count more.
+    """
     if e.is_Atom:
         return 1 if not e.is_Rational or e.is_Integer else 2
     if isinstance(e, sp.Pow):
-        return size(e.base) + (1 if e.exp in (2, -1) else 2) + int(e.base.is_Add)
+        inside = e.exp.is_negative and e.base.is_Add and any(map(_is_quotient, e.base.args))
+        return size(e.base) + (1 if e.exp in (2, -1) else 2) + int(e.base.is_Add) + 3 * inside
     if isinstance(e, sp.Add):
-        return sum(map(size, e.args)) + len(e.args) - 1
+        signs = len(e.args) - 1 + sum(bool(x.could_extract_minus_sign()) for x in e.args)
+        return int(sum(map(size, e.args)) + signs + 2 * sum(map(_holds_wave, e.args)))
     if isinstance(e, sp.Mul):
         sums = any(x.is_Add for x in e.args)
-        return sum(size(x) + int(x.is_Add) for x in e.args if x != -1) + int(sums and -1 in e.args)
+        whole = sum(size(x) + bool(x.is_Add) for x in e.args if x != -1)
+        return whole + int(sums and -1 in e.args) + int(_holds_wave(e))
     return 1 + sum(map(size, e.args))
+
+
+def _is_quotient(term: Expr) -> bool:
+    return any(
+        x.is_Pow and x.exp.is_negative and not x.base.is_Number for x in sp.Mul.make_args(term)
+    )
+
+
+def _holds_wave(term: Expr) -> bool:
+    """Whether a term has a sum with sines or cosines in brackets, which is hard to read."""
+    return term.is_Mul and any(x.is_Add and x.has(sp.sin, sp.cos) for x in term.args)
 
 
 def _forms(e: Expr) -> Iterator[Expr]:
@@ -53,7 +123,7 @@ def _forms(e: Expr) -> Iterator[Expr]:
     over, under = (min(_whole(x), key=size) for x in (top, bottom))
     yield sp.cancel(over / under) if size(over) + size(under) < LONGEST // 4 else over / under
     yield over / under
-    yield sp.Add(*(min(_whole(x), key=size) / under for x in sp.Add.make_args(over)))
+    yield sp.Add(*(min(_whole(x), key=size) / under for x in sp.Add.make_args(sp.expand(top))))
 
 
 def _whole(e: Expr) -> Iterator[Expr]:
@@ -72,9 +142,24 @@ def _flat(e: Expr) -> Iterator[Expr]:
     yield flat
     if not flat.has(sp.sin, sp.cos):
         return
-    yield canonical(flat)
+    short = canonical(flat)
+    yield from _with_cosines(short)
+    yield short
     yield _no_even_sines(flat)
     yield tidy(flat)
+
+
+def _with_cosines(flat: Expr) -> Iterator[Expr]:
+    """a + b sin² of one angle as (a + b) sin² + a cos²."""
+    angles = {x.args[0] for x in flat.atoms(sp.sin, sp.cos)}
+    if len(angles) != 1:
+        return
+    wave = sp.sin(*angles)
+    still, slope = flat.coeff(wave, 0), flat.coeff(wave, 2)
+    if slope != 0 and sp.expand(still + slope * wave**2 - flat) == 0 and not still.has(sp.cos):
+        yield (
+            _factored(sp.expand(still + slope)) * wave**2 + _factored(still) * sp.cos(*angles) ** 2
+        )
 
 
 def _no_even_sines(flat: Expr) -> Expr:
@@ -106,11 +191,15 @@ def _collected(flat: Expr) -> Iterator[Expr]:
     yield _shared(list(terms))
 
 
+@lru_cache(maxsize=4096)
 def _factored(e: Expr) -> Expr:
-    """A sum without sines and cosines: as a product, or with what some terms share in front."""
+    """A sum as a product, or with what some of its terms share in front of them."""
     if not e.is_Add:
         return e
-    return min((e, sp.factor(e), _shared(list(e.args))), key=size)
+    forms = [e, _shared(list(e.args))]
+    if len(e.args) <= MOST_FACTORED and not e.has(sp.sin, sp.cos):
+        forms.append(sp.factor(e))
+    return min(forms, key=size)
 
 
 def _in_front(e: Expr) -> Expr:
@@ -133,7 +222,7 @@ def _shared(terms: Sequence[Expr]) -> Expr:
         return sp.Add(*terms)
     inside = [term / best for term in terms if best in _factors(term)]
     outside = [term for term in terms if best not in _factors(term)]
-    product = _in_front(sp.Mul(best, _shared(inside)))
+    product = sp.Mul(best, _factored(sp.Add(*inside)))
     return product + (_shared(outside) if outside else 0)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from eomgen.show.mathml import decimal
 from eomgen.show.notation import parsed
+from eomgen.show.order import ordered_factors
 from eomgen.show.tex import escaped, tex
 
 Expr = Any
@@ -163,7 +164,7 @@ def _svg_formula(e: Expr) -> str:
     if e.could_extract_minus_sign():
         return "−" + _svg_formula(-e)
     if e.is_Mul:
-        factors = sorted(e.args, key=lambda x: not x.is_Number)
+        factors = ordered_factors(e)
         return "\u2009".join(_svg_formula(x) for x in factors)
     if e.is_Number:
         return escape(decimal(e)[0] if not e.is_Rational or e.is_Integer else f"{e.p}/{e.q}")

@@ -12,6 +12,7 @@ from sympy.simplify.radsimp import fraction
 
 from eomgen.exposition.spatial import ForceCross, MotionCross
 from eomgen.show.notation import parsed
+from eomgen.show.order import ordered_factors, ordered_terms
 
 Expr = Any
 SUM, PRODUCT, POWER, ATOM = range(4)
@@ -102,7 +103,7 @@ def terms_of(e: Expr) -> Sequence[Expr]:
     """The terms of a sum in the order in which they are written."""
     if isinstance(e, sp.MatAdd):
         return tuple(e.args)
-    return tuple(e.as_ordered_terms()) if isinstance(e, sp.Add) else (e,)
+    return tuple(ordered_terms(e)) if isinstance(e, sp.Add) else (e,)
 
 
 def _sum(terms: Sequence[Expr]) -> str:
@@ -133,12 +134,6 @@ def _product(e: Expr) -> tuple[str, int]:
         return f"<mfrac>{_row(top)}{_row(bottom)}</mfrac>", POWER
     factors = [_bracketed(x, POWER) for x in ordered_factors(e)]
     return APART.join(factors), PRODUCT
-
-
-def ordered_factors(e: Expr) -> list[Expr]:
-    """Numbers, then symbols and powers, then functions."""
-    factors = e.as_ordered_factors()
-    return sorted(factors, key=lambda x: 0 if x.is_Number else 2 if x.has(sp.Function) else 1)
 
 
 def _row(e: Expr) -> str:

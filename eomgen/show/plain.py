@@ -2,12 +2,15 @@
 
 from typing import Any
 
+import sympy as sp
 from sympy.printing.pretty.pretty import PrettyPrinter
 from sympy.printing.pretty.pretty_symbology import pretty_use_unicode
 from sympy.printing.pretty.stringpict import prettyForm, stringPict
+from sympy.simplify.radsimp import fraction
 
 from eomgen.show.mathml import decimal
 from eomgen.show.notation import parsed
+from eomgen.show.order import ordered_factors, ordered_terms
 
 Expr = Any
 MARKS = {0: "", 1: "\u0307", 2: "\u0308"}
@@ -35,6 +38,15 @@ class PlainPrinter(PrettyPrinter):  # type: ignore[misc]
 
     def _print_MatrixSymbol(self, e: Expr) -> Any:
         return self._print_Symbol(e)
+
+    def _print_Mul(self, e: Expr) -> Any:
+        top, bottom = fraction(e, exact=True)
+        if bottom != 1:
+            return self._print(top) / self._print(bottom)
+        return super()._print_Mul(sp.Mul(*ordered_factors(e), evaluate=False))
+
+    def _as_ordered_terms(self, e: Expr, order: Any = None) -> list[Expr]:
+        return ordered_terms(e)
 
     def name(self, name: str) -> str:
         """A name in one line: base, superscript after ^, subscripts after _."""
@@ -81,7 +93,7 @@ class PlainPrinter(PrettyPrinter):  # type: ignore[misc]
 
 def printer(*, use_unicode: bool) -> PlainPrinter:
     """A printer that never breaks lines."""
-    return PlainPrinter({"wrap_line": False, "use_unicode": use_unicode})
+    return PlainPrinter({"wrap_line": False, "use_unicode": use_unicode, "order": "none"})
 
 
 def minus_signs(text: str) -> str:

@@ -5,9 +5,11 @@ import unicodedata
 from typing import Any
 
 from sympy.printing.latex import LatexPrinter
+from sympy.simplify.radsimp import fraction
 
-from eomgen.show.mathml import decimal
+from eomgen.show.mathml import decimal, negative
 from eomgen.show.notation import GREEK, parsed
+from eomgen.show.order import ordered_factors, ordered_terms
 
 Expr = Any
 ACCENTS = {1: r"\dot", 2: r"\ddot"}
@@ -22,6 +24,23 @@ class TexPrinter(LatexPrinter):  # type: ignore[misc]
 
     def _print_MatrixSymbol(self, e: Expr, style: str = "plain") -> str:
         return tex_symbol(e.name)
+
+    def _print_Mul(self, e: Expr) -> str:
+        if negative(e):
+            return f"- {self._product(-e)}"
+        return self._product(e)
+
+    def _product(self, e: Expr) -> str:
+        top, bottom = fraction(e, exact=True)
+        if bottom != 1:
+            return rf"\frac{{{self._print(top)}}}{{{self._print(bottom)}}}"
+        if not e.is_Mul:
+            return str(self._print(e))
+        parts = ((x, self._print(x)) for x in ordered_factors(e))
+        return " ".join(rf"\left({text}\right)" if x.is_Add else text for x, text in parts)
+
+    def _as_ordered_terms(self, e: Expr, order: Any = None) -> list[Expr]:
+        return ordered_terms(e)
 
     def _print_Float(self, e: Expr) -> str:
         digits, power = decimal(e)

@@ -21,6 +21,7 @@ class Distance(ConstraintTable):
     negative.
     """
 
+    told = "Two points keep their distance, as if by a massless rod. λ pushes them apart."
     example: ClassVar[str] = """
 [[constraints]]
 type = "distance"

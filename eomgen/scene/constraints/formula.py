@@ -20,6 +20,7 @@ class Coupling(ConstraintTable):
     The multiplier is the generalised force on `coordinate`, N m or N.
     """
 
+    told = "A coordinate follows others."
     example: ClassVar[str] = """
 [[constraints]]
 type = "coupling"
@@ -52,6 +53,7 @@ class Equation(ConstraintTable):
     positions.
     """
 
+    told = "An equation of coordinates, or one that is linear in the velocities."
     example: ClassVar[str] = """
 [[constraints]]
 type = "equation"

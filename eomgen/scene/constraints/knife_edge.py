@@ -19,6 +19,7 @@ class KnifeEdge(OnOther):
     The multiplier is the force along `across` on the body, N.
     """
 
+    told = "A point does not move across an edge."
     example: ClassVar[str] = """
 [[constraints]]
 type = "knife_edge"

@@ -32,6 +32,7 @@ class PointOn(OnOther):
     apex of a cone, the constraint is singular.
     """
 
+    told = "A point stays on a line, a curve or a surface, without friction."
     example: ClassVar[str] = """
 [[constraints]]
 type = "point_on"

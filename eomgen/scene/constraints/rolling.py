@@ -44,6 +44,7 @@ class Rolling(OnOther):
     components of the friction that rolling needs. A disc that lies flat is singular.
     """
 
+    told = "A body rolls without slip: its point in contact has the velocity of the surface there."
     example: ClassVar[str] = """
 [[constraints]]
 type = "rolling"

@@ -194,6 +194,8 @@ class EffectTable(Table):
     """For each field with a point of a body the fields that name the body or bodies."""
     direction_fields: ClassVar[tuple[str, ...]] = ()
     """Fields with a fixed direction in the world, or None."""
+    told: ClassVar[str] = ""
+    """What it is, as a derivation says it; "" for the first paragraph of its description."""
     single: ClassVar[bool] = False
     """Whether a scene has at most one of it."""
     input_field: ClassVar[str] = ""

@@ -17,6 +17,7 @@ class ExternalForce(EffectTable):
     `<name>_z`.
     """
 
+    told = "A force at a point of a body."
     example: ClassVar[str] = """
 [[effects]]
 type = "external_force"

@@ -20,6 +20,7 @@ class ExternalTorque(EffectTable):
     With `torque = "input"` it is the input `<name>`, in space `<name>_x`, `<name>_y`, `<name>_z`.
     """
 
+    told = "A torque on a body."
     example: ClassVar[str] = """
 [[effects]]
 type = "external_torque"

@@ -23,6 +23,7 @@ class Gravity(EffectTable):
     applied forces, in F of M v̇ + V + G = F instead of G.
     """
 
+    told = "Weight m g of each body."
     example: ClassVar[str] = """
 [[effects]]
 type = "gravity"

@@ -14,6 +14,10 @@ class Motor(OnCoordinate):
     At a prismatic joint it is a force. With `torque = "input"` it is the input `<name>`.
     """
 
+    told = (
+        "A torque, at a prismatic joint a force, on the joint's child, with its reaction "
+        "on the parent."
+    )
     example: ClassVar[str] = """
 [[effects]]
 type = "motor"

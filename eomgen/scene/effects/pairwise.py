@@ -32,6 +32,7 @@ class Pairwise(EffectTable):
       potential energy, so its work counts as that of an applied force.
     """
 
+    told = "A force along the line between the centres of mass of every two bodies."
     example: ClassVar[str] = """
 [[effects]]
 type = "pairwise"
