@@ -171,29 +171,6 @@ def test_one_method_alone() -> None:
         assert error(choice.tried.trajectory.y[-1], true[-1], case.scale(true)) < target
 
 
-def test_few_equal_steps() -> None:
-    """A loose error and few rows may be had by few equal steps, at the end of each a row."""
-    case = case_of("pendulum")
-    few = replace(case, kept={**case.kept, "samples": 201})
-    true = truth(case)
-    tried: list[Tried] = []
-    run = Case.run
-
-    def kept(self: Case, setting: Setting, **given: Any) -> Tried:
-        tried.append(run(self, setting, **given))
-        return tried[-1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Case, "run", kept)
-        assert meet(few, 1e-3).met
-        equal = next(one for one in tried if one.setting.integrator == "rk4")
-        assert len(equal.trajectory.t) >= 201
-        assert error(equal.trajectory.y[-1], true[-1], case.scale(true)) < 1e-3
-        tried.clear()
-        assert meet(case, 1e-3).met
-        assert all(one.setting.dt is None for one in tried)
-
-
 @pytest.mark.full
 def test_a_motion_that_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lorenz's over 50 s grows an error by 1e19: no run in doubles is right, and once DOP853 as

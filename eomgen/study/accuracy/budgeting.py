@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from eomgen.base.errors import RunError
-from eomgen.study.accuracy.choosing import TIGHTER, error_law, growth, patience, race, rung
+from eomgen.study.accuracy.choosing import RUNG, TIGHTER, error_law, growth, patience, race, rung
 from eomgen.study.accuracy.search import Choice, Plan, Say, Search
 from eomgen.study.accuracy.trial import Case, Method, Tried, method_of
 
@@ -23,8 +23,6 @@ FIRST = 1e-4
 """Tolerance of the first runs."""
 LEAST = 1e-14
 """Smallest error that is aimed at: rounding keeps most runs in doubles from a smaller one."""
-RUNG = 100.0
-"""Factor by which a next run is to reduce the error while its convergence is not known."""
 
 
 def within(
@@ -39,7 +37,7 @@ def within(
     if not 0 < budget < math.inf:
         raise RunError(f"--budget: {budget:g} s is not a computing time; give e.g. 2s")
     search = Search(case, say, FIRST, budget)
-    names = race(search, asked, False)
+    names = race(search, asked)
     while search.runs and not search.slides:
         judged = search.judged()
         best = min(search.runs, key=lambda run: judged[id(run)])

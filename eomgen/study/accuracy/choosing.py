@@ -40,18 +40,11 @@ TIGHTER = 3.0
 """Another run is made only if it is to reduce the error at least by this factor."""
 SLACK = 1.5
 """A method's first run may take this many times the work of the cheapest so far."""
-BETTER = 1.5
-"""Of the accepted runs, the most accurate is chosen that takes at most this many times the least
-work."""
 OVERRUN = 3.0
 """A run is stopped after this many times its expected work, and other methods are tried."""
 SLOWED = 2.0
 """Steps of DOP853 that last this many times the fastest decay are limited by stability, not
 accuracy: above about 6 they are unstable."""
-LOOSE = 1e-5
-"""Equal steps are tried for required errors down to this."""
-FEW_ROWS = 257
-"""With more rows, equal steps do not pay: each row ends a step."""
 STIFF = ("Rodas5P", "Radau")
 """Tried first where motion is stiff; the first of them only where compiled code makes its steps."""
 PATIENT = "gauss_6"
@@ -88,7 +81,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         raise RunError(f"--accuracy: {target:g} is not between 0 and {WRONG:g}; give e.g. 1e-6")
     start = min(1e-4, max(1e-6, 1e-4 * (target / 1e-3) ** (1 / 3)))
     search = Search(case, say, start)
-    names = race(search, asked, target >= LOOSE)
+    names = race(search, asked)
     while search.runs and not search.slides:
         judged = search.judged()
         best = min(search.runs, key=lambda run: judged[id(run)])
@@ -101,7 +94,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
         steady = [run for run in sure if search.estimate(run).most <= WRONG]
         enough = [run for run in steady if judged[id(run)] <= ENOUGH * aim]
         if enough:
-            best = _best(enough, judged)
+            best = min(enough, key=lambda run: judged[id(run)])
             if search.may_miss(best):
                 search.shorten(best)
                 continue
@@ -111,7 +104,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
             continue
         hopeful = [run for run in search.runs if run not in sure and judged[id(run)] <= HOPE * aim]
         if hopeful:
-            search.verify(_best(hopeful, judged))
+            search.verify(min(hopeful, key=lambda run: run.work))
             continue
         plans = [_towards(search, method_of(name), judged, GOAL * aim) for name in names]
         possible = [plan for plan in plans if plan]
@@ -141,13 +134,6 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
             for name in stiff:
                 _first(search, method_of(name))
     return search.nothing()
-
-
-def _best(runs: Sequence[Tried], judged: dict[int, float]) -> Tried:
-    """The most accurate run of those that take hardly more work than the cheapest."""
-    most = BETTER * min(run.work for run in runs)
-    near = [run for run in runs if run.work <= most]
-    return min(near, key=lambda run: (judged[id(run)], run.work))
 
 
 def _missed(
@@ -206,14 +192,13 @@ def _slowed(search: Search) -> bool:
     return search.fast.decay * search.case.t_end / steps >= SLOWED
 
 
-def race(search: Search, asked: str | None, loose: bool) -> list[str]:
+def race(search: Search, asked: str | None) -> list[str]:
     """Run each method once; stop runs that take much more work than another. Return the names of
     all methods that were run.
 
     If stability limits the steps of DOP853, LSODA is run, too, which changes over to an implicit
     method. If a run needed Jacobians, or none finished, those of `STIFF` are run, too. Else the
-    first of them is if a mode is fast: a small oscillation is damped instead of followed. And rk4
-    is if the motion is smooth and the required error `loose`: it spends no time on step control.
+    first of them is if a mode is fast: a small oscillation is damped instead of followed.
     """
     names = [method_of(asked).name] if asked is not None else _candidates(search)
     for name in names:
@@ -225,12 +210,9 @@ def race(search: Search, asked: str | None, loose: bool) -> list[str]:
     if "LSODA" not in names and _takes_multistep(search.case.problem) and _slowed(search):
         names.append("LSODA")
         _first(search, method_of("LSODA"))
-    more = []
-    if not search.runs or any(run.trajectory.counts["jacobians"] for run in search.runs):
-        more = _stiff(search.case)
-    else:
-        more = _stiff(search.case)[:-1] if search.fast.quick else []
-        more += ["rk4"] if loose and _few_steps_do(search.case) else []
+    more = _stiff(search.case)
+    if search.runs and not any(run.trajectory.counts["jacobians"] for run in search.runs):
+        more = more[:-1] if search.fast.quick else []
     more = [name for name in more if name not in names]
     for name in more:
         _first(search, method_of(name))
@@ -249,13 +231,6 @@ def patience(search: Search, names: list[str], plans: Sequence[object], most: fl
     names.append(PATIENT)
     _first(search, method_of(PATIENT), most)
     return True
-
-
-def _few_steps_do(case: Case) -> bool:
-    """Whether few equal steps may be enough: the motion is smooth and has few rows, each of which
-    ends a step.
-    """
-    return _smooth(case) and case.rows <= FEW_ROWS
 
 
 def _smooth(case: Case) -> bool:
