@@ -85,11 +85,7 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
     while search.runs and not search.slides:
         judged = search.judged()
         best = min(search.runs, key=lambda run: judged[id(run)])
-        floor, state = search.representable(best)
-        aim, why = target, ""
-        if floor > ENOUGH * target:
-            aim = NEAR * floor
-            why = f"a double resolves {state} only to {floor:.1g} of its range of motion"
+        aim, why = _aim(search, best, target)
         sure = [run for run in search.runs if id(run) in search.second]
         steady = [run for run in sure if search.estimate(run).most <= WRONG]
         enough = [run for run in steady if judged[id(run)] <= ENOUGH * aim]
@@ -123,17 +119,35 @@ def meet(case: Case, target: float, asked: str | None = None, say: Say = lambda 
             continue
         if not possible:
             return _missed(search, best, judged, target, why)
-        plan = min(possible, key=lambda plan: plan.work)
         other = asked is None and search.fast.noise.any() and not set(names) & set(STIFF)
-        stiff = _stiff(search.case) if other else []
-        bounded = plan is not aside and (aside or len(possible) > 1 or stiff)
-        made = search.make(plan, OVERRUN * plan.cost if bounded else math.inf)
-        if not made and search.broken[-1].cut:
-            # Rounding errors of a fast mode shorten explicit steps without end.
-            names += stiff
-            for name in stiff:
-                _first(search, method_of(name))
+        names += _go_on(search, possible, aside, _stiff(search.case) if other else [])
     return search.nothing()
+
+
+def _go_on(
+    search: Search, plans: Sequence[Plan], aside: Plan | None, stiff: list[str]
+) -> list[str]:
+    """Make the run that is expected to take the least work for the target. If it is stopped where
+    there are others, methods for `stiff` motion are run, which are returned: rounding errors of a
+    fast mode shorten explicit steps without end.
+    """
+    plan = min(plans, key=lambda plan: plan.work)
+    bounded = plan is not aside and (aside or len(plans) > 1 or stiff)
+    if search.make(plan, OVERRUN * plan.cost if bounded else math.inf):
+        return []
+    if not search.broken[-1].cut:
+        return []
+    for name in stiff:
+        _first(search, method_of(name))
+    return stiff
+
+
+def _aim(search: Search, best: Tried, target: float) -> tuple[float, str]:
+    """The error that is aimed at and, if doubles cannot represent the target, why it is another."""
+    floor, state = search.representable(best)
+    if floor <= ENOUGH * target:
+        return target, ""
+    return NEAR * floor, f"a double resolves {state} only to {floor:.1g} of its range of motion"
 
 
 def _missed(

@@ -151,12 +151,7 @@ def arithmetic(
         seed,
         lambda part: progress(0.2 + 0.4 * part),
     )
-    agreed = min(agreement(truth, *pair) for pair in zip(samples, truths, strict=True))
-    if agreed < AGREED:
-        raise RunError(
-            f"the mass matrix is so close to singular that two solutions in {DIGITS} digits agree "
-            f"to {agreed:.0f} only, too few to judge by; make masses and lengths less uneven"
-        )
+    agreed = _agreed(truth, samples, truths)
     samples = [replace(s, condition=condition_numbers(terms.module, s)) for s in samples]
     found = [
         Solver(route, "float64", None, None, None, (), words) for route, words in missing.items()
@@ -179,6 +174,17 @@ def arithmetic(
         tuple(_timed(found, every, samples[0].y)),
         agreed,
     )
+
+
+def _agreed(truth: Truth, samples: Sequence[Sample], truths: Sequence[Exact]) -> float:
+    """The least number of digits to which two solutions agree. Raises `RunError` if too few."""
+    agreed = min(agreement(truth, *pair) for pair in zip(samples, truths, strict=True))
+    if agreed < AGREED:
+        raise RunError(
+            f"the mass matrix is so close to singular that two solutions in {DIGITS} digits agree "
+            f"to {agreed:.0f} only, too few to judge by; make masses and lengths less uneven"
+        )
+    return agreed
 
 
 def solve_operations(n: int) -> int:
