@@ -135,6 +135,27 @@ def c(request: pytest.FixtureRequest) -> Compiled:
     return compiled(request.param)
 
 
+def test_points() -> None:
+    """Places, velocities and Jacobians of named points are those of the recursion, which are the
+    solver's in `test_routes`.
+    """
+    tree, names = random_tree(9), ("point_positions", "point_velocities", "point_jacobians")
+    assert tree.text is not None
+    text = tree.text.replace('outputs = "all"', f"outputs = {[*names]}")
+    text += '\n[[points]]\nname = "p"\nbody = "b1"\nat = [0.3, "-l/2"]\n'
+    closed, aba = (
+        load(compile_scene(parse_scene(f'route = "{route}"\n{text}')))
+        for route in ("closed", "aba")
+    )
+    rng = np.random.default_rng(29)
+    for _ in range(TRIES):
+        y = tree.random_state(aba, rng)
+        for name in names:
+            found, expected = (getattr(module, name)(0.0, y) for module in (closed, aba))
+            assert difference(found, expected) <= TOLERANCE, name
+            assert np.any(expected)
+
+
 # State forms.
 
 
