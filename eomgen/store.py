@@ -15,7 +15,7 @@ import marshal
 import os
 import pickle
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields, replace
 from functools import cache
@@ -161,6 +161,21 @@ def _live_code(content: bytes | None) -> LiveCode | None:
         counts = {str(name): int(count) for name, count in saved.items()}
         return LiveCode(source, pairs, int(operations), counts)
     return None
+
+
+def kept_text(name: str, make: Callable[[], str]) -> str:
+    """A text that only this program determines, from the store, or made and stored.
+
+    A store that cannot be used is no obstacle.
+    """
+    entries = entries_of()
+    key = hashlib.sha256(f"{name} of {package_digest()}".encode()).hexdigest()[:32]
+    if entries and (content := entries.get(key)):
+        return content.decode()
+    new = make()
+    if entries:
+        entries.put(key, new.encode())
+    return new
 
 
 def bytecode_of(source: str) -> CodeType:

@@ -23,6 +23,7 @@ from eomgen.base.loading import load_source
 from eomgen.codegen.interface import interface_of
 from eomgen.codegen.live import live_system
 from eomgen.engine.differences import differences
+from eomgen.engine.methods import METHODS
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.pipeline import python_module
@@ -34,6 +35,7 @@ from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import parse_scene
 from eomgen.show.live import live_table
 from eomgen.store import live_code
+from eomgen.tables.integrators import INTEGRATORS
 
 pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
 
@@ -147,6 +149,12 @@ def both_runs(name: str, method: str, dt: float, seconds: float) -> tuple[Any, T
         pytest.skip("the method does not suit the scene")
     assert method in found["names"]
     return found, run
+
+
+def test_every_method_but_scipys_is_printed() -> None:
+    """The engine has them all, and pages and units take theirs from its table."""
+    own = {name for name, spec in INTEGRATORS.items() if "from_scipy" not in spec.method}
+    assert own == set(METHODS) == {*EQUAL, *ADAPTIVE}
 
 
 @pytest.mark.every(3)
