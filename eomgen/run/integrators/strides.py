@@ -88,15 +88,16 @@ class Strides:
         stepper, solver, branches = self._stepper, self._stepper.solver, self._stepper.branches
         ends, until, is_whole = stride.ends, stepper.until, stepper.is_whole
         start, whole = solver.t, len(ends)
-        starts = np.concatenate(([start], ends))
-        if until == stepper.t_end:
-            begun = 0.0 if stepper.method.series else solver.h_abs
-            lengths = np.concatenate(([begun], stride.memory["h_abs"]))
-            free = (starts + np.minimum(lengths, stepper.longest) < until)[:-1]
-            if ends[-1] == until or not free.all():
-                whole = int(np.argmin(free))  # those from here on are shortened by the end
-                stepper.shorten()
-        solver.t_old, solver.t = starts[-2:].tolist()
+        if until == stepper.t_end and stepper.method.series:  # which tries no step twice
+            whole -= int(ends[-1] == until)
+        elif until == stepper.t_end:
+            starts = np.concatenate(([start], ends[:-1]))
+            lengths = np.concatenate(([solver.h_abs], stride.memory["h_abs"][:-1]))
+            free = starts + np.minimum(lengths, stepper.longest) < until
+            whole = whole if free.all() else int(np.argmin(free))
+        if whole < len(ends):  # those from there on are shortened by the end
+            stepper.shorten()
+        solver.t_old, solver.t = float(ends[-2]) if len(ends) > 1 else start, float(ends[-1])
         for name, values in stride.memory.items():
             last = values[-1]
             setattr(solver, name, last.copy() if last.ndim else float(last))
