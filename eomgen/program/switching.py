@@ -23,24 +23,21 @@ def with_switching_functions(program: Program, states: Collection[str]) -> Progr
     """
     if "derivative" not in program.outputs:
         return program
+    compared = list(_compared(program))
+    if not compared:
+        return program
     steps = list(program.steps)
-    index_of = {step: i for i, step in enumerate(steps)}
+    differences = {step.operands: i for i, step in enumerate(steps) if step.operation == "sub"}
     nodes: dict[int, None] = {}
-    for pair in _compared(program):
+    for pair in compared:
         if len(pair) == 1:
             nodes[pair[0]] = None
             continue
-        stage = max(steps[i].stage for i in pair)
-        found = [
-            index_of[difference]
-            for operands in (pair, pair[::-1])
-            if (difference := Step("sub", operands, stage)) in index_of
-        ]
+        found = [differences[way] for way in (pair, pair[::-1]) if way in differences]
         if not found:
-            difference = Step("sub", pair, stage)
-            index_of[difference] = len(steps)
             found = [len(steps)]
-            steps.append(difference)
+            differences[pair] = len(steps)
+            steps.append(Step("sub", pair, max(steps[i].stage for i in pair)))
         nodes[found[0]] = None
     moving, timed = depends(steps, states), depends(steps, (TIME,))
     groups = {
@@ -55,9 +52,9 @@ def with_switching_functions(program: Program, states: Collection[str]) -> Progr
 
 def depends(steps: Sequence[Step], names: Collection[str]) -> bytearray:
     """For each step 1 if it depends on one of the named inputs, else 0."""
-    depends = bytearray(len(steps))
+    depends, known = bytearray(len(steps)), frozenset(names)
     for i, (_, operands, _, value) in enumerate(steps):
-        depends[i] = value in names or any(depends[o] for o in operands)
+        depends[i] = max([depends[o] for o in operands]) if operands else value in known
     return depends
 
 
