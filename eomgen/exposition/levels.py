@@ -31,4 +31,4 @@ def at_detail(steps: Sequence[Step], detail: Detail) -> tuple[Step, ...]:
 
 
 def _is_beyond(step: Step) -> bool:
-    return step.title.startswith(BEYOND) or step.title.endswith(": its forces")
+    return step.title.startswith(BEYOND) or step.title.endswith((": its forces", "(gravity)"))

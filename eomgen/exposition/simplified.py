@@ -92,7 +92,8 @@ def size(e: Expr) -> int:
         inside = e.exp.is_negative and e.base.is_Add and any(map(_is_quotient, e.base.args))
         return size(e.base) + (1 if e.exp in (2, -1) else 2) + int(e.base.is_Add) + 3 * inside
     if isinstance(e, sp.Add):
-        signs = len(e.args) - 1 + sum(bool(x.could_extract_minus_sign()) for x in e.args)
+        minus = sum(bool(x.could_extract_minus_sign()) for x in e.args)
+        signs = len(e.args) - 1 + (minus if minus < len(e.args) else 0)
         return int(sum(map(size, e.args)) + signs + 2 * sum(map(_holds_wave, e.args)))
     if isinstance(e, sp.Mul):
         sums = any(x.is_Add for x in e.args)
@@ -123,7 +124,8 @@ def _forms(e: Expr) -> Iterator[Expr]:
     over, under = (min(_whole(x), key=size) for x in (top, bottom))
     yield sp.cancel(over / under) if size(over) + size(under) < LONGEST // 4 else over / under
     yield over / under
-    yield sp.Add(*(min(_whole(x), key=size) / under for x in sp.Add.make_args(sp.expand(top))))
+    for whole in (over, sp.expand(top)):
+        yield sp.Add(*(min(_whole(x), key=size) / under for x in sp.Add.make_args(whole)))
 
 
 def _whole(e: Expr) -> Iterator[Expr]:

@@ -103,7 +103,7 @@ def _lines(equation: Equation, pretty: PlainPrinter) -> list[str]:
 
 def _term_by_term(equation: Equation, pretty: PlainPrinter) -> str:
     """A long sum with each term on its own line."""
-    first, *others = terms_of(equation.right)
+    first, *others = (x for term in terms_of(equation.right) for x in in_parts(term, WIDTH))
     parts = [str(pretty.doprint(sp.Eq(equation.left, first, evaluate=False)))]
     for term in others:
         minus = negative(term)
@@ -283,12 +283,13 @@ def _html(equation: Equation) -> Iterator[str]:
         for entry in entries(equation):
             yield from _html(entry)
         return
-    if not isinstance(right, sp.Add) or indent + size_of(right) <= PAGE:
+    terms = [x for term in terms_of(right) for x in in_parts(term, PAGE - indent)]
+    if len(terms) == 1 or indent + size_of(right) <= PAGE:
         yield mathml(left, right)
         return
     rows: list[str] = []
     line, length = "", 0.0
-    for i, term in enumerate(terms_of(right)):
+    for i, term in enumerate(terms):
         size, minus = size_of(term) + 2, negative(term)
         if length and indent + length + size > PAGE:
             rows.append(line)

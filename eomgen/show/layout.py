@@ -10,10 +10,12 @@ from eomgen.show.notation import parsed
 
 
 def entries(equation: Equation) -> Iterator[Equation]:
-    """A matrix equation as one equation for each entry."""
+    """A matrix equation as one equation for each entry, of a matrix for those that are not 0."""
     left, matrix = equation.left, equation.right
     for i in range(matrix.rows):
         for j in range(matrix.cols):
+            if matrix.cols > 1 and matrix.rows > 1 and matrix[i, j] == 0:
+                continue
             if isinstance(left, sp.MatrixBase):
                 yield Equation(left[i, j], matrix[i, j])
                 continue

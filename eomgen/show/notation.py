@@ -54,4 +54,5 @@ def parsed(name: str) -> Written:
         base, below = head, [base[len(head) :], *below]
     if below and (split := below[-1].rpartition("_"))[2] in AXES and split[0]:
         below[-1:] = [split[0], split[2]]
-    return Written(base, DOTS.index(mark + dots), above, tuple(below))
+    greek = (GREEK.get(part, part) for part in below)
+    return Written(base, DOTS.index(mark + dots), above, tuple(greek))

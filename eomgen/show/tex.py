@@ -121,7 +121,7 @@ def _letter(letter: str) -> str:
 
 def _below(part: str) -> str:
     if len(part) == 1:
-        return part
+        return _letter(part)
     return rf"\mathrm{{{escaped(part).replace(chr(92) + '_', chr(92) + ' ')}}}"
 
 

@@ -166,7 +166,7 @@ def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
         POWER,
         "For every velocity that the joints leave free, the forces of inertia do the work of "
         f"the loads: m a for each body's force{weights}. Forces in the joints do none. This is "
-        "M dv/dt + V + G = F; first the mass matrix,",
+        "M dv/dt + V + G = F; first the mass matrix (entries that are not written are 0),",
         [(sp.Symbol("M"), terms.M)],
     )
     yield "Velocity forces", "", [(sp.Symbol("V"), terms.V)]
