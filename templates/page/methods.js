@@ -10,7 +10,7 @@
 const methods = (() => {
   // After more iterations than SLOW the next step takes other factors; after more than MOST their end says
   // too little of the error, and Newton's method itself is taken.
-  const [SLOW, MOST] = [9, 15];
+  const [SLOW, MOST] = [12, 15];
   const [STATES, VELOCITIES] = [3, 3]; // at which it is looked whether leapfrog suits
 
   // What the engine is given, for a problem `of`. For small arrays a loop is faster than `set`.
