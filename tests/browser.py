@@ -19,7 +19,7 @@ CHROMIUM = (
     os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 )
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-DESK, PHONE = (1280, 800), (390, 844)
+DESK, PHONE = (1000, 640), (390, 844)
 TIMES = 10
 FILLED = 1 / 3
 """Least part of the picture's width or height that bodies fill in the course of a motion."""
@@ -182,7 +182,7 @@ def check_playing(opened: Opened) -> None:
 
 def check_scrubbing(opened: Opened, run: Run) -> None:
     """The slider of time leads to the state there."""
-    row = rows_of(run)[6]
+    row = rows_of(run)[-4]
     opened.page.locator("#time").evaluate(
         "(e, t) => { e.value = t; e.dispatchEvent(new Event('input')); }", float(run.t[row])
     )
@@ -265,6 +265,10 @@ def check_dragging(opened: Opened) -> None:
     assert away > 1e-3 * opened.view["height"], f"the pull moved it by {away:.2g} m only"
 
 
+FOCUS = """() => { const at = document.activeElement;
+  return [at?.id || at?.className || '', at === document.body]; }"""
+
+
 def check_keys(opened: Opened) -> None:
     """Everything by keys alone: time, mode, view, theme, and what Tab leads to."""
     page, press = opened.page, opened.page.keyboard.press
@@ -292,11 +296,9 @@ def check_keys(opened: Opened) -> None:
     seen, around = set(), 0
     for _ in range(400):
         press("Tab")
-        name = page.evaluate(
-            "document.activeElement?.id || document.activeElement?.className || ''"
-        )
+        name, is_body = page.evaluate(FOCUS)
         seen.add(name)
-        around += page.evaluate("document.activeElement === document.body")
+        around += is_body
         if around == 2:  # from where the focus was to the end, and all from the start
             break
     assert {"theme", "stage", "play", "time", "speed"} <= seen, seen

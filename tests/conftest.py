@@ -3,7 +3,7 @@
 import gc
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,8 @@ from campaign import FULL, is_kept
 from matplotlib.figure import Figure
 from mechanisms import BUILT_IN, Compiled, compiled
 from xdist.scheduler import LoadScopeScheduling
+
+from eomgen.native.compiler import Compiler
 
 TOGETHER = {
     "closed": "generated handout identities pivots program routes".split(),
@@ -100,14 +102,31 @@ def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def _in_short() -> Iterator[None]:
     """Calls and runs are timed as seldom as may be: no test asks how long something took. And C is
-    compiled without optimisation, which takes a third of the time and changes no bit:
-    `test_no_optimisation_changes_a_bit` of the native code shows that.
+    compiled without optimisation, which takes a third of the time and changes no bit: tests with
+    the fixture `optimised` show that.
     """
+
+    def plainly(self: Compiler, sources: Mapping[str, str], main: str, *flags: str) -> bytes:
+        texts = {
+            name: text.replace('optimize("O3", ', "optimize(") for name, text in sources.items()
+        }
+        return COMPILE(self, texts, main, *("-O0" if x[:2] == "-O" else x for x in flags))
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("eomgen.native.library.LEVELS", ("-O0", "-O0"))
+        patch.setattr(Compiler, "shared_library", plainly)
         patch.setattr("eomgen.study.timing.TIMING", 0.0)
         patch.setattr("eomgen.study.accuracy.work_precision.REPEATS", 0.0)
         yield
+
+
+COMPILE = Compiler.shared_library
+
+
+@pytest.fixture
+def optimised(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """C is compiled as for users."""
+    monkeypatch.setattr(Compiler, "shared_library", COMPILE)
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path / "optimised"))
 
 
 @pytest.fixture(scope="session", autouse=True)

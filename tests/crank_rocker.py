@@ -4,6 +4,11 @@ A, B, C, D = 0.3, 0.8, 0.6, 0.7
 """Lengths of a crank-rocker: crank, coupler, rocker and ground, m."""
 
 
+def lengths(*values: float) -> dict[str, float]:
+    """The parameters of bars of these lengths, so that many of them run by one generated module."""
+    return dict(zip("abcd", values, strict=True))
+
+
 def four_bar(
     lengths: tuple[float, float, float, float] = (A, B, C, D),
     initial: str = "q = { theta = 0.3 }",

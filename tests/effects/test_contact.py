@@ -24,7 +24,6 @@ from eomgen.base.errors import SceneError
 from eomgen.commands.main import main
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_program, python_module
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.base import Contact, JointLoad, Load
 from eomgen.scene.effects.vectors import NEAREST
@@ -588,10 +587,7 @@ def test_a_soft_contact_is_no_event_and_a_rigid_one_no_load() -> None:
 SLIDER = """
 name = "slider"
 dimensions = 2
-[[bodies]]
-name = "b"
-mass = 2.0
-inertia_com = 0.1
+bodies = [{ name = "b", mass = 2.0, inertia_com = 0.1 }]
 [[joints]]
 name = "j"
 type = "prismatic"
@@ -627,21 +623,6 @@ def test_a_rigid_stop_is_a_contact_of_each_limit(limits: str) -> None:
 
 
 # Only what is there.
-
-
-def test_absence_is_free() -> None:
-    """Without the effect the module is that of a scene that never had it; nothing is computed that
-    a contact does not have.
-    """
-    plain = made(free("a", "b", inertia=0.3), tangents=False).source
-    text = scene("spheres", PLANE, *HUNT, *RUB)
-    model = replace(elaborate(parse_scene(text).replaced(effects=[], outputs="all")), route="aba")
-    kept = tuple(name for name in model.outputs if name in KEPT)
-    assert python_module(compile_program(replace(model, outputs=kept)).system) == plain
-    assert made(text, tangents=False).source != plain
-    smooth = made(free("b") + contact('body = "b"', "radius = 0.1", *SPRING)).module
-    assert smooth.COST["derivative"].get("sqrt", 0) == 0
-    assert list(smooth.PARAMETERS)[2:] == ["e_radius", "e_stiffness"]
 
 
 @pytest.mark.parametrize(("lines", "most"), [((), 0), (RUB, 10)])

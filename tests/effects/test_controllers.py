@@ -1,7 +1,5 @@
 """Controllers with states of their own, against closed forms and hand-written equations."""
 
-import re
-
 import numpy as np
 import pytest
 from engine import engine, plain, quick
@@ -18,28 +16,16 @@ INERTIA = 0.4
 WHEEL = """\
 name = "wheel"
 outputs = "all"
-[[bodies]]
-name = "disc"
-mass = 1.0
-inertia_com = 0.4
-[[joints]]
-name = "axle"
-type = "revolute"
-parent = "world"
-child = "disc"
-coordinate = "q"
+bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.4 }]
+joints = [{ name = "axle", type = "revolute", parent = "world", child = "disc", coordinate = "q" }]
 """
 CART = """\
 name = "cart"
 outputs = "all"
-[[bodies]]
-name = "cart"
-mass = 2.0
-inertia_com = 0.1
-[[bodies]]
-name = "pole"
-mass = 0.5
-inertia_com = 0.02
+bodies = [
+    { name = "cart", mass = 2.0, inertia_com = 0.1 },
+    { name = "pole", mass = 0.5, inertia_com = 0.02 },
+]
 [[joints]]
 name = "rail"
 type = "prismatic"
@@ -62,14 +48,10 @@ ARM = """\
 name = "arm"
 dimensions = 3
 outputs = "all"
-[[bodies]]
-name = "upper"
-mass = 1.0
-inertia_com = [0.02, 0.03, 0.04]
-[[bodies]]
-name = "lower"
-mass = 0.5
-inertia_com = [0.015, 0.02, 0.03]
+bodies = [
+    { name = "upper", mass = 1.0, inertia_com = [0.02, 0.03, 0.04] },
+    { name = "lower", mass = 0.5, inertia_com = [0.015, 0.02, 0.03] },
+]
 [[joints]]
 name = "shoulder"
 type = "ball"
@@ -308,15 +290,6 @@ def test_dynamics_with_states(name: str) -> None:
     assert np.allclose(plain, module.derivative(0.4, y)[nq : nq + len(v)], atol=1e-10)
 
 
-@pytest.mark.parametrize("name", ["pid tracks", "own"])
-def test_columns(name: str) -> None:
-    """Many states at once."""
-    module = quick(SCENES[name]).module
-    states = np.stack([random_state(module, seed) for seed in range(6)], axis=1)
-    one = np.stack([module.derivative(0.2, y) for y in states.T], axis=1)
-    assert np.allclose(module.derivative(0.2, states), one, rtol=1e-13, atol=1e-14)
-
-
 @pytest.mark.every(4)
 @pytest.mark.parametrize(
     "integrator",
@@ -333,27 +306,6 @@ def test_integrators(integrator: str) -> None:
     assert run.finished
     off = 1e-5 if adaptive else {"euler": 1e-2, "semi_implicit_euler": 1e-2}.get(integrator, 1e-6)
     assert np.allclose(run.y[-1], exact, atol=off)
-
-
-def test_power() -> None:
-    """Kinetic energy grows by what the effects do."""
-    module = plain(SCENES["own"]).module
-    y, h = random_state(module, 4), 1e-6
-    f = module.derivative(0.0, y)
-    after, before = (module.kinetic_energy(0.0, x) for x in (y + h * f, y - h * f))
-    power = np.sum(module.effect_powers(0.0, y))
-    assert np.isclose((after - before) / (2 * h), power, rtol=1e-6)
-
-
-def test_absence_is_free() -> None:
-    """No states, functions or names of controllers where there are none."""
-    bare = plain(WHEEL)
-    bounded = re.compile(r"\bm(ax|in)\([a-z_]\w*, ")  # of a value, by a limit
-    assert not bounded.search(bare.source) and ", x=None" not in bare.source
-    assert bounded.search(plain(WHEEL + servo("pd", "limit = 1")).source)
-    straight = plain(WHEEL + servo("pd"))
-    assert straight.model.extra == () and not bounded.search(straight.source)
-    assert plain(WHEEL + servo("pd", "target_rate = 0")).source == straight.source
 
 
 CONTROLLER = '[[effects]]\ntype = "controller"\nname = "own"\n{}\n'

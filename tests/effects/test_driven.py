@@ -247,17 +247,15 @@ def test_rates_of_formulas(function: str) -> None:
 KAPITZA = """\
 name = "kapitza"
 outputs = "all"
-[parameters]
-a = 0.1
-w = 20.0
-[[bodies]]
-name = "pivot"
-mass = 0
-inertia_com = 0
-[[bodies]]
-name = "bob"
-mass = 1.0
-inertia_com = 0
+parameters = { a = 0.1, w = 20.0 }
+bodies = [
+    { name = "pivot", mass = 0, inertia_com = 0 },
+    { name = "bob", mass = 1.0, inertia_com = 0 },
+]
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "driven", name = "shaker", joint = "shaft", coordinate = "a*cos(w*t)" },
+]
 [[joints]]
 type = "prismatic"
 name = "shaft"
@@ -271,14 +269,6 @@ parent = "pivot"
 child = "bob"
 r_child = [0, -1]
 coordinate = "lean"
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "driven"
-name = "shaker"
-joint = "shaft"
-coordinate = "a*cos(w*t)"
 [initial.q]
 lean = 0.001
 """
@@ -336,18 +326,15 @@ TURNTABLE = """\
 name = "turntable"
 outputs = "all"
 dimensions = 3
-[parameters]
-w = 6.0
-l = 0.8
-m = 1.3
-[[bodies]]
-name = "post"
-mass = 2.0
-inertia_com = [0.1, 0.1, 0.1]
-[[bodies]]
-name = "bob"
-mass = "m"
-inertia_com = [0, 0, 0]
+parameters = { w = 6.0, l = 0.8, m = 1.3 }
+bodies = [
+    { name = "post", mass = 2.0, inertia_com = [0.1, 0.1, 0.1] },
+    { name = "bob", mass = "m", inertia_com = [0, 0, 0] },
+]
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "driven", name = "table", joint = "axle", coordinate = "w*t" },
+]
 [[joints]]
 type = "revolute"
 name = "axle"
@@ -362,14 +349,6 @@ child = "bob"
 axis = [0, 1, 0]
 r_child = [0, 0, "l"]
 coordinate = "angle"
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "driven"
-name = "table"
-joint = "axle"
-coordinate = "w*t"
 """
 
 

@@ -21,14 +21,8 @@ BALL = """\
 name = "ball"
 outputs = "all"
 dimensions = {}
-[[bodies]]
-name = "ball"
-mass = 0.7
-inertia_com = {}
-[[joints]]
-name = "flight"
-type = "free"
-child = "ball"
+bodies = [{{ name = "ball", mass = 0.7, inertia_com = {} }}]
+joints = [{{ name = "flight", type = "free", child = "ball" }}]
 """
 BEAD = """\
 name = "bead"

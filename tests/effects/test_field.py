@@ -9,7 +9,6 @@ from spatial_trees import PLANE, SPACE
 
 from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import generate
 from eomgen.scene.reader import parse_scene, read_scene
 
 MASS = 0.7
@@ -18,14 +17,8 @@ name = "ball"
 outputs = "all"
 route = "aba"
 dimensions = {}
-[[bodies]]
-name = "ball"
-mass = 0.7
-inertia_com = {}
-[[joints]]
-name = "flight"
-type = "free"
-child = "ball"
+bodies = [{{ name = "ball", mass = 0.7, inertia_com = {} }}]
+joints = [{{ name = "flight", type = "free", child = "ball" }}]
 """
 FIELD = '[[effects]]\ntype = "field"\nname = "pull"\n'
 BODY = FIELD + 'body = "ball"\n'
@@ -193,18 +186,6 @@ def test_a_constant_force_has_a_closed_form(at: str) -> None:
     one, other = (plain(text, route).module for route in ("closed", "aba"))
     y = np.array([0.4, 1.5])
     np.testing.assert_allclose(one.derivative(0.0, y), other.derivative(0.0, y), rtol=1e-13)
-
-
-def test_absence_is_free() -> None:
-    """Without the effects the module is that of a scene that never had them."""
-    bare = BALL.format(PLANE, 0.03)
-    texts = [
-        FIELD.replace("pull", kind) + f'body = "ball"\n{keys}\n' for kind, keys in KINDS.items()
-    ]
-    once = parse_scene(bare + "".join(texts))
-    never = generate(elaborate(parse_scene(bare))).module
-    assert generate(elaborate(once)).module != never
-    assert generate(elaborate(once.replaced(effects=()))).module == never
 
 
 def test_the_particles_pass_every_obstacle() -> None:

@@ -8,7 +8,6 @@ from scipy.integrate import solve_ivp
 from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_scene
-from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem
 from eomgen.scene.reader import parse_scene
 
@@ -296,18 +295,6 @@ def test_jacobian_and_energy(scene: str, more: str) -> None:
             for x in (y + h * f, y - h * f)
         )
         assert abs(after - before) / (2 * h) < 1e-6
-
-
-def test_columns_and_a_run() -> None:
-    """Many states at once, and a run of the whole program."""
-    module = plain(SPACE + PULL.format("at = [2.0, 1.0, 3.0]")).module
-    states = np.stack([random_state(module, seed) for seed in range(4)], axis=1)
-    one = np.stack([module.derivative(0.0, y) for y in states.T], axis=1)
-    assert np.allclose(module.derivative(0.0, states), one, rtol=1e-13)
-    problem = as_problem(module)
-    run = integrate(problem, "DOP853", 2.0, rtol=1e-11)
-    energy = [module.kinetic_energy(0.0, y) + module.potential_energy(0.0, y) for y in run.y]
-    assert np.ptp(energy) < 1e-8
 
 
 def test_plain_gravity_is_as_it_was() -> None:

@@ -627,7 +627,7 @@ def test_jacobian_of_large_scenes(name: str) -> None:
     """Some columns, as central differences in 60 digits have them."""
     m = moment(name, "", 61)
     J = m.module.jacobian(m.t, m.doubles, u=m.u)
-    for i in np.random.default_rng(62).choice(len(m.y), 6, replace=False):
+    for i in np.random.default_rng(62).choice(len(m.y), 3, replace=False):
         column = along(lambda y: m.at("derivative", y), m.y, exact(np.eye(len(m.y))[i]))
         assert apart(J[:, i], column) < ROUNDING
 

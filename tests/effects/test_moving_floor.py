@@ -15,28 +15,15 @@ G, RADIUS, BALL, FLOOR = 9.81, 0.3, 2.0, 3.0
 SHAKEN = """\
 name = "shaken"
 outputs = ["kinetic_energy", "potential_energy", "effect_powers"]
-[parameters]
-a = 0.03
-w = 20.0
-e = 0.5
-[[bodies]]
-name = "floor"
-mass = 3.0
-inertia_com = 0.1
-[[bodies]]
-name = "ball"
-mass = 2.0
-inertia_com = 0.03
-[[joints]]
-name = "lift"
-type = "prismatic"
-parent = "world"
-child = "floor"
-axis = [0, 1]
-[[joints]]
-name = "flight"
-type = "free"
-child = "ball"
+parameters = { a = 0.03, w = 20.0, e = 0.5 }
+bodies = [
+    { name = "floor", mass = 3.0, inertia_com = 0.1 },
+    { name = "ball", mass = 2.0, inertia_com = 0.03 },
+]
+joints = [
+    { name = "lift", type = "prismatic", parent = "world", child = "floor", axis = [0, 1] },
+    { name = "flight", type = "free", child = "ball" },
+]
 [[effects]]
 type = "gravity"
 g = 9.81
@@ -124,18 +111,11 @@ def test_a_drive_bears_what_rests_on_its_floor(name: str) -> None:
 ARMS = """\
 name = "arms"
 dimensions = 3
-[[bodies]]
-name = "base"
-mass = 1.5
-inertia_com = [0.05, 0.06, 0.07]
-[[bodies]]
-name = "upper"
-mass = 0.9
-inertia_com = [0.02, 0.03, 0.025]
-[[bodies]]
-name = "lower"
-mass = 0.6
-inertia_com = [0.01, 0.012, 0.011]
+bodies = [
+    { name = "base", mass = 1.5, inertia_com = [0.05, 0.06, 0.07] },
+    { name = "upper", mass = 0.9, inertia_com = [0.02, 0.03, 0.025] },
+    { name = "lower", mass = 0.6, inertia_com = [0.01, 0.012, 0.011] },
+]
 [[joints]]
 name = "table"
 type = "revolute"

@@ -7,21 +7,17 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
-from typing import Any
 
 import numpy as np
 import pytest
 from campaign import some
-from engine import MP, Digits, Engine, along, apart, engine
+from engine import MP, Engine, along, apart, engine
 from scipy.integrate import solve_ivp
 from spatial_newton_euler import SpatialMotion, solve
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.base.errors import SceneError
-from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_program, python_module
-from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.vectors import NEAREST
 from eomgen.scene.reader import parse_scene
 from eomgen.tables.outputs import OUTPUTS
@@ -30,15 +26,6 @@ EXACT = 1e-12
 KEPT = ("applied_force", "kinetic_energy", "potential_energy", "momentum")
 """Outputs, besides those that every module has, that are looked at here."""
 M = 2.0
-
-
-def exact_dynamics(made: Engine, y: np.ndarray) -> Dynamics:
-    """The model at a state, in 60 digits."""
-    model = made.model
-    parameters = {p.name: MP.mpf(p.default) for p in model.parameters}
-    nq = len(model.coordinates)
-    state = [MP.mpf(x) for x in y]
-    return Dynamics(model, Values(parameters, {}, state[:nq], state[nq:]), Digits())
 
 
 # Scenes.
@@ -419,8 +406,6 @@ KINDS = {
         "joint_stop", "low = -0.5", "high = 0.5", "stiffness = 90.0", "damping = 7.0"
     ),
 }
-KEEPING = ("spring", "no_length", "rope", "joint_spring", "joint_stop")
-LOSING = ("damper", "friction")
 
 
 def linked(table: str) -> str:
@@ -428,45 +413,6 @@ def linked(table: str) -> str:
     bodies = SLIDER.replace('"b"', '"a"').replace('name = "j"', 'name = "j0"')
     second = PENDULUM[PENDULUM.index("[[bodies]]") :].replace('"world"', '"a"')
     return bodies + second + table
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_change_of_energy_is_the_power_of_the_effects(kind: str) -> None:
-    """dT/dt is the power of all; of what has potential energy, power is minus its change."""
-    found = made(linked(KINDS[kind]))
-    own, rng = found.model.effects[-1], np.random.default_rng(5)
-
-    def own_energy(y: np.ndarray) -> Any:
-        return own.potential_energy(exact_dynamics(found, y))
-
-    worked = 0.0
-    for _ in range(6):
-        y = np.array([MP.mpf(x) for x in found.random_state(rng)])
-        rate = found.exactly("derivative", y)
-        here = exact_dynamics(found, y)
-        powers = [here.power(e) for e in found.model.effects]
-        kinetic = along(partial(found.exactly, "kinetic_energy"), y, rate)
-        potential = along(partial(found.exactly, "potential_energy"), y, rate)
-        size = 1 + sum(map(abs, powers))
-        assert abs(kinetic - sum(powers)) < 1e-25 * size
-        change = along(own_energy, y, rate)
-        lost = powers[-1] + change  # what is put in beside the potential energy
-        worked = max(worked, abs(powers[-1]))
-        if kind in KEEPING:
-            assert abs(lost) < 1e-25 * size
-            assert abs(kinetic + potential) < 1e-25 * size
-        elif "law" not in kind:
-            assert lost < 1e-25 * size
-            assert kind not in LOSING or change == 0
-        else:
-            assert change == 0
-        module, plain = found.module, y.astype(float)
-        values = Values(module.PARAMETERS, {}, plain[:2], plain[2:])
-        in_doubles = Dynamics(found.model, values, FloatScalars())
-        doubles = sum(in_doubles.power(e) for e in found.model.effects)
-        assert abs(doubles - float(kinetic)) < 1e-10 * size
-    assert worked > 0.1
 
 
 # Derivatives, and points that meet.
@@ -556,20 +502,6 @@ def test_the_energy_of_points_that_meet_has_the_force_for_a_slope() -> None:
 
 
 # Only what is there.
-
-
-@pytest.mark.every(2)
-@pytest.mark.parametrize("kind", KINDS)
-def test_absence_is_free(kind: str) -> None:
-    """Without the effect the module is that of a scene that never had it."""
-    plain = made(linked("")).source
-    table = KINDS[kind]
-    scene = parse_scene(linked(table)).replaced(outputs="all")
-    without = scene.replaced(effects=[e for e in scene.effects if e.name != "e"])
-    model = replace(elaborate(without), route="aba")
-    kept = tuple(name for name in model.outputs if name in KEPT)
-    assert python_module(compile_program(replace(model, outputs=kept)).system) == plain
-    assert made(linked(table)).source != plain
 
 
 def test_nothing_is_computed_that_a_spring_does_not_have() -> None:

@@ -105,18 +105,10 @@ def test_a_unit_moves_as_our_own_run(scene: str, t_end: float, folder: Path) -> 
     np.testing.assert_allclose(exchanged(path, t_end), run.y[-1], rtol=1e-8, atol=1e-8)
 
 
-@pytest.fixture
-def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Units are compiled without optimisation, which changes no bit."""
-    monkeypatch.setattr("eomgen.exports.fmu.FLAGS", ("-O0", "-fvisibility=hidden"))
-
-
 @pytest.mark.every(6)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("method", METHODS)
-def test_each_method_moves_as_our_own_run(
-    scene: str, method: str, tmp_path: Path, quickly: None
-) -> None:
+def test_each_method_moves_as_our_own_run(scene: str, method: str, tmp_path: Path) -> None:
     """Impacts, a stiff motion, a quaternion, a loop, rolling; equal steps to the bit."""
     source, t_end = SCENES[scene], {"ball": 1.6, "contacts": 0.9, "rolling": 0.04}.get(scene, 0.2)
     try:
@@ -159,7 +151,7 @@ initial = { v = { q_dot = 3.0 } }
 """
 
 
-def test_steps_pass_over_no_brief_force(tmp_path: Path, quickly: None) -> None:
+def test_steps_pass_over_no_brief_force(tmp_path: Path) -> None:
     """A cam that brakes for 7 ms in a communication step of 4 s."""
     path = eomgen.export(CAM, "fmu", tmp_path / "unit.fmu")[0]
     found = simulate_fmu(

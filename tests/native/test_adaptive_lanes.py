@@ -174,12 +174,8 @@ def test_default_tolerances_are_those_of_a_single_run(
 
 STEEP = """
 name = "steep"
-
-[[bodies]]
-name = "bob"
-mass = 1.0
-inertia_com = 0
-
+bodies = [{ name = "bob", mass = 1.0, inertia_com = 0 }]
+initial = { q = { theta = -1.4 } }
 [[joints]]
 name = "pivot"
 type = "revolute"
@@ -187,20 +183,15 @@ parent = "world"
 child = "bob"
 r_child = [-1.0, 0]
 coordinate = "theta"
-
 [[effects]]
 type = "gravity"
 g = 9.81
-
 [[effects]]
 type = "field"
 name = "push"
 kind = "formula"
 body = "bob"
 force = ["1/(1 + exp(900*x))", 0]
-
-[initial]
-q = { theta = -1.4 }
 """
 """A pendulum with a force that overflows beyond x = 0.79 m, although it is finite there."""
 

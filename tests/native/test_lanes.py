@@ -287,14 +287,13 @@ STIFF = """
 name = "stiff"
 bodies = [{ name = "rod", mass = 1.0, inertia_com = 0.1 }]
 effects = [{ type = "joint_spring", name = "spring", joint = "pin", stiffness = 1e6 }]
+initial = { q = { a = 0.2 } }
 [[joints]]
 name = "pin"
 type = "revolute"
 parent = "world"
 child = "rod"
 coordinate = "a"
-[initial]
-q = { a = 0.2 }
 """
 
 
@@ -349,3 +348,18 @@ def test_stable_runs_are_not_taken_for_unstable(scene: str) -> None:
     k, _, _ = ours.prepare(p.T)
     _, sound = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=0.2, dt=2e-4, every=1000)
     assert sound.all()
+
+
+def test_no_optimisation_changes_a_bit(request: pytest.FixtureRequest) -> None:
+    """Other tests compile without it."""
+    texts = lanes.sources(*interfaced_program_of(check(read("two_body_forced"))), ())
+    y, p, u = members(kernels("two_body_forced")[1], 21)
+    found = []
+    for about in ("plain", "optimised"):
+        if about == "optimised":
+            request.getfixturevalue("optimised")
+        ours = Lanes(texts, lanes.width(), about)
+        k, _, _ = ours.prepare(p.T)
+        rows, _ = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=0.2, dt=0.01, every=5)
+        found.append((rows.tobytes(), ours.output("derivative", 0.0, y, k, u)[0].tobytes()))
+    assert found[0] == found[1]

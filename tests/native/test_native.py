@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import call
@@ -52,8 +52,8 @@ OUTPUTS = (
 
 @cache
 def pair(scene: str) -> tuple[Any, Any]:
-    """A scene's compiled module, without optimisation, which takes long, and its Python module. Of
-    a large scene an ordinary run compiles the derivative alone.
+    """A scene's compiled module, and its Python module. Of a large scene an ordinary run compiles
+    the derivative alone.
     """
     if scene in some(LARGE, ()):
         system = compile_program(check(read(scene)), jacobian=False).system
@@ -64,9 +64,7 @@ def pair(scene: str) -> tuple[Any, Any]:
     else:
         made = eomgen.generate(scene, backend="c")
         python, sources = load_module(made.reference, made.name), made.library
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(library, "LEVELS", ("-O0", "-O0"))
-        return compiled_module(python, library.built(sources)), python
+    return compiled_module(python, library.built(sources)), python
 
 
 def result(call: Callable[[], Any]) -> Any:
@@ -107,55 +105,55 @@ def test_the_bits_are_those_of_the_python_module(scene: str) -> None:
         assert same(ours(0.7, np.tile(y.T, 7)), np.tile(together, 7)), name  # of whole registers
 
 
-@pytest.mark.parametrize("level", some(["-O2", "-O3"], ["-O1", "-O2", "-O3"]))
-def test_no_optimisation_changes_a_bit(level: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("level", some(["-O2"], ["-O1", "-O2", "-O3"]))
+def test_no_optimisation_changes_a_bit(
+    level: str, monkeypatch: pytest.MonkeyPatch, optimised: None
+) -> None:
     """Nothing is contracted and no order is changed."""
     monkeypatch.setattr(library, "LEVELS", (level, level))
-    compiled = eomgen.load(eomgen.generate("two_body", backend="c"))
-    _, python = pair("two_body")
+    compiled = eomgen.load(eomgen.generate("double_pendulum", backend="c"))
+    python = eomgen.load(eomgen.generate("double_pendulum"))
     for seed in range(200):
         y = random_state(python, np.random.default_rng(seed))
         assert same(compiled.derivative(0.0, y), python.derivative(0.0, y))
         assert same(compiled.jacobian(0.0, y), python.jacobian(0.0, y))
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"y": [0.0] * 8},
-        {"y": np.zeros(7)},
-        {"y": np.full(8, np.nan)},
-        {"y": np.full(8, 1e200)},
-        {"y": np.full(8, 1e19)},
-        {"y": np.zeros(8, dtype=np.float32)},
-        {"y": np.ma.masked_equal(np.arange(8.0), 3)},
-        {"y": np.zeros((8, 0))},
-        {"y": np.array([np.zeros(8), np.full(8, np.inf), np.ones(8), np.full(8, 1e200)]).T},
-        {"y": np.ones(8)[::-1], "p": {"m_A": 2.0}},
-        {"y": np.ones(8), "p": {"m_A": -1.0}},
-        {"y": np.ones(8), "p": {"m_X": 1.0}},
-        {"y": np.ones(8), "p": {"m_A": 1e80}},
-        {"y": np.ones(8), "p": {"m_A": np.nan}},
-        {"y": np.ones(8), "p": {"m_A": "1"}},
-        {"y": np.ones(8), "p": [1, 1, 1, 1, 1, 1, 9]},
-        {"y": np.ones(8), "p": np.ones(3)},
-        {"y": np.ones(8), "p": "text"},
-        {"y": np.ones(8), "u": {"push": 1.0}},
-        {"y": np.ones(8), "u": np.zeros(0)},
-        {"y": "text"},
-        {"y": np.array(1.0)},
-        {"y": np.zeros((8, 2, 2))},
-    ],
-    ids=range(23),
-)
-def test_what_is_wrong_gets_the_same_answer(given: dict[str, Any]) -> None:
+WRONG: list[dict[str, Any]] = [
+    {"y": [0.0] * 8},
+    {"y": np.zeros(7)},
+    {"y": np.full(8, np.nan)},
+    {"y": np.full(8, 1e200)},
+    {"y": np.full(8, 1e19)},
+    {"y": np.zeros(8, dtype=np.float32)},
+    {"y": np.ma.masked_equal(np.arange(8.0), 3)},
+    {"y": np.zeros((8, 0))},
+    {"y": np.array([np.zeros(8), np.full(8, np.inf), np.ones(8), np.full(8, 1e200)]).T},
+    {"y": np.ones(8)[::-1], "p": {"m_A": 2.0}},
+    {"y": np.ones(8), "p": {"m_A": -1.0}},
+    {"y": np.ones(8), "p": {"m_X": 1.0}},
+    {"y": np.ones(8), "p": {"m_A": 1e80}},
+    {"y": np.ones(8), "p": {"m_A": np.nan}},
+    {"y": np.ones(8), "p": {"m_A": "1"}},
+    {"y": np.ones(8), "p": [1, 1, 1, 1, 1, 1, 9]},
+    {"y": np.ones(8), "p": np.ones(3)},
+    {"y": np.ones(8), "p": "text"},
+    {"y": np.ones(8), "u": {"push": 1.0}},
+    {"y": np.ones(8), "u": np.zeros(0)},
+    {"y": "text"},
+    {"y": np.array(1.0)},
+    {"y": np.zeros((8, 2, 2))},
+]
+
+
+@pytest.mark.parametrize("name", ["derivative", "jacobian", "kinetic_energy"])
+def test_what_is_wrong_gets_the_same_answer(name: str) -> None:
     """A state without a result, columns among others, arguments of a wrong kind."""
-    compiled, python = pair("two_body")
-    y, rest = given["y"], {k: v for k, v in given.items() if k != "y"}
-    for name in ("derivative", "jacobian", "kinetic_energy"):
-        one = result(lambda name=name: getattr(compiled, name)(0.0, y, **rest))
-        other = result(lambda name=name: getattr(python, name)(0.0, y, **rest))
-        assert same(one, other), (one, other)
+    both = pair("two_body")
+    for given in WRONG:
+        y, rest = given["y"], {k: v for k, v in given.items() if k != "y"}
+        found = [result(partial(getattr(module, name), 0.0, y, **rest)) for module in both]
+        assert same(*found), (given, found)
 
 
 @pytest.mark.every(2)
@@ -444,14 +442,15 @@ def test_several_at_once_and_one_killed(fresh: Path) -> None:
     command = [sys.executable, "-c", code]
     slow = script(fresh / "slow", f'case "$1" in --version) ;; *) sleep 60;; esac; exec {CC} "$@"')
     killed = subprocess.Popen(command, env={**os.environ, "CC": slow}, stdout=subprocess.DEVNULL)
-    others = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    said = {process.communicate()[0] for process in others}
+    other = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    made = eomgen.load(eomgen.generate("pendulum", route="aba", backend="c"))
+    said = other.communicate()[0]
     killed.kill()
     killed.wait()
     python = eomgen.load(eomgen.generate("pendulum", route="aba"))
-    assert said == {python.derivative(0.0, np.ones(2)).tobytes().hex() + "\n"}
     again = eomgen.load(eomgen.generate("pendulum", route="aba", backend="c"))
-    assert again.derivative(0.0, np.ones(2)).tobytes().hex() + "\n" in said
+    for module in (python, made, again):
+        assert module.derivative(0.0, np.ones(2)).tobytes().hex() + "\n" == said
 
 
 def test_a_library_says_what_it_holds() -> None:
@@ -464,7 +463,9 @@ def test_a_library_says_what_it_holds() -> None:
     assert compiled.STATES == pair("cart_pole")[1].STATES
 
 
-def test_the_page_on_c_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_on_c_is_right(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Its program is compiled by its command and prints what it says."""
     page = (Path(__file__).parent.parent.parent / "docs" / "c.md").read_text("utf-8")
     (text,) = re.findall(r"^```c\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
@@ -475,5 +476,6 @@ def test_the_page_on_c_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
     assert done.stdout == f"{wanted}\n"
     (text,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == re.findall(r"# prints (.*)", text)
+    capsys.readouterr()
+    exec(compile(text, "docs/c.md", "exec"), {})
+    assert capsys.readouterr().out.splitlines() == re.findall(r"# prints (.*)", text)

@@ -14,7 +14,6 @@ from crank_rocker import four_bar
 
 import eomgen
 from eomgen.api.given import check
-from eomgen.native import lanes
 from eomgen.run.module import load_module
 from eomgen.scene.built_in import built_in_names
 from eomgen.store import generated_code
@@ -77,12 +76,9 @@ FUNCTIONS %= (
 
 @cache
 def pair(scene: str, method: str = "rk4") -> tuple[eomgen.Stepper, eomgen.Stepper, Any]:
-    """The steps of a scene in C, compiled quickly, and in NumPy; and its module."""
-    with pytest.MonkeyPatch.context() as patch:
-        for width, (_, *others) in lanes.FLAGS.items():
-            patch.setitem(lanes.FLAGS, width, ("-O1", *others))
-        given = {"dt": 1e-3, "method": method, "lanes": LANES}
-        found = [eomgen.stepper(scene, backend=name, **given) for name in ("c", "numpy")]
+    """The steps of a scene in C and in NumPy, and its module."""
+    given = {"dt": 1e-3, "method": method, "lanes": LANES}
+    found = [eomgen.stepper(scene, backend=name, **given) for name in ("c", "numpy")]
     model = check(scene)
     return found[0], found[1], load_module(generated_code(model).module, model.name)
 

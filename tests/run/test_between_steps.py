@@ -167,7 +167,7 @@ def test_a_sliding_mode_ends_a_run_in_a_line() -> None:
 
 def test_a_relay_that_swings_is_no_sliding_mode() -> None:
     """It falls from 0.5 in 1 s, and is back after 4 s."""
-    run = chosen(SLIDER.format(force="-1 if x > 0 else 1", x=0.5, v=0.0, t_end=40), 1e-5)
+    run = chosen(SLIDER.format(force="-1 if x > 0 else 1", x=0.5, v=0.0, t_end=16), 1e-5)
     assert run.choice.met
     assert run.trajectory.y[-1] == pytest.approx([0.5, 0.0], abs=1e-5)
 

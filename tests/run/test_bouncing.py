@@ -79,45 +79,6 @@ restitution = {e}
     assert unaccounted(made, run) < 1e-9
 
 
-PENDULA = 'name = "cradle"\noutputs = "all"\n' + "".join(
-    f"""
-[[bodies]]
-name = "b{i}"
-mass = 0.2
-inertia_com = 0
-[[joints]]
-name = "j{i}"
-type = "revolute"
-parent = "world"
-child = "b{i}"
-r_parent = [{0.1 * i}, 0]
-r_child = [0, 0.5]
-coordinate = "q{i}"
-"""
-    for i in range(5)
-)
-
-
-@pytest.mark.every(2)
-@pytest.mark.parametrize("moving", [1, 2])
-def test_newtons_cradle(moving: int) -> None:
-    """As many swing out as swung in, as far, half a period later; the others hang still."""
-    start = -0.4
-    made = plain(
-        PENDULA
-        + GRAVITY
-        + '[[effects]]\ntype = "contact"\nname = "hit"\nlaw = "impact"\nagainst = "each_other"\n'
-        + 'bodies = "all"\nradius = 0.05\nrestitution = 1.0\n[initial.q]\n'
-        + "".join(f"q{i} = {start}\n" for i in range(moving))
-    )
-    period = 4 * math.sqrt(0.5 / G) * ellipk(math.sin(start / 2) ** 2)
-    run = ran(made, period / 2)
-    expected = np.zeros(10)
-    expected[5 - moving : 5] = -start
-    assert apart(run.y[-1], expected) < 1e-7
-    assert unaccounted(made, run) < 1e-8
-
-
 @pytest.mark.parametrize("integrator", ["DOP853", "rk4"])
 def test_a_pendulum_bounces_off_its_stop(integrator: str) -> None:
     """Halves of its swing: each rebound rises to e² of the energy before."""
@@ -185,47 +146,6 @@ b_angle = {angle!r}
     creep = 1e-3 * share / math.sqrt(1 - share**2)
     run = ran(made[0.2], 0.5, "LSODA")
     assert abs(np.linalg.norm(run.y[-1, 3:5]) - creep) < 1e-3 * creep
-
-
-def test_a_ball_leaves_a_driven_table() -> None:
-    """It lies on the table until that falls faster than g, and then flies."""
-    a, w = 0.05, 20.0
-    made = plain(f"""
-name = "shaker"
-outputs = "all"
-parameters = {{ a = {a}, w = {w} }}
-bodies = [
-    {{ name = "table", mass = 2.0, inertia_com = 0.1 }},
-    {{ name = "ball", mass = 0.1, inertia_com = 1e-4 }},
-]
-joints = [
-    {{ name = "lift", type = "prismatic", parent = "world", child = "table", axis = [0, 1] }},
-    {{ name = "flight", type = "free", child = "ball" }},
-]
-initial = {{ q = {{ ball_y = 0.05 }}, v = {{ ball_y_dot = {a * w} }} }}
-{GRAVITY}
-[[effects]]
-type = "driven"
-name = "shaker"
-joint = "lift"
-coordinate = "a*sin(w*t)"
-[[effects]]
-type = "contact"
-name = "plate"
-law = "impact"
-body = "ball"
-radius = 0.05
-other = "table"
-restitution = 0.5
-""")
-    run = ran(made, 0.08)
-    lifts = [event for event in run.events if event.kind == "lift"]
-    leaves = math.asin(G / (a * w**2)) / w
-    assert len(lifts) == 1
-    assert abs(lifts[0].t - leaves) < 1e-8
-    y, v = 0.05 + a * math.sin(w * leaves), a * w * math.cos(w * leaves)
-    flight = 0.08 - leaves
-    assert abs(run.y[-1, 1] - (y + v * flight - G * flight**2 / 2)) < 1e-8
 
 
 def test_two_bodies_bounce_until_they_lie_still() -> None:

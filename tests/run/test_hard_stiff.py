@@ -50,16 +50,10 @@ name = "servo"
 bodies = [{ name = "b", mass = 1.0, inertia_com = 0.1 }]
 joints = [{ name = "j", type = "revolute", parent = "world", child = "b", r_child = [0, 1] }]
 initial = { q = { j_angle = 1.0 } }
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "pd"
-name = "hold"
-joint = "j"
-target = 0.5
-stiffness = 1e8
-damping = 1e7
+effects = [
+    { type = "gravity", g = 9.81 },
+    { type = "pd", name = "hold", joint = "j", target = 0.5, stiffness = 1e8, damping = 1e7 },
+]
 """
 DROPPED = """
 name = "dropped"

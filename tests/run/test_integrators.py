@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign import some
 from campaigns import energy
 from scipy.integrate import DOP853, RK45, solve_ivp
 from scipy.special import ellipj, ellipk
@@ -131,20 +130,6 @@ def test_order_is_the_stated_one(name):
     assert order == pytest.approx(INTEGRATORS[name].order, abs=0.1)
 
 
-def test_orders_are_the_textbook_ones():
-    assert {name: INTEGRATORS[name].order for name in FIXED} == {
-        "euler": 1,
-        "semi_implicit_euler": 1,
-        "leapfrog": 2,
-        "leapfrog_4": 4,
-        "leapfrog_6": 6,
-        "rk4": 4,
-        "implicit_midpoint": 2,
-        "gauss_4": 4,
-        "gauss_6": 6,
-    }
-
-
 @pytest.mark.parametrize("name", ADAPTIVE)
 def test_adaptive_method_meets_its_tolerance(name):
     errors = {}
@@ -244,12 +229,6 @@ def test_symplectic_steps_keep_areas(name):
     assert abs(growth("rk4")) > 1e-8
 
 
-def test_euler_gains_energy():
-    energy = pendulum_energy(run(PENDULUM, "euler", 20.0, dt=0.01).y)
-    assert np.all(np.diff(energy[::100]) > 0)
-    assert energy[-1] - energy[0] > 0.05
-
-
 @pytest.mark.every(2)
 @pytest.mark.parametrize("name", GAUSS)
 @pytest.mark.parametrize("dt", [0.05, 0.2])
@@ -263,59 +242,6 @@ def test_gauss_conserves_quadratic_invariants(name, dt):
     for weights in (INERTIA, INERTIA**2):  # twice the energy, and |angular momentum|^2
         invariant = body.y**2 @ weights
         assert invariant == pytest.approx(invariant[0], rel=1e-14)
-
-
-def attracted(t, y):
-    """Two axes of a planet's motion, r'' = -r/|r|^3."""
-    return np.array([y[2], y[3], *(-y[:2] / np.hypot(*y[:2]) ** 3)])
-
-
-def attracted_jacobian(t, y):
-    r = np.hypot(*y[:2])
-    pull = 3 * np.outer(y[:2], y[:2]) / r**5 - np.eye(2) / r**3
-    return np.block([[np.zeros((2, 2)), np.eye(2)], [pull, np.zeros((2, 2))]])
-
-
-PLANET = Problem(
-    name="planet",
-    states=("x", "y", "x_dot", "y_dot"),
-    positions=(0, 1),
-    derivative=attracted,
-    jacobian=attracted_jacobian,
-    initial=np.array([0.4, 0.0, 0.0, 2.0]),
-)
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize("name", [*GAUSS, *LEAPFROGS])
-def test_angular_momentum_of_a_planet_is_kept(name):
-    """Eccentricity 0.6, 5 revolutions; the momentum is 0.8, and bilinear."""
-    orbit = run(PLANET, name, 31.0, dt=0.04).y
-    momentum = orbit[:, 0] * orbit[:, 3] - orbit[:, 1] * orbit[:, 2]
-    assert momentum == pytest.approx(0.8, rel=2e-14)
-    off = run(PLANET, "rk4", 31.0, dt=0.04).y
-    momentum = off[:, 0] * off[:, 3] - off[:, 1] * off[:, 2]
-    assert np.abs(momentum - 0.8).max() > 1e-8
-
-
-@pytest.mark.parametrize("name", GAUSS)
-def test_the_length_of_a_quaternion_is_kept(name):
-    """Without normalisation: q' = q w / 2 is linear in q, and |q|² quadratic."""
-
-    def matrix(t):
-        x, y, z = math.cos(t), 2 * math.sin(3 * t), 1.5
-        return np.array([[0, -x, -y, -z], [x, 0, z, -y], [y, -z, 0, x], [z, y, -x, 0]]) / 2
-
-    turning = Problem(
-        name="turning",
-        states=("w", "x", "y", "z"),
-        positions=(0, 1, 2, 3),
-        derivative=lambda t, q: matrix(t) @ q,
-        jacobian=lambda t, q: matrix(t),
-        initial=np.array([1.0, 0.0, 0.0, 0.0]),
-    )
-    lengths = np.linalg.norm(run(turning, name, 40.0, dt=0.1).y, axis=1)
-    assert lengths == pytest.approx(1, abs=1e-14)
 
 
 @pytest.mark.parametrize("name", ["euler", "rk4", "gauss_4"])
@@ -583,8 +509,8 @@ def test_a_singular_matrix_is_in_the_message(method):
 def test_runs_in_threads_keep_their_remarks_apart():
     """Each has its own remarks in any interleaving, and Python's warning filters stay unchanged."""
     filters = list(warnings.filters)
-    asked = [(_opposite, "LSODA", {}), (_singular, "Radau", {"max_steps": 300})] * 2
-    asked += [(_singular, "BDF", {"max_steps": 300}), (_opposite, "Radau", {"max_steps": 100})]
+    asked = [(_opposite, "LSODA", {}), (_singular, "Radau", {"max_steps": 100})]
+    asked += [(_singular, "BDF", {"max_steps": 100}), (_opposite, "Radau", {"max_steps": 100})]
 
     def message(slope, method, options):
         return integrate(_misled(slope), method, 200.0, **options).message
@@ -922,23 +848,6 @@ def test_canonical_momenta_tell_the_same_motion(tumbling):
         for d in np.eye(4) * 1e-6
     ]
     assert problem.jacobian(0.0, y) == pytest.approx(np.array(columns).T, abs=1e-8)
-
-
-@pytest.mark.every(3)
-@pytest.mark.parametrize(("form", "name"), energy.RUNS)
-def test_energy_over_many_periods(tumbling, form, name):
-    """A short version of `campaigns/energy.py`, which runs 1e5 of them."""
-    periods = some(60, 2000)
-    times, change = energy.run(tumbling[form], name, periods, energy.STEPS[name])
-    found = energy.drift(times, change)
-    if name == "rk4":
-        assert found.slope < -20 * found.error
-        assert found.slope * periods == pytest.approx(change[-1], rel=0.2)
-    else:
-        assert abs(found.slope) * periods < found.band / 20
-        assert abs(found.slope) < 1.5e-6 * some(10, 1)
-        half = len(change) // 2
-        assert np.abs(change[half:]).max() == pytest.approx(found.band, rel=0.3), "it does not grow"
 
 
 # --- progress, imports --------------------------------------------------------------------------

@@ -81,7 +81,7 @@ def test_spikes(tightest: Any) -> None:
         assert abs(width - WIDTH) < 1e-9
 
 
-@pytest.mark.parametrize("rtol", some(["1e-6", "1e-8", "1e-10"], list(cart.LADDER)))
+@pytest.mark.parametrize("rtol", some(["1e-6", "1e-10"], list(cart.LADDER)))
 def test_published_ladder(rtol: str) -> None:
     """Error and evaluations of DOP853.
 
@@ -104,14 +104,15 @@ def test_default_tolerances_are_wrong_and_report_success(method: str) -> None:
     assert found > 0.05
 
 
-@pytest.mark.parametrize("rtol", some(["1e-13"], list(cart.FLOOR)))
+@pytest.mark.full
+@pytest.mark.parametrize("rtol", list(cart.FLOOR))
 def test_lu_has_a_floor(rtol: str, tightest: Any) -> None:
     """M's condition number is 4e6 at the spikes, and its rounding is never made good again.
 
     Where the floor lies is left to rounding: 8e-10 to 2e-8 from starts that differ by single
     doubles; published are 9.4e-10 and 3.05e-9.
     """
-    found, _ = cart.errors(some(1, 4), "DOP853", rtol, derivative=cart.by_lu)
+    found, _ = cart.errors(4, "DOP853", rtol, derivative=cart.by_lu)
     assert cart.FLOOR[rtol] / 6 < median(found) < cart.FLOOR[rtol] * 6
     assert min(found) > 50 * cart.error(tightest.y)
 

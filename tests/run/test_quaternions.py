@@ -41,11 +41,12 @@ def off_unit(asked: Problem, y: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("scene", some(["spinning_top"], ["tumbling_body", "spinning_top"]))
-def test_twenty_thousand_steps_stay_on_the_sphere(scene: str) -> None:
+def test_steps_stay_on_the_sphere(scene: str) -> None:
     """Classical Runge-Kutta of the tumbling body and of the top: below 1e-12 off, at every row."""
     asked, dt = problem(scene), 5e-4
-    run = integrate(asked, "rk4", 20_000 * dt, dt=dt, samples=1001)
-    assert run.finished and run.counts["steps"] == 20_000
+    steps = some(5_000, 1_000_000)
+    run = integrate(asked, "rk4", steps * dt, dt=dt, samples=1001)
+    assert run.finished and run.counts["steps"] == steps
     assert off_unit(asked, run.y) < 1e-12
 
 

@@ -51,10 +51,9 @@ VALUES = {"p": 1.3, "u": -0.6}
 DRIVEN = """
 name = "driven"
 dimensions = 2
-[[bodies]]
-name = "bead"
-mass = 2.0
-inertia_com = 0
+bodies = [{ name = "bead", mass = 2.0, inertia_com = 0 }]
+effects = [{ type = "motor", name = "push", joint = "wire", torque = "3*cos(2*t)" }]
+initial = { q = [0.1], v = [0.2] }
 [[joints]]
 name = "wire"
 type = "prismatic"
@@ -62,14 +61,6 @@ parent = "world"
 child = "bead"
 axis = [1, 0]
 coordinate = "x"
-[[effects]]
-type = "motor"
-name = "push"
-joint = "wire"
-torque = "3*cos(2*t)"
-[initial]
-q = [0.1]
-v = [0.2]
 """
 
 

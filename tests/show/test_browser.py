@@ -32,7 +32,10 @@ def run() -> Run:
     return eomgen.simulate("double_pendulum", t_end=2.0, samples=201)
 
 
-def test_a_page_does_what_it_must(browser: Any, run: Run, tmp_path: Path) -> None:
+def test_a_page_does_what_it_must(
+    browser: Any, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("browser.TIMES", 5)
     save_page(run.motion, run.page(), tmp_path / "page.html")
     assert "bodies fill" in check_page(browser, tmp_path / "page.html", run)
 
@@ -74,23 +77,14 @@ SENT = """() => new Promise((done) => {
 })"""
 
 
-def test_nothing_can_be_sent(browser: Any, run: Run, tmp_path: Path) -> None:
-    """The content security policy is closed, whatever a script in the page would try."""
-    path = tmp_path / "page.html"
-    save_page(run.motion, run.page(), path)
-    page = browser.new_page()
-    asked: list[str] = []
-    page.on("requestfinished", lambda request: asked.append(request.url))
-    page.goto(f"{path.as_uri()}#still")
-    assert page.evaluate(SENT) == ["connect-src", "img-src", "script-src-elem"]
-    assert asked == [path.as_uri()]
-    page.close()
-
-
-def test_pictures_are_saved_as_vectors(browser: Any, run: Run, tmp_path: Path) -> None:
-    """Bodies are where the page shows them, curves have their values, and a PDF has no pixels."""
+def test_pictures_are_saved_and_nothing_is_sent(browser: Any, run: Run, tmp_path: Path) -> None:
+    """In vectors: bodies are where the page shows them, curves have their values, and a PDF has no
+    pixels. The content security policy is closed, whatever a script in the page would try.
+    """
     save_page(run.motion, run.page(), tmp_path / "page.html")
     with opened(browser, tmp_path / "page.html") as page:
+        sent: list[str] = []
+        page.page.on("requestfinished", lambda request: sent.append(request.url))
         page.at(1.0)
         drawn = []
         for button in ("#save-svg", ".plot-tools >> text=SVG"):
@@ -115,6 +109,11 @@ def test_pictures_are_saved_as_vectors(browser: Any, run: Run, tmp_path: Path) -
         slope, level = np.polyfit(wanted, y, 1)
         assert slope < 0 and np.abs(slope * wanted + level - y).max() < 0.1
         assert b"/Subtype /Image" not in page.page.pdf()
+        assert page.page.evaluate(SENT) == ["connect-src", "img-src", "script-src-elem"]
+        assert not [url for url in sent if "invalid" in url]
+        assert all("Content Security Policy" in text for text in page.said)
+        page.said.clear()
+        del page.asked[1:]
 
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -52,12 +52,8 @@ CORNERS = """
 name = "wheel"
 parameters = { k = 400.0 }
 bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.4 }]
-[[joints]]
-name = "axle"
-type = "revolute"
-parent = "world"
-child = "disc"
-coordinate = "q"
+joints = [{ name = "axle", type = "revolute", parent = "world", child = "disc", coordinate = "q" }]
+initial = { q = { q = 0.3 }, v = { q_dot = 5.0 } }
 [[effects]]
 type = "motor"
 name = "cam"
@@ -75,9 +71,6 @@ joint = "axle"
 viscous = 0.02
 coulomb = 0.1
 speed = 0.01
-[initial]
-q = { q = 0.3 }
-v = { q_dot = 5.0 }
 """
 """A wheel between springy stops, that a narrow cam brakes; long steps would pass over it."""
 RUN = """
