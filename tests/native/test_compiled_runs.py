@@ -435,7 +435,7 @@ def test_each_function_is_that_of_its_module(name: str) -> None:
                 assert values[0].tobytes() == values[1].tobytes(), what
                 compared.add((what, python is plain))
     assert len(compared) == (12 if plain.contacts else 4)
-    assert ours.compiled is not None and ours.compiled.steps("rodas_5p", ()) is not None
+    assert ours.compiled is not None and ours.compiled.steps("Rodas5P", ()) is not None
     y = plain.initial
     assert plain.derivative(0.3, y).tobytes() != perturbed.derivative(0.3, y).tobytes()
 
