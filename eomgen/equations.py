@@ -46,11 +46,11 @@ class Derivation:
 
     @property
     def matrices(self) -> "Matrices":
-        """The equations as matrices. Raises `SceneError` if they are too long to be written out."""
+        """The equations as matrices. Raises `SceneError` if they are not written out."""
         if self.exposition.matrices is None:
             raise SceneError(
-                f"derive: M, V, G and F of {self.name} are too long to be written out as "
-                f"expressions; a module computes their numbers: `{NUMBERS}`"
+                f"derive: M, V, G and F of {self.name} are not written out as expressions, but "
+                f"as an algorithm; a module computes their numbers: `{NUMBERS}`"
             )
         return self.exposition.matrices
 
