@@ -16,7 +16,6 @@ from eomgen.base.templating import render, templates_folder
 from eomgen.show.drawing_data import drawing_data
 from eomgen.show.motion import Array, Motion
 from eomgen.show.picture_data import geometry_values
-from eomgen.store import kept_text
 
 MOST_NUMBERS = 16_000
 """As many numbers of states as a page holds in double precision, or twice as many in single."""
@@ -98,17 +97,19 @@ def render_page(motion: Motion, code: PageCode) -> str:
         "live": code.live,
         "data": data,
         "mechanism": code.source,
-        "steps": kept_text("steps of pages", _steps) if code.live else "",
+        "steps": _steps() if code.live else "",
         "three": f"/*\n{licence}*/\n{(three / 'three.min.js').read_text(encoding='utf-8')}",
     }
     return render("page", "page.html", context, html=True)
 
 
 def _steps() -> str:
-    # Imported here because the engine's text is printed once for all pages.
+    """The engine of live pages, printed once for all of them."""
+    # Imported here because only live pages need them.
     from eomgen.engine.printed import steps_of_pages
+    from eomgen.store import kept_text
 
-    return steps_of_pages()
+    return kept_text("steps of pages", steps_of_pages)
 
 
 def save_page(motion: Motion, code: PageCode, path: Path, force: bool = False) -> None:
