@@ -160,7 +160,7 @@ def test_a_derivation_in_ascii(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert main(["derive", "two_body", "-o", str(target)]) == 0
     terminal.seek(0)
     shown = terminal.read()
-    assert "omega_B = phidot + thetadot" in shown and "\\u" not in shown
+    assert "omega_B = thetadot + phidot" in shown and "\\u" not in shown
     assert "ψ_A = θ" in target.read_text("utf-8")
 
 

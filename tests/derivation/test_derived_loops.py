@@ -168,7 +168,7 @@ def test_matrices_of_the_freedoms_against_the_module(scene: str) -> None:
 
 def test_three_formats_and_sketches() -> None:
     """The steps in text, HTML and LaTeX; the loop's force at both bodies."""
-    found = eomgen.derive("four_bar")
+    found = eomgen.derive("four_bar", detail="all")
     text, page, paper = found.text(), found.html(), found.latex()
     titles = [step.title for step in found.steps]
     assert "Constraint `rocker_pin`: velocities" in titles

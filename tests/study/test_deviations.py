@@ -14,7 +14,8 @@ from whipple import TABLE
 
 import eomgen
 from eomgen.api.given import check
-from eomgen.api.linearising import Point, linearisable, linearised_at
+from eomgen.api.linearising import linearisable, linearised_at
+from eomgen.api.options import PointOptions
 from eomgen.tables.outputs import SAVED
 
 SLED = """
@@ -151,7 +152,7 @@ def test_what_rolls_against_states_that_meet_the_constraints(name: str, tmp_path
     shown = eomgen.state_space(scene, at="initial", outputs=outputs)
     heads = tuple(x for x in outputs if x in SAVED)
     model = replace(linearisable(check(scene)), outputs=heads)
-    module: Any = linearised_at(model, Point("initial")).module
+    module: Any = linearised_at(model, PointOptions(scene, at="initial")).module
     rows, rolling = len(module.CONSTRAINTS), len(module.VELOCITY_CONSTRAINTS)
     nq = len(module.POSITIONS)
     nv = len(module.STATES) - nq
