@@ -213,6 +213,28 @@ def mujoco_constrained(
     return np.asarray((free + inverse @ forces)[made.v])
 
 
+def mujoco_wrenches(
+    tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs = None
+) -> np.ndarray:
+    """Force and moment of each of the tree's `joints` on its parent, as the scene language has it.
+
+    At the joint's point on the child, in world axes, (nj, 6) in the plane too.
+    """
+    import mujoco
+
+    made = _mujoco_run(tree, q, v, u)
+    model, data = made.model, made.data
+    mujoco.mj_rnePostConstraint(model, data)
+    wrenches = []
+    for body, k in zip(tree.bodies, made.bodies, strict=True):
+        if body.joint.kind != "free":
+            moment, force = data.cfrc_int[k, :3], data.cfrc_int[k, 3:]  # on the child, at `about`
+            about = data.subtree_com[model.body_rootid[k]]
+            point = data.xpos[k] + data.xmat[k].reshape(3, 3) @ body.joint.r_child
+            wrenches.append([*-force, *-(moment + np.cross(about - point, force))])
+    return np.array(wrenches).reshape(-1, 6)
+
+
 # Pinocchio.
 
 
