@@ -7,9 +7,8 @@ Before it, `scene.reader` reads a scene, `model.elaborate` makes a model of it, 
 keeps the generated code, and `run` loads and integrates it.
 """
 
-import gc
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from eomgen.base.errors import RunError
@@ -76,20 +75,6 @@ class Compiled:
         return lines
 
 
-@contextmanager
-def _seldom_collected() -> Iterator[None]:
-    """Look for garbage seldom: a program is a hundred thousand things that are kept, and to go
-    through them again and again takes a third of the time.
-    """
-    before = gc.get_threshold()
-    gc.set_threshold(before[0] and max(before[0], 100_000), 20, 20)
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
-
-
-@_seldom_collected()
 def generate(model: Model, *, jacobian: bool = True) -> Generated:
     """Derive a model's equations and write them as code. Equal models give equal bytes.
 
@@ -143,7 +128,6 @@ class Live:
     saved: Mapping[str, int]
 
 
-@_seldom_collected()
 def live(model: Model, geometry: Sequence[Formula] = (), *, series: bool = False) -> Live:
     """The functions of a model's page, of its interactive model; `geometry` are formulas of
     parameters and time, the entries of the function of that name. With `series` they have those of

@@ -1,7 +1,6 @@
 """Generated modules, executed, against an independent solver in maximal coordinates."""
 
 import ast
-import gc
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,12 +11,9 @@ from campaign import some
 from mechanisms import BUILT_IN, SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
 from newton_euler import Mechanism, Motion
 
-from eomgen import pipeline
 from eomgen.base.errors import SceneError
-from eomgen.model.elaborate import elaborate
-from eomgen.model.model import Model
 from eomgen.pipeline import compile_scene
-from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.scene.reader import parse_scene
 
 TOLERANCE = 1e-12
 MANY = some(150, 1000)
@@ -399,22 +395,3 @@ def test_no_place_and_no_date(built_in: Compiled) -> None:
     assert "/home" not in built_in.source
     assert str(Path(__file__).parent.parent.parent) not in built_in.source
     assert not re.search(r"\b20\d\d-\d\d", built_in.source)
-
-
-def test_garbage_is_looked_for_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
-    """While code is generated, and afterwards as often as before."""
-    seen, check = [], pipeline.check_nonsingular
-
-    def watched(model: Model) -> None:
-        seen.append(gc.get_threshold()[0])
-        check(model)
-
-    monkeypatch.setattr(pipeline, "check_nonsingular", watched)
-    before = gc.get_threshold()
-    try:
-        gc.set_threshold(700, 10, 10)
-        pipeline.generate(elaborate(read_scene("pendulum")), jacobian=False)
-        assert gc.get_threshold() == (700, 10, 10)
-    finally:
-        gc.set_threshold(*before)
-    assert seen == [100_000]
