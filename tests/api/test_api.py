@@ -219,8 +219,9 @@ def test_how_a_run_ends_is_data() -> None:
     assert run.outcome.kind == "interrupted" and run.message.startswith("interrupted at t = ")
 
 
-def test_nothing_of_the_process_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The collector of whoever calls is left as it is."""
+def test_nothing_of_the_process_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The collector of whoever calls is left as it is, whether or not the store has the module."""
+    monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
     monkeypatch.setattr("gc.set_threshold", None)
     monkeypatch.setattr("gc.disable", None)
     assert eomgen.load(eomgen.generate("acrobot")).NAME == "acrobot"
