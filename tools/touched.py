@@ -15,6 +15,7 @@ TESTS = ROOT / "tests"
 PLACES = {
     "eomgen/scene/effects": "effects",
     "eomgen/commands": "api",
+    "eomgen/engine": "native run subset",
     "eomgen/exposition": "derivation",
     "eomgen/model": "scene",
     "eomgen/scalars": "program",
@@ -29,7 +30,7 @@ PLACES = {
     "templates": "codegen",
     "generated": "codegen",
 }
-"""Folders whose tests have another name, the inner ones first."""
+"""Folders whose tests have other names, the inner ones first."""
 
 
 def changed(base: str) -> list[str]:
@@ -46,7 +47,7 @@ def tests_of(path: str) -> set[Path]:
     parts = Path(path).parts
     for folder, name in PLACES.items():
         if path.startswith(f"{folder}/"):
-            return {TESTS / name}
+            return {TESTS / each for each in name.split()}
     if parts[0] == "eomgen":
         folder = TESTS / parts[1]
         return {folder} if folder.is_dir() else {TESTS / "api"}
