@@ -1,6 +1,7 @@
 """Derivations read to their end: Ẏ by nothing but the printed equations is that of the module."""
 
 import sys
+from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
@@ -51,13 +52,22 @@ def model_of(scene: str) -> Model:
     return with_closed_form(assembled(elaborate(found)))
 
 
+@pytest.fixture
+def deep() -> Iterator[None]:
+    """What is looked up needs what is looked up in turn. Other tests expect Python's own limit."""
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(20_000)
+    yield
+    sys.setrecursionlimit(limit)
+
+
 @pytest.mark.every(2)
+@pytest.mark.usefixtures("deep")
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_last_step_by_the_printed_equations(scene: str) -> None:
     """Each entry of Ẏ looked up, and what it needs looked up in turn; Y is the module's state."""
     model, found = model_of(scene), eomgen.derive(scene)
     module = eomgen.load(eomgen.generate(scene))
-    sys.setrecursionlimit(20_000)
     for seed in range(2):
         at = instant(model, seed, 0.02, closed=bool(model.constraints))
         start = {name: x for name, x in at.known.items() if not _follows(model, name)}
