@@ -135,6 +135,20 @@ def test_a_terminal_of_ascii(tmp_path: Path, name: str, how: str) -> None:
     assert "\\u" not in done.stdout or name == "schema"  # as JSON spells it anywhere
 
 
+@pytest.mark.parametrize("name", some(QUICKER[::2], list(COMMANDS)))
+@pytest.mark.every(4)
+def test_a_full_output_ends_no_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    """Of each command: all its files, one line of what was lost, and 1."""
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert main([word.format(out=tmp_path) for word in COMMANDS[name].split()]) == 1
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1] == "eomgen: standard output cannot be written: No space left on device"
+    assert len(list(tmp_path.iterdir())) == WRITES.get(name, 0)
+
+
 @pytest.mark.every(2)
 @pytest.mark.parametrize("name", some(QUICKER[1::2], list(COMMANDS)))
 def test_ascii_and_a_closed_error_stream(
