@@ -94,6 +94,8 @@ def constant(*values: float) -> tuple[Formula, ...]:
 
 def difference(a: Formula, b: Formula) -> Formula:
     """a - b, without terms that are 0."""
+    if isinstance(a, Constant) and isinstance(b, Constant):
+        return Constant(a.value - b.value)
     if b == ZERO:
         return a
     if a == b:

@@ -16,7 +16,10 @@ def drawing_data(motion: Motion) -> tuple[dict[str, Any], Geometry]:
 
     A number is a number, or `{"of": k}`, the k-th of these formulas. Keys:
 
-    bodies, joints, elements, traces, size    of the `Picture`
+    bodies, joints, traces, size    of the `Picture`
+    marks     frames of its `marks`, each with the index of its symbol; ends: where links are held
+    symbols   of marks, each a list of lines
+    planes, balls, winds    its elements of these kinds
     camera    mode, center (m, world axes; in mode "follow" from the followed body's centre),
               height and width (m) that it shows at least, follow (an index or null), azimuth,
               elevation (degrees), background (null for the theme's)

@@ -12,7 +12,6 @@ from eomgen.scene.constraints.base import ConstraintTable
 from eomgen.scene.effects.elements import WORLD_INDEX, Element, Vector, Wind
 from eomgen.scene.joints.base import WORLD, kinds_of, spatial
 from eomgen.show.arrows import wind_at
-from eomgen.show.joint_axes import zero_direction
 
 COIL, SYMBOL = 0.06, 0.14
 """Radius of a coil, and of what is drawn at a joint, relative to the mechanism's size."""
@@ -56,9 +55,6 @@ class _Layout:
 
     def coordinates(self, joint: str) -> tuple[str, ...]:
         return tuple(c.name for c in self._model.bodies[self.child(joint)].positions)
-
-    def zero(self, joint: str) -> Vector | None:
-        return zero_direction(self._model, self._model.bodies[self.child(joint)])
 
     def point(self, name: str) -> tuple[int, Vector]:
         point = next(point for point in self._model.points if point.name == name)

@@ -31,10 +31,13 @@ def joint_axis(model: Model, body: Body) -> tuple[Formula, ...] | None:
     return constant(*(_fixed_rotation(body) @ axis))
 
 
-def zero_direction(model: Model, body: Body) -> tuple[Formula, ...] | None:
-    """A unit vector across the axis of a revolute joint, in the parent's axes, at coordinate 0.
+def directions_across(
+    model: Model, body: Body
+) -> tuple[tuple[Formula, ...], tuple[Formula, ...]] | None:
+    """Two unit vectors across the axis of a revolute joint, in the parent's axes.
 
-    It points to the child's centre of mass, if that is beside the axis.
+    The first points to the child's centre of mass at coordinate 0, if that is beside the axis; a
+    turn by a right angle leads to the second.
     """
     joint = body.joint
     if kinds_of(joint, model.dimensions) != ["revolute"]:
@@ -46,8 +49,12 @@ def zero_direction(model: Model, body: Body) -> tuple[Formula, ...] | None:
     if np.linalg.norm(across) <= 1e-9 * np.linalg.norm(arm):
         one = np.eye(3)[np.argmin(np.abs(axis))]
         across = one - (one @ axis) * axis
-    across = _fixed_rotation(body) @ (across / np.linalg.norm(across))
-    return constant(*across[: model.dimensions])
+    across = across / np.linalg.norm(across)
+    first, second = (
+        constant(*(_fixed_rotation(body) @ one)[: model.dimensions])
+        for one in (across, np.cross(axis, across))
+    )
+    return first, second
 
 
 def _fixed_rotation(body: Body) -> NDArray[np.float64]:

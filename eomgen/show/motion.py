@@ -38,17 +38,6 @@ class Plane:
     offset: float
 
 
-@dataclass(frozen=True)
-class Ball:
-    """A fixed ball or, with a `reach` beyond its surface, an obstacle of a force field; m, world
-    axes.
-    """
-
-    center: tuple[float, ...]
-    radius: float
-    reach: float | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A run of a mechanism: n samples, ny states, nb bodies, nj joints that hold a common point.
@@ -60,7 +49,7 @@ class Motion:
     joint_drift   distance between a joint's points on parent and child
     anchors       points to mark as joints
     works         done since the start by each effect, or by all of a type; None if not asked for
-    planes, balls fixed obstacles that bodies touch or avoid
+    planes        fixed obstacles that bodies touch
     framing       the view of a picture of it, or what determines it
     keeps_energy  whether exact motion conserves energy
     picture       of which the shapes are a part; its numbers are formulas of parameters
@@ -90,7 +79,6 @@ class Motion:
     works: Array | None = None  # (n, m) J, of m effects
     effects: tuple[str, ...] = ()  # m names
     planes: tuple[Plane, ...] = ()
-    balls: tuple[Ball, ...] = ()
     keeps_energy: bool = True
     picture: Picture | None = None
     drawn: Picture | None = None
@@ -104,7 +92,6 @@ class Motion:
         assert self.works is None or self.works.shape == (n, len(self.effects))
         assert all(len(anchor) == 1 + self.dimensions for anchor in self.anchors)
         assert all(len(plane.normal) == self.dimensions for plane in self.planes)
-        assert all(len(ball.center) == self.dimensions for ball in self.balls)
 
     @property
     def dimensions(self) -> int:

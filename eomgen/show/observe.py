@@ -11,13 +11,14 @@ from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.appearance import Appearance
+from eomgen.scene.effects import elements
 from eomgen.scene.joints.base import WORLD, Primitive
+from eomgen.scene.look import number, numbers
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.framing import Framing
-from eomgen.show.motion import Anchor, Motion
+from eomgen.show.motion import Anchor, Motion, Plane
 from eomgen.show.of_run import fixed_points, leading_bodies, spread, with_run
-from eomgen.show.picture import picture_of
-from eomgen.show.surroundings import balls_of, planes_of
+from eomgen.show.picture import Picture, picture_of
 from eomgen.show.view import eye_axes
 
 
@@ -82,12 +83,18 @@ def observe(
         quaternions=tuple(getattr(module, "QUATERNIONS", ())),
         works=works,
         effects=effects,
-        planes=planes_of(model),
-        balls=balls_of(model),
+        planes=planes_of(drawn),
         keeps_energy=keeps_energy(model, inputs or {}),
         picture=picture,
         drawn=drawn,
     )
+
+
+def planes_of(drawn: Picture) -> tuple[Plane, ...]:
+    """The planes of contacts with the world, without repeats."""
+    planes = (e for e in drawn.elements if isinstance(e, elements.Plane))
+    fixed = (e for e in planes if e.body == elements.WORLD_INDEX)
+    return tuple(dict.fromkeys(Plane(numbers(e.normal), number(e.offset)) for e in fixed))
 
 
 def joint_drift(model: Model, poses: FloatArray) -> FloatArray:

@@ -27,7 +27,7 @@ from eomgen.show.colours import body_colours
 from eomgen.show.connections import hidden_rods
 from eomgen.show.effect_elements import SYMBOL, elements_of, elements_of_constraints
 from eomgen.show.invented import invented_shapes, inventor_of
-from eomgen.show.joint_axes import joint_axis, slides
+from eomgen.show.joint_axes import directions_across, joint_axis, slides
 
 MOST_TRACES = 12
 """Greatest number of points whose paths are drawn: more paths would hide everything else."""
@@ -50,6 +50,10 @@ class DrawnBody:
 class DrawnJoint:
     """A joint: the indices of its bodies (-1 for the world), its point on each, and in space or of
     a slider its axis, a unit vector of three components in the parent's axes.
+
+    across  at a revolute joint two unit vectors across its axis, in the parent's axes: that from
+            which the coordinate is counted, towards the child's centre of mass if that is beside
+            the axis, and that towards which it turns
     """
 
     name: str
@@ -59,6 +63,7 @@ class DrawnJoint:
     child: int
     at_child: Vector
     axis: Vector | None
+    across: tuple[Vector, Vector] | None
 
 
 @dataclass(frozen=True)
@@ -168,7 +173,7 @@ def _holders(model: Model) -> list[tuple[int, Body]]:
 def _joint(model: Model, k: int, body: Body) -> DrawnJoint:
     joint, zero = body.joint, (ZERO,) * model.dimensions
     if not joint.holds:
-        return DrawnJoint(joint.name, joint.type, WORLD_INDEX, zero, k, zero, None)
+        return DrawnJoint(joint.name, joint.type, WORLD_INDEX, zero, k, zero, None, None)
     return DrawnJoint(
         joint.name,
         joint.type,
@@ -177,6 +182,7 @@ def _joint(model: Model, k: int, body: Body) -> DrawnJoint:
         k,
         joint.r_child,
         joint_axis(model, body),
+        directions_across(model, body),
     )
 
 

@@ -1,20 +1,23 @@
 """A picture as data for a page, and the formulas that the page evaluates for it."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from eomgen.language.formula import Formula, evaluate, names_in
 from eomgen.language.rewriting import plain_data
 from eomgen.scalars.floats import FloatScalars
-from eomgen.scene.effects.elements import Element, Link, Round, without_formula
+from eomgen.scene.effects.elements import Plane, Round, Wind, without_formula
+from eomgen.show.marks import marks_of
 from eomgen.show.picture import Picture
+from eomgen.show.symbols import END, Symbol
 
 Geometry = tuple[Formula, ...]
 """Formulas of parameters and the time `t`. A page evaluates them at each change of them."""
 
 
 def picture_data(picture: Picture) -> tuple[dict[str, Any], Geometry]:
-    """Bodies, joints, elements, traces and size as tables and lists for JSON, and its geometry.
+    """Bodies, joints, marks, symbols and the rest as tables and lists for JSON, and the geometry.
 
     A number is a number, or `{"of": k}`: the k-th formula of the geometry.
     """
@@ -28,25 +31,29 @@ def picture_data(picture: Picture) -> tuple[dict[str, Any], Geometry]:
     def data(value: Any) -> Any:
         return plain_data(value, place)
 
+    winds = tuple(e for e in picture.elements if isinstance(e, Wind))  # a page shows it by motion
+    rest = tuple(e for e in picture.elements if not isinstance(e, Wind))
+    symbols: dict[Symbol, int] = {}
+    marks, ends = [], []
+    for mark in marks_of(replace(picture, elements=rest)):
+        table = {"kind": mark.frame.kind} | data(mark.frame) | {"layer": mark.layer}
+        if mark.symbol is END:
+            ends.append(table["at"])
+        else:
+            marks.append(table | {"symbol": symbols.setdefault(mark.symbol, len(symbols))})
     tables = {
         "bodies": data(picture.bodies),
         "joints": data(picture.joints),
-        "elements": [_element(e, data(without_formula(e))) for e in picture.elements],
+        "marks": marks,
+        "symbols": [data(symbol) for symbol in symbols],
+        "ends": ends,
+        "planes": [data(e) for e in rest if isinstance(e, Plane)],
+        "balls": [data(e) for e in rest if isinstance(e, Round) and e.body < 0],
+        "winds": [data(without_formula(e)) for e in winds],
         "traces": data(picture.traces),
         "size": picture.size,
     }
     return tables, tuple(places)
-
-
-def _element(element: Element, table: dict[str, Any]) -> dict[str, Any]:
-    """An element's table with its kind, and with the keys that the page knows."""
-    table = {"kind": element.kind} | table
-    if isinstance(element, Link):
-        table["from"], table["to"] = table.pop("start"), table.pop("end")
-    table.pop("formula", None)
-    if isinstance(element, Round) and element.axis == ():
-        table["axis"] = None
-    return table
 
 
 def geometry_values(geometry: Geometry, values: Mapping[str, float], t: float = 0.0) -> list[float]:

@@ -5,24 +5,22 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
 from matplotlib.patches import Polygon as Patch
 
 from eomgen.scene.look import BARE
-from eomgen.show.framing import View
-from eomgen.show.motion import INSTANTS, MOST_MARKS, Array, Ball, Motion, instants, paths
+from eomgen.show.motion import INSTANTS, MOST_MARKS, Array, Motion, instants, paths
 from eomgen.show.outlines import outline, turned
+from eomgen.show.strokes import Sight, strokes
 from eomgen.show.style import ink_on, mixed
-from eomgen.show.symbols import Sight, strokes
 
 SPREAD = 20
 """Size of planes relative to that of the motion, since a wide view shows more than the motion."""
 
-LAYERS = {"back": 2.5, "middle": 1.5 + INSTANTS, "front": 3 + INSTANTS}
+LAYERS = {"fixed": 1.2, "back": 2.5, "middle": 1.5 + INSTANTS, "front": 3 + INSTANTS}
 """Order in which lines are drawn; the bodies at the last time have 2 + INSTANTS."""
 
-FILL, SURFACE, REACH = 0.08, 0.4, 0.25
-"""Strength of the ink of fixed objects: their inside, their surface, the reach of a field."""
+FILL, SURFACE = 0.08, 0.4
+"""Strength of the ink of fixed objects: their inside and their surface."""
 
 
 def draw_plane(
@@ -45,8 +43,6 @@ def draw_plane(
     for (row, strength), order in zip(rows, orders, strict=True):
         draw_pose(axes, motion, motion.poses[row], strength, zorder=order)
     draw_symbols(axes, motion, rows[-1][0], np.eye(3))
-    for ball in motion.balls:
-        draw_ball(axes, ball, np.array(ball.center), motion.camera)
     _draw_planes(axes, motion)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.06)
@@ -55,49 +51,32 @@ def draw_plane(
 
 
 def draw_symbols(axes: Axes, motion: Motion, row: int, eye: Array) -> None:
-    """Draw springs, motors, supports and the like at a sample, seen along the axes `eye`."""
+    """Draw springs, motors, supports and the like at a sample, seen along the axes `eye`.
+
+    The view is extended to show fixed things that are smaller than the camera's height.
+    """
     if motion.drawn is None:
         return
     paper = motion.camera.background
-    ink = mixed(paper, ink_on(paper), 0.75)
     for stroke in strokes(Sight(motion.drawn, motion.poses[row], eye)):
-        order = LAYERS[stroke.layer]
+        line, order = stroke.line, LAYERS[stroke.layer]
         if motion.dimensions == 3 and stroke.layer == "middle":
             order = LAYERS["back"]  # all bodies are one image there
-        lines = ":" if stroke.dashed else "-"
-        if stroke.closed:
-            axes.fill(*stroke.points.T, fc=paper, ec=ink, lw=stroke.weight, zorder=order)
-        else:
-            axes.plot(*stroke.points.T, color=ink, lw=stroke.weight, ls=lines, zorder=order)
-
-
-def draw_ball(axes: Axes, ball: Ball, center: Array, camera: View) -> None:
-    """Draw a fixed ball at its `center` in the picture, behind the bodies.
-
-    The view is extended to show balls that are smaller than the camera's height.
-    """
-    paper = camera.background
-    ink = ink_on(paper)
-    surface = Circle(
-        (center[0], center[1]),
-        ball.radius,
-        facecolor=mixed(paper, ink, FILL) if ball.reach is None else "none",
-        edgecolor=mixed(paper, ink, SURFACE),
-        linewidth=0.8,
-        zorder=1.2,
-    )
-    (axes.add_patch if 2 * ball.radius <= camera.height else axes.add_artist)(surface)
-    if ball.reach is not None:
-        reach = Circle(
-            (center[0], center[1]),
-            ball.radius + ball.reach,
-            facecolor="none",
-            edgecolor=mixed(paper, ink, REACH),
-            linewidth=0.8,
-            linestyle=":",
-            zorder=1.1,
+        size = float(np.ptp(stroke.points, axis=0).max())
+        small = not line.dashed and size <= motion.camera.height
+        seen_whole = stroke.layer != "fixed" or small
+        outline = Patch(
+            stroke.points,
+            closed=bool(np.allclose(stroke.points[0], stroke.points[-1])),
+            fc="none" if line.fill is None else mixed(paper, ink_on(paper), line.fill),
+            ec=mixed(paper, ink_on(paper), line.ink),
+            lw=line.weight,
+            ls=":" if line.dashed else "-",
+            capstyle="round",
+            joinstyle="round",
+            zorder=order,
         )
-        axes.add_artist(reach)
+        (axes.add_patch if seen_whole else axes.add_artist)(outline)
 
 
 def _draw_planes(axes: Axes, motion: Motion) -> None:

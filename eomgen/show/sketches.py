@@ -16,11 +16,14 @@ from eomgen.model.model import Body, Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point
+from eomgen.show.symbols import BASE, numbers_of
 
 Expr = Any
 OBLIQUE = 0.5
 ANGLE = math.radians(35.0)
 WIDE, HIGH, MARGIN = 520.0, 340.0, 46.0
+GROUND = 12.0
+"""How far below its joint the ground is."""
 MOST_NAMED = 6
 """The most bodies of a sketch whose arms are named."""
 
@@ -231,17 +234,16 @@ def _marks(shape: Shape, at: Any, model: Model, few: bool) -> Iterator[Item]:
         yield Label((centre[0] - 11, centre[1] - 12), shape.body.name, "axis")
     if shape.own is not None:
         own = at(shape.own)
-        yield Dot(own, 4.2, False, "arm")
         if shape.body.parent < 0:
             yield from _ground(own)
+        yield Dot(own, 4.2, False, "arm")
 
 
 def _ground(p: Point) -> Iterator[Item]:
-    """Hatching under a joint on the world."""
-    x, y = p[0], p[1] - 7
-    yield Line(((x - 16, y), (x + 16, y)), "axis")
-    for i in range(5):
-        yield Line(((x - 12 + 7 * i, y), (x - 18 + 7 * i, y - 7)), "axis")
+    """What holds a joint on the world."""
+    for line in BASE:
+        down = (numbers_of(point) for point in line.points)
+        yield Line(tuple((p[0] + GROUND * y, p[1] - GROUND * x) for x, y in down), "axis")
 
 
 def _world_axes(pose: Pose) -> Iterator[Item]:

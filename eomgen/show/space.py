@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgb
 
 from eomgen.scene.look import BARE
 from eomgen.show.motion import MOST_MARKS, Array, Motion, instants, paths
-from eomgen.show.plane import FILL, SURFACE, draw_ball, draw_symbols
+from eomgen.show.plane import FILL, SURFACE, draw_symbols
 from eomgen.show.raster import frame_around, render_solids
 from eomgen.show.solid import solids
 from eomgen.show.style import FAINT, ink_on, mixed
@@ -45,8 +45,6 @@ def draw_space(
     floor = floor_under(motion, cast)
     rows = instants(motion) if rows is None else rows
     _draw_floor(axes, floor, eye, paper)
-    for ball in motion.balls:
-        draw_ball(axes, ball, eye @ ball.center, camera)
     _draw_patches(axes, patches(motion, floor), eye, paper)
     if eye[2, 2] > 0:  # seen from below, the floor hides its shadows
         _draw_shadow(

@@ -104,17 +104,7 @@ const lines = (() => {
     return line;
   }
 
-  // Points of an arc about z, from one angle to another, x, y, z one after another.
-  function arc(from, to, count = 48, radius = 1) {
-    const points = [];
-    for (let i = 0; i <= count; i += 1) {
-      const angle = from + ((to - from) * i) / count;
-      points.push(radius * Math.cos(angle), radius * Math.sin(angle), 0);
-    }
-    return points;
-  }
-
-  // The same as pairs of ends with gaps between them.
+  // Joined points as pairs of ends with gaps between them.
   function dashes(points) {
     const found = [];
     for (let i = 0; i + 5 < points.length; i += 6) found.push(...points.slice(i, i + 6));
@@ -128,5 +118,5 @@ const lines = (() => {
     return found;
   }
 
-  return { make, arc, dashes, pairs, setSize: (width, height) => size.value.set(width, height) };
+  return { make, dashes, pairs, setSize: (width, height) => size.value.set(width, height) };
 })();

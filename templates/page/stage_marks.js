@@ -3,10 +3,9 @@
 
 const makeMarks = (scene, paper, mixed) => {
   const { center, place, vector } = tools;
-  const { joints, bodies, elements } = DATA.drawing;
+  const { joints, bodies, ends } = DATA.drawing;
   const MANY = 30; // more marks than these are smaller until the view comes closer
   const SIDES = { revolute: 24, spherical: 24, universal: 24, prismatic: 4, cylindrical: 4, fixed: 3 };
-  const ends = elements.filter(({ from, to }) => from && to).flatMap(({ from, to }) => [from, to]);
   const shown = [
     ...joints.filter(({ type }) => !["free", "planar", "particle"].includes(type)),
     ...ends.map(({ body, at }) => ({ type: "end", child: body, at_child: at })),

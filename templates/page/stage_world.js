@@ -6,9 +6,8 @@ const makeWorld = (scene, mixed) => {
   const { space, number, vector, roundLength, add, scaled, dot, cross, unit } = tools;
   const LAYER = { planes: -60, grid: -50, surface: -40, wind: 60 }; // the order in which things are drawn
   const [GRID, HALF, PIECES] = [110, 14, 7]; // pixels between lines, at most; lines on each side; pieces of a line
-  const { elements, floor } = DATA.drawing;
-  const planes = elements.filter((element) => element.kind === "plane");
-  const winds = elements.filter((element) => element.kind === "wind" && element.velocity);
+  const { planes, floor } = DATA.drawing;
+  const winds = DATA.drawing.winds.filter(({ velocity }) => velocity);
 
   // ---- Grid: lines through the view in the plane, a square that fades on the floor in space ----
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, get_args
 
@@ -21,12 +22,14 @@ from eomgen.scene.look import Box, Camera, Cylinder, Disc, Rod, Shape, Sphere, n
 from eomgen.scene.reader import built_in_names, parse_scene
 from eomgen.scene.reference import by_type
 from eomgen.scene.schema import Simulation
+from eomgen.show.marks import marks_of
 from eomgen.show.of_run import world_points
 from eomgen.show.outlines import extent_points
 from eomgen.show.picture import Picture, picture_of, shapes_of
 from eomgen.show.picture_data import geometry_values, picture_data
 from eomgen.show.solid import rotation
-from eomgen.show.symbols import Sight, strokes
+from eomgen.show.strokes import Sight, strokes
+from eomgen.show.symbols import END, WIND
 
 DOCS = Path(__file__).parent.parent.parent / "docs"
 UNTUNED = sorted((Path(__file__).parent.parent / "untuned").glob("*.toml"))
@@ -263,6 +266,21 @@ def with_case(case: Case) -> tuple[Model, Picture]:
     return model, picture
 
 
+def test_a_page_draws_the_lines_of_figures() -> None:
+    """Each symbol once, and all that a figure shows but wind, which moves on a page."""
+    for case in CASES:
+        model, picture = with_case(case)
+        data, _ = picture_data(picture.valued(model.defaults))
+        on_page = [line for mark in data["marks"] for line in data["symbols"][mark["symbol"]]]
+        shown = [
+            {**asdict(line), "points": [[*map(float, point)] for point in line.points]}
+            for mark in marks_of(picture.valued(model.defaults))
+            if mark.symbol not in (END, WIND)
+            for line in mark.symbol
+        ]
+        assert on_page == shown and len(data["symbols"]) <= len(data["marks"])
+
+
 def test_springs_end_where_they_are_held() -> None:
     """The lines of a coil and of a slack rope begin and end at the spring's points."""
     for name, held in (("mass_on_spring", 0.3), ("swing", 0.9)):
@@ -273,7 +291,7 @@ def test_springs_end_where_they_are_held() -> None:
             pose = np.eye(3, 4)[np.newaxis] + np.array([0, 0, 0, held])
         sight = Sight(drawn, pose, np.eye(3))
         for link in (e for e in drawn.elements if e.kind in ("spring_damper", "rope")):
-            lines = [s.points for s in strokes(sight) if not s.closed]
+            lines = [s.points for s in strokes(sight) if s.line.fill is None]
             tips = np.array([[line[0], line[-1]] for line in lines])
             wanted = np.array([sight.at(link.start), sight.at(link.end)])
             assert (np.abs(tips - wanted).max(axis=(1, 2)) < 1e-12).any() or link.kind != "rope"

@@ -8,20 +8,25 @@ import numpy as np
 import pytest
 from effect_cases import CASES, Case
 from matplotlib.collections import PolyCollection
-from matplotlib.patches import Circle
 from matplotlib.patches import Polygon as Patch
 from matplotlib.path import Path as Outline
 from test_show import panel, swinging
 from test_show_space import sliding
 
 from eomgen.commands.main import main
+from eomgen.language.formula import Constant
+from eomgen.language.rewriting import constant
 from eomgen.model.elaborate import elaborate
+from eomgen.scene.appearance import Appearance
+from eomgen.scene.effects.elements import WORLD_INDEX, Round
+from eomgen.scene.look import number, numbers
 from eomgen.scene.reader import parse_scene
 from eomgen.show.balance import keeps_energy, works_by_type
 from eomgen.show.figure import draw_motion
-from eomgen.show.motion import Ball, Plane
+from eomgen.show.motion import Plane
+from eomgen.show.observe import planes_of
+from eomgen.show.picture import Picture, picture_of
 from eomgen.show.solid import solids
-from eomgen.show.surroundings import balls_of, planes_of
 from eomgen.show.view import cast_of, eye_axes, floor_under, patches
 
 SCENE = """\
@@ -67,7 +72,32 @@ radius = 0.2
 reach = 0.4
 """
 SLOPE, WALL = Plane((-0.6, 0.8), -0.9), Plane((1.0, 0.0), -0.4)
-PEG, OBSTACLE, HILL = Ball((0.2, -0.5), 0.3), Ball((1.0, 1.0), 0.2, 0.5), Ball((0.0, -50.0), 49.0)
+
+
+def fixed(*balls: tuple[tuple[float, ...], float, float | None]) -> Picture:
+    """Balls of the world, and obstacles, which have a reach."""
+    found = (
+        Round(
+            "obstacle" if reach else "ball",
+            "",
+            WORLD_INDEX,
+            constant(*center),
+            Constant(radius),
+            reach and Constant(reach),
+        )
+        for center, radius, reach in balls
+    )
+    return Picture((), (), tuple(found), (), 1.0)
+
+
+def circles(axes: Any) -> list[tuple[tuple[float, ...], float, Patch]]:
+    """Fixed circles, by middle and radius."""
+    found = [p for p in axes.get_children() if isinstance(p, Patch) and p.zorder == 1.2]
+    ends = [(p.get_xy().min(axis=0), p.get_xy().max(axis=0)) for p in found]
+    return [
+        (tuple(((low + high) / 2).round(9)), round((high - low)[0] / 2, 9), p)
+        for (low, high), p in zip(ends, found, strict=True)
+    ]
 
 
 def test_what_stands_still_in_a_model() -> None:
@@ -75,8 +105,13 @@ def test_what_stands_still_in_a_model() -> None:
     effects = "".join(f'[[effects]]\ntype = "contact"\n{SOFT}\n{each}\n' for each in CONTACTS)
     model = elaborate(parse_scene(SCENE + effects + AVOID, "scene"))
     model = model.with_parameters({"depth": 0.25})
-    assert planes_of(model) == (Plane((-0.6, 0.8), -0.5), Plane((0.0, 1.0), 0.0))
-    assert balls_of(model) == (Ball((1.0, 2.0), 0.25), Ball((3.0, 0.25), 0.2, 0.4))
+    drawn = picture_of(model, Appearance()).valued(model.defaults)
+    assert planes_of(drawn) == (Plane((-0.6, 0.8), -0.5), Plane((0.0, 1.0), 0.0))
+    balls = [e for e in drawn.elements if isinstance(e, Round) and e.body == WORLD_INDEX]
+    assert [(*numbers(e.at), number(e.radius), e.reach and number(e.reach)) for e in balls] == [
+        (1.0, 2.0, 0.25, None),
+        (3.0, 0.25, 0.2, 0.4),
+    ]
 
 
 def behind(points: np.ndarray, planes: tuple[Plane, ...]) -> np.ndarray:
@@ -112,24 +147,23 @@ def test_planes_in_the_figure() -> None:
 
 def test_balls_in_the_figure() -> None:
     """Small ones are seen whole; of a hill larger than the picture the view takes no notice."""
-    axes = panel(draw_motion(swinging(balls=(PEG, OBSTACLE, HILL))), "8 poses")
-    circles = [p for p in axes.patches if isinstance(p, Circle)]
-    drawn = [(*p.center, p.radius, p.get_linestyle(), p.get_fill()) for p in circles]
-    assert {(x, y, r) for x, y, r, *_ in drawn} == {
-        (0.2, -0.5, 0.3),
-        (1.0, 1.0, 0.2),
-        (1.0, 1.0, 0.7),
-        (0.0, -50.0, 49.0),
+    drawn = fixed(((0.2, -0.5), 0.3, None), ((1.0, 1.0), 0.2, 0.5), ((0.0, -50.0), 49.0, None))
+    axes = panel(draw_motion(swinging(drawn=drawn)), "8 poses")
+    assert {(at, radius) for at, radius, _ in circles(axes)} == {
+        ((0.2, -0.5), 0.3),
+        ((1.0, 1.0), 0.2),
+        ((1.0, 1.0), 0.7),
+        ((0.0, -50.0), 49.0),
     }
-    assert [r for _, _, r, line, _ in drawn if line != "solid"] == [0.7]
-    assert [p.radius for p in circles if p.get_facecolor()[3] > 0] == [0.3, 49.0]
+    assert [r for _, r, p in circles(axes) if p.get_linestyle() == ":"] == [0.7]
+    assert {r for _, r, p in circles(axes) if p.get_facecolor()[3] > 0} == {0.3, 49.0}
     assert axes.dataLim.y1 == pytest.approx(1.2) and axes.dataLim.y0 > -1.5
 
 
 GROUND, SLANT = Plane((0.0, 0.0, 1.0), 0.6), Plane((0.0, 0.6, 0.8), 1.0)
 SURROUNDED: dict[str, Any] = {
     "planes": (SLANT, GROUND, Plane((0.0, 0.0, 1.0), -1.0), Plane((1.0, 0.0, 0.0), -9.0)),
-    "balls": (Ball((0.5, 0.2, 1.0), 0.3), Ball((0.0, 1.0, 1.0), 0.2, 0.1)),
+    "drawn": fixed(((0.5, 0.2, 1.0), 0.3, None), ((0.0, 1.0, 1.0), 0.2, 0.1)),
 }
 
 
@@ -150,15 +184,12 @@ def test_planes_in_space() -> None:
     drawn = [c for c in axes.collections if isinstance(c, PolyCollection) and c.zorder == 1.0]
     seen = [path.vertices[:4] for collection in drawn for path in collection.get_paths()]
     np.testing.assert_allclose(seen, (np.array([slant, lower]) @ eye.T)[..., :2])
-    circles = [(p.center, p.radius) for p in axes.patches if isinstance(p, Circle)]
-    expected = [(0.3, SURROUNDED["balls"][0]), (0.2, SURROUNDED["balls"][1])]
-    expected.append((0.3, SURROUNDED["balls"][1]))
-    for center, radius in circles:
+    expected = [(0.3, (0.5, 0.2, 1.0)), (0.2, (0.0, 1.0, 1.0)), (0.3, (0.0, 1.0, 1.0))]
+    for center, radius, _ in circles(axes):
         assert any(
-            radius == pytest.approx(r) and np.allclose(center, (eye @ ball.center)[:2])
-            for r, ball in expected
+            radius == pytest.approx(r) and np.allclose(center, (eye @ at)[:2]) for r, at in expected
         )
-    assert len(circles) == 3
+    assert len(circles(axes)) == 3
     assert floor_under(sliding(), cast_of(solids(motion.shapes, 3.0, 2000))).z == 0.0
 
 

@@ -12,7 +12,6 @@ from eomgen.language.formula import Formula
 from eomgen.scene.effects.base import EffectTable, JointLoad, Mechanism, Scalar, Vector
 from eomgen.scene.effects.bodies import wrong
 from eomgen.scene.effects.elements import AtJoint, Layout
-from eomgen.scene.effects.elements import Vector as Formulas
 from eomgen.scene.effects.vectors import dot, length, scale
 
 
@@ -131,9 +130,9 @@ class OnJoints(EffectTable):
             for index in range(len(layout.joints[joint])):
                 if self.coordinate in (None, names[index]):
                     at = AtJoint("brake", self.name, layout.child(joint), index, layout.symbol)
-                    yield self.drawn(at, layout.zero(joint))
+                    yield self.drawn(at)
 
-    def drawn(self, at: AtJoint, zero: Formulas | None) -> AtJoint:
+    def drawn(self, at: AtJoint) -> AtJoint:
         """The symbol at one coordinate: by default that of friction."""
         return at
 

@@ -45,9 +45,6 @@ class Layout(Protocol):
     def coordinates(self, joint: str) -> tuple[str, ...]:
         """The names of a joint's coordinates."""
 
-    def zero(self, joint: str) -> Vector | None:
-        """See `AtJoint.zero`."""
-
     def point(self, name: str) -> tuple[int, Vector]:
         """The body of a named point, and where on it."""
 
@@ -85,9 +82,6 @@ class AtJoint:
     motor    a motor, a servo (which has a controller), or a drive that prescribes the coordinate
     stop     limits `low` and `high`, either of which may be absent
     brake    friction
-
-    zero  at a revolute joint a unit vector across its axis, in the parent's axes, from which the
-          coordinate is counted: towards the child's centre of mass, if that is beside the axis
     """
 
     kind: Literal["torsion", "motor", "servo", "drive", "stop", "brake"]
@@ -98,7 +92,6 @@ class AtJoint:
     rest: Formula | None = None
     low: Formula | None = None
     high: Formula | None = None
-    zero: Vector | None = None
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import JointLoad, Mechanism, Scalar
 from eomgen.scene.effects.dofs import Dof, OnJoints, spring_energy
-from eomgen.scene.effects.elements import AtJoint, Vector
+from eomgen.scene.effects.elements import AtJoint
 from eomgen.scene.effects.spring import check_law
 
 
@@ -84,9 +84,9 @@ rest = 0.5
             pairs = zip(dof.along(back), dof.rates, strict=True)
             yield from dof.loads([-(force + damping * rate) for force, rate in pairs])
 
-    def drawn(self, at: AtJoint, zero: Vector | None) -> AtJoint:
+    def drawn(self, at: AtJoint) -> AtJoint:
         """A torsion spring, or a coil along a slider."""
-        return replace(at, kind="torsion", rest=self.rest, zero=zero)
+        return replace(at, kind="torsion", rest=self.rest)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int

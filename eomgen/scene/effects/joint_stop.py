@@ -12,7 +12,7 @@ from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.scene.effects.base import Contact, JointLoad, Mechanism, Scalar
 from eomgen.scene.effects.dofs import Dof, OnJoints, spring_energy
-from eomgen.scene.effects.elements import AtJoint, Vector
+from eomgen.scene.effects.elements import AtJoint
 from eomgen.scene.effects.vectors import negative
 
 
@@ -132,9 +132,9 @@ damping = 1.0
         """Those that it acts on."""
         return self.acted_on(joints)
 
-    def drawn(self, at: AtJoint, zero: Vector | None) -> AtJoint:
+    def drawn(self, at: AtJoint) -> AtJoint:
         """Its limits."""
-        return replace(at, kind="stop", low=self.low, high=self.high, zero=zero)
+        return replace(at, kind="stop", low=self.low, high=self.high)
 
     def keeps_energy(
         self, values: Mapping[str, float], inputs: Mapping[str, float], dimensions: int
