@@ -11,7 +11,6 @@ from eomgen.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
-    from eomgen.api.derivation import Derivation
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
     from eomgen.api.environments import environment
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from eomgen.api.importing import import_robot
     from eomgen.api.linearising import linearise
     from eomgen.api.reopening import load_run
-    from eomgen.api.runs import Run
     from eomgen.api.simulating import simulate
     from eomgen.api.stepping import Stepper, stepper
     from eomgen.api.sweeping import Ensemble, ensemble, grid, sampled
@@ -30,7 +28,8 @@ if TYPE_CHECKING:
     from eomgen.api.systems import nonlinear_system, state_space
     from eomgen.api.verifying import horizon, verify
     from eomgen.base.errors import EomgenError, RunError, SceneError
-    from eomgen.results.module import Module
+    from eomgen.equations import Derivation
+    from eomgen.results import Module, Run
     from eomgen.scene.built_in import built_in_names
     from eomgen.scene.schema import Scene
 
@@ -74,7 +73,7 @@ __all__ = [
 _PLACES = {
     **dict.fromkeys(("check", "read"), "api.given"),
     **dict.fromkeys(("generate", "load"), "api.generating"),
-    "Derivation": "api.derivation",
+    "Derivation": "equations",
     "derive": "api.deriving",
     "environment": "api.environments",
     "export": "api.exporting",
@@ -90,8 +89,7 @@ _PLACES = {
     **dict.fromkeys(("horizon", "verify"), "api.verifying"),
     **dict.fromkeys(("accuracy", "arithmetic"), "api.accuracy"),
     "effects": "api.effects",
-    "Module": "results.module",
-    "Run": "api.runs",
+    **dict.fromkeys(("Module", "Run"), "results"),
     **dict.fromkeys(("EomgenError", "RunError", "SceneError"), "base.errors"),
     "Scene": "api.given",
     "built_in_names": "scene.built_in",

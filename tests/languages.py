@@ -14,10 +14,10 @@ import numpy as np
 from live import run_in_node
 
 from eomgen.native.library import compiled_library
-from eomgen.subset.expander import Text
 from eomgen.subset.languages import JAVASCRIPT, C
 from eomgen.subset.printing import printed
 from eomgen.subset.structures import filled, take
+from eomgen.subset.text import Text, own_name
 
 BY_BITS = """
 const view = new DataView(new ArrayBuffer(8));
@@ -92,7 +92,7 @@ def _in_python(text: Text, name: str, cases: Any, known: Any, given: Given) -> l
 
 
 def _in_c(text: Text, name: str, cases: Any, known: Any, given: Given) -> list[list[str]]:
-    own = text.expanded([(name, known)])[-1].name
+    own = own_name(name, known)
     shared = printed(text, [(name, known)], C).replace(
         f"static inline {_result(text, name)} {own}(", f"{_result(text, name)} {own}("
     )
@@ -131,7 +131,7 @@ def _as_c(x: Any) -> Any:
 
 
 def _in_node(text: Text, name: str, cases: Any, known: Any, given: Given) -> list[list[str]]:
-    own = text.expanded([(name, known)])[-1].name
+    own = own_name(name, known)
     source = "\n".join(
         (JAVASCRIPT.prelude, given.javascript, printed(text, [(name, known)], JAVASCRIPT))
     )

@@ -5,9 +5,9 @@ for tests of equal bits: in the engine's subset of Python, so that they are prin
 import re
 import sys
 
-from eomgen.subset.expander import Text
 from eomgen.subset.languages import JAVASCRIPT
 from eomgen.subset.printing import printed
+from eomgen.subset.text import Text
 from eomgen.subset.words import sqrt
 
 TURN = 6.283185307179586

@@ -43,8 +43,8 @@ def with_series(program: Program, interface: Interface) -> tuple[Program, Interf
 def series_functions(text: SeriesText, language: Language) -> str:
     """The source of the recurrences, `first_coefficients` and `next_coefficients`."""
     # Imported here because the printer takes a while.
-    from eomgen.subset.expander import Text
     from eomgen.subset.printing import printed
+    from eomgen.subset.text import Text
 
     functions = Text()
     functions.add(text.source)

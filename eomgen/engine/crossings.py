@@ -142,7 +142,7 @@ def evaluate(
     given: Along,
     t: float,
     y: Annotated[Vector, "STATES"],
-    to: Annotated[Vector, "many"],
+    to: Annotated[Vector, "of.many"],
 ) -> None:
     """The functions at a time."""
     of.left -= 1
@@ -155,7 +155,7 @@ def evaluate_within(
     start: float,
     length: float,
     share: float,
-    to: Annotated[Vector, "many"],
+    to: Annotated[Vector, "of.many"],
 ) -> None:
     """The functions at a fraction of the step."""
     of.moments[0] = start + length * share

@@ -52,11 +52,11 @@ def _subtract_products(n: int, p: int, columns: Matrix) -> None:
 @with_arrays(_subtract_products)
 def subtract_products(n: int, p: int, columns: Annotated[Matrix, "n", "n"]) -> None:
     """Subtract row p from all that are below it, each times its factor, which is in column p."""
-    factors = copy(columns[p, p + 1 :])
+    factors = copy(columns[p])
     for j in range(p + 1, n):
         above = columns[j, p]
         if above != 0.0:
-            columns[j, p + 1 :] -= above * factors
+            columns[j, p + 1 :] -= above * factors[p + 1 :]
 
 
 def _subtract_columns(n: int, m: int, columns: Matrix, x: Vector) -> None:
@@ -145,12 +145,12 @@ def eliminated(factors: Factors) -> bool:
     used = 0
     for p in range(m):
         factors.columns[p, m:] /= diagonal
-        below = copy(factors.columns[p, m:])
+        below = copy(factors.columns[p])
         end = used + nonzero(n - m, factors.right[p, m:], factors.entries[used:])
         for e in range(used, end):
             k = factors.entries[e]
             factor = factors.right[p, m + k]
-            factors.columns[m + k, m:] -= factor * below
+            factors.columns[m + k, m:] -= factor * below[m:]
         factors.ends[p] = end
         used = end
     for i in range(m, n):
@@ -158,9 +158,9 @@ def eliminated(factors: Factors) -> bool:
     for p in range(m, n):
         pivot = p + place_of_largest(n - p, factors.columns[p, p:])
         if pivot != p:
-            row = copy(factors.columns[m:, p])
+            row = copy(factors.columns[:, p])
             factors.columns[m:, p] = factors.columns[m:, pivot]
-            factors.columns[m:, pivot] = row
+            factors.columns[m:, pivot] = row[m:]
             number = factors.order[p]
             factors.order[p] = factors.order[pivot]
             factors.order[pivot] = number

@@ -34,10 +34,10 @@ from eomgen.engine import (
 )
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.methods import EQUAL, Root, Roots
-from eomgen.subset.expander import Text
 from eomgen.subset.languages import JAVASCRIPT, C, Language
 from eomgen.subset.printing import printed
 from eomgen.subset.structures import arrays_of
+from eomgen.subset.text import Text, own_name
 from eomgen.subset.unrolled import unrolled_functions
 
 CONTACTS: Roots = [(name, {}) for name in "begin deepest press strike release settle taken".split()]
@@ -104,7 +104,7 @@ def steps_of_pages() -> str:
     """JavaScript: `makeSteps` returns what pages call, by name, and makers of `records`, and is
     given those of the `SIZES` that are needed.
     """
-    names = ", ".join(d.name for d in text().expanded(ON_PAGES))
+    names = ", ".join(dict.fromkeys(own_name(*root) for root in ON_PAGES))
     codes = "".join(f", {name}: {value!r}" for name, value in CODES.items())
     records = ", ".join(map(record_of_pages, RECORDS))
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)

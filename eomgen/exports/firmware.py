@@ -17,8 +17,8 @@ from eomgen.exports.steps import contacts_left_out, method_of, model_for, size_o
 from eomgen.model.model import Model
 from eomgen.program.ordering import ordered
 from eomgen.store import interfaced_program_of
-from eomgen.subset.expander import Text
 from eomgen.subset.languages import REALS
+from eomgen.subset.text import Text
 from eomgen.tables.integrators import INTEGRATORS
 
 METHOD = "rk4"

@@ -30,8 +30,8 @@ from eomgen.run.problem import Problem
 from eomgen.run.sizes import mechanism_size
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import generated_code
-from eomgen.subset.expander import Text
 from eomgen.subset.languages import Language
+from eomgen.subset.text import Text
 from eomgen.subset.words import Whole
 from eomgen.tables.integrators import INTEGRATORS as SPECS
 

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from eomgen.subset.kinds import INT, OF_NUMBERS, Kind
-
+OF_NUMBERS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "tanh", "atan2")
 RESERVED = frozenset(
     "auto boolean byte case catch char const debugger default delete do double enum eval export "
     "extends extern final function goto implements inline instanceof interface let long new null "
@@ -12,16 +11,27 @@ RESERVED = frozenset(
     "switch this throw throws typedef typeof undefined union unsigned var void volatile".split()
 )
 """Words of C and JavaScript that are names in Python."""
+BRACES = {
+    "and": "&&", "or": "||", "not": "!",
+    "choice": "{} ? {} : {}",
+    "if": "if ({}) {{",
+    "while": "while ({}) {{",
+    "else": "} else {",
+    "range": "for ({i} = {start}; {i} < {end}; {i}++) {{",
+    "back": "for ({i} = {start}; {i} > {end}; {i}--) {{",
+    "done": "}",
+    "end": ";",
+}  # fmt: skip
+"""Words of statements, and of operators that Python calls otherwise."""
 
 
 @dataclass(frozen=True)
 class Language:
-    """What differs between languages with braces.
+    """What differs between languages.
 
     function      how a function begins, by its result, name and arguments
     number, whole types of numbers
-    infinite      how infinity is written
-    names         how functions of numbers are called
+    names         how functions of numbers, infinity and what is not a number are called
     array         how a local array is declared, by type, name and size, and the function
     arrays        the types of arrays of numbers, and of whole ones
     part          how a part of an array is passed on, by its name and the place where it begins
@@ -31,18 +41,19 @@ class Language:
     typed         whether arguments and results have types, and records structures
     listed        how four entries of an array of numbers that follow one another are given, from
                   the place of the first; one by one if it is empty
+    words         those of statements
     """
 
     function: str
     number: str
     whole: str
-    infinite: str
     names: Mapping[str, str]
     array: str
     arrays: tuple[str, str]
     part: str
     field: str
     prelude: str
+    words: Mapping[str, str]
     literal: str = "{}"
     typed: bool = False
     listed: str = ""
@@ -52,8 +63,7 @@ C = Language(
     function="static inline {result} {name}({arguments}) {{",
     number="double",
     whole="int64_t",
-    infinite="INFINITY",
-    names={"abs": "fabs", "next_after": "next_after", "pow": "pow", "nan": "NAN"},
+    names={"abs": "fabs", "nan": "NAN", "inf": "INFINITY"},
     array="{type} {name}[ROOM({size})];",
     arrays=("double", "int64_t"),
     part="{array} + {place}",
@@ -68,6 +78,7 @@ static inline double next_after(double t) {
     return nextafter(t, INFINITY);
 }
 """,
+    words=BRACES,
     typed=True,
 )
 REALS = replace(
@@ -84,10 +95,10 @@ JAVASCRIPT = Language(
     function="function {name}({arguments}) {{",
     number="let",
     whole="let",
-    infinite="Infinity",
     names={
         **{name: f"Math.{name}" for name in ("abs", "pow", *OF_NUMBERS)},
-        "nan": "NaN", "isfinite": "Number.isFinite", "next_after": "nextAfter",
+        "nan": "NaN", "inf": "Infinity",
+        "isfinite": "Number.isFinite", "next_after": "nextAfter",
     },
     array="const {name} = {function}.{name}_ = roomFor({function}.{name}_, {type}Array, {size});",
     arrays=("Float64", "Int32"),
@@ -105,13 +116,5 @@ JAVASCRIPT = Language(
 // The room of a function's last call, if that had as many numbers.
 const roomFor = (room, Numbers, n) => (room?.length === n ? room : new Numbers(n));
 """,
+    words=BRACES,
 )  # fmt: skip
-
-
-def type_of(kind: Kind, language: Language) -> str:
-    """How the type of a kind is written before a name."""
-    if kind.of not in ("float", "int"):
-        return f"{kind.of} *"
-    if kind.is_array:
-        return f"{language.arrays[kind.of == 'int']} *"
-    return f"{language.whole if kind == INT else language.number} "

@@ -1,42 +1,55 @@
 """The source of functions of the engine in another language."""
 
 import ast
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from eomgen.subset.braces import Printer
-from eomgen.subset.expander import Text
-from eomgen.subset.kinds import fields_of, is_protocol, of_annotation
-from eomgen.subset.languages import Language, type_of
+from eomgen.subset.functions import Function, type_of
+from eomgen.subset.languages import Language
+from eomgen.subset.text import NotInSubsetError, Text, fields_of, functions_of, own_name
+
+Roots = Iterable[tuple[str, Mapping[str, Any]]]
 
 
-def printed(
-    text: Text,
-    roots: Iterable[tuple[str, Mapping[str, Any]]],
-    language: Language,
-) -> str:
+def printed(text: Text, roots: Roots, language: Language) -> str:
     """The source of functions of the engine and of all that they call, those called first. Each is
     given with values of its `Known` parameters.
 
     Raises `NotInSubsetError` for text outside the subset.
     """
-    functions = text.expanded(roots)
-    made = {d.name: d for d in functions}
-    lines = list(_structures(text, made.values(), language)) if language.typed else []
-    changes: dict[str, set[str]] = {}
-    for d in functions:
-        lines += ["", *Printer(text, made, d, language, changes).lines()]
+    functions = functions_of_text(text, roots, language)
+    lines = list(_structures(text, functions.values(), language)) if language.typed else []
+    for name, function in functions.items():
+        lines += ["", *function.lines(name)]
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _structures(
-    text: Text, functions: Iterable[ast.FunctionDef], language: Language
-) -> Iterable[str]:
+def functions_of_text(
+    text: Text, roots: Roots, language: Language, kind: Callable[..., Function] = Function
+) -> dict[str, Function]:
+    """The functions, by the names that they are printed with."""
+    made: dict[str, Function] = {}
+    begun: set[str] = set()
+
+    def make(e: ast.AST, name: str, known: Mapping[str, Any]) -> Function:
+        own = own_name(name, known)
+        if own not in made:
+            if own in begun:
+                raise NotInSubsetError(e, "calls itself")
+            begun.add(own)
+            made[own] = kind(text, language, name, known, make)
+        return made[own]
+
+    for name, known in roots:
+        make(text.functions[name], name, known)
+    return made
+
+
+def _structures(text: Text, functions: Iterable[Function], language: Language) -> Iterable[str]:
     """C's structures of the records that are arguments."""
-    kinds = (of_annotation(a.annotation).of for d in functions for a in d.args.args)
-    for name in dict.fromkeys(kinds):
+    for name in dict.fromkeys(x.of for f in functions for x in f.arguments.values()):
         record = text.classes.get(name)
-        if record and not is_protocol(record):
+        if record and functions_of(record) is None:
             yield f"typedef struct {name} {{"
             for each, kind in fields_of(record).items():
                 yield f"    {type_of(kind, language)}{each};"

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 __all__ = [
     "Known", "Matrix", "Row", "Vector", "Whole", "added", "all_within", "combined", "copy",
     "counts", "exp", "inf", "isfinite", "larger", "log", "matrix", "nan", "next_after", "numbers",
-    "ordered", "outer", "product", "rows", "sqrt", "table", "transposed", "unrolled", "whole",
+    "ordered", "product", "rows", "sqrt", "table", "transposed", "unrolled", "whole",
     "with_arrays", "with_lists", "zeros",
 ]  # fmt: skip
 
@@ -144,11 +144,6 @@ def product(a: Matrix, x: Vector) -> Vector:
 def larger(a: Vector, b: Vector | float) -> Vector:
     """The larger one of each two entries."""
     return np.maximum(a, b)
-
-
-def outer(x: Vector, y: Vector) -> Matrix:
-    """All products, a row for each entry of x."""
-    return np.multiply.outer(x, y)
 
 
 def transposed(x: Matrix) -> Matrix:

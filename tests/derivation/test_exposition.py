@@ -16,11 +16,11 @@ from effect_cases import CASES, TRIED, Case
 from followed import follow_effects, follow_recursion, instant
 
 import eomgen
-from eomgen.api.derivation import Derivation
 from eomgen.commands.main import main
 from eomgen.derivation.dots import dotted
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
+from eomgen.equations import Derivation
 from eomgen.exposition.derivation import exposition_of, prescribed_motion
 from eomgen.exposition.effects import derived_effects
 from eomgen.exposition.evaluate import array, define, number

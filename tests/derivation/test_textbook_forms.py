@@ -10,7 +10,7 @@ import sympy as sp
 from campaign import some
 
 import eomgen
-from eomgen.api.derivation import Derivation
+from eomgen.equations import Derivation
 from eomgen.exposition.simplified import simplified
 
 FALL = 'effects = [{ type = "gravity", g = "g" }%s]'

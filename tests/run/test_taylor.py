@@ -40,7 +40,7 @@ from eomgen.store import generated_code
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.reference import reference
 from eomgen.study.precision.precise import digits
-from eomgen.subset.expander import Text
+from eomgen.subset.text import Text
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 compiler = pytest.mark.skipif(CC is None, reason="there is no C compiler")

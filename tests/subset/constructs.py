@@ -18,7 +18,6 @@ from eomgen.subset.words import (
     nan,
     next_after,
     ordered,
-    outer,
     product,
     rows,
     sqrt,
@@ -110,8 +109,10 @@ def matrices(n: int, m: int, a: Annotated[Matrix, "n", "m"], x: Annotated[Vector
     a[n - 1, :] = row
     column = copy(a[:, 0])
     a[:, 1] = column * 2.0
-    below = copy(a[1:, 0])
-    a[1:, 1:] -= outer(below, x[1:])
+    for i in range(1, n):
+        below = a[i, 0]
+        a[i, 1:] -= below * x[1:]
+    a[1:, 1:] *= 0.5
     other = matrix(n, m)
     other[:, :] = a * 0.5
     a[:, :] += other

@@ -12,7 +12,7 @@ from eomgen.engine import adaptive
 from eomgen.engine.adaptive import Bounds, Progress
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.printed import steps_of_few
-from eomgen.subset.expander import NotInSubsetError, Text
+from eomgen.subset.text import NotInSubsetError, Text
 from eomgen.subset.unrolled import unrolled_functions
 
 
@@ -62,8 +62,9 @@ def test_few_states_as_single_numbers(n: int) -> None:
 
 OUTSIDE = {
     "shifted": "def f(x: Annotated[Vector, 'STATES']) -> None:\n    x[1:] = x[:1]\n",
-    "whole": "def f(x: Annotated[Vector, 'STATES']) -> float:\n    y = x + x\n    return y[0]\n",
-    "power": "def f(x: Annotated[Vector, 'STATES']) -> None:\n    x[:] = x ** x\n",
+    "part": "def f(x: Annotated[Vector, 'STATES']) -> None:\n    x[:1] = 1.0\n",
+    "whole": "def f(x: Annotated[Vector, 'STATES']) -> float:\n    y = x + x\n    return y\n",
+    "column": "def f(k: Annotated[Matrix, 'STATES', '2']) -> None:\n    k[:, 0] = 1.0\n",
     "named": "def f(k: Annotated[Matrix, '2', 'STATES'], i: int) -> None:\n    k[i] = k[0]\n",
 }
 

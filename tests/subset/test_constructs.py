@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from languages import NONE, Given, results
 
-from eomgen.subset.expander import NotInSubsetError, Text
 from eomgen.subset.languages import JAVASCRIPT, C
 from eomgen.subset.printing import printed
+from eomgen.subset.text import NotInSubsetError, Text
 
 TEXT = Text.of(constructs)
 SEEDED = np.random.default_rng(2)
@@ -120,7 +120,7 @@ REFUSED = {
     "z = product(a, x) + x": "to a name first",
     "x[:] = product(a, x * 2.0)": "while it is read",
     "x[which] = x[others]": "shifted",
-    "x[:] = [t, x[0]]": "while it is read",
+    "x[:] = [0.5, x[0]]": "while it is read",
     "for j_ in range(n): pass": "the name of an index",
     "i_ = 1": "the name of an index",
     "new = 1": "a word of another language",

@@ -11,7 +11,7 @@ from eomgen.engine import equal_steps, explicit, quaternions, sums, system
 from eomgen.engine.adaptive import MADE
 from eomgen.engine.equal_steps import EVENT
 from eomgen.engine.explicit import Step
-from eomgen.subset.expander import Text
+from eomgen.subset.text import Text
 
 TEXT = Text.of(equal_steps, explicit, quaternions, sums, system)
 SEEDED = np.random.default_rng(3)

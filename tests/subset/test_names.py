@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from languages import results
 
-from eomgen.subset.expander import NotInSubsetError, Text
 from eomgen.subset.languages import C
 from eomgen.subset.printing import printed
+from eomgen.subset.text import NotInSubsetError, Text
 from eomgen.subset.words import Matrix, Vector, transposed, zeros
 
 

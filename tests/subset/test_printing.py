@@ -6,7 +6,7 @@ import numpy as np
 from languages import results
 
 from eomgen.engine import elimination, roots
-from eomgen.subset.expander import Text
+from eomgen.subset.text import Text
 
 TEXT = Text.of(elimination, roots)
 SEEDED = np.random.default_rng(1)

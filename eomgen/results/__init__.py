@@ -1,1 +1,0 @@
-"""What the public functions return, as values; nothing here computes or draws."""

@@ -1,0 +1,107 @@
+"""The engine's text as it is read: functions, records and protocols, and the kinds they state."""
+
+import ast
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+NONE: Mapping[str, Any] = {}
+ARRAYS = {"Vector": "float", "Matrix": "float", "Whole": "int"}
+
+
+class NotInSubsetError(SyntaxError):
+    """Text outside the subset; the message names its line."""
+
+    def __init__(self, node: ast.AST, why: str) -> None:
+        super().__init__(f"line {getattr(node, 'lineno', '?')}: {ast.unparse(node)}: {why}")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """`of` is "float", "int", "" for nothing, or the name of a record or a protocol; `sizes` are
+    those of an array, as text.
+    """
+
+    of: str
+    sizes: tuple[str, ...] = ()
+
+
+@dataclass
+class Text:
+    """The engine's text: its functions, and the fields and functions of its records and protocols,
+    by name; the constants of each function's module; and the functions themselves.
+    """
+
+    functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
+    classes: dict[str, ast.ClassDef] = field(default_factory=dict)
+    constants: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    python: dict[str, Callable[..., Any]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, *modules: ModuleType) -> "Text":
+        """The text of modules. Raises `NotInSubsetError` if two things have one name."""
+        text = cls()
+        for module in modules:
+            constants = {n: x for n, x in vars(module).items() if n.isupper()}
+            text.add(inspect.getsource(module), constants, vars(module))
+        return text
+
+    def add(
+        self, source: str, constants: Mapping[str, Any] = NONE, python: Mapping[str, Any] = NONE
+    ) -> None:
+        """Add what a source defines. Raises `NotInSubsetError` if a name is there already."""
+        for d in ast.parse(source).body:
+            name = d.name if isinstance(d, ast.FunctionDef | ast.ClassDef) else ""
+            if name in self.functions or name in self.classes:
+                raise NotInSubsetError(d, "another module of the text has this name")
+            if isinstance(d, ast.FunctionDef):
+                self.functions[name], self.constants[name] = d, constants
+                if name in python:
+                    self.python[name] = python[name]
+            elif isinstance(d, ast.ClassDef):
+                self.classes[name] = d
+
+
+def own_name(name: str, known: Mapping[str, Any]) -> str:
+    """That of a function which is printed for values of its `Known` parameters."""
+    return "_".join([name, *(str(getattr(x, "name", x)) for x in known.values())])
+
+
+def is_known(parameter: ast.arg) -> bool:
+    """Whether a parameter has a value when the text is printed."""
+    return isinstance(parameter.annotation, ast.Name) and parameter.annotation.id == "Known"
+
+
+def kind_of(annotation: ast.expr | None) -> Kind:
+    """The kind that an annotation names."""
+    match annotation:
+        case None | ast.Constant(None):
+            return Kind("")
+        case ast.Name("bool"):
+            return Kind("int")
+        case ast.Name(name):
+            return Kind(name)
+        case ast.Subscript(ast.Name("Annotated"), ast.Tuple([ast.Name(name), *sizes])):
+            return Kind(ARRAYS[name], tuple(ast.literal_eval(size) for size in sizes))
+    raise NotInSubsetError(annotation, "not a kind of the subset")
+
+
+@cache
+def fields_of(record: ast.ClassDef) -> Mapping[str, Kind]:
+    """The kinds of a record's fields."""
+    return {
+        d.target.id: kind_of(d.annotation)
+        for d in record.body
+        if isinstance(d, ast.AnnAssign) and isinstance(d.target, ast.Name)
+    }
+
+
+@cache
+def functions_of(protocol: ast.ClassDef) -> Mapping[str, Kind] | None:
+    """The kinds of what the functions of a protocol return; None for another class."""
+    if not any(isinstance(base, ast.Name) and base.id == "Protocol" for base in protocol.bases):
+        return None
+    return {d.name: kind_of(d.returns) for d in protocol.body if isinstance(d, ast.FunctionDef)}
