@@ -296,17 +296,18 @@ def test_a_store_with_a_hostile_name(
 
 
 @pytest.mark.parametrize("columns", ["", "x", "0", "-3", "1", "2", "9" * 12, "9" * 5000])
-def test_any_width_of_the_terminal(monkeypatch: pytest.MonkeyPatch, columns: str) -> None:
-    """COLUMNS may say anything."""
-    monkeypatch.setenv("COLUMNS", columns)
+def test_any_width_of_the_terminal(columns: str) -> None:
+    """COLUMNS may say anything. It is put back before pytest, which fills lines, reports the test."""
     stream = io.StringIO()
-    monkeypatch.setattr(stream, "isatty", lambda: True)
-    monkeypatch.setattr(sys, "stderr", stream)
-    with terminal_progress("label") as progress:
-        progress(0.5)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", columns)
+        patch.setattr(stream, "isatty", lambda: True)
+        patch.setattr(sys, "stderr", stream)
+        with terminal_progress("label") as progress:
+            progress(0.5)
+        with pytest.raises(SystemExit):
+            main(["--help"])
     assert 2 < len(stream.getvalue()) < 3000 or columns in ("1", "2")
-    with pytest.raises(SystemExit):
-        main(["--help"])
 
 
 def test_messages_stay_lines() -> None:
