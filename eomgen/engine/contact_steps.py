@@ -23,7 +23,7 @@ from eomgen.engine.contacts import (
     TOLERANCE,
     ContactLaw,
     Touching,
-    started,
+    nothing_held,
     strike,
 )
 from eomgen.engine.roots import Search
@@ -61,7 +61,7 @@ def through(
 ) -> int:
     """Go to `end`, about a length from here. WHOLE, or why that is not possible."""
     n = len(least)
-    now.alpha = ALPHA * started(law, now, at.t, at.y)
+    now.alpha = ALPHA * nothing_held(law, now, at.t, at.y)
     at.since = at.t
     at.events = 0
     touching = 0

@@ -118,11 +118,11 @@ def begin(
 
     `alpha` is ALPHA times the rate of the motion at its start, and at least 1/span.
     """
-    rate = started(law, now, t, y)
+    rate = nothing_held(law, now, t, y)
     now.alpha = ALPHA * max(rate, 1.0 / span)
 
 
-def started(law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES"]) -> float:
+def nothing_held(law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES"]) -> float:
     """Hold nothing. The rate of the motion, 1/s: the greatest of √a and v of the gaps."""
     free = zeros(len(now.slack))
     accelerations(law, t, y, free)
