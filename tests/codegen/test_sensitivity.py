@@ -210,6 +210,7 @@ def test_what_must_vanish() -> None:
     assert apart(answer, np.linalg.solve(M, np.eye(nv)[row])) < 1e-11
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("route", ["aba", "ldl"])
 @pytest.mark.parametrize("name", ["machine", "furuta_pendulum", "spinning_top", "acrobot"])
 def test_jacobians_of_points(name: str, route: str) -> None:

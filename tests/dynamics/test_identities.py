@@ -63,7 +63,7 @@ def test_mass_matrix(c: Compiled) -> None:
                 assert_close(M[i, j], both - first - second, both)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(4)
 def test_gravity_force_is_the_slope_of_the_potential(c: Compiled) -> None:
     """G = ∂U/∂q; without gravity both are 0."""
     n = len(c.module.STATES)

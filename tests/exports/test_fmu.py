@@ -105,7 +105,7 @@ def test_a_unit_moves_as_our_own_run(scene: str, t_end: float, folder: Path) -> 
     np.testing.assert_allclose(exchanged(path, t_end), run.y[-1], rtol=1e-8, atol=1e-8)
 
 
-@pytest.mark.every(9)
+@pytest.mark.every(15)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("method", METHODS)
 def test_each_method_moves_as_our_own_run(scene: str, method: str, tmp_path: Path) -> None:

@@ -504,6 +504,7 @@ def test_directions_together_have_the_bits_of_one_alone(monkeypatch: pytest.Monk
 # When.
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["DOP853", "Rodas5P", "RK45"])
 def test_a_long_run_is_compiled_on_its_way(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """It begins in Python. A short one is not compiled, but takes libraries that are there."""

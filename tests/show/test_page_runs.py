@@ -153,7 +153,7 @@ def test_every_method_but_scipys_is_printed() -> None:
 @pytest.mark.every(3)
 @pytest.mark.parametrize("method", [*EQUAL, *ADAPTIVE])
 @pytest.mark.parametrize(
-    "name", some(["bouncing_two_body", "peaucellier", "pendulum"], built_in_names())
+    "name", some(["bouncing_two_body", "four_bar", "pendulum"], built_in_names())
 )
 def test_the_same_bits(name: str, method: str) -> None:
     """Time and state at the end, or that both fail. On pages implicit steps of trees keep factors,
