@@ -41,18 +41,27 @@ def _group(nodeid: str) -> str:
     return GROUPS.get(name, name)
 
 
+def _is_of_all(config: pytest.Config) -> bool:
+    """Whether all tests were asked for, and no folder, file or mark."""
+    return [Path(name).name for name in config.args] == ["tests"] and not config.option.markexpr
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """What takes longest comes first. Of cases that are more of the same, an ordinary run takes
-    one of every n, and of tests for full runs none; see the markers in pyproject.toml.
+    one of every n, of tests for full runs none, and if it is one of all tests, then none of those
+    that stand apart; see the markers in pyproject.toml.
     """
     if not FULL:
+        beside = set() if _is_of_all(config) else {"apart"}
         seen: dict[str, int] = {}
         left = []
         for item in items:
             name = item.nodeid.partition("[")[0]
             seen[name] = seen.get(name, -1) + 1
             every = item.get_closest_marker("every")
-            if item.get_closest_marker("full") or (every and not is_kept(seen[name], *every.args)):
+            if any(map(item.get_closest_marker, {"full", "apart"} - beside)) or (
+                every and not is_kept(seen[name], *every.args)
+            ):
                 left.append(item)
         config.hook.pytest_deselected(items=left)
         gone = set(map(id, left))

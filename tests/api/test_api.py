@@ -271,6 +271,7 @@ def test_a_verification() -> None:
     assert eomgen.verify("pendulum", states=1).missed == ()
 
 
+@pytest.mark.apart
 def test_values_are_sent_to_another_process() -> None:
     """There and back, to one that was started anew; what is refused there is raised here."""
     model, module = eomgen.check("cart_pole"), eomgen.generate("cart_pole")

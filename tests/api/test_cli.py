@@ -27,6 +27,7 @@ LARGE = (
 pytestmark = pytest.mark.usefixtures("blank_figures")
 
 
+@pytest.mark.apart
 @pytest.mark.parametrize("seed", some(("1",), ("0", "1", "2")))
 def test_committed_modules_are_what_is_generated(tmp_path: Path, seed: str) -> None:
     """Built-in scenes derived anew give the committed bytes, or the committed digest, whatever the
@@ -374,6 +375,7 @@ def test_passes_report_what_they_save(tmp_path: Path, capsys: pytest.CaptureFixt
     assert int(lines[2][-3]) > int(lines[3][-3]) >= int(lines[4][-3])
 
 
+@pytest.mark.apart
 def test_progress_is_shown_on_a_terminal_and_not_in_a_pipe(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -90,6 +90,7 @@ def installed(folder: Path, name: str, points: Mapping[str, Mapping[str, str]]) 
     (about / "entry_points.txt").write_text("\n".join(lines))
 
 
+@pytest.mark.apart
 def test_what_a_package_adds_is_used_as_ours(tmp_path: Path) -> None:
     """In runs, derivations, generated code, reference, schema and messages. In a full run pip
     installs it; else what pip writes is written here.
@@ -106,6 +107,7 @@ def test_what_a_package_adds_is_used_as_ours(tmp_path: Path) -> None:
     assert not done.returncode, done.stderr
 
 
+@pytest.mark.apart
 @pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("group", "point", "said"),

@@ -170,6 +170,7 @@ def used(house: Path, *words: str | Path) -> str:
     return done.stdout
 
 
+@pytest.mark.apart
 def test_what_is_added_by_hand_is_ours(house: Path) -> None:
     """A few commands take it; in full runs all do."""
     said = used(house, "-c", RUN, *FEW)
@@ -195,6 +196,7 @@ assert main("simulate boat.toml --laps 12 -o out".split()) == 1
 """
 
 
+@pytest.mark.apart
 def test_an_option_is_one_entry(house: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The functions, the commands, their completion, messages and the reference have it."""
     monkeypatch.setenv("TOOLS", str(ROOT / "tools"))

@@ -354,6 +354,7 @@ def test_a_malformed_program_is_recorded_again(folder: Path) -> None:
     assert path.read_bytes().partition(b"\n")[2] == whole
 
 
+@pytest.mark.apart
 def test_writers_at_once(tmp_path: Path) -> None:
     """Processes that put and get at once find nothing, or what one of them wrote; nothing is left
     behind.
@@ -490,6 +491,7 @@ def test_what_is_too_large_is_not_kept(tmp_path: Path, monkeypatch: pytest.Monke
     assert LARGEST > 72_063_948, "a thousand links with all outputs"
 
 
+@pytest.mark.apart
 def test_the_key_names_all_that_shapes_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each library that is loaded to generate code, each such file of this program, and Python."""
     code = (

@@ -92,6 +92,7 @@ def test_every_command_is_tried() -> None:
     assert set(COMMANDS) == set(parsers()[1])
 
 
+@pytest.mark.apart
 @pytest.mark.parametrize(
     ("name", "fault"), some(FEW, [(name, fault) for name in COMMANDS for fault in FAULTS])
 )
@@ -275,6 +276,7 @@ def began() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 SOME_STOPS = ((signal.SIGINT, 0.0), (signal.SIGTERM, 0.3), (signal.SIGINT, 1.0))
 
 
+@pytest.mark.apart
 @pytest.mark.parametrize(
     ("number", "delay"),
     some(SOME_STOPS, tuple((number, delay) for number in STOPS for delay in DELAYS)),
@@ -332,6 +334,7 @@ def injected(number: str, last: int, command: str, out: Path) -> subprocess.Comp
     )
 
 
+@pytest.mark.apart
 @pytest.mark.parametrize("number", some(("SIGINT",), ("SIGINT", "SIGTERM")))
 @pytest.mark.parametrize("name", some(("check",), ("check", "generate", "simulate", "derive")))
 def test_a_stop_at_any_call(tmp_path: Path, name: str, number: str) -> None:

@@ -297,7 +297,7 @@ def test_a_store_with_a_hostile_name(
 
 @pytest.mark.parametrize("columns", ["", "x", "0", "-3", "1", "2", "9" * 12, "9" * 5000])
 def test_any_width_of_the_terminal(columns: str) -> None:
-    """COLUMNS may say anything. It is put back before pytest, which fills lines, reports the test."""
+    """COLUMNS may say anything. It is put back before pytest, which fills lines, says more."""
     stream = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLUMNS", columns)

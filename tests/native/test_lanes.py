@@ -121,6 +121,7 @@ def test_plain_sine_and_cosine_have_the_bits_of_numpys() -> None:
     assert np.isnan([sine(math.inf), cosine(-math.inf), sine([[math.nan]])[0, 0]]).all()
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_sines_of_columns_have_the_bits_of_the_library(width: int) -> None:
     """Of both of an angle, and of one alone, over the whole range of doubles."""
@@ -350,6 +351,7 @@ def test_stable_runs_are_not_taken_for_unstable(scene: str) -> None:
     assert sound.all()
 
 
+@pytest.mark.apart
 def test_no_optimisation_changes_a_bit(request: pytest.FixtureRequest) -> None:
     """Other tests compile without it."""
     texts = lanes.sources(*interfaced_program_of(check(read("two_body_forced"))), ())

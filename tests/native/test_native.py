@@ -105,6 +105,7 @@ def test_the_bits_are_those_of_the_python_module(scene: str) -> None:
         assert same(ours(0.7, np.tile(y.T, 7)), np.tile(together, 7)), name  # of whole registers
 
 
+@pytest.mark.apart
 @pytest.mark.parametrize("level", some(["-O2"], ["-O1", "-O2", "-O3"]))
 def test_no_optimisation_changes_a_bit(
     level: str, monkeypatch: pytest.MonkeyPatch, optimised: None
@@ -434,6 +435,7 @@ def test_where_nothing_can_be_written(
         eomgen.load(made)
 
 
+@pytest.mark.apart
 def test_several_at_once_and_one_killed(fresh: Path) -> None:
     """Processes that compile the same scene, one of them stopped midway, leave a sound store."""
     code = "import eomgen, numpy; made = eomgen.generate('pendulum', route='aba', backend='c'); "

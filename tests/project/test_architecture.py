@@ -69,6 +69,7 @@ def test_what_needs_no_scene_loads_little(command: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.apart
 def test_the_running_half_does_without_sympy(tmp_path: Path) -> None:
     """Loading, integrating, drawing, and all of `simulate` where the module is in the store: SymPy
     is neither needed nor imported.

@@ -46,6 +46,7 @@ def blocks(text: str) -> list[tuple[str, str]]:
     return re.findall(r"^```(\w+)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.apart
 @pytest.mark.usefixtures("blank_figures")
 @pytest.mark.parametrize("page", some(SHORT, PAGES), ids=lambda page: page.stem)
 def test_a_page_does_what_it_says(

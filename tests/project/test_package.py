@@ -39,6 +39,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     yield folder
 
 
+@pytest.mark.apart
 def test_the_wheel_holds_the_package_and_nothing_else(built: Path) -> None:
     """Every tracked file of package and templates, each licence, and the metadata."""
     (path,) = built.glob("*.whl")
@@ -106,6 +107,7 @@ def test_the_typed_script_runs() -> None:
     subprocess.run([sys.executable, SCRIPT], cwd=ROOT, check=True, capture_output=True)
 
 
+@pytest.mark.apart
 def test_generating_and_simulating_need_no_drawing() -> None:
     """Without Matplotlib and Pillow, from an empty store; SciPy, which takes longer to load than a
     scene takes to generate, is for runs alone.

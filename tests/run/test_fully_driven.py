@@ -118,6 +118,7 @@ def test_a_driven_crank() -> None:
     np.testing.assert_allclose(coarse.saved["driving_forces"][:, 0], rough, atol=5e-2)
 
 
+@pytest.mark.apart
 @pytest.mark.every(2)
 @pytest.mark.every(2)
 @pytest.mark.parametrize("text", [ROD, BAR], ids=["tree", "loop"])

@@ -16,7 +16,7 @@ from eomgen.results import Run
 from eomgen.show.gallery import Exhibit, gallery_page, thumbnail
 from eomgen.show.page import render_page, save_page
 
-pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
+pytestmark = [pytest.mark.apart, pytest.mark.skipif(bool(missing()), reason=missing())]
 
 NASTY = "</script><img src=x onerror=alert(1)><b id=hacked>{{ 7*7 }}\u2028"
 

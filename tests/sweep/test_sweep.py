@@ -221,6 +221,7 @@ def started(out: Path, members: int, t_end: float, chunks: int) -> "subprocess.P
     return process
 
 
+@pytest.mark.apart
 def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
     """Killed at any time, its workers end with it, also within a run; and it ends with the bytes of
     one that was not.
@@ -240,6 +241,7 @@ def test_a_killed_sweep_goes_on(tmp_path: Path) -> None:
         assert (one / name).read_bytes() == (two / name).read_bytes(), name
 
 
+@pytest.mark.apart
 @pytest.mark.every(2)
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_two_stops_at_once(number: signal.Signals, tmp_path: Path) -> None:
