@@ -8,10 +8,10 @@ from eomgen.model.model import Model
 from eomgen.program.tape import TIME
 
 if TYPE_CHECKING:
+    from eomgen.derivation.exposition import Exposition
     from eomgen.derivation.matrices import Matrices
     from eomgen.derivation.steps import Step
     from eomgen.derivation.symbols import Expr
-    from eomgen.exposition.derivation import Exposition
 
 NUMBERS = (
     "m = eomgen.load(eomgen.generate(scene, outputs=['mass_matrix', 'velocity_force', "

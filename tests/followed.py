@@ -8,16 +8,16 @@ import numpy as np
 import sympy as sp
 
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.effects import DerivedEffect, derived_effects
+from eomgen.derivation.evaluate import Numbers, array, define, follow, number
+from eomgen.derivation.exposition import used_bodies
+from eomgen.derivation.frames import frames_of
+from eomgen.derivation.poses import poses
+from eomgen.derivation.reading import reading_names
+from eomgen.derivation.recursion import recursive_steps
 from eomgen.derivation.steps import Equation, Step
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.start.constraint_equations import ConstraintEquations, newton
-from eomgen.exposition.derivation import used_bodies
-from eomgen.exposition.effects import DerivedEffect, derived_effects
-from eomgen.exposition.evaluate import Numbers, array, define, follow, number
-from eomgen.exposition.frames import frames_of
-from eomgen.exposition.poses import poses
-from eomgen.exposition.reading import reading_names
-from eomgen.exposition.recursion import recursive_steps
 from eomgen.model.model import Model
 from eomgen.scalars.floats import FloatScalars
 

@@ -14,7 +14,7 @@ from newton_euler import Mechanism, Motion, solve
 
 from eomgen.codegen.from_equations import from_equations
 from eomgen.codegen.system import optimised
-from eomgen.derivation.closed import Equations, derive
+from eomgen.derivation.handout.closed import Equations, derive
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import python_module
 from eomgen.scene.reader import parse_scene, read_scene

@@ -16,7 +16,6 @@ PLACES = {
     "eomgen/scene/effects": "effects",
     "eomgen/commands": "api",
     "eomgen/engine": "native run subset",
-    "eomgen/exposition": "derivation",
     "eomgen/model": "scene",
     "eomgen/scalars": "program",
     "eomgen/scenes": "codegen",

@@ -35,8 +35,8 @@ def derivation_of(
     detail: Detail = "steps",
 ) -> Derivation:
     """The derivation of a model. Raises `SceneError` as `derive` does."""
-    from eomgen.exposition.derivation import exposition_of  # imports SymPy
-    from eomgen.exposition.levels import at_detail
+    from eomgen.derivation.exposition import exposition_of  # imports SymPy
+    from eomgen.derivation.steps import at_detail
 
     with reporter.located(), reporter.waiting(f"deriving {model.name} …"):
         checked(model)

@@ -78,7 +78,7 @@ def _symbolic(model: Model) -> Derived:
     # Imported here because SymPy takes longer to load than all other modules together.
     from eomgen.codegen.from_closed_form import from_closed_form, of_pins, of_projected
     from eomgen.codegen.from_equations import from_equations
-    from eomgen.derivation import closed
+    from eomgen.derivation.handout import closed
     from eomgen.derivation.projected.derive import derive_projected
 
     derived, _ = with_stand_ins(model)

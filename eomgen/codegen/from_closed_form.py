@@ -13,8 +13,8 @@ from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.stand_ins import with_stand_ins
 from eomgen.codegen.system import System, names_of_inputs
-from eomgen.derivation.closed import Equations, conditions
-from eomgen.derivation.forms import state_form
+from eomgen.derivation.handout.closed import Equations, conditions
+from eomgen.derivation.handout.forms import state_form
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.projected.equations import Balance

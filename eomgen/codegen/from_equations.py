@@ -8,9 +8,9 @@ import sympy as sp
 from eomgen.codegen.from_recursion import output
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
-from eomgen.derivation.closed import Equations, conditions, written_out_forces
-from eomgen.derivation.forms import state_form
-from eomgen.derivation.free_bodies import SymbolicMechanism
+from eomgen.derivation.handout.closed import Equations, conditions, written_out_forces
+from eomgen.derivation.handout.forms import state_form
+from eomgen.derivation.handout.free_bodies import SymbolicMechanism
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.symbols import Vec, rotate
 from eomgen.language.formula import evaluate

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.closed import Equations
+from eomgen.derivation.handout.closed import Equations
+from eomgen.derivation.handout.solution import Definition
 from eomgen.derivation.projected.derive import ProjectedEquations
-from eomgen.derivation.solution import Definition
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula, written
 

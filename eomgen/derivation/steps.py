@@ -1,18 +1,40 @@
-"""The derivation step by step, numbered like the handout."""
+"""What a derivation that is to be read consists of."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-import sympy as sp
-
-from eomgen.derivation.closed import Equations
-from eomgen.derivation.dots import dotted
-from eomgen.derivation.elimination import trees
 from eomgen.derivation.symbols import Expr
-from eomgen.language.formula import written
+from eomgen.tables.details import DETAILS, Detail
 
 Definition = tuple[Expr, Expr]
 """A symbol and what it stands for."""
+Pairs = list[tuple[Expr, Expr]]
+"""Left and right sides of equations."""
+Kind = Literal["introduction", "state", "bodies", "balance", "joint", "motion", "effect",
+               "constraint", "algorithm", "equations", "solution", "form", "impact", "force",
+               "variant"]  # fmt: skip
+
+LEVELS: dict[Kind, Detail] = {
+    "introduction": "summary",
+    "state": "summary",
+    "bodies": "steps",  # each by itself, with its forces
+    "balance": "steps",  # Newton and Euler for each
+    "joint": "steps",  # a joint, and its derivatives
+    "motion": "steps",  # where bodies are, and how they move
+    "effect": "steps",
+    "constraint": "steps",
+    "algorithm": "steps",
+    "equations": "summary",  # M, V, G, F
+    "solution": "summary",  # the accelerations
+    "form": "summary",  # the derivative of the state
+    "impact": "steps",
+    "force": "all",  # what joints, constraints and gravity exert
+    "variant": "all",  # another way to write what has been said
+}
+"""The first level of detail at which a kind of step is shown."""
+FIGURES: dict[Kind, str] = {"state": "mechanism", "bodies": "bodies"}
+"""The sketch beside the words of a kind of step."""
 
 
 @dataclass(frozen=True)
@@ -25,243 +47,24 @@ class Equation:
 
 @dataclass(frozen=True)
 class Step:
-    """One step: the handout's equation numbers, a title, an explanation, and its equations.
+    """One step: what it is, a title, an explanation, its equations, its number in brackets.
 
-    In the words, blank lines divide paragraphs and backquotes enclose what is code. `figure` names
-    the sketch that belongs beside the words: "mechanism", "bodies", or none.
+    In the words, blank lines divide paragraphs and backquotes enclose what is code.
     """
 
-    number: str
+    kind: Kind
     title: str
     words: str
     equations: tuple[Equation, ...]
-    figure: str = ""
+    number: str = ""
+
+    @property
+    def figure(self) -> str:
+        """The sketch that belongs beside the words: "mechanism", "bodies", or none."""
+        return FIGURES.get(self.kind, "")
 
 
-def handout_steps(equations: Equations) -> tuple[Step, ...]:
-    """Every step from the state to the closed form, in symbols meant for reading."""
-    shown = readable(equations)
-    return tuple(
-        Step(
-            number,
-            title,
-            words,
-            tuple(
-                Equation(left.xreplace(shown), right.xreplace(shown))
-                for left, right in pairs
-                if left.xreplace(shown) != right.xreplace(shown)
-            ),
-        )
-        for number, title, words, pairs in (
-            *_mechanism(equations),
-            *_equations_of_motion(equations),
-            *_solution(equations),
-        )
-    )
-
-
-NOT_SYMMETRIC = (
-    "Not symmetric: its rows are torques about the bodies' own centres. `mass_matrix()` of the "
-    "generated module is the symmetric one."
-)
-Pairs = list[tuple[Expr, Expr]]
-"""Left and right sides, in the derivation's own symbols."""
-
-
-def _mechanism(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
-    """State, free bodies, and the joints as constraints."""
-    s, kin, model = equations.symbols, equations.kinematics, equations.model
-    held = [k for k, body in enumerate(model.bodies) if body.joint.holds]
-    yield (
-        "(1)",
-        "State",
-        "Each body has the position x, y of its centre of mass, its momentum P = m v, its "
-        "orientation and its angular momentum L = I ω. The joints leave the coordinates free.",
-        [
-            (sp.Symbol("Y"), _redundant_state(equations)),
-            *zip(s.angle, kin.angle, strict=True),
-            *zip(s.omega, kin.omega, strict=True),
-        ],
-    )
-    yield (
-        "(2)-(11)",
-        "Momenta and forces",
-        "Force is dP/dt, torque is dL/dt. The joint force f_j acts on the parent, -f_j on the "
-        "child; both are unknown. The forces of effects, (29) to (35), are among them.",
-        [pair for k in range(len(model.bodies)) for pair in _momenta(equations, k)],
-    )
-    yield (
-        "(12)-(17)",
-        "Free bodies",
-        f"The same for the accelerations: {_count(3 * len(model.bodies))} scalar equations in "
-        f"{_count(3 * len(model.bodies) + 2 * len(held))} unknowns, the accelerations and the "
-        "joint forces. What the joints say of the accelerations is missing.",
-        list(equations.free_bodies.equations),
-    )
-    arms = []
-    for k in held:
-        name = model.bodies[k].joint.name
-        for word, arm in (("parent", kin.arm_parent[k]), ("child", kin.arm_child[k])):
-            for axis, component in zip("xy", arm, strict=True):
-                arms.append((sp.Symbol(f"r_{name},{word},{axis}"), component))
-    yield (
-        "(18), (19)",
-        "Arms",
-        "From each centre of mass to the joint, in world axes.",
-        arms,
-    )
-    yield (
-        "(20), (21)",
-        "Constraint",
-        "The two bodies share the joint: x_parent + r_parent = x_child + r_child. This gives the "
-        "place of the child.",
-        [pair for k in held for pair in (*_shared(equations, k), *_placed(equations, k))],
-    )
-    yield (
-        "(22), (23)",
-        "Constraint differentiated twice",
-        "The child's acceleration, from the parent's and from the angular velocities and "
-        "accelerations.",
-        [
-            pair
-            for k in held
-            for pair in zip((s.xdd[k], s.ydd[k]), kin.acceleration[k], strict=True)
-        ],
-    )
-
-
-def _count(n: int) -> str:
-    words = "zero one two three four five six seven eight nine ten eleven twelve".split()
-    return words[n] if n < len(words) else str(n)
-
-
-def _shared(equations: Equations, k: int) -> Pairs:
-    """The place of a joint, by the parent and by the child (20)."""
-    s, body = equations.symbols, equations.model.bodies[k]
-    arms = {
-        word: [sp.Symbol(f"r_{body.joint.name},{word},{axis}") for axis in "xy"]
-        for word in ("parent", "child")
-    }
-    above = (s.x[body.parent], s.y[body.parent]) if body.parent >= 0 else (sp.S.Zero, sp.S.Zero)
-    own = (s.x[k], s.y[k])
-    return [(above[i] + arms["parent"][i], own[i] + arms["child"][i]) for i in range(2)]
-
-
-def _placed(equations: Equations, k: int) -> Pairs:
-    """The place of a child (21)."""
-    s = equations.symbols
-    return list(zip((s.x[k], s.y[k]), equations.kinematics.position[k], strict=True))
-
-
-def _momenta(equations: Equations, k: int) -> Pairs:
-    """Rates of place and momentum of a body, as in (4) to (7): by its momenta, by its forces."""
-    s, name = equations.symbols, equations.model.bodies[k].name
-    (_, fx), (_, fy), (_, torque) = equations.free_bodies.equations[3 * k : 3 * k + 3]
-    px, py, spin = (sp.Symbol(f"{word}_{name}{axis}") for word, axis in
-                    (("P", ",x"), ("P", ",y"), ("L", "")))  # fmt: skip
-    dpx, dpy, dspin = (sp.Symbol(dotted(x.name)) for x in (px, py, spin))
-    pairs = [(s.xd[k], px / s.mass[k]), (s.yd[k], py / s.mass[k]), (dpx, fx), (dpy, fy)]
-    if s.inertia[k] != 0:
-        pairs.append((s.omega[k], spin / s.inertia[k]))
-    return [*pairs, (dspin, torque)]
-
-
-def _redundant_state(equations: Equations) -> Expr:
-    """The redundant state of all bodies (1): x, P, orientation, L."""
-    s, row = equations.symbols, []
-    for k, body in enumerate(equations.model.bodies):
-        momentum = [sp.Symbol(f"P_{body.name},{axis}") for axis in "xy"]
-        row += [s.x[k], s.y[k], *momentum, s.angle[k], sp.Symbol(f"L_{body.name}")]
-    return sp.Matrix([row])
-
-
-def _equations_of_motion(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
-    """The joint forces eliminated, and M, V, G, F."""
-    floating = any(tree.floating for tree in trees(equations.model))
-    force = (
-        "f_j accelerates the bodies on the inner"
-        if floating
-        else ("-f_j accelerates the bodies on the outer")
-    )
-    sums = ", a floating tree's first rows being the sum of its forces." if floating else "."
-    yield (
-        "(24), (25)",
-        "Elimination",
-        f"The joint force {force} side of its joint. Put into the torque equations, with the "
-        "dependent accelerations replaced by (22) and (23), this leaves M a + V + G = F in the "
-        f"accelerations a of the coordinates{sums}",
-        [_system(equations), (sp.Symbol("a"), sp.Matrix(equations.symbols.a))],
-    )
-    collected = equations.collected
-    rows = "" if collected.M == collected.M.T else NOT_SYMMETRIC
-    yield "(26)", "Mass matrix", rows, [(sp.Symbol("M"), collected.M)]
-    yield "(27)", "Velocity forces", "", [(sp.Symbol("V"), collected.V)]
-    yield "(28)", "Gravity forces", "", [(sp.Symbol("G"), collected.G)]
-    words = "External forces and joint torques, eliminated in the same way."
-    efforts = equations.free_bodies.efforts.items()
-    yield "(29)-(36)", "Applied forces", words, [(sp.Symbol("F"), collected.F), *efforts]
-
-
-def _system(equations: Equations) -> tuple[Expr, Expr]:
-    """M a + V + G = F, by its letters."""
-    n = len(equations.symbols.a)
-    M, (a, V, G, F) = sp.MatrixSymbol("M", n, n), (sp.MatrixSymbol(x, n, 1) for x in "aVGF")
-    return sp.MatAdd(sp.MatMul(M, a), V, G), F
-
-
-def _solution(equations: Equations) -> Iterator[tuple[str, str, str, Pairs]]:
-    """The closed form; its numbers continue the handout's."""
-    yield (
-        "(37)",
-        "Closed form",
-        "Solved once, symbolically, for the angular acceleration α of every body. The pivots d "
-        "are sums of positive terms, so no division can fail at any pose; c couples one body to "
-        "another, b is its load, and M the mass of a whole tree.",
-        _solved(equations),
-    )
-    yield "(38)", "Joint force", "Recovered from the accelerations.", list(equations.joint_force)
-
-
-def _solved(equations: Equations) -> list[tuple[Expr, Expr]]:
-    """The solution without the generalised forces, which only `forward_dynamics` has."""
-    still = dict.fromkeys(equations.symbols.tau, sp.Integer(0))
-    return [
-        (symbol, expression.xreplace(still))
-        for symbol, expression in equations.solution.definitions
-    ]
-
-
-def readable(equations: Equations) -> dict[Expr, Expr]:
-    """Symbols by ones whose names that printers know how to write."""
-    s, model = equations.symbols, equations.model
-    names = [body.name for body in model.bodies]
-    shown: dict[Expr, Expr] = {}
-    taken = {*s.parameters, *s.inputs, *(q.name for q in s.q)}
-    for q, v, a in zip(s.q, s.v, s.a, strict=True):
-        shown[v], shown[a] = sp.Symbol(dotted(q.name)), sp.Symbol(dotted(q.name, 2))
-    words = (
-        ("x", s.x), ("y", s.y), ("psi", s.angle), (dotted("x"), s.xd), (dotted("y"), s.yd),
-        ("omega", s.omega), (dotted("x", 2), s.xdd), (dotted("y", 2), s.ydd), ("alpha", s.alpha),
-    )  # fmt: skip
-    for word, symbols in words:
-        for name, symbol in zip(names, symbols, strict=True):
-            shown.setdefault(symbol, sp.Symbol(f"{word}_{name}"))
-    for body, (fx, fy) in zip(model.bodies, s.force, strict=True):
-        shown[fx] = sp.Symbol(f"f_{body.joint.name},x")
-        shown[fy] = sp.Symbol(f"f_{body.joint.name},y")
-    for formula, symbol in s.formulas.items():
-        shown[symbol] = sp.Symbol(written(formula))
-    short = {"pivot": "d", "coupling": "c", "load": "b", "mass": "M", "weight": "w", "row": "j",
-             "effort": "tau"}  # fmt: skip
-    for body in model.bodies:
-        for field, letter in (("mass", "m"), ("inertia_com", "I")):
-            named = s.parameters.get(f"{body.name}_{field}")
-            if named is not None and f"{letter}_{body.name}" not in taken:
-                shown[named] = sp.Symbol(f"{letter}_{body.name}")
-    for symbol in (*equations.free_bodies.efforts, *dict(equations.solution.definitions)):
-        kind, _, rest = symbol.name.partition("__")
-        if symbol not in shown and kind in short:
-            rest = rest.replace("__", ",")
-            brief = f"{short[kind]}_{rest}"
-            shown[symbol] = sp.Symbol(f"{kind}_{rest}" if brief in taken else brief)
-    return shown
+def at_detail(steps: Sequence[Step], detail: Detail) -> tuple[Step, ...]:
+    """The steps of a level; their numbers stay."""
+    last = DETAILS.index(detail)
+    return tuple(step for step in steps if DETAILS.index(LEVELS[step.kind]) <= last)

@@ -6,8 +6,8 @@ from typing import Any
 
 import sympy as sp
 
-from eomgen.exposition.effects import DerivedEffect
-from eomgen.exposition.reading import read, reading_names
+from eomgen.derivation.effects import DerivedEffect
+from eomgen.derivation.reading import read, reading_names
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved

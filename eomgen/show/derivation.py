@@ -11,8 +11,8 @@ import sympy as sp
 from markupsafe import Markup
 
 from eomgen.base.templating import render
+from eomgen.derivation.effects import DerivedEffect
 from eomgen.derivation.steps import Equation, Step
-from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Model
 from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.drawing import Drawing, svg, tikz, tikz_colours

@@ -10,7 +10,7 @@ from typing import Any
 import sympy as sp
 from sympy.simplify.radsimp import fraction
 
-from eomgen.exposition.spatial import ForceCross, MotionCross
+from eomgen.derivation.spatial import ForceCross, MotionCross
 from eomgen.show.notation import parsed
 from eomgen.show.order import ordered_factors, ordered_terms
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.derivation.effects import DerivedEffect
 from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
-from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Body, Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import Load

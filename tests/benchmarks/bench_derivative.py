@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from eomgen.derivation.closed import derive
+from eomgen.derivation.handout.closed import derive
 from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import compile_model
 from eomgen.run.module import load_module

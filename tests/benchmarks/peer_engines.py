@@ -10,7 +10,7 @@ import sympy as sp
 from paired import chain_of_pinocchio, paired, row, spread
 from scipy.integrate import DOP853
 
-from eomgen.derivation.closed import derive
+from eomgen.derivation.handout.closed import derive
 from eomgen.model.model import Model
 
 Method = Callable[[float], np.ndarray]

@@ -13,17 +13,17 @@ from campaign import some
 from followed import Instant, instant
 
 import eomgen
+from eomgen.derivation.constraints import DerivedConstraint, derived_constraints
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.evaluate import Numbers, array, define, number
+from eomgen.derivation.exposition import exposition_of
+from eomgen.derivation.frames import frames_of
+from eomgen.derivation.loops import by_independent_velocities, elimination_steps
+from eomgen.derivation.poses import poses
 from eomgen.dynamics.loops import constraints as solved
 from eomgen.dynamics.loops.clusters import accelerations_at_rest, jacobian_of
 from eomgen.dynamics.start.assembly import assembled
 from eomgen.dynamics.start.assur import with_closed_form
-from eomgen.exposition.constraints import DerivedConstraint, derived_constraints
-from eomgen.exposition.derivation import exposition_of
-from eomgen.exposition.evaluate import Numbers, array, define, number
-from eomgen.exposition.frames import frames_of
-from eomgen.exposition.loops import by_independent_velocities, elimination_steps
-from eomgen.exposition.poses import poses
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.built_in import built_in_names

@@ -18,13 +18,13 @@ from followed import follow_effects, follow_recursion, instant
 import eomgen
 from eomgen.commands.main import main
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.effects import derived_effects
+from eomgen.derivation.evaluate import array, define, number
+from eomgen.derivation.exposition import exposition_of, prescribed_motion
+from eomgen.derivation.impacts import impact_steps
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.equations import Derivation
-from eomgen.exposition.derivation import exposition_of, prescribed_motion
-from eomgen.exposition.effects import derived_effects
-from eomgen.exposition.evaluate import array, define, number
-from eomgen.exposition.impacts import impact_steps
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene
@@ -345,7 +345,7 @@ def report_words(words: str) -> Any:
     """A step of words alone."""
     from eomgen.derivation.steps import Step
 
-    return Step("", "", words, ())
+    return Step("effect", "", words, ())
 
 
 def test_forces_in_sketches_have_the_names_of_the_equations() -> None:

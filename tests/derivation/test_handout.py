@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 from mechanisms import compiled
 
-from eomgen.derivation.closed import Equations
+from eomgen.derivation.handout.closed import Equations
 
 SCENES = ("two_body", "two_body_forced")
 C, S = sp.cos, sp.sin

@@ -11,7 +11,7 @@ from campaign import some
 from mechanisms import BUILT_IN, REPORTED, SEEDS, Scene, compiled, random_tree
 from newton_euler import Mechanism, solve
 
-from eomgen.derivation.closed import Equations, derive
+from eomgen.derivation.handout.closed import Equations, derive
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene
 

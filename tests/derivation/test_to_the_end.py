@@ -90,7 +90,7 @@ def _follows(model: Model, name: str) -> bool:
 
 
 def _read(model: Model, name: str) -> str:
-    from eomgen.exposition.reading import reading_names
+    from eomgen.derivation.reading import reading_names
 
     return reading_names(model).get(name, name)
 

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 
 import sympy as sp
 
-from eomgen.derivation.solution import is_sum_of_positive_terms
+from eomgen.derivation.handout.solution import is_sum_of_positive_terms
 from eomgen.derivation.symbols import Expr, tidy
 
 MOST_TERMS = 400

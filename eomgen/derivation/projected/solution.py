@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
+from eomgen.derivation.handout.solution import is_sum_of_positive_terms
 from eomgen.derivation.projected.equations import (
     Inertia,
     Loads,
@@ -30,7 +31,6 @@ from eomgen.derivation.projected.equations import (
 )
 from eomgen.derivation.projected.simplify import nested, sum_of_squares
 from eomgen.derivation.projected.symbols import Ledger, Symbols
-from eomgen.derivation.solution import is_sum_of_positive_terms
 from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 

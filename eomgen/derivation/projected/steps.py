@@ -8,7 +8,7 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.projected.simplify import gathered
-from eomgen.derivation.steps import Equation, Pairs, Step
+from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
 from eomgen.scene.joints.base import WORLD
@@ -19,8 +19,8 @@ LONGEST = 160
 """Operations of an expression up to which it is gathered for reading."""
 SLACK = 2.5
 """How much longer than its shortest form a sum may be whose terms are to be seen."""
-POWER = "Virtual power"
-"""The title of the step with the mass matrix."""
+Titled = tuple[Kind, str, str, Pairs]
+"""Kind, title, words and lines of a step, these in the derivation's own symbols."""
 ROTATIONS = ("R__", "k__")
 """How names of entries of rotations begin, which are shown with their joint."""
 
@@ -38,18 +38,19 @@ def projected_steps(equations: ProjectedEquations) -> tuple[Step, ...]:
     solved = {*equations.symbols.a} <= {*equations.solution.definitions}
     ends = _solution(equations) if solved else ()
     parts = (*_joints(equations), *_balance(equations), *ends)
-    for number, (title, words, pairs) in enumerate(parts, 1):
+    for kind, title, words, pairs in parts:
         lines = [Equation(read(left), read(right)) for left, right in pairs]
         kept = tuple(line for line in lines if line.left != line.right)
-        steps.append(Step(f"({number})", title, words, kept))
+        steps.append(Step(kind, title, words, kept))
     return tuple(steps)
 
 
-def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
+def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
     """The state, and each joint as a constraint with its derivatives."""
     s, model = equations.symbols, equations.model
     plane = model.dimensions == 2
     yield (
+        "state",
         "State",
         "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
         "axes of the body to which it belongs.",
@@ -72,11 +73,13 @@ def _joints(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
             pairs.append((sp.Symbol(f"R_{body.name}"), whole[:size, :size]))
         pairs.append((sp.Symbol(f"r_{body.name}"), position[:size, :].applyfunc(_short)))
         yield (
+            "joint",
             f"Joint `{body.joint.name}`: {body.joint.type}, `{parent}` to `{body.name}`",
             _joint_words(body.name, parent),
             pairs,
         )
         yield (
+            "motion",
             f"Joint `{body.joint.name}`, differentiated twice",
             f"Angular velocity ω and velocity u of the centre of mass of `{body.name}`, and their "
             f"derivatives α and a, in axes of `{body.name}`"
@@ -142,7 +145,7 @@ def _short(expression: Expr) -> Expr:
     return gathered(expression, frozenset())
 
 
-def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
+def _balance(equations: ProjectedEquations) -> Iterator[Titled]:
     """M, V, G, F."""
     terms, model = equations.balance, equations.model
     definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
@@ -154,6 +157,7 @@ def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
     ]
     if named:
         yield (
+            "balance",
             "Parts of the motion",
             "These parts have names, to keep what follows short. ω, u with a velocity as index are "
             "the partial velocities: the motion of a body while this velocity is 1 and all others "
@@ -163,18 +167,19 @@ def _balance(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
         )
     weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
     yield (
-        POWER,
+        "equations",
+        "Virtual power",
         "For every velocity that the joints leave free, the forces of inertia do the work of "
         f"the loads: m a for each body's force{weights}. Forces in the joints do none. This is "
         "M dv/dt + V + G = F; first the mass matrix (entries that are not written are 0),",
         [(sp.Symbol("M"), terms.M)],
     )
-    yield "Velocity forces", "", [(sp.Symbol("V"), terms.V)]
-    yield "Gravity forces", "", [(sp.Symbol("G"), terms.G)]
-    yield "Applied forces", "", [(sp.Symbol("F"), terms.F)]
+    yield "equations", "Velocity forces", "", [(sp.Symbol("V"), terms.V)]
+    yield "equations", "Gravity forces", "", [(sp.Symbol("G"), terms.G)]
+    yield "equations", "Applied forces", "", [(sp.Symbol("F"), terms.F)]
 
 
-def _solution(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]:
+def _solution(equations: ProjectedEquations) -> Iterator[Titled]:
     """The closed form without the generalised forces, which only `forward_dynamics` has."""
     s, definitions = equations.symbols, equations.solution.definitions
     still = dict.fromkeys(s.tau, sp.Integer(0))
@@ -187,6 +192,7 @@ def _solution(equations: ProjectedEquations) -> Iterator[tuple[str, str, Pairs]]
         if symbol in needed and not before:
             pairs.append((symbol, _flat(e.xreplace(still), s.fixed)))
     yield (
+        "solution",
         "Closed form",
         "Gauss: of all motions that the joints allow, the true one has the least sum of weighted "
         "squares of the differences between the bodies' accelerations and those of free bodies. "

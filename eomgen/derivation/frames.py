@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.mechanism import NamingMechanism, Notes
 from eomgen.derivation.projected.constraints import about, fixed_axes, of_quaternion
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbols import Expr
-from eomgen.exposition.mechanism import NamingMechanism, Notes
 from eomgen.language.formula import Formula
 from eomgen.model.model import Body, JointIndex, Model
 from eomgen.model.orientation import rows_of

@@ -8,11 +8,9 @@ from collections.abc import Iterator
 
 import sympy as sp
 
-from eomgen.derivation.steps import Equation, Step
-from eomgen.derivation.symbols import Expr
-from eomgen.exposition.effects import DerivedEffect
-from eomgen.exposition.frames import Frame
-from eomgen.exposition.recursion import (
+from eomgen.derivation.effects import DerivedEffect
+from eomgen.derivation.frames import Frame
+from eomgen.derivation.recursion import (
     FRAMES,
     VECTORS,
     Recursion,
@@ -25,6 +23,8 @@ from eomgen.exposition.recursion import (
     total,
     velocities,
 )
+from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 
 ABOUT = (
@@ -57,11 +57,13 @@ def composite_steps(
     yield from frame_steps(r, f"{ABOUT}\n\n{VECTORS[r.size]}{FRAMES}")
     order = range(len(frames))
     lines = [line for k in order for line in (*velocities(r, k), *_acceleration(r, k))]
-    yield Step("", "Outwards: velocities and accelerations", outward_words(r), tuple(lines))
+    yield Step(
+        "algorithm", "Outwards: velocities and accelerations", outward_words(r), tuple(lines)
+    )
     lines = [line for k in reversed(order) for line in _bias(r, k)]
-    yield Step("", "Inwards: the bias force", BIAS, tuple(lines))
+    yield Step("algorithm", "Inwards: the bias force", BIAS, tuple(lines))
     lines = [line for k in reversed(order) for line in _mass(r, k)]
-    yield Step("", "Inwards: the mass matrix M", MASS, tuple(lines))
+    yield Step("algorithm", "Inwards: the mass matrix M", MASS, tuple(lines))
 
 
 def _acceleration(r: Recursion, k: int) -> Iterator[Equation]:

@@ -12,14 +12,12 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.effects import DerivedEffect
+from eomgen.derivation.frames import Frame
+from eomgen.derivation.mechanism import AXES, NamingMechanism, Notes, rotation_symbols
+from eomgen.derivation.poses import frame_name
 from eomgen.derivation.projected.symbols import real
-from eomgen.derivation.steps import Equation, Step
-from eomgen.derivation.symbols import Expr
-from eomgen.exposition.effects import DerivedEffect
-from eomgen.exposition.frames import Frame
-from eomgen.exposition.mechanism import AXES, NamingMechanism, Notes, rotation_symbols
-from eomgen.exposition.poses import frame_name
-from eomgen.exposition.spatial import (
+from eomgen.derivation.spatial import (
     ForceCross,
     MotionCross,
     cut,
@@ -28,6 +26,8 @@ from eomgen.exposition.spatial import (
     motion_transform,
     rigid_inertia,
 )
+from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD
@@ -108,20 +108,20 @@ def recursive_steps(
     yield from frame_steps(r, f"{ABOUT}\n\n{VECTORS[r.size]}{FRAMES}{PIVOTS}")
     order = range(len(frames))
     lines = [line for k in order for line in velocities(r, k)]
-    yield Step("", "Outwards: velocities and bias forces", outward_words(r), tuple(lines))
+    yield Step("algorithm", "Outwards: velocities and bias forces", outward_words(r), tuple(lines))
     words = (
         "From the leaves to the root. I^A is the inertia that a frame seems to have with all that "
         "hangs on it, p^A the force on it that would leave it without acceleration. What is left "
         "of both after the frame's own joint has given way, I^a and p^a, goes to the parent."
     )
     lines = [line for k in reversed(order) for line in _articulated(r, k)]
-    yield Step("", "Inwards: articulated-body inertias", words, tuple(lines))
+    yield Step("algorithm", "Inwards: articulated-body inertias", words, tuple(lines))
     words = (
         "From the root to the leaves: the joint's acceleration follows from the forces and from "
         "the parent's acceleration a'. The world accelerates by minus g, which stands for gravity."
     )
     lines = [line for k in order for line in _accelerations(r, k)]
-    yield Step("", "Outwards: accelerations", words, tuple(lines))
+    yield Step("algorithm", "Outwards: accelerations", words, tuple(lines))
     yield _applied(r)
 
 
@@ -151,14 +151,15 @@ def _applied(r: Recursion) -> Step:
         "is the sum of the loads f on a frame and on all that hangs on it, moved to its origin; "
         "F is its part along the joint's motion, plus the joint's own loads."
     )
-    return Step("", "Applied forces, term by term", words, tuple(lines))
+    return Step("variant", "Applied forces, term by term", words, tuple(lines))
 
 
 def frame_steps(r: Recursion, words: str) -> Iterator[Step]:
     """What the algorithm is, and the constants of each frame."""
-    yield Step("", "The algorithm", words, ())
+    yield Step("algorithm", "The algorithm", words, ())
     for k, frame in enumerate(r.frames):
-        yield Step("", f"Frame `{frame.name}`: {_kind(r, k)}", "", tuple(_constants(r, frame)))
+        title = f"Frame `{frame.name}`: {_kind(r, k)}"
+        yield Step("algorithm", title, "", tuple(_constants(r, frame)))
 
 
 def _kind(r: Recursion, k: int) -> str:

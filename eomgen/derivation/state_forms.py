@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.closed import Equations
 from eomgen.derivation.dots import dotted
-from eomgen.derivation.forms import StateForm, state_form
+from eomgen.derivation.effects import DerivedEffect
+from eomgen.derivation.handout.closed import Equations
+from eomgen.derivation.handout.forms import StateForm, state_form
 from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr, over_coordinates
-from eomgen.exposition.effects import DerivedEffect
 from eomgen.model.model import Model
 
 FORMS = {
@@ -130,7 +130,7 @@ def form_step(
     ]
     equations += [Equation(s, rate) for s, rate in zip(plain, rates, strict=True) if s != rate]
     equations += [Equation(symbol, e) for symbol, e in written.definitions]
-    return Step("", f"State form {form}: Y and its derivative", words, tuple(equations))
+    return Step("form", f"State form {form}: Y and its derivative", words, tuple(equations))
 
 
 def rate_symbol(state: Expr) -> Expr:

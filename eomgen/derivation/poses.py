@@ -6,11 +6,8 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.derivation.dots import dotted
-from eomgen.derivation.projected.symbols import real
-from eomgen.derivation.steps import Definition, Equation
-from eomgen.derivation.symbols import Expr
-from eomgen.exposition.frames import Frame
-from eomgen.exposition.mechanism import (
+from eomgen.derivation.frames import Frame
+from eomgen.derivation.mechanism import (
     AXES,
     crossed,
     omega_symbols,
@@ -19,6 +16,9 @@ from eomgen.exposition.mechanism import (
     turned,
     velocity_symbols,
 )
+from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.steps import Definition, Equation
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 
 

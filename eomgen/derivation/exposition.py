@@ -6,20 +6,41 @@ what depends on the motion enters the derivation as forces with names, and each 
 forces are.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
 
 from eomgen.base.errors import SceneError
-from eomgen.derivation.closed import Equations, derive
-from eomgen.derivation.elimination import symmetric
+from eomgen.derivation.composite import composite_steps
+from eomgen.derivation.constraints import DerivedConstraint, derived_constraints, tree_of
+from eomgen.derivation.effects import DerivedEffect, derived_effects, equations_of, with_symbols
+from eomgen.derivation.embedding import embedded
+from eomgen.derivation.frames import frames_of
+from eomgen.derivation.handout.closed import Equations, derive
+from eomgen.derivation.handout.elimination import symmetric
+from eomgen.derivation.handout.steps import handout_steps, readable
+from eomgen.derivation.impacts import impact_steps
+from eomgen.derivation.loops import (
+    bias_of,
+    constraint_steps,
+    elimination_steps,
+    freedom_algorithm,
+    freedom_steps,
+    polygon_steps,
+)
 from eomgen.derivation.matrices import Matrices, of_pins, of_projected
+from eomgen.derivation.mechanism import NamingMechanism, Notes
+from eomgen.derivation.poses import poses
 from eomgen.derivation.projected.derive import derive_projected
-from eomgen.derivation.projected.steps import POWER, projected_steps
+from eomgen.derivation.projected.steps import projected_steps
 from eomgen.derivation.projected.symbols import real
-from eomgen.derivation.steps import Definition, Equation, Step, handout_steps, readable
+from eomgen.derivation.reading import numbered, read_all, reading_names, renumbered
+from eomgen.derivation.recursion import recursive_steps
+from eomgen.derivation.simplified import simplified, solved_directly, tidied
+from eomgen.derivation.state_forms import form_step, momentum_form, plain_form, velocity_form
+from eomgen.derivation.steps import Definition, Equation, Kind, Step
 from eomgen.derivation.supported import (
     MOST_REPORTED,
     why_not_closed,
@@ -29,26 +50,6 @@ from eomgen.derivation.supported import (
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
 from eomgen.dynamics.start.assur import with_closed_form
-from eomgen.exposition.composite import composite_steps
-from eomgen.exposition.constraints import DerivedConstraint, derived_constraints, tree_of
-from eomgen.exposition.effects import DerivedEffect, derived_effects, equations_of, with_symbols
-from eomgen.exposition.embedding import embedded
-from eomgen.exposition.frames import frames_of
-from eomgen.exposition.impacts import impact_steps
-from eomgen.exposition.loops import (
-    bias_of,
-    constraint_steps,
-    elimination_steps,
-    freedom_algorithm,
-    freedom_steps,
-    polygon_steps,
-)
-from eomgen.exposition.mechanism import NamingMechanism, Notes
-from eomgen.exposition.poses import poses
-from eomgen.exposition.reading import numbered, read_all, reading_names, renumbered
-from eomgen.exposition.recursion import recursive_steps
-from eomgen.exposition.simplified import simplified, solved_directly, tidied
-from eomgen.exposition.state_forms import form_step, momentum_form, plain_form, velocity_form
 from eomgen.language.formula import names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.model import Model
@@ -148,12 +149,8 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
     )
     names = _names(model, readable(equations))
     names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
-    figures = {"(1)": "mechanism", "(2)-(11)": "bodies"}
-    steps = [
-        replace(_renamed(step, names), figure=figures.get(step.number, ""))
-        for step in handout_steps(equations)
-    ]
-    place = next(i for i, step in enumerate(steps) if step.number == "(37)")
+    steps = [_renamed(step, names) for step in handout_steps(equations)]
+    place = _first(steps, "solution")
     written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
     s, rows = equations.symbols, equations.symmetric
     direct = solved_directly(rows.M, rows.F - rows.V - rows.G) if form == "velocity" else None
@@ -181,7 +178,14 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
     whole = _whole(of_pins(equations), model, parts)
     if not is_of_handout(model):
         return Exposition(renumbered(steps), whole, parts.loads)
-    return Exposition((Step("", "The handout", HANDOUT, ()), *steps), whole, parts.loads)
+    return Exposition(
+        (Step("introduction", "The handout", HANDOUT, ()), *steps), whole, parts.loads
+    )
+
+
+def _first(steps: Sequence[Step], *kinds: Kind) -> int:
+    """The place of the first step of these kinds."""
+    return next(i for i, step in enumerate(steps) if step.kind in kinds)
 
 
 def is_of_handout(model: Model) -> bool:
@@ -203,19 +207,18 @@ def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
     equations = replace(equations, balance=_each(equations.balance, simplified))
     names = reading_names(model)
     found = [_renamed(step, names) for step in projected_steps(equations)]
-    titles = [step.title for step in found]
-    joints = next(i for i, title in enumerate(titles) if title in ("Parts of the motion", POWER))
+    joints = _first(found, "balance", "equations")
     words = (
         "Each body by itself, with its weight, the forces of the effects, and those of its joints."
     )
     start = [
-        replace(found[0], figure="mechanism"),
-        Step("", "Free bodies", words, (), "bodies"),
+        found[0],
+        Step("bodies", "Free bodies", words, ()),
         *found[1:joints],
     ]
     if tied:
         return _of_tied(model, parts, start, found[joints:], of_projected(equations))
-    place = titles.index("Closed form")
+    place = _first(found, "solution")
     tree = of_projected(equations)
     direct = solved_directly(tree.M, tree.F - tree.V - tree.G)
     if direct is not None:
@@ -247,6 +250,8 @@ def _of_tied(
         solved, reduced = freedom_steps(found, tree, parts.constraints)
         matrices = _whole(reduced, model, parts, len(found.definitions))
         before, ends = [*polygon_steps(model, found)], [*effects, *solved]
+        # Velocities and accelerations follow from the constraints, and so need not be read here.
+        start = [replace(x, kind="variant") if x.kind == "motion" else x for x in start]
     else:
         before, ends = [], [*effects, *constraint_steps(model, parts.constraints)]
         ends += elimination_steps(model, parts.constraints, bias_of(len(model.velocities)))
@@ -267,8 +272,8 @@ def _recursive(model: Model, parts: Parts) -> Exposition:
     words = "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
     words += "axes of the body to which it belongs."
     steps = [
-        Step("", "State", words, tuple(state), "mechanism"),
-        Step("", "Free bodies", _free_words(model), (), "bodies"),
+        Step("state", "State", words, tuple(state)),
+        Step("bodies", "Free bodies", _free_words(model), ()),
     ]
     effects = _effect_steps(model, parts, every=True)
     if not parts.constraints:
@@ -295,8 +300,8 @@ def _last(model: Model, parts: Parts) -> Step:
 
 def _told(intro: str, steps: list[Step], matrices: Matrices | None, parts: Parts) -> Exposition:
     """Steps numbered from one, after an introduction if there is one."""
-    whole = numbered([replace(step, number="") for step in steps])
-    first = (Step("", "An algorithm", intro, ()),) if intro else ()
+    whole = numbered(steps)
+    first = (Step("introduction", "An algorithm", intro, ()),) if intro else ()
     return Exposition((*first, *whole), matrices, parts.loads)
 
 
@@ -324,14 +329,14 @@ def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterato
             "x, y, z the position of its centre of mass."
         )
         _, equations = poses(model, frames_of(model), needed)
-        yield Step("", "Where the bodies are, and how they move", words, tuple(equations))
+        yield Step("motion", "Where the bodies are, and how they move", words, tuple(equations))
     for derived in parts.effects:
         lines = equations_of(derived.definitions)
         if derived.kept:
             lines = _loads_as_they_are(derived)
         lines += [Equation(symbol, rate) for symbol, rate in derived.rates]
         yield Step(
-            "",
+            "force" if derived.falls else "effect",
             f"Effect `{derived.effect.name}` ({derived.effect.type.replace('_', ' ')})",
             derived.words,
             tuple(lines),
@@ -400,7 +405,7 @@ def _symmetry(equations: Equations) -> Iterator[Step]:
         name = sp.MatrixSymbol(f"{letter}_sym", n, columns)
         lines.append(Equation(name, sp.MatMul(transform, sp.MatrixSymbol(letter, n, columns))))
         lines.append(Equation(name, whole))
-    yield Step("", SYMMETRIC_TITLE, SYMMETRIC, tuple(lines))
+    yield Step("variant", SYMMETRIC_TITLE, SYMMETRIC, tuple(lines))
 
 
 def _names(model: Model, shown: dict[Expr, Expr]) -> dict[str, str]:

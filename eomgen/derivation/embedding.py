@@ -15,16 +15,16 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.derivation.constraints import DerivedConstraint, DerivedRow
+from eomgen.derivation.frames import frames_of
+from eomgen.derivation.poses import poses
 from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr
 from eomgen.dynamics.loops.dependent_coordinates import Turn, angle_of, solved
 from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
-from eomgen.exposition.constraints import DerivedConstraint, DerivedRow
-from eomgen.exposition.frames import frames_of
-from eomgen.exposition.poses import poses
-from eomgen.exposition.simplified import simplified, size
 from eomgen.model.groups import Group
 from eomgen.model.model import Model
 

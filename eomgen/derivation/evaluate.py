@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from eomgen.derivation.spatial import ForceCross, MotionCross
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr
-from eomgen.exposition.spatial import ForceCross, MotionCross
 from eomgen.scalars.functions import BY_MATH
 
 Numbers = dict[str, Any]

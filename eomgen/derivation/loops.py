@@ -4,16 +4,16 @@ from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
+from eomgen.derivation.constraints import DerivedConstraint, DerivedRow
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.effects import equations_of
+from eomgen.derivation.embedding import Embedding, Polygon, projected, solved_for
 from eomgen.derivation.matrices import Matrices
 from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Definition, Equation, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.dynamics.start.walks import safely_dependent
-from eomgen.exposition.constraints import DerivedConstraint, DerivedRow
-from eomgen.exposition.effects import equations_of
-from eomgen.exposition.embedding import Embedding, Polygon, projected, solved_for
-from eomgen.exposition.simplified import simplified, size
 from eomgen.model.model import Model
 from eomgen.tables.routes import ROUTES
 
@@ -82,9 +82,11 @@ def polygon_steps(model: Model, found: Embedding) -> Iterator[Step]:
         ]
         lines += equations_of(polygon.lengths)
         lines += equations_of(polygon.positions)
-        yield Step("", f"{title}: positions", _where(model, constraint, polygon), tuple(lines))
-        yield Step("", f"{title}: velocities", *_velocities(polygon))
-        yield Step("", f"{title}: accelerations", *_accelerations(polygon))
+        yield Step(
+            "constraint", f"{title}: positions", _where(model, constraint, polygon), tuple(lines)
+        )
+        yield Step("constraint", f"{title}: velocities", *_velocities(polygon))
+        yield Step("constraint", f"{title}: accelerations", *_accelerations(polygon))
 
 
 def _where(model: Model, constraint: object, polygon: Polygon) -> str:
@@ -145,7 +147,7 @@ def freedom_steps(
     matrix = [Equation(sp.Symbol("K"), K)] if k > 1 or K.rows > 1 else []
     if any(found.kappa):
         matrix.append(Equation(sp.Symbol("kappa"), found.kappa))
-    steps = [Step("", "One equation for each freedom", FREE, (*matrix, *letters))]
+    steps = [Step("equations", "One equation for each freedom", FREE, (*matrix, *letters))]
     names = [model.velocities[j].acceleration for j in found.independent]
     right = vectors["F"] - vectors["V"] - vectors["G"]
     solved = tuple(solved_for(names, M, right))
@@ -161,7 +163,7 @@ def freedom_steps(
             " From the last freedom to the first each is eliminated: d is a pivot, and b what is "
             "left of F_r - V_r - G_r."
         )
-    steps.append(Step("", "Solved", words, tuple(equations_of(shown))))
+    steps.append(Step("solution", "Solved", words, tuple(equations_of(shown))))
     steps += _force_steps(found, tree, constraints)
     reduced = Matrices(
         tuple(real(model.coordinates[i].name) for i in model.state_coordinates),
@@ -190,7 +192,9 @@ def _force_steps(
         for polygon in found.polygons
         for symbol, _ in polygon.velocities
     ]
-    yield Step("", "The forces of the constraints", FORCES, (*lines, *_multiplier_lines(found)))
+    yield Step(
+        "force", "The forces of the constraints", FORCES, (*lines, *_multiplier_lines(found))
+    )
     yield from acting_steps(constraints)
 
 
@@ -239,19 +243,21 @@ def freedom_algorithm(found: Embedding, constraints: Sequence[DerivedConstraint]
         Equation(rest, sp.MatMul(K.T, sp.MatAdd(h, sp.MatMul(M, kappa)))),
         Equation(rate, sp.MatMul(-1, sp.Inverse(reduced), rest)),
     ]
-    yield Step("", "One equation for each freedom", ALGORITHM, tuple(lines))
+    yield Step("equations", "One equation for each freedom", ALGORITHM, tuple(lines))
     own = sp.Matrix([real(model.velocities[j].acceleration) for j in found.independent])
     all_of_them = sp.Matrix([real(c.acceleration) for c in model.velocities])
     whole = _matrix(dotted("v"), n, 1)
     lines = [Equation(own, rate), *equations_of(found.rates)]
-    yield Step("", "Solved", "The accelerations of the freedoms, and of the others.", tuple(lines))
+    yield Step(
+        "solution", "Solved", "The accelerations of the freedoms, and of the others.", tuple(lines)
+    )
     forces = sp.Matrix([missing_symbol(c.name) for c in model.velocities])
     lines = [
         Equation(whole, sp.ImmutableMatrix(all_of_them)),
         Equation(forces, sp.MatAdd(sp.MatMul(M, whole), h)),
         *_multiplier_lines(found),
     ]
-    yield Step("", "The forces of the constraints", FORCES, tuple(lines))
+    yield Step("force", "The forces of the constraints", FORCES, tuple(lines))
     yield from acting_steps(constraints)
 
 
@@ -267,7 +273,7 @@ def acting_steps(constraints: Sequence[DerivedConstraint]) -> Iterator[Step]:
         lines = tuple(equations_of(derived.force.definitions))
         words = "What λ exerts on the bodies or along the coordinates."
         if lines:
-            yield Step("", f"Constraint `{derived.constraint.name}`: its forces", words, lines)
+            yield Step("force", f"Constraint `{derived.constraint.name}`: its forces", words, lines)
 
 
 # With all coordinates as the state.
@@ -289,7 +295,7 @@ def constraint_steps(model: Model, constraints: Sequence[DerivedConstraint]) -> 
         ]
         if left_out:
             words += f" Left out, because they follow from others: {', '.join(left_out)}."
-        yield Step("", f"Constraint `{constraint.name}`", words, tuple(lines))
+        yield Step("constraint", f"Constraint `{constraint.name}`", words, tuple(lines))
         lines = equations_of(derived.speeds)
         for row in derived.rows:
             lines.append(Equation(real(dotted(f"g_{row.name}")), row.speed))
@@ -298,7 +304,7 @@ def constraint_steps(model: Model, constraints: Sequence[DerivedConstraint]) -> 
                 lines.append(Equation(entry(row.name, velocity), slope))
         lines += [Equation(real(f"beta_{row.name}"), row.bend) for row in derived.rows]
         title = f"Constraint `{constraint.name}`, differentiated twice"
-        yield Step("", title, RATES, tuple(lines))
+        yield Step("constraint", title, RATES, tuple(lines))
 
 
 def _kind(model: Model, derived: DerivedConstraint) -> str:
@@ -341,12 +347,12 @@ def elimination_steps(
         dependent = [j for _, j in model.pivots]
         rates = [rates[j] for j in (*dependent, *(j for j in range(n) if j not in dependent))]
         lines.append(_one_by_one(rates))
-        yield Step("", "One equation for each freedom", INDEPENDENT, tuple(lines))
+        yield Step("equations", "One equation for each freedom", INDEPENDENT, tuple(lines))
     else:
         lines += [*_range_space(m, n), _one_by_one(rates)]
-        yield Step("", "The accelerations that meet the constraints", RANGE, tuple(lines))
+        yield Step("equations", "The accelerations that meet the constraints", RANGE, tuple(lines))
     known = Equation(_matrix("lambda", m, 1), sp.Matrix([row.multiplier for row in rows]))
-    yield Step("", "The forces of the constraints", FORCES, (known, _multipliers(model, m, n)))
+    yield Step("force", "The forces of the constraints", FORCES, (known, _multipliers(model, m, n)))
     yield from acting_steps(constraints)
 
 

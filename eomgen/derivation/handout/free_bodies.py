@@ -6,8 +6,8 @@ from typing import Any
 
 import sympy as sp
 
+from eomgen.derivation.handout.kinematics import Kinematics
 from eomgen.derivation.joint_loads import JointMechanism, joint_loads
-from eomgen.derivation.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load

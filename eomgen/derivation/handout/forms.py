@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.base.errors import SceneError
-from eomgen.derivation.closed import Equations
+from eomgen.derivation.handout.closed import Equations
 from eomgen.derivation.symbols import Expr, over_bodies, over_coordinates
 from eomgen.model.states import State, velocity_states
 from eomgen.scene.joints.base import WORLD

@@ -11,13 +11,10 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.dots import dotted
-from eomgen.derivation.projected.symbols import real
-from eomgen.derivation.steps import Definition
-from eomgen.derivation.symbols import Expr
-from eomgen.exposition.effects import AnyLoad, DerivedEffect, named_loads
-from eomgen.exposition.frames import Frame, frames_of
-from eomgen.exposition.impacts import power
-from eomgen.exposition.mechanism import (
+from eomgen.derivation.effects import AnyLoad, DerivedEffect, named_loads
+from eomgen.derivation.frames import Frame, frames_of
+from eomgen.derivation.impacts import power
+from eomgen.derivation.mechanism import (
     AXES,
     NamingMechanism,
     Notes,
@@ -27,8 +24,11 @@ from eomgen.exposition.mechanism import (
     rotation_symbols,
     velocity_symbols,
 )
-from eomgen.exposition.poses import frame_name, poses
-from eomgen.exposition.state_forms import needed_by
+from eomgen.derivation.poses import frame_name, poses
+from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.state_forms import needed_by
+from eomgen.derivation.steps import Definition
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 from eomgen.scene.constraints.base import Constraint, Row
 from eomgen.scene.effects.base import JointLoad, Load

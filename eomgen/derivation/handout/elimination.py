@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from eomgen.derivation.free_bodies import FreeBodies, Wrench
-from eomgen.derivation.kinematics import Kinematics
+from eomgen.derivation.handout.free_bodies import FreeBodies, Wrench
+from eomgen.derivation.handout.kinematics import Kinematics
 from eomgen.derivation.symbols import (
     Expr,
     Symbols,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from eomgen.base.errors import SceneError
-from eomgen.derivation.elimination import (
+from eomgen.derivation.handout.elimination import (
     Collected,
     body_rows,
     collect,
@@ -13,9 +13,9 @@ from eomgen.derivation.elimination import (
     symmetric,
     trees,
 )
-from eomgen.derivation.free_bodies import FreeBodies, draw_free_bodies
-from eomgen.derivation.kinematics import Kinematics, differentiate_joints
-from eomgen.derivation.solution import Definition, Solution, gathered, solve
+from eomgen.derivation.handout.free_bodies import FreeBodies, draw_free_bodies
+from eomgen.derivation.handout.kinematics import Kinematics, differentiate_joints
+from eomgen.derivation.handout.solution import Definition, Solution, gathered, solve
 from eomgen.derivation.supported import off_centre, why_not_pins
 from eomgen.derivation.symbols import Expr, Symbols, make_symbols, over_bodies
 from eomgen.language.formula import is_zero

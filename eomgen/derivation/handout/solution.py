@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
-from eomgen.derivation.elimination import Tree, trees
-from eomgen.derivation.kinematics import Kinematics
+from eomgen.derivation.handout.elimination import Tree, trees
+from eomgen.derivation.handout.kinematics import Kinematics
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, over_bodies, scale, tidy
 from eomgen.model.model import Model
 

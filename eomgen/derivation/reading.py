@@ -63,11 +63,8 @@ def numbered(steps: Sequence[Step], start: int = 1) -> tuple[Step, ...]:
     """Steps with numbers in brackets, from `start`, for those that have none."""
     found, n = [], start
     for step in steps:
-        if step.number:
-            found.append(step)
-            continue
-        found.append(Step(f"({n})", step.title, step.words, step.equations, step.figure))
-        n += 1
+        found.append(step if step.number else replace(step, number=f"({n})"))
+        n += not step.number
     return tuple(found)
 
 

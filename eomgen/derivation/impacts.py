@@ -4,17 +4,17 @@ from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
-from eomgen.derivation.projected.symbols import real
-from eomgen.derivation.steps import Equation, Step
-from eomgen.derivation.symbols import Expr
-from eomgen.exposition.effects import DerivedEffect
-from eomgen.exposition.mechanism import (
+from eomgen.derivation.effects import DerivedEffect
+from eomgen.derivation.mechanism import (
     crossed,
     omega_symbols,
     rotation_symbols,
     turned,
     velocity_symbols,
 )
+from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import Contact, JointLoad, Load
 
@@ -60,7 +60,7 @@ def impact_steps(model: Model, effects: Sequence[DerivedEffect]) -> Iterator[Ste
             sp.MatAdd(v, sp.MatMul(sp.Inverse(mass), rows.T, impulse)),
         ),
     )
-    yield Step("", "Impacts: the impulse equations", LAW, equations)
+    yield Step("impact", "Impacts: the impulse equations", LAW, equations)
     for contact in contacts:
         yield _contact_step(model, contact)
 
@@ -81,7 +81,7 @@ def _contact_step(model: Model, contact: Contact) -> Step:
         "rows of J; by virtual work Jᵀ holds the generalised forces of unit impulses."
     )
     kept = tuple(line for line in lines if line.left != line.right)
-    return Step("", f"Contact `{name}`", words, kept)
+    return Step("impact", f"Contact `{name}`", words, kept)
 
 
 def power(model: Model, loads: Sequence[Load | JointLoad]) -> Expr:
