@@ -10,8 +10,8 @@ from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
 from eomgen.derivation.handout.closed import Equations, conditions, written_out_forces
 from eomgen.derivation.handout.forms import state_form
-from eomgen.derivation.handout.free_bodies import SymbolicMechanism
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
+from eomgen.derivation.joint_loads import mechanism_over
 from eomgen.derivation.symbols import Vec, rotate
 from eomgen.language.formula import evaluate
 from eomgen.model.model import Point
@@ -140,7 +140,7 @@ def _point(equations: Equations, point: Point) -> tuple[Vec, Vec]:
 def _powers(equations: Equations) -> list[Any]:
     """The power of each effect: Σ f · v of its forces plus Σ τ ω of its torques at joints."""
     s, model = equations.symbols, equations.model
-    mechanism: Any = SymbolicMechanism(model, s)
+    mechanism: Any = mechanism_over(model, s, s.y)
     index = {body.name: k for k, body in enumerate(model.bodies)}
     joint = {body.joint.name: k for k, body in enumerate(model.bodies)}
     powers = []

@@ -14,6 +14,7 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import AnyLoad, DerivedEffect, named_loads
 from eomgen.derivation.frames import Frame, frames_of
 from eomgen.derivation.impacts import power
+from eomgen.derivation.linkage import quaternion_rates, rate
 from eomgen.derivation.mechanism import (
     AXES,
     NamingMechanism,
@@ -25,10 +26,9 @@ from eomgen.derivation.mechanism import (
     velocity_symbols,
 )
 from eomgen.derivation.poses import frame_name, poses
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.state_forms import needed_by
 from eomgen.derivation.steps import Definition
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model
 from eomgen.scene.constraints.base import Constraint, Row
 from eomgen.scene.effects.base import JointLoad, Load
@@ -240,24 +240,6 @@ class _Motion:
         return rate(expression, self.rates)
 
 
-def rate(e: Expr, rates: Mapping[Expr, Expr]) -> Expr:
-    """The time derivative of an expression in one pass; symbols without a rate are constant."""
-    if not rates.keys() & e.free_symbols:
-        return sp.S.Zero
-    if e.is_Symbol:
-        return rates[e]
-    if e.is_Add:
-        return sp.Add(*(rate(x, rates) for x in e.args))
-    if e.is_Mul:
-        factors = list(e.args)
-        terms = [(i, rate(x, rates)) for i, x in enumerate(factors)]
-        products = (sp.Mul(*factors[:i], x, *factors[i + 1 :]) for i, x in terms if x != 0)
-        return sp.Add(*products)
-    return sp.Add(
-        *(sp.diff(e, s) * rates[s] for s in sorted(e.free_symbols, key=str) if s in rates)
-    )
-
-
 def _coordinate_rates(model: Model) -> Iterator[tuple[Expr, Expr]]:
     """Each coordinate and its time derivative: ½ q ∘ ω for a quaternion q."""
     for body in model.bodies:
@@ -267,12 +249,9 @@ def _coordinate_rates(model: Model) -> Iterator[tuple[Expr, Expr]]:
             for x, v in zip(body.positions[:count], body.velocities[:count], strict=True)
         )
         if len(body.positions) > count:
-            w, x, y, z = (real(c.name) for c in body.positions[count:])
-            a, b, c = (real(v.name) / 2 for v in body.velocities[count:])
-            yield w, -(x * a + y * b + z * c)
-            yield x, w * a + y * c - z * b
-            yield y, w * b + z * a - x * c
-            yield z, w * c + x * b - y * a
+            q = [real(c.name) for c in body.positions[count:]]
+            spin = [real(v.name) for v in body.velocities[count:]]
+            yield from zip(q, quaternion_rates(q, spin), strict=True)
 
 
 def _rotation_rates(body: str, size: int) -> Iterator[tuple[Expr, Expr]]:

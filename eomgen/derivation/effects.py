@@ -10,9 +10,8 @@ import sympy as sp
 
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.mechanism import AXES, NamingMechanism, Notes
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.language.formula import Name
 from eomgen.model.dependence import is_plain
 from eomgen.model.model import Model

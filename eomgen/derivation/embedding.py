@@ -18,11 +18,10 @@ import sympy as sp
 from eomgen.derivation.constraints import DerivedConstraint, DerivedRow
 from eomgen.derivation.frames import frames_of
 from eomgen.derivation.poses import poses
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.dynamics.loops.dependent_coordinates import Turn, angle_of, solved
 from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
 from eomgen.model.groups import Group

@@ -6,7 +6,7 @@ what depends on the motion enters the derivation as forces with names, and each 
 forces are.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,8 @@ from eomgen.derivation.constraints import DerivedConstraint, derived_constraints
 from eomgen.derivation.effects import DerivedEffect, derived_effects, equations_of, with_symbols
 from eomgen.derivation.embedding import embedded
 from eomgen.derivation.frames import frames_of
-from eomgen.derivation.handout.closed import Equations, derive
+from eomgen.derivation.handout.closed import Equations, collected_equations
+from eomgen.derivation.handout.closed import solved as solved_pins
 from eomgen.derivation.handout.elimination import symmetric
 from eomgen.derivation.handout.steps import handout_steps, readable
 from eomgen.derivation.impacts import impact_steps
@@ -30,12 +31,12 @@ from eomgen.derivation.loops import (
     freedom_steps,
     polygon_steps,
 )
-from eomgen.derivation.matrices import Matrices, of_pins, of_projected
+from eomgen.derivation.matrices import Matrices, of_pins, of_projected, projected_definitions
 from eomgen.derivation.mechanism import NamingMechanism, Notes
 from eomgen.derivation.poses import poses
-from eomgen.derivation.projected.derive import derive_projected
+from eomgen.derivation.projected.derive import balanced
+from eomgen.derivation.projected.derive import solved as solved_projected
 from eomgen.derivation.projected.steps import projected_steps
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.reading import numbered, read_all, reading_names, renumbered
 from eomgen.derivation.recursion import recursive_steps
 from eomgen.derivation.simplified import simplified, solved_directly, tidied
@@ -48,7 +49,7 @@ from eomgen.derivation.supported import (
     why_not_pins,
 )
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.dynamics.start.assur import with_closed_form
 from eomgen.language.formula import names_in
 from eomgen.language.rates import with_rates
@@ -141,31 +142,26 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
 
 
 def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
-    equations = derive(bare)
-    equations = replace(
-        equations,
-        collected=_each(equations.collected, tidied),
-        symmetric=_each(equations.symmetric, simplified),
-    )
-    names = _names(model, readable(equations))
+    equations = collected_equations(bare)
+    equations = replace(equations, symmetric=_each(equations.symmetric, simplified))
+    s, rows = equations.symbols, equations.symmetric
+    direct = solved_directly(rows.M, rows.F - rows.V - rows.G) if form == "velocity" else None
+    if direct is None:
+        equations = solved_pins(equations)
+    equations = replace(equations, collected=_each(equations.collected, tidied))
+    shown = readable(equations)
+    names = _names(model, shown)
     names |= {f"angle_{body.name}": f"psi_{body.name}" for body in model.bodies}
     steps = [_renamed(step, names) for step in handout_steps(equations)]
     place = _first(steps, "solution")
-    written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
-    s, rows = equations.symbols, equations.symmetric
-    direct = solved_directly(rows.M, rows.F - rows.V - rows.G) if form == "velocity" else None
+    whole = _whole(of_pins(equations), model, parts)
     if direct is not None:
-        lines = [Equation(x, e) for x, e in zip(s.a, direct, strict=True)]
-        shown = readable(equations)
-        steps[place] = replace(
-            steps[place],
-            words=SOLVED,
-            equations=tuple(
-                Equation(x.left.xreplace(shown), x.right.xreplace(shown)) for x in lines
-            ),
-        )
-        steps[place] = _renamed(steps[place], names)
+        read = {x.xreplace(shown): e.xreplace(shown) for x, e in zip(s.a, direct, strict=True)}
+        steps[place] = _renamed(_directly(steps[place], read), names)
+        whole = _with(whole, direct)
         written = plain_form(model, direct)
+    else:
+        written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
     last = form_step(model, form, written, parts.effects)
     ends = [*_symmetry(equations), *impact_steps(model, parts.effects), last]
     inner = _numbered_within(_effect_steps(model, parts), "36")
@@ -175,7 +171,6 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
         *steps[place:],
         *(_renamed(step, names) for step in numbered(ends, 39)),
     ]
-    whole = _whole(of_pins(equations), model, parts)
     if not is_of_handout(model):
         return Exposition(renumbered(steps), whole, parts.loads)
     return Exposition(
@@ -186,6 +181,17 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
 def _first(steps: Sequence[Step], *kinds: Kind) -> int:
     """The place of the first step of these kinds."""
     return next(i for i, step in enumerate(steps) if step.kind in kinds)
+
+
+def _directly(step: Step, found: Mapping[Expr, Expr]) -> Step:
+    """A step of a solution that is short: a line for each acceleration."""
+    return replace(step, words=SOLVED, equations=tuple(Equation(*x) for x in found.items()))
+
+
+def _with(found: Matrices, direct: Sequence[Expr]) -> Matrices:
+    """Matrices with a solution."""
+    solution = zip(found.a, direct, strict=True)
+    return replace(found, definitions=(*found.definitions, *solution))
 
 
 def is_of_handout(model: Model) -> bool:
@@ -202,9 +208,14 @@ def _each(found: Any, change: Callable[[Expr], Expr]) -> Any:
 
 
 def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
-    tied = bool(parts.constraints)
-    equations = derive_projected(bare, solving=not tied)
+    equations = balanced(bare)
     equations = replace(equations, balance=_each(equations.balance, simplified))
+    tree, direct = of_projected(equations), None
+    if not parts.constraints:
+        direct = solved_directly(tree.M, tree.F - tree.V - tree.G)
+        if direct is None:
+            equations = solved_projected(equations)
+            tree = replace(tree, definitions=projected_definitions(equations))
     names = reading_names(model)
     found = [_renamed(step, names) for step in projected_steps(equations)]
     joints = _first(found, "balance", "equations")
@@ -216,15 +227,15 @@ def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
         Step("bodies", "Free bodies", words, ()),
         *found[1:joints],
     ]
-    if tied:
-        return _of_tied(model, parts, start, found[joints:], of_projected(equations))
     place = _first(found, "solution")
-    tree = of_projected(equations)
-    direct = solved_directly(tree.M, tree.F - tree.V - tree.G)
-    if direct is not None:
-        lines = tuple(Equation(x, e) for x, e in zip(tree.a, direct, strict=True))
+    if parts.constraints:
+        return _of_tied(model, parts, start, found[joints:place], tree)
+    whole = _whole(tree, model, parts)
+    if direct:
         said = {**names, **{s.name: text for s, text in tree.formulas.items()}}
-        found[place] = _renamed(replace(found[place], words=SOLVED, equations=lines), said)
+        lines = dict(zip(tree.a, direct, strict=True))
+        found[place] = _renamed(_directly(found[place], lines), said)
+        whole = _with(whole, direct)
     solved = {line.left.name: line.right for line in found[place].equations}
     rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
     form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
@@ -236,7 +247,7 @@ def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
         *found[place:],
         *(_renamed(step, names) for step in ends),
     ]
-    return _told("", steps, _whole(tree, model, parts), parts)
+    return _told("", steps, whole, parts)
 
 
 def _of_tied(

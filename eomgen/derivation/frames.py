@@ -9,16 +9,19 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.linkage import (
+    fixed_angle,
+    fixed_axes,
+    inertia_of,
+    primitive_motion,
+    quaternion_scale,
+    vector,
+)
 from eomgen.derivation.mechanism import NamingMechanism, Notes
-from eomgen.derivation.projected.constraints import about, fixed_axes, of_quaternion
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
-from eomgen.derivation.symbols import Expr
-from eomgen.language.formula import Formula
-from eomgen.model.model import Body, JointIndex, Model
-from eomgen.model.orientation import rows_of
-from eomgen.scalars.exact import direction, quarters, radians
-from eomgen.scene.joints.base import Primitive, WithRotor
+from eomgen.derivation.symbols import Expr, real
+from eomgen.model.model import JointIndex, Model
+from eomgen.scene.joints.base import WithRotor
 
 ORIGIN = sp.zeros(3, 1)
 
@@ -94,13 +97,10 @@ def _add(
     armature = angle = sp.Integer(0)
     if joint.holds:
         rotation = fixed_axes(joint, symbols)
-        if model.dimensions == 2 and joint.orientation is not None:
-            angle = symbols.value(rows_of(joint.orientation)[0][0])
-        elif model.dimensions == 2:
-            count, rest = quarters(radians(joint.orientation_deg))
-            angle = count * sp.pi / 2 + symbols.number(rest)
-        offset = _vector(joint.r_parent, symbols)
-        centre = -_vector(joint.r_child, symbols)
+        if model.dimensions == 2:
+            angle = fixed_angle(joint, symbols)
+        offset = vector(joint.r_parent, symbols)
+        centre = -vector(joint.r_child, symbols)
         if isinstance(joint, WithRotor):
             armature = joint.reflected_inertia(symbols.value)
     if parent >= 0:
@@ -114,7 +114,10 @@ def _add(
         velocities = body.velocities[body.plain :] if ball else body.velocities[i : i + 1]
         held = [locked[c.name] for c in positions if c.name in locked]
         q = tuple(sp.Float(x) for x in held) or tuple(real(c.name) for c in positions)
-        turned, slid, axis = _motion(primitive, q, joint.name, symbols)
+        turned, slid, axis = sp.eye(3), ORIGIN, ORIGIN
+        if primitive is not None:
+            scale = real(f"k_{joint.name}")
+            turned, slid, axis = primitive_motion(primitive, q, scale, symbols)
         v = index.spin if ball else index.v[i : i + 1]
         turns = primitive is not None and primitive.kind == "revolute"
         found.append(
@@ -135,41 +138,9 @@ def _add(
                 armature=armature,
                 mass=symbols.value(body.mass) if final else sp.Integer(0),
                 centre=centre if final else ORIGIN,
-                inertia=_inertia(body, symbols) if final else sp.zeros(3, 3),
-                defined=((real(f"k_{joint.name}"), _scale(q)),) if ball else (),
+                inertia=inertia_of(body, symbols) if final else sp.zeros(3, 3),
+                defined=((real(f"k_{joint.name}"), quaternion_scale(q)),) if ball else (),
             )
         )
         parent, rotation, offset, angle = len(found) - 1, sp.eye(3), ORIGIN, sp.Integer(0)
     return parent
-
-
-def _motion(
-    primitive: Primitive | None, q: Sequence[Expr], joint: str, symbols: NamingMechanism
-) -> tuple[Expr, Expr, Expr]:
-    """Rotation, displacement and axis of a joint primitive at its coordinates."""
-    if primitive is None:
-        return sp.eye(3), ORIGIN, ORIGIN
-    if primitive.kind == "spherical":
-        return of_quaternion(q, real(f"k_{joint}")), ORIGIN, ORIGIN
-    axis = sp.Matrix([symbols.number(part) for part in direction(primitive.axis)])
-    if primitive.kind == "prismatic":
-        return sp.eye(3), axis * q[0], axis
-    return about(axis, q[0]), ORIGIN, axis
-
-
-def _scale(q: Sequence[Expr]) -> Expr:
-    """2/|q|², by which a quaternion of any length gives a rotation."""
-    return 2 / sum(x**2 for x in q)
-
-
-def _vector(parts: tuple[Formula, ...], symbols: NamingMechanism) -> Expr:
-    x, y, *z = (symbols.value(part) for part in parts)
-    return sp.Matrix([x, y, *(z or [0])])
-
-
-def _inertia(body: Body, symbols: NamingMechanism) -> Expr:
-    entries = [symbols.value(entry) for entry in body.inertia_com]
-    if len(entries) == 1:
-        return sp.diag(0, 0, entries[0])
-    xx, yy, zz, xy, xz, yz = entries
-    return sp.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -12,9 +12,8 @@ from eomgen.derivation.mechanism import (
     turned,
     velocity_symbols,
 )
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Equation, Step
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import Contact, JointLoad, Load
 

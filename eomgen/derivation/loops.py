@@ -9,10 +9,9 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import equations_of
 from eomgen.derivation.embedding import Embedding, Polygon, projected, solved_for
 from eomgen.derivation.matrices import Matrices
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Definition, Equation, Step
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.dynamics.start.walks import safely_dependent
 from eomgen.model.model import Model
 from eomgen.tables.routes import ROUTES

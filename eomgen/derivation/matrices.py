@@ -71,20 +71,26 @@ def _poses(equations: Equations) -> list[Definition]:
 def of_projected(equations: ProjectedEquations) -> Matrices:
     """The matrices of the derivation by projected constraints."""
     s, found = equations.symbols, equations.balance
-    numbers = {symbol: sp.Float(float(x)) for x, symbol in s.numbers.items()}
-    given = {**numbers, **dict.fromkeys(s.tau, sp.S.Zero)}
-    definitions = [
-        (symbol, value.xreplace(given)) for symbol, value in equations.solution.definitions.items()
-    ]
+    definitions = projected_definitions(equations)
     motion = definitions[: equations.motion_definitions]
+    given = _given(equations)
     M, V, G, F = (
         written_out(m.xreplace(given), motion) for m in (found.M, found.V, found.G, found.F)
     )
-    return Matrices(
-        *(s.q, s.v, s.a, M, V, G, F),
-        tuple(definitions),
-        _formulas(s.formulas),
-    )
+    return Matrices(*(s.q, s.v, s.a, M, V, G, F), definitions, _formulas(s.formulas))
+
+
+def projected_definitions(equations: ProjectedEquations) -> tuple[Definition, ...]:
+    """Its solution in order."""
+    given, found = _given(equations), equations.solution.definitions
+    return tuple((symbol, value.xreplace(given)) for symbol, value in found.items())
+
+
+def _given(equations: ProjectedEquations) -> dict[Expr, Expr]:
+    """Numbers of the scene, and no further generalised forces."""
+    s = equations.symbols
+    numbers = {symbol: sp.Float(float(x)) for x, symbol in s.numbers.items()}
+    return {**numbers, **dict.fromkeys(s.tau, sp.S.Zero)}
 
 
 def _formulas(symbols: dict[Formula, Expr]) -> dict[Expr, str]:

@@ -5,27 +5,27 @@ definitions are noted in the order in which they are made.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
 import sympy as sp
 
 from eomgen.derivation.dots import dotted
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import Model, dofs_of
 from eomgen.model.partials import gradient_of, partials_of
 from eomgen.scalars.exact import Real
+from eomgen.scalars.protocol import Scalars
 from eomgen.scene.constraints.base import Partials
 from eomgen.scene.effects.base import Vector
 from eomgen.scene.joints.base import WORLD
 
 AXES = "xyz"
-SCALARS = SymbolicScalars()
 
 
 @dataclass
@@ -51,29 +51,99 @@ class Notes:
         return f"{self.suffix}{number}"
 
 
-class NamingMechanism:
-    """A model over symbols that a person reads: see `scene.effects.base.Mechanism`."""
+class SymbolicMechanism:
+    """A model over symbols, as effects see it that use joints and inputs alone: see
+    `scene.effects.base.Mechanism`.
 
-    def __init__(self, model: Model, notes: Notes) -> None:
-        self.model = model
-        self.notes = notes
+    names     symbols by the names of the scene
+    formulas  formulas that are symbols themselves
+    heights   of the bodies, if effects use them
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        names: Mapping[str, Expr],
+        scalars: Scalars,
+        formulas: Mapping[Formula, Expr] = MappingProxyType({}),
+        heights: Iterable[Expr] = (),
+    ) -> None:
+        self.model, self.names = model, dict(names)
+        self._scalars, self._formulas = scalars, formulas
+        self._heights = tuple(heights)
         self.dimensions = model.dimensions
+        self.magnitude = model.magnitude
         self.bodies = tuple(body.name for body in model.bodies)
         self.joints = dofs_of(model.bodies, model.dimensions)
         self._by_joint = {body.joint.name: body for body in model.bodies}
-        self._points: dict[tuple[str, Vector], str] = {}
-        names = [x.name for group in (model.parameters, model.inputs, model.extra) for x in group]
-        names += [c.name for body in model.bodies for c in (*body.positions, *body.velocities)]
-        self.names = {"t": real("t"), **{name: real(name) for name in names}}
-
-    @property
-    def magnitude(self) -> float:
-        """The order of magnitude of its lengths, m."""
-        return self.model.magnitude
 
     def mass(self, body: str) -> Expr:
         """Mass of a body."""
         return self.value(self.model.bodies[self.bodies.index(body)].mass)
+
+    def height(self, body: str) -> Expr:
+        """World y or z of a body's centre of mass."""
+        return self._heights[self.bodies.index(body)]
+
+    def coordinate(self, joint: str, index: int = 0) -> Expr:
+        """A coordinate of a joint."""
+        return self.names[self.coordinate_name(joint, index)]
+
+    def coordinate_name(self, joint: str, index: int = 0) -> str:
+        """Its name."""
+        return self._by_joint[joint].positions[index].name
+
+    def rate(self, joint: str, index: int = 0) -> Expr:
+        """A velocity of a joint."""
+        return self.names[self._by_joint[joint].velocities[index].name]
+
+    def value(self, formula: Formula, **names: Expr) -> Expr:
+        """A quantity over the names of the scene."""
+        if formula in self._formulas:
+            return self._formulas[formula]
+        return evaluate(formula, {**self.names, **names}, self._scalars)
+
+    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
+        """A formula with its derivatives."""
+        return partials_of(formula, by, self.model, self.names, self._scalars)
+
+    def gradient(
+        self, formula: Formula, names: Mapping[str, Expr]
+    ) -> tuple[Expr, tuple[Expr, ...], Expr]:
+        """A formula of `names`, t and parameters with its derivatives."""
+        return gradient_of(formula, names, self.names, self._scalars)
+
+    def input(self, name: str) -> Expr:
+        """An input."""
+        return self.names[name]
+
+    def state(self, name: str) -> Expr:
+        """An extra state."""
+        return self.names[name]
+
+    def number(self, value: Real) -> Expr:
+        """A number."""
+        return self._scalars.number(value)
+
+    def call(self, function: str, *arguments: Expr) -> Expr:
+        """A function of formulas."""
+        return self._scalars.call(function, *arguments)
+
+    def called(self, letter: str, *values: Expr) -> Vector:
+        """The values themselves."""
+        return values
+
+
+class NamingMechanism(SymbolicMechanism):
+    """A model over symbols that a person reads, with names for what effects use."""
+
+    def __init__(self, model: Model, notes: Notes) -> None:
+        names = [x.name for group in (model.parameters, model.inputs, model.extra) for x in group]
+        names += [c.name for body in model.bodies for c in (*body.positions, *body.velocities)]
+        symbols = {"t": real("t"), **{name: real(name) for name in names}}
+        super().__init__(model, symbols, SymbolicScalars())
+        self.notes = notes
+        self._points: dict[tuple[str, Vector], str] = {}
 
     def height(self, body: str) -> Expr:
         """World y or z of a body's centre of mass."""
@@ -136,47 +206,9 @@ class NamingMechanism:
         self.notes.bodies[body] = None
         return turned(rotation_symbols(body, self.dimensions), vector)
 
-    def coordinate(self, joint: str, index: int = 0) -> Expr:
-        """A coordinate of a joint."""
-        return self.names[self.coordinate_name(joint, index)]
-
-    def coordinate_name(self, joint: str, index: int = 0) -> str:
-        """Its name."""
-        return self._by_joint[joint].positions[index].name
-
-    def rate(self, joint: str, index: int = 0) -> Expr:
-        """A velocity of a joint."""
-        return self.names[self._by_joint[joint].velocities[index].name]
-
-    def value(self, formula: Formula, **names: Expr) -> Expr:
-        """A quantity over the names of the scene."""
-        return evaluate(formula, {**self.names, **names}, SCALARS)
-
-    def partials(self, formula: Formula, by: Literal["positions", "velocities"]) -> Partials:
-        """A formula with its derivatives."""
-        return partials_of(formula, by, self.model, self.names, SCALARS)
-
-    def gradient(
-        self, formula: Formula, names: Mapping[str, Expr]
-    ) -> tuple[Expr, tuple[Expr, ...], Expr]:
-        """A formula of `names`, t and parameters with its derivatives."""
-        return gradient_of(formula, names, self.names, SCALARS)
-
-    def input(self, name: str) -> Expr:
-        """An input."""
-        return self.names[name]
-
-    def state(self, name: str) -> Expr:
-        """An extra state."""
-        return self.names[name]
-
-    def number(self, value: Real) -> Expr:
-        """A number."""
-        return SCALARS.number(value)
-
     def call(self, function: str, *arguments: Expr) -> Expr:
         """A function of formulas; the value of a case distinction gets a name."""
-        value = SCALARS.call(function, *arguments)
+        value = super().call(function, *arguments)
         if isinstance(value, sp.Piecewise):
             return self.called("b", value)[0]
         return value

@@ -16,9 +16,8 @@ from eomgen.derivation.mechanism import (
     turned,
     velocity_symbols,
 )
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.steps import Definition, Equation
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model
 
 

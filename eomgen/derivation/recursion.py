@@ -14,20 +14,19 @@ import sympy as sp
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect
 from eomgen.derivation.frames import Frame
+from eomgen.derivation.linkage import hat
 from eomgen.derivation.mechanism import AXES, NamingMechanism, Notes, rotation_symbols
 from eomgen.derivation.poses import frame_name
-from eomgen.derivation.projected.symbols import real
 from eomgen.derivation.spatial import (
     ForceCross,
     MotionCross,
     cut,
-    hat,
     motion_subspace,
     motion_transform,
     rigid_inertia,
 )
 from eomgen.derivation.steps import Equation, Step
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.scene.joints.base import WORLD

@@ -5,7 +5,7 @@ of sines and cosines as functions of sums of angles, and each with what its term
 """
 
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import sympy as sp
 
@@ -26,11 +26,16 @@ def simplified(e: Expr) -> Expr:
     """The shortest form found, of a scalar or of each entry of a matrix."""
     if isinstance(e, sp.MatrixBase):
         return e.applyfunc(simplified)
-    if not isinstance(e, sp.Expr) or e.is_Matrix or e.is_Atom or size(e) > LONGEST:
+    if not isinstance(e, sp.Expr) or e.is_Matrix or e.is_Atom or isinstance(e, sp.Function):
         return e
-    if e.has(sp.Piecewise) or isinstance(e, sp.Function):
+    return _shortest(e)
+
+
+@lru_cache(maxsize=4096)
+def _shortest(e: Expr) -> Expr:
+    if size(e) > LONGEST or e.has(sp.Piecewise):
         return e
-    forms = (_with_signs(form) for form in _forms(e))
+    forms = (_with_signs(form) for form in dict.fromkeys(_forms(e)))
     return min(forms, key=lambda form: (size(form), _minus(form), len(sp.Add.make_args(form))))
 
 
@@ -68,17 +73,29 @@ def tidied(e: Expr) -> Expr:
 
 
 def solved_directly(M: Expr, right: Expr) -> list[Expr] | None:
-    """M⁻¹ right for one or two unknowns, simplified; None for more, or if that is long."""
-    if M.rows == 1:
-        found = [simplified(right[0] / M[0, 0])]
-    elif M.rows == 2 and sum(map(size, (*M, *right))) <= MOST_SOLVED:
-        (a, b), (c, d) = M.tolist()
-        whole = simplified(a * d - b * c)
-        p, q = right
-        tops = [simplified(d * p - b * q), simplified(a * q - c * p)]
-        found = [min((top / whole, simplified(top / whole)), key=size) for top in tops]
-    else:
+    """M⁻¹ right, simplified, if M consists of blocks of one or two; None if not, or if it is long.
+
+    Rows and columns may be in any order.
+    """
+    each = range(M.rows)
+    blocks = [[i for i in each if M[i, j] != 0 or M[j, i] != 0] for j in each]
+    if not all(1 <= len(block) <= 2 for block in blocks):
         return None
+    found = [sp.S.Zero] * M.rows
+    for j, coupled in enumerate(blocks):
+        if len(coupled) == 1:
+            found[j] = simplified(right[j] / M[j, j])
+        elif j == coupled[0]:
+            block = M.extract(coupled, coupled)
+            sides = [right[i] for i in coupled]
+            if sum(map(size, (*block, *sides))) > MOST_SOLVED:
+                return None
+            (a, b), (c, d) = block.tolist()
+            p, q = sides
+            whole = simplified(a * d - b * c)
+            tops = [simplified(d * p - b * q), simplified(a * q - c * p)]
+            pairs = [min((top / whole, simplified(top / whole)), key=size) for top in tops]
+            found[coupled[0]], found[coupled[1]] = pairs
     return found if sum(map(size, found)) <= MOST_SOLVED else None
 
 
@@ -114,26 +131,30 @@ def _holds_wave(term: Expr) -> bool:
 
 
 def _forms(e: Expr) -> Iterator[Expr]:
+    if not _has_quotient(e):
+        yield from _whole(e)
+        return
     yield e
     top, bottom = sp.fraction(sp.together(e))
-    if bottom.is_Number:
-        for flat in _flat(e):
-            yield flat
-            yield from _collected(flat)
-        return
     over, under = (min(_whole(x), key=size) for x in (top, bottom))
     yield sp.cancel(over / under) if size(over) + size(under) < LONGEST // 4 else over / under
     yield over / under
-    for whole in (over, sp.expand(top)):
+    for whole in dict.fromkeys((over, sp.expand(top))):
         yield sp.Add(*(min(_whole(x), key=size) / under for x in sp.Add.make_args(whole)))
 
 
 def _whole(e: Expr) -> Iterator[Expr]:
     """Forms of what has no denominator but numbers."""
     yield e
-    for flat in _flat(e):
+    if not e.has(sp.Add):
+        return
+    for flat in dict.fromkeys(_flat(e)):
         yield flat
         yield from _collected(flat)
+
+
+def _has_quotient(e: Expr) -> bool:
+    return any(x.exp.could_extract_minus_sign() for x in e.atoms(sp.Pow) if not x.base.is_Number)
 
 
 def _flat(e: Expr) -> Iterator[Expr]:
@@ -199,14 +220,40 @@ def _factored(e: Expr) -> Expr:
     if not e.is_Add:
         return e
     forms = [e, _shared(list(e.args))]
-    if len(e.args) <= MOST_FACTORED and not e.has(sp.sin, sp.cos):
+    few = 2 < len(e.args) <= MOST_FACTORED
+    if few and not e.has(sp.sin, sp.cos) and not _has_lone_symbol(e.args):
         forms.append(sp.factor(e))
     return min(forms, key=size)
 
 
+def _has_lone_symbol(terms: Sequence[Expr]) -> bool:
+    """Whether a term is a symbol, but for a number, that no other has: then no product is equal."""
+    lone = [x.as_coeff_Mul()[1] for x in terms]
+    return any(
+        x.is_Symbol and not any(other.has(x) for other in terms if other is not term)
+        for x, term in zip(lone, terms, strict=True)
+    )
+
+
 def _in_front(e: Expr) -> Expr:
     """A sum with the factors that all of its terms share in front."""
-    return sp.factor_terms(e) if e.is_Add else e
+    common = _common(sp.Add.make_args(e))
+    return e if common == 1 else common * sp.Add(*(x / common for x in e.args))
+
+
+def _common(terms: Sequence[Expr]) -> Expr:
+    """The product of the factors that all terms share; of numbers if they have one denominator."""
+    numbers = [term.as_coeff_Mul()[0] for term in terms]
+    powers = [dict(x.as_base_exp() for x in sp.Mul.make_args(term)) for term in terms]
+    shared = {base for base in powers[0] if all(base in other for other in powers[1:])}
+    found = sp.S.One
+    if all(x.is_Rational and x.q == numbers[0].q for x in numbers):
+        found = reduce(sp.gcd, numbers)
+    for base in sorted(shared, key=sp.default_sort_key):
+        least = [other[base] for other in powers]
+        if not base.is_Number and all(x.is_Rational for x in least):
+            found *= base ** min(least)
+    return found
 
 
 def _shared(terms: Sequence[Expr]) -> Expr:
@@ -222,9 +269,10 @@ def _shared(terms: Sequence[Expr]) -> Expr:
     )
     if best is None:
         return sp.Add(*terms)
-    inside = [term / best for term in terms if best in _factors(term)]
+    inside = [term for term in terms if best in _factors(term)]
     outside = [term for term in terms if best not in _factors(term)]
-    product = sp.Mul(best, _factored(sp.Add(*inside)))
+    common = _common(inside)
+    product = sp.Mul(common, _factored(sp.Add(*(term / common for term in inside))))
     return product + (_shared(outside) if outside else 0)
 
 

@@ -4,10 +4,9 @@ A motion is [ω; v] and a force [n; f], six components, at the origin of a frame
 plane three, [ω_z; v_x; v_y] and [n_z; f_x; f_y].
 """
 
-from collections.abc import Sequence
-
 import sympy as sp
 
+from eomgen.derivation.linkage import hat
 from eomgen.derivation.symbols import Expr
 
 PLANAR = (2, 3, 4)
@@ -30,12 +29,6 @@ class ForceCross(sp.MatrixExpr):  # type: ignore[misc]
     def shape(self) -> tuple[int, int]:
         """That of f."""
         return (self.args[0].rows, 1)
-
-
-def hat(a: Sequence[Expr]) -> Expr:
-    """The matrix of a ×."""
-    x, y, z = a
-    return sp.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
 def cut(matrix: Expr, dimensions: int) -> Expr:

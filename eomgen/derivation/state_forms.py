@@ -9,9 +9,9 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect
 from eomgen.derivation.handout.closed import Equations
 from eomgen.derivation.handout.forms import StateForm, state_form
-from eomgen.derivation.projected.symbols import real
+from eomgen.derivation.linkage import quaternion_rates
 from eomgen.derivation.steps import Equation, Step
-from eomgen.derivation.symbols import Expr, over_coordinates
+from eomgen.derivation.symbols import Expr, over_coordinates, real
 from eomgen.model.model import Model
 
 FORMS = {
@@ -156,16 +156,9 @@ def plain_form(model: Model, accelerations: Sequence[Expr]) -> WrittenForm:
             rates.append(real(velocity.name))
         if not index.quaternion:
             continue
-        w, x, y, z = (real(c.name) for c in body.positions[body.plain :])
-        a, b, c = (real(v.name) for v in body.velocities[body.plain :])
-        states += [w, x, y, z]
-        half = sp.Rational(1, 2)
-        rates += [
-            -half * (x * a + y * b + z * c),
-            half * (w * a + y * c - z * b),
-            half * (w * b + z * a - x * c),
-            half * (w * c + x * b - y * a),
-        ]
+        q = [real(c.name) for c in body.positions[body.plain :]]
+        states += q
+        rates += quaternion_rates(q, [real(v.name) for v in body.velocities[body.plain :]])
     order = {c.name: i for i, c in enumerate(model.coordinates)}
     both = sorted(zip(states, rates, strict=True), key=lambda pair: order[pair[0].name])
     both += zip((real(c.name) for c in model.velocities), accelerations, strict=True)

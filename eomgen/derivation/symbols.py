@@ -23,8 +23,12 @@ class SympyScalars(Scalars):
         return sp.Rational(repr(value))
 
     def call(self, function: str, *arguments: Expr) -> Expr:
-        """No function is ever called: such a formula is one symbol, see `_quantity`."""
-        raise AssertionError(function)
+        """A function of formulas. What SymPy would rewrite is opaque, such as exp, with its powers,
+        and atan(1).
+        """
+        if function in ("sin", "cos", "tan", "tanh"):
+            return getattr(sp, function)(*arguments)
+        return sp.Function(function, real=True)(*arguments)
 
 
 def _quantity(formula: Formula, parameters: dict[str, Expr], formulas: dict[Formula, Expr]) -> Expr:
@@ -90,12 +94,12 @@ def make_symbols(model: Model) -> Symbols:
         if isinstance(quantity, Name)
     }
     parameters = {
-        p.name: sp.Symbol(p.name, positive=True) if p.name in positive else _real(p.name)
+        p.name: sp.Symbol(p.name, positive=True) if p.name in positive else real(p.name)
         for p in model.parameters
     }
 
     called = dict.fromkeys(functions_of_parameters(model))
-    formulas = {formula: _real(f"formula__{i}") for i, formula in enumerate(called, 1)}
+    formulas = {formula: real(f"formula__{i}") for i, formula in enumerate(called, 1)}
 
     def quantity(formula: Formula) -> Expr:
         return _quantity(formula, parameters, formulas)
@@ -104,12 +108,12 @@ def make_symbols(model: Model) -> Symbols:
     bodies = [body.name for body in model.bodies]
 
     def each(names: Sequence[str], pattern: str) -> tuple[Expr, ...]:
-        return tuple(_real(pattern.format(name)) for name in names)
+        return tuple(real(pattern.format(name)) for name in names)
 
     return Symbols(
         parameters=parameters,
         formulas=formulas,
-        inputs={i.name: _real(i.name) for i in model.inputs},
+        inputs={i.name: real(i.name) for i in model.inputs},
         mass=tuple(quantity(body.mass) for body in model.bodies),
         inertia=tuple(quantity(body.moment) for body in model.bodies),
         q=each(coordinates, "{}"),
@@ -127,13 +131,14 @@ def make_symbols(model: Model) -> Symbols:
         ydd=each(bodies, "ydd__{}"),
         alpha=each(bodies, "alpha__{}"),
         force=tuple(
-            (_real(f"fx__{body.joint.name}"), _real(f"fy__{body.joint.name}"))
+            (real(f"fx__{body.joint.name}"), real(f"fy__{body.joint.name}"))
             for body in model.bodies
         ),
     )
 
 
-def _real(name: str) -> Expr:
+def real(name: str) -> Expr:
+    """A real symbol. Names of scenes contain no two underscores, so these never clash."""
     return sp.Symbol(name, real=True)
 
 

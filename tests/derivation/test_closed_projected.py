@@ -20,11 +20,12 @@ from eomgen.codegen.from_closed_form import from_closed_form, of_projected
 from eomgen.codegen.from_recursion import from_recursion
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import System
-from eomgen.derivation.projected.constraints import hat, state_joints
+from eomgen.derivation.linkage import hat, rate
+from eomgen.derivation.projected.constraints import state_joints
 from eomgen.derivation.projected.derive import ProjectedEquations, derive_projected
 from eomgen.derivation.projected.simplify import gathered, sum_of_squares
 from eomgen.derivation.projected.steps import projected_steps
-from eomgen.derivation.projected.symbols import Ledger, make_symbols, rate
+from eomgen.derivation.projected.symbols import Ledger, make_symbols
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
 from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate

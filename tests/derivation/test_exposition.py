@@ -22,6 +22,7 @@ from eomgen.derivation.effects import derived_effects
 from eomgen.derivation.evaluate import array, define, number
 from eomgen.derivation.exposition import exposition_of, prescribed_motion
 from eomgen.derivation.impacts import impact_steps
+from eomgen.derivation.steps import at_detail
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.equations import Derivation
@@ -33,6 +34,7 @@ from eomgen.show.derivation import as_html, as_latex, as_text
 from eomgen.show.drawing import Label, Line
 from eomgen.show.prose import blocks, pieces
 from eomgen.show.terms import explained
+from eomgen.tables.details import DETAILS
 
 ROUNDING = 1e-9
 SHOWN = some(("two_body_forced", "bouncing_two_body", "furuta_pendulum", "walker_motors"),
@@ -438,6 +440,16 @@ def test_one_name_for_a_mass_in_all_steps() -> None:
         }
     ).text()
     assert "m_cart" in text and "cart_mass" not in text
+
+
+def test_levels_go_by_kind() -> None:
+    """What is shown depends on what a step is, whatever its title; each level has all before it."""
+    steps = derived("two_body_forced").steps
+    kinds = [[s.kind for s in at_detail(steps, detail)] for detail in DETAILS]
+    assert kinds == [[k for k in kinds[-1] if k in some] for some in map(set, kinds)]
+    assert {"equations", "solution", "form"} <= set(kinds[0]) < set(kinds[1]) < set(kinds[2])
+    other = [replace(step, title="Solved") for step in steps]
+    assert [[s.kind for s in at_detail(other, detail)] for detail in DETAILS] == kinds
 
 
 def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

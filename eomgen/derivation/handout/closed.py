@@ -1,6 +1,6 @@
 """The `closed` route: the handout's derivation from joint constraint to closed form, by SymPy."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -42,7 +42,23 @@ class Equations:
 
 
 def derive(model: Model) -> Equations:
-    """Derive, eliminate and solve; see the modules of this package for each step.
+    """Derive, eliminate and solve; see the modules of this package for each step. Raises
+    `SceneError` for a model without a closed form.
+    """
+    return solved(collected_equations(model))
+
+
+def solved(equations: Equations) -> Equations:
+    """The same with their solution."""
+    model, symbols, kinematics = equations.model, equations.symbols, equations.kinematics
+    rows = equations.collected
+    right_side = body_rows(model, kinematics, rows.F - rows.V - rows.G)
+    right_side += _generalised_forces(model, symbols)
+    return replace(equations, solution=solve(model, symbols, kinematics, right_side))
+
+
+def collected_equations(model: Model) -> Equations:
+    """The equations without a solution.
 
     Raises `SceneError` for a model without a closed form.
     """
@@ -56,8 +72,6 @@ def derive(model: Model) -> Equations:
         *(symmetric(model, symbols, kinematics, m) for m in
           (collected.M, collected.V, collected.G, collected.F))
     )  # fmt: skip
-    right_side = body_rows(model, kinematics, collected.F - collected.V - collected.G)
-    solution = solve(model, symbols, kinematics, right_side + _generalised_forces(model, symbols))
     return Equations(
         model,
         symbols,
@@ -65,7 +79,7 @@ def derive(model: Model) -> Equations:
         free_bodies,
         collected,
         generalised,
-        solution,
+        Solution((), (), ()),
         _recovered_forces(model, symbols, free_bodies),
     )
 

@@ -7,25 +7,13 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.handout.kinematics import Kinematics
-from eomgen.derivation.joint_loads import JointMechanism, joint_loads
+from eomgen.derivation.joint_loads import joint_loads, mechanism_over
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, cross, rotate, scale
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 
 Wrench = tuple[Vec, Expr]
 """Force in world axes at the centre of mass, and torque about z."""
-
-
-class SymbolicMechanism(JointMechanism):
-    """The model as effects see it, with the heights of its bodies."""
-
-    def __init__(self, model: Model, symbols: Symbols) -> None:
-        super().__init__(model, symbols)
-        self._heights = symbols.y
-
-    def height(self, body: str) -> Expr:
-        """World y symbol of a body."""
-        return self._heights[self.bodies.index(body)]
 
 
 @dataclass(frozen=True)
@@ -51,7 +39,7 @@ def draw_free_bodies(model: Model, symbols: Symbols, kinematics: Kinematics) -> 
 
     The joint force f_j acts on the parent at r_parent, and -f_j on the child at r_child.
     """
-    mechanism: Any = SymbolicMechanism(model, symbols)
+    mechanism: Any = mechanism_over(model, symbols, symbols.y)
     loads = [load for effect in model.effects for load in effect.loads(mechanism)]
     forces = [load for load in loads if isinstance(load, Load)]
     at_joints = [load for load in loads if isinstance(load, JointLoad)]

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from eomgen.derivation.linkage import rate
 from eomgen.derivation.symbols import Expr, Symbols, Vec, add, rotate, scale
 from eomgen.model.model import Model
 from eomgen.scene.joints import Joint
@@ -30,66 +31,43 @@ class Kinematics:
 
 
 def differentiate_joints(model: Model, symbols: Symbols) -> Kinematics:
-    """State each joint's constraint as functions of time and let SymPy differentiate it twice."""
-    t = sp.Symbol("t", real=True)
-    moving = dict.fromkeys((*symbols.q, *symbols.x, *symbols.y))
-    functions = {s: sp.Function(f"{s.name}__of_t", real=True)(t) for s in moving}
-    rates = {
-        **dict(zip(symbols.q, zip(symbols.v, symbols.a, strict=True), strict=True)),
-        **dict(zip(symbols.x, zip(symbols.xd, symbols.xdd, strict=True), strict=True)),
-        **dict(zip(symbols.y, zip(symbols.yd, symbols.ydd, strict=True), strict=True)),
-    }
-
-    def at_an_instant(expression: Expr) -> Expr:
-        """Functions of time and their derivatives as plain symbols, highest derivative first."""
-        for order in (2, 1):
-            expression = expression.xreplace(
-                {sp.Derivative(f, (t, order)): rates[s][order - 1] for s, f in functions.items()}
-            )
-        return expression.xreplace({f: s for s, f in functions.items()})
-
+    """State each joint's constraint, and differentiate it twice."""
+    rates: dict[Expr, Expr] = {}
+    for orders in ((symbols.q, symbols.v, symbols.a), (symbols.x, symbols.xd, symbols.xdd),
+                   (symbols.y, symbols.yd, symbols.ydd)):  # fmt: skip
+        rates |= zip((*orders[0], *orders[1]), (*orders[1], *orders[2]), strict=True)
+    zero = (sp.S.Zero, sp.S.Zero)
     angles: list[Expr] = []
-    arms_parent: list[Vec] = []
-    arms_child: list[Vec] = []
+    arms: list[tuple[Vec, Vec]] = []
     positions: list[Vec] = []
-    zero = sp.Integer(0)
     for body, last in zip(model.bodies, model.angle_index, strict=True):
-        q = [functions[s] for s in symbols.q[last + 1 - len(body.positions) : last + 1]]
-        base = angles[body.parent] if body.parent >= 0 else zero
-        angle = base + q[-1]
+        base = angles[body.parent] if body.parent >= 0 else sp.S.Zero
+        angles.append(base + symbols.q[last])
         if not body.joint.holds:
-            r_parent, r_child, position = (zero, zero), (zero, zero), (q[0], q[1])
-        else:
-            parent = (zero, zero)
-            if body.parent >= 0:
-                parent = (functions[symbols.x[body.parent]], functions[symbols.y[body.parent]])
-            r_parent = rotate(_vector(symbols, body.joint, "r_parent"), base)
-            r_child = rotate(_vector(symbols, body.joint, "r_child"), angle)
-            position = add(parent, add(r_parent, scale(-1, r_child)))
-        angles.append(angle)
-        arms_parent.append(r_parent)
-        arms_child.append(r_child)
-        positions.append(position)
-
-    def derivative(order: int) -> tuple[Vec, ...]:
-        return tuple(
-            (at_an_instant(sp.diff(x, t, order)), at_an_instant(sp.diff(y, t, order)))
-            for x, y in positions
-        )
-
-    def instant(vectors: list[Vec]) -> tuple[Vec, ...]:
-        return tuple((at_an_instant(x), at_an_instant(y)) for x, y in vectors)
-
+            arms.append((zero, zero))
+            positions.append((symbols.q[last - 2], symbols.q[last - 1]))
+            continue
+        parent = (symbols.x[body.parent], symbols.y[body.parent]) if body.parent >= 0 else zero
+        r_parent = rotate(_vector(symbols, body.joint, "r_parent"), base)
+        r_child = rotate(_vector(symbols, body.joint, "r_child"), angles[-1])
+        arms.append((r_parent, r_child))
+        positions.append(add(parent, add(r_parent, scale(-1, r_child))))
+    omegas = [rate(angle, rates) for angle in angles]
+    velocities = [_rates(r, rates) for r in positions]
     return Kinematics(
-        angle=tuple(at_an_instant(angle) for angle in angles),
-        omega=tuple(at_an_instant(sp.diff(angle, t)) for angle in angles),
-        alpha=tuple(at_an_instant(sp.diff(angle, t, 2)) for angle in angles),
-        arm_parent=instant(arms_parent),
-        arm_child=instant(arms_child),
-        position=instant(positions),
-        velocity=derivative(1),
-        acceleration=derivative(2),
+        angle=tuple(angles),
+        omega=tuple(omegas),
+        alpha=tuple(rate(omega, rates) for omega in omegas),
+        arm_parent=tuple(arm for arm, _ in arms),
+        arm_child=tuple(arm for _, arm in arms),
+        position=tuple(positions),
+        velocity=tuple(velocities),
+        acceleration=tuple(_rates(v, rates) for v in velocities),
     )
+
+
+def _rates(vector: Vec, rates: dict[Expr, Expr]) -> Vec:
+    return rate(vector[0], rates), rate(vector[1], rates)
 
 
 def _vector(symbols: Symbols, joint: Joint, field: str) -> Vec:

@@ -10,16 +10,23 @@ components. A point that is fixed in axes turning at ω moves by r' + ω x r.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import sympy as sp
 
-from eomgen.derivation.projected.symbols import Ledger, Symbols, rate, real, triple
-from eomgen.derivation.symbols import Expr
-from eomgen.language.formula import Formula
+from eomgen.derivation.linkage import (
+    fixed_angle,
+    fixed_axes,
+    hat,
+    primitive_motion,
+    quaternion_rates,
+    quaternion_scale,
+    rate,
+    vector,
+)
+from eomgen.derivation.projected.symbols import Ledger, Symbols, triple
+from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Body, Model
-from eomgen.model.orientation import rows_of, turns_of
-from eomgen.scalars.exact import Real, direction, orientation, quarters, radians
+from eomgen.scalars.exact import direction
 from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import Primitive
 
@@ -95,7 +102,7 @@ def _differentiated(
     axes, r_parent, arm = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
     if joint.holds:
         axes = fixed_axes(joint, symbols)
-        r_parent, arm = symbols.vector(joint.r_parent), symbols.vector(joint.r_child)
+        r_parent, arm = vector(joint.r_parent, symbols), vector(joint.r_child, symbols)
     primitives = joint.primitives(model.dimensions)
     rotation, relative_omega, slide = _relative_motion(body.name, primitives, q, v, symbols, ledger)
     if primitives and not all(_simple(primitive) for primitive in primitives):
@@ -104,11 +111,11 @@ def _differentiated(
     reach = inward * r_parent + slide
     base = inward * parent.omega
 
-    def in_joint(vector: Expr) -> Expr:
-        return rate(vector, ledger.rates) + base.cross(vector)
+    def in_joint(r: Expr) -> Expr:
+        return rate(r, ledger.rates) + base.cross(r)
 
-    def in_child(vector: Expr) -> Expr:
-        return rate(vector, ledger.rates) + own.omega.cross(vector)
+    def in_child(r: Expr) -> Expr:
+        return rate(r, ledger.rates) + own.omega.cross(r)
 
     moved = in_joint(reach)
     omega = back * base + relative_omega
@@ -129,36 +136,6 @@ def _differentiated(
     )
 
 
-class Quantities(Protocol):
-    """The symbols of quantities and of fixed numbers."""
-
-    def value(self, formula: Formula) -> Expr:
-        """A quantity."""
-
-    def number(self, value: Real) -> Expr:
-        """A number."""
-
-
-def fixed_axes(joint: Joint, symbols: Quantities) -> Expr:
-    """The axes of a joint at q = 0 in its parent's, by numbers or by formulas of parameters."""
-    if joint.orientation is None:
-        fixed = orientation(joint.orientation_deg)
-        return sp.Matrix([[symbols.number(entry) for entry in row] for row in fixed])
-    rows = rows_of(joint.orientation)
-    if len(rows) == 3:
-        return sp.Matrix([[symbols.value(part) for part in row] for row in rows])
-    if len(rows[0]) == 4:
-        q = [symbols.value(part) for part in rows[0]]
-        return of_quaternion(q, 2 / sum(x**2 for x in q))
-    axes = sp.eye(3)
-    for k, turn in turns_of(rows[0]):
-        if isinstance(turn, tuple):
-            axes = axes * sp.Matrix([[symbols.number(x) for x in row] for row in turn])
-        else:
-            axes = axes * about(sp.Matrix([int(i == k) for i in range(3)]), symbols.value(turn))
-    return axes
-
-
 def _relative_motion(
     name: str,
     primitives: Sequence[Primitive],
@@ -173,31 +150,23 @@ def _relative_motion(
     rotation, relative_omega, slide = sp.eye(3), sp.zeros(3, 1), sp.zeros(3, 1)
     q, v = list(q), list(v)
     for primitive in primitives:
+        own, spin, scale = q[:1], v[:1], sp.S.One
         if primitive.kind == "spherical":
-            w, x, y, z = q[:4]
-            a, b, c = v[:3]
-            half = sp.Rational(1, 2)
-            ledger.rates[w] = -half * (x * a + y * b + z * c)
-            ledger.rates[x] = half * (w * a + y * c - z * b)
-            ledger.rates[y] = half * (w * b + z * a - x * c)
-            ledger.rates[z] = half * (w * c + x * b - y * a)
-            # |q|² is constant, so k has no rate.
-            k = ledger.define(real(f"k__{name}"), 2 / (w**2 + x**2 + y**2 + z**2))
-            rotated_by, spin = of_quaternion(q[:4], k), sp.Matrix(v[:3])
-            rotation, relative_omega = rotation * rotated_by, rotated_by.T * relative_omega + spin
-            q, v = q[4:], v[3:]
-            continue
-        ledger.rates[q[0]] = v[0]
-        axis = sp.Matrix([symbols.number(part) for part in direction(primitive.axis)])
-        if primitive.kind == "prismatic":
-            slide += rotation * axis * q[0]
+            own, spin = q[:4], v[:3]
+            scale = ledger.define(real(f"k__{name}"), quaternion_scale(own))
+            ledger.rates.update(zip(own, quaternion_rates(own, spin), strict=True))
         else:
-            rotated_by = about(axis, q[0])
+            ledger.rates[own[0]] = spin[0]
+        rotated_by, moved, axis = primitive_motion(primitive, own, scale, symbols)
+        if primitive.kind == "prismatic":
+            slide += rotation * moved
+        else:
+            turning = axis * spin[0] if primitive.kind == "revolute" else sp.Matrix(spin)
             rotation, relative_omega = (
                 rotation * rotated_by,
-                rotated_by.T * relative_omega + axis * v[0],
+                rotated_by.T * relative_omega + turning,
             )
-        q, v = q[1:], v[1:]
+        q, v = q[len(own) :], v[len(spin) :]
     return rotation, relative_omega, slide
 
 
@@ -217,10 +186,9 @@ def _axis_angle_of(
     if joint.orientation is not None:
         if dimensions == 3:
             return None
-        axis, angle = sp.Matrix([0, 0, 1]), symbols.value(rows_of(joint.orientation)[0][0])
+        axis, angle = sp.Matrix([0, 0, 1]), fixed_angle(joint, symbols)
     elif dimensions == 2 and not isinstance(degrees, tuple) and degrees != 0.0:
-        count, rest = quarters(radians(degrees))
-        axis, angle = sp.Matrix([0, 0, 1]), count * sp.pi / 2 + symbols.number(rest)
+        axis, angle = sp.Matrix([0, 0, 1]), fixed_angle(joint, symbols)
     elif degrees not in (0.0, (0.0, 0.0, 0.0)):
         return None
     for primitive, coordinate in zip(primitives, q, strict=False):  # a spin has four
@@ -263,32 +231,3 @@ def _entries(name: str, rotation: Expr, relative_omega: Expr, ledger: Ledger) ->
 def _position(symbol: Expr) -> tuple[int, int]:
     row, column = symbol.name[-2:]
     return "xyz".index(row), "xyz".index(column)
-
-
-def about(axis: Expr, angle: Expr) -> Expr:
-    """The rotation about a unit vector: n nᵀ + cos (1 - n nᵀ) + sin [n]x.
-
-    1 - n_x² is n_y² + n_z², of which nothing cancels where n is nearly x.
-    """
-    along = axis * axis.T
-    x, y, z = (along[i, i] for i in range(3))
-    across = sp.diag(y + z, x + z, x + y) + sp.diag(x, y, z) - along
-    return along + sp.cos(angle) * across + sp.sin(angle) * hat(axis)
-
-
-def hat(a: Expr) -> Expr:
-    """The matrix of a x."""
-    x, y, z = a
-    return sp.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-
-
-def of_quaternion(q: Sequence[Expr], k: Expr) -> Expr:
-    """The rotation of w, x, y, z with k = 2/|q|²: 1 + k (w [v]x + [v]x²), whatever its length."""
-    w, x, y, z = q
-    return sp.Matrix(
-        [
-            [1 - k * (y**2 + z**2), k * (x * y - w * z), k * (x * z + w * y)],
-            [k * (x * y + w * z), 1 - k * (x**2 + z**2), k * (y * z - w * x)],
-            [k * (x * z - w * y), k * (y * z + w * x), 1 - k * (x**2 + y**2)],
-        ]
-    )

@@ -2,7 +2,7 @@
 method).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from eomgen.base.errors import SceneError
 from eomgen.derivation.projected.constraints import Constraint, state_joints
@@ -42,11 +42,25 @@ class ProjectedEquations:
     balance: Balance
     motion_definitions: int
     solution: Solution
+    world: World
+    ledger: Ledger
 
 
-def derive_projected(model: Model, *, solving: bool = True) -> ProjectedEquations:
-    """Derive and solve; see the modules of this package for each step. Without `solving`, the
-    definitions of `solution` are those of the motion alone.
+def derive_projected(model: Model) -> ProjectedEquations:
+    """Derive and solve; see the modules of this package for each step. Raises `SceneError` for a
+    model that is too large to be read or derived.
+    """
+    return solved(balanced(model))
+
+
+def solved(e: ProjectedEquations) -> ProjectedEquations:
+    """The same with their solution."""
+    found = solve(e.model, e.symbols, e.bodies, e.motions, e.loads, e.world, e.ledger)
+    return replace(e, solution=found)
+
+
+def balanced(model: Model) -> ProjectedEquations:
+    """The equations without a solution: its definitions are those of the motion alone.
 
     Raises `SceneError` for a model that is too large to be read or derived.
     """
@@ -62,9 +76,7 @@ def derive_projected(model: Model, *, solving: bool = True) -> ProjectedEquation
     motions = body_motions(model, constraints, applied_loads.uniform, world, ledger, symbols)
     equations = balance(model, symbols, bodies, motions, applied_loads, world, ledger)
     before = len(ledger.definitions)
-    solution = Solution(ledger.definitions, (), ())
-    if solving:
-        solution = solve(model, symbols, bodies, motions, applied_loads, world, ledger)
     return ProjectedEquations(
-        model, symbols, bodies, constraints, motions, applied_loads, equations, before, solution
+        *(model, symbols, bodies, constraints, motions, applied_loads, equations, before),
+        *(Solution(ledger.definitions, (), ()), world, ledger),
     )

@@ -11,8 +11,9 @@ from typing import Any
 
 import sympy as sp
 
-from eomgen.derivation.joint_loads import JointMechanism, joint_loads
-from eomgen.derivation.projected.constraints import Constraint, MotionSymbols, about
+from eomgen.derivation.joint_loads import joint_loads, mechanism_over
+from eomgen.derivation.linkage import about, inertia_of
+from eomgen.derivation.projected.constraints import Constraint, MotionSymbols
 from eomgen.derivation.projected.simplify import gathered
 from eomgen.derivation.projected.symbols import Ledger, Symbols
 from eomgen.derivation.symbols import Expr
@@ -78,22 +79,14 @@ class Balance:
 
 def inertias(model: Model, symbols: Symbols) -> tuple[Inertia, ...]:
     """Mass and inertia of every body; in the plane the moment about z alone is one."""
-    found = []
-    for body in model.bodies:
-        entries = [symbols.value(entry) for entry in body.inertia_com]
-        if len(entries) == 1:
-            entries = [0, 0, entries[0], 0, 0, 0]
-        xx, yy, zz, xy, xz, yz = entries
-        moments = sp.Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        found.append(Inertia(symbols.value(body.mass), moments))
-    return tuple(found)
+    return tuple(Inertia(symbols.value(b.mass), inertia_of(b, symbols)) for b in model.bodies)
 
 
 def loads(model: Model, symbols: Symbols, bodies: tuple[Inertia, ...], ledger: Ledger) -> Loads:
     """The loads of all effects on bodies and joints; those at joints that depend on the motion get
     definitions.
     """
-    mechanism: Any = JointMechanism(model, symbols)
+    mechanism: Any = mechanism_over(model, symbols)
     given = [load for effect in model.effects for load in effect.loads(mechanism)]
     at_joints = [load for load in given if isinstance(load, JointLoad)]
     motors, definitions = joint_loads(model, symbols, at_joints)

@@ -35,9 +35,7 @@ def projected_steps(equations: ProjectedEquations) -> tuple[Step, ...]:
         return expression.xreplace(numbers).xreplace(shown)
 
     steps = []
-    solved = {*equations.symbols.a} <= {*equations.solution.definitions}
-    ends = _solution(equations) if solved else ()
-    parts = (*_joints(equations), *_balance(equations), *ends)
+    parts = (*_joints(equations), *_balance(equations), *_solution(equations))
     for kind, title, words, pairs in parts:
         lines = [Equation(read(left), read(right)) for left, right in pairs]
         kept = tuple(line for line in lines if line.left != line.right)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from eomgen.derivation.projected.simplify import gathered
-from eomgen.derivation.symbols import Expr, SympyScalars, functions_of_parameters
+from eomgen.derivation.symbols import Expr, SympyScalars, functions_of_parameters, real
 from eomgen.language.formula import Formula, Name, evaluate
 from eomgen.model.model import Model
 from eomgen.model.orientation import rows_of, turns_of
@@ -52,16 +52,6 @@ class Symbols:
         if formula in self.formulas:
             return self.formulas[formula]
         return evaluate(formula, self.parameters, SympyScalars())
-
-    def vector(self, parts: tuple[Formula, ...]) -> Expr:
-        """A vector with two or three components as one with three."""
-        x, y, *z = (self.value(part) for part in parts)
-        return sp.Matrix([x, y, *(z or [0])])
-
-
-def real(name: str) -> Expr:
-    """A real symbol. Names of scenes contain no two underscores, so these never clash."""
-    return sp.Symbol(name, real=True)
 
 
 def triple(word: str, name: str) -> Expr:
@@ -152,11 +142,3 @@ class Ledger:
         """The same for the components of a vector."""
         pairs = zip("xyz", expressions, strict=True)
         return sp.Matrix([self.named(f"{word}__{name}__{axis}", e) for axis, e in pairs])
-
-
-def rate(expression: Expr, rates: Mapping[Expr, Expr]) -> Expr:
-    """Time derivative of an expression or vector; symbols without a rate are constant."""
-    if isinstance(expression, sp.MatrixBase):
-        return expression.applyfunc(lambda e: rate(e, rates))
-    moving = sorted((s for s in expression.free_symbols if s in rates), key=str)
-    return sp.Add(*(sp.diff(expression, s) * rates[s] for s in moving))
