@@ -517,3 +517,9 @@ RECORDS = (
 """The records of which commands take options."""
 FLAGS = {each.name: flag_of(each) for record in RECORDS for each in options_of(record)}
 """The flags of options on the command line, by their names; "" for those that have none there."""
+
+
+def as_flag(name: str) -> str:
+    """What messages of the command line call an argument."""
+    flags = FLAGS.get(name, "").split()
+    return flags[-1] if flags else f"--{name.replace('_', '-')}"

@@ -1,6 +1,7 @@
 """Systems of planar pendulum trees by the symbolic route, in any form of the state."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
@@ -9,7 +10,7 @@ from eomgen.codegen.from_recursion import output
 from eomgen.codegen.recording import Recording
 from eomgen.codegen.system import OutputNodes, System, names_of_inputs, output_shape, recorded
 from eomgen.derivation.handout.closed import Equations, conditions, written_out_forces
-from eomgen.derivation.handout.forms import state_form
+from eomgen.derivation.handout.forms import StateForm, state_form
 from eomgen.derivation.joint_loads import TIME as TIME_SYMBOL
 from eomgen.derivation.joint_loads import mechanism_over
 from eomgen.derivation.symbols import Vec, rotate
@@ -28,6 +29,72 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
     """The system of the equations, with or without the Jacobian of the derivative."""
     model, symbols, form = equations.model, equations.symbols, state_form(equations)
     tape = Tape()
+    made = _lowerings(equations, form, tape)
+    unforced, starting = made.unforced, made.starting
+
+    def rows(lowering: Lowering, expressions: Iterable[Any]) -> list[Node]:
+        return [lowering.lower(e.xreplace(form.replaced)) for e in expressions]
+
+    for pivot in equations.solution.pivots:  # first, so that each gets its own variable name
+        unforced.lower(pivot)
+    rates = rows(unforced, form.rates)
+    by = {
+        "jacobian": list(made.states.values()),
+        "input_jacobian": list(made.inputs.values()),
+        "parameter_jacobian": list(made.parameters.values()),
+    }
+    nodes: OutputNodes = {
+        "initial_state": ((len(form.states),), [starting.lower(e) for e in form.initial]),
+        "derivative": ((len(rates),), rates),
+    }
+    recipes = _recipes(equations)
+    extra = {
+        "forward_dynamics": names_of_inputs(made.tau.values()),
+        "inverse_dynamics": names_of_inputs(made.vd.values()),
+    }
+    lowerings = {"forward_dynamics": made.forced, "inverse_dynamics": made.inverse}
+    for name in (*["jacobian"] * jacobian, *model.outputs):
+        if name in by:
+            slopes = slopes_of(rates, by[name])
+            nodes[name] = ((len(rates), len(by[name])), [node for row in slopes for node in row])
+        elif name == "point_jacobians" and model.form == "velocity":
+            slopes = slopes_of(
+                rows(unforced, recipes["point_velocities"]), [made.states[s] for s in symbols.v]
+            )
+            nodes[name] = (output_shape(name, model), [node for row in slopes for node in row])
+        elif name not in recipes and model.form == "velocity":
+            entries = output(Recording(model, "aba", tape=tape), name, extra)
+            nodes[name] = (output_shape(name, model), entries)
+        elif name in recipes and (model.form == "velocity" or OUTPUTS[name].forms):
+            entries = rows(lowerings.get(name, unforced), recipes[name])
+            nodes[name] = (output_shape(name, model), entries)
+    checks = [
+        Check(what, starting.lower(value).index, may_vanish)
+        for what, value, may_vanish in conditions(equations)
+    ]
+    program = recorded(tape, nodes, checks)
+    return System(model, "closed", tuple(form.states), program, extra, frozenset(), ())
+
+
+@dataclass(frozen=True)
+class _Lowerings:
+    """The inputs of a program, and what puts expressions on its tape: without generalised forces,
+    with them, with accelerations in place of them, and at the start.
+    """
+
+    parameters: Mapping[str, Node]
+    states: Mapping[Any, Node]
+    inputs: Mapping[Any, Node]
+    tau: Mapping[Any, Node]
+    vd: Mapping[Any, Node]
+    unforced: Lowering
+    forced: Lowering
+    inverse: Lowering
+    starting: Lowering
+
+
+def _lowerings(equations: Equations, form: StateForm, tape: Tape) -> _Lowerings:
+    model, symbols = equations.model, equations.symbols
     named = {name: tape.input(name, Stage.PARAMETERS) for name in symbols.parameters}
     parameters = {symbol: named[name] for name, symbol in symbols.parameters.items()}
     for formula, symbol in symbols.formulas.items():
@@ -47,58 +114,23 @@ def from_equations(equations: Equations, *, jacobian: bool = True) -> System:
     }
     given = parameters | states | inputs | {TIME_SYMBOL: tape.input(TIME, Stage.INPUTS)}
     zero = tape.constant(0.0)
-    unforced = Lowering(tape, given | dict.fromkeys(tau, zero), defined)
-    forced = Lowering(tape, given | tau, defined)
-    inverse = Lowering(tape, given | vd, defined)
     start = {
         s: tape.constant(value)
         for s, value in zip(
             (*symbols.q, *symbols.v), (*model.initial_q, *model.initial_v), strict=True
         )
     }
-    starting = Lowering(tape, parameters | start, {})
-
-    def rows(lowering: Lowering, expressions: Iterable[Any]) -> list[Node]:
-        return [lowering.lower(e.xreplace(form.replaced)) for e in expressions]
-
-    for pivot in equations.solution.pivots:  # first, so that each gets its own variable name
-        unforced.lower(pivot)
-    rates = rows(unforced, form.rates)
-    by = {
-        "jacobian": list(states.values()),
-        "input_jacobian": list(inputs.values()),
-        "parameter_jacobian": list(named.values()),
-    }
-    nodes: OutputNodes = {
-        "initial_state": ((len(form.states),), [starting.lower(e) for e in form.initial]),
-        "derivative": ((len(rates),), rates),
-    }
-    recipes = _recipes(equations)
-    extra = {
-        "forward_dynamics": names_of_inputs(tau.values()),
-        "inverse_dynamics": names_of_inputs(vd.values()),
-    }
-    lowerings = {"forward_dynamics": forced, "inverse_dynamics": inverse}
-    for name in (*["jacobian"] * jacobian, *model.outputs):
-        if name in by:
-            slopes = slopes_of(rates, by[name])
-            nodes[name] = ((len(rates), len(by[name])), [node for row in slopes for node in row])
-        elif name == "point_jacobians" and model.form == "velocity":
-            slopes = slopes_of(
-                rows(unforced, recipes["point_velocities"]), [states[s] for s in symbols.v]
-            )
-            nodes[name] = (output_shape(name, model), [node for row in slopes for node in row])
-        elif name not in recipes and model.form == "velocity":
-            entries = output(Recording(model, "aba", tape=tape), name, extra)
-            nodes[name] = (output_shape(name, model), entries)
-        elif name in recipes and (model.form == "velocity" or OUTPUTS[name].forms):
-            entries = rows(lowerings.get(name, unforced), recipes[name])
-            nodes[name] = (output_shape(name, model), entries)
-    checks = [
-        Check(what, starting.lower(value).index, may_vanish)
-        for what, value, may_vanish in conditions(equations)
-    ]
-    return recorded(model, "closed", form.states, tape, nodes, checks, extra, frozenset())
+    return _Lowerings(
+        named,
+        states,
+        inputs,
+        tau,
+        vd,
+        unforced=Lowering(tape, given | dict.fromkeys(tau, zero), defined),
+        forced=Lowering(tape, given | tau, defined),
+        inverse=Lowering(tape, given | vd, defined),
+        starting=Lowering(tape, parameters | start, {}),
+    )
 
 
 def _recipes(equations: Equations) -> dict[str, list[Any]]:

@@ -65,17 +65,10 @@ def from_recursion(
     if model.constraints:
         parts = constraint_outputs(record)
         nodes |= {name: (shape, record.closed(part)) for name, (shape, part) in parts.items()}
-    return recorded(
-        model,
-        record.route,
-        velocity_states(model),
-        tape,
-        nodes,
-        [*checks(record), *conditions],
-        extra,
-        derivatives.tangents,
-        contact_labels(record.dynamics),
-    )
+    tangents = derivatives.tangents
+    program = recorded(tape, nodes, [*checks(record), *conditions], tangents)
+    labels = contact_labels(record.dynamics)
+    return System(model, record.route, velocity_states(model), program, extra, tangents, labels)
 
 
 def output(record: Recording, name: str, extra: ExtraInputs) -> list[Node]:

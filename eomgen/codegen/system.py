@@ -74,17 +74,12 @@ def names_of_inputs(nodes: Iterable[Node]) -> tuple[str, ...]:
 
 
 def recorded(
-    model: Model,
-    route: str,
-    states: Sequence[State],
     tape: Tape,
     nodes: OutputNodes,
     checks: Sequence[Check],
-    extra: Mapping[str, tuple[str, ...]],
-    tangents: frozenset[str],
-    contacts: tuple[ContactLabel, ...] = (),
-) -> System:
-    """The system of a tape and the nodes of its outputs, before optimisation."""
+    tangents: frozenset[str] = frozenset(),
+) -> Program:
+    """The program of a tape and the nodes of its outputs, before optimisation."""
     for name, (shape, entries) in nodes.items():
         count = shape[0] if name in tangents else math.prod(shape)
         assert count == len(entries), f"{name}: {len(entries)} nodes for {shape}"
@@ -92,8 +87,7 @@ def recorded(
         name: Output(shape, tuple(node.index for node in entries))
         for name, (shape, entries) in nodes.items()
     }
-    program = finish(tape, outputs, checks)
-    return System(model, route, tuple(states), program, extra, tangents, contacts)
+    return finish(tape, outputs, checks)
 
 
 def optimised(system: System) -> System:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from eomgen.api.given import Outputs, check_name, check_outputs, modelled
 from eomgen.api.inputs import Given, read_table
-from eomgen.api.options import FLAGS
+from eomgen.api.options import as_flag
 from eomgen.api.overlaps import overlaps_at_start
 from eomgen.api.reporter import Reporter
 from eomgen.base.errors import RunError
@@ -69,7 +69,7 @@ def reporter_of(given: Arguments, scene: str) -> Reporter:
     return Reporter(
         scene=path.name,
         text=lambda: scene_text(path),
-        argument=_option,
+        argument=as_flag,
         note=lambda notice: note(given, notice),
         trial=lambda text: print(f"    trying {text}", flush=True),
         waiting=timed_notice,
@@ -132,13 +132,8 @@ def given_inputs(texts: list[str], known: Sequence[str]) -> dict[str, Given]:
         if sign:
             found[name] = value
         else:
-            found |= read_table(Path(text), known, Reporter(argument=_option))
+            found |= read_table(Path(text), known, Reporter(argument=as_flag))
     return found
-
-
-def _option(name: str) -> str:
-    flags = FLAGS.get(name, "").split()
-    return flags[-1] if flags else f"--{name.replace('_', '-')}"
 
 
 def overlap_lines(model: Model) -> list[str]:

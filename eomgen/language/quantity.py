@@ -163,46 +163,29 @@ def name_quantities(
     for field, info in type(table).model_fields.items():
         extra, value = info.json_schema_extra, getattr(table, field)
         if isinstance(value, dict) and any(isinstance(x, Table) for x in value.values()):
-            tables = {}
+            fields[field] = {}
             for key, inner in value.items():
                 at = f"{location}.{info.alias or field}.{key}"
-                inside, new, kept = name_quantities(
-                    inner, f"{prefix}_{key}", at, known, motion, sliding
-                )
-                tables[key] = inner.replaced(**inside)
-                parameters += new
-                conditions += kept
-            fields[field] = tables
+                found = name_quantities(inner, f"{prefix}_{key}", at, known, motion, sliding)
+                fields[field][key] = inner.replaced(**found[0])
+                parameters += found[1]
+                conditions += found[2]
         if not isinstance(extra, dict) or "unit" not in extra:
             continue
-        sees = [str(word) for word in _listed(extra.get("sees"))]
         named: list[Formula] = []
         for formula, suffix, key_path, off_diagonal in _parts(value, field):
             where = f"{location}.{key_path}"
-            bound = "any" if off_diagonal else str(extra["bound"])
-            if bound == "nonnegative" and getattr(table, "allow_active", False):
-                bound = "any"
-            allowed = [
-                *(motion if "motion" in sees else ()),
-                *(word for word in sees if word != "motion"),
-            ]
+            bound = _bound(table, str(extra["bound"]), off_diagonal)
             by_joint = isinstance(value, dict)
             slides = suffix[1:] in sliding if by_joint else bool(about_slides(table, sliding))
             unit = of_joint(str(extra["unit"]), slides)
             if isinstance(formula, Angle) and unit != "rad":
                 raise SceneError(f"{where}: is an angle; give a number, in {unit or 'no unit'}")
-            for name in names_in(formula):
-                if name in motion and name not in allowed and name not in known:
-                    raise SceneError(
-                        f"{where}: '{name}' changes with the motion, which this value must not; "
-                        "use parameters"
-                    )
-            moving = _check_names(formula, where, known, allowed)
+            moving = _sees_motion(formula, where, known, motion, _listed(extra.get("sees")))
             if isinstance(formula, Constant) and formula.value != 0.0:
-                what = of_joint(str(info.description), slides)
-                about = f"{prefix}: {what}{suffix.replace('_', ', ', 1)}"
+                what = of_joint(str(info.description), slides) + suffix.replace("_", ", ", 1)
                 name = f"{prefix}_{field}{suffix}"
-                parameters.append(Parameter(name, formula.value, unit, about, where))
+                parameters.append(Parameter(name, formula.value, unit, f"{prefix}: {what}", where))
                 formula = Name(name)
             named.append(formula)
             conditions += (
@@ -210,13 +193,45 @@ def name_quantities(
                 if moving
                 else of_quantity(where, formula, bound, unit)
             )
-        if isinstance(value, tuple):
-            fields[field] = tuple(named)
-        elif isinstance(value, dict):
-            fields[field] = dict(zip(value, named, strict=True))
-        elif named:
-            fields[field] = named[0]
+        if named or isinstance(value, tuple | dict):
+            fields[field] = _like(value, named)
     return fields, parameters, conditions
+
+
+def _like(value: Any, named: Sequence[Formula]) -> Any:
+    """The formulas in the form of a field's value: a tuple, a table, or one."""
+    if isinstance(value, tuple):
+        return tuple(named)
+    return dict(zip(value, named, strict=True)) if isinstance(value, dict) else named[0]
+
+
+def _bound(table: Table, given: str, off_diagonal: bool) -> str:
+    """The bound of a quantity: none off a diagonal, or where a table may drive the motion."""
+    active = given == "nonnegative" and getattr(table, "allow_active", False)
+    return "any" if off_diagonal or active else given
+
+
+def _sees_motion(
+    formula: Formula,
+    where: str,
+    known: Mapping[str, float],
+    motion: Sequence[str],
+    sees: Sequence[str],
+) -> bool:
+    """Whether a formula depends on more than parameters. Raises `SceneError` for a name that it may
+    not use.
+    """
+    allowed = [
+        *(motion if "motion" in sees else ()),
+        *(word for word in sees if word != "motion"),
+    ]
+    for name in names_in(formula):
+        if name in motion and name not in allowed and name not in known:
+            raise SceneError(
+                f"{where}: '{name}' changes with the motion, which this value must not; "
+                "use parameters"
+            )
+    return _check_names(formula, where, known, allowed)
 
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")

@@ -20,7 +20,7 @@ from eomgen.model.frames import Centres, from_centre, joint_from_centres
 from eomgen.model.geometry import axis_notices, entries_of_inertia, normalised_joint
 from eomgen.model.initial import initial_state
 from eomgen.model.inputs import own_inputs
-from eomgen.model.model import Body, Model, Point, prescribed_of, velocities_of
+from eomgen.model.model import Body, Model, Point, Prescribed, prescribed_of, velocities_of
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.orientation import oriented
 from eomgen.model.prescribed import locked_values
@@ -57,12 +57,7 @@ def elaborate(scene: Scene) -> Model:
     locked = locked_values(scene.locked, bodies, effects)
     appearance_of(scene)  # raises SceneError if the mechanism cannot be drawn
     prescribed = prescribed_of(bodies, effects, locked)
-    if not velocities_of(bodies, prescribed) and all(c.locked for c in prescribed):
-        raise SceneError("scene: every coordinate is locked, so nothing moves; leave one free")
-    if scene.initial.guess and not constraints:
-        raise SceneError(
-            "initial.guess: is for mechanisms with loops, and this scene has none; give initial.q"
-        )
+    _check_free(scene, bodies, prescribed, bool(constraints))
     start = initial_state(scene.initial, bodies, prescribed)
     lengths = (line for link in links for line in axis_notices(link.joint, link.joint_location))
     model = Model(
@@ -92,13 +87,24 @@ def elaborate(scene: Scene) -> Model:
         held=start.given if constraints else (),
         notices=(
             *scene.remarks,
-            *dict.fromkeys(lengths),
-            *dict.fromkeys(notice for body in bodies for notice in body.notices),
+            *dict.fromkeys([*lengths, *(notice for body in bodies for notice in body.notices)]),
             *start.notices,
             *_notices(effects, {p.name: p.default for p in found.parameters}),
         ),
     )
     return replace(model, outputs=outputs_for(scene.outputs, "outputs[{}]", available_in(model)))
+
+
+def _check_free(
+    scene: Scene, bodies: Sequence[Body], prescribed: Sequence[Prescribed], closed: bool
+) -> None:
+    """Raise `SceneError` if all coordinates are locked, or there are guesses without loops."""
+    if not velocities_of(bodies, prescribed) and all(c.locked for c in prescribed):
+        raise SceneError("scene: every coordinate is locked, so nothing moves; leave one free")
+    if scene.initial.guess and not closed:
+        raise SceneError(
+            "initial.guess: is for mechanisms with loops, and this scene has none; give initial.q"
+        )
 
 
 def _notices(effects: Sequence[Effect], values: Mapping[str, float]) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """Printing of programs as source code: variable names, inlining, parentheses."""
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 
@@ -152,19 +152,12 @@ def print_block(
     given = {i for i in live if is_given(i)}
     uses = Counter(nodes)
     uses.update(chain.from_iterable(steps[i].operands for i in live if i not in given))
-
     results, kept = frozenset(nodes), frozenset(keep)
-    products = frozenset(
-        o
-        for i in live
-        if dialect.fused and i not in given and steps[i].operation in ("add", "sub")
-        for o in steps[i].operands
-        if steps[o].operation == "mul" and uses[o] == 1 and o not in given | kept
-    )
+    moving = [i for i in live if i not in given]
+    single = {o for o, count in uses.items() if count == 1} - given - kept
+    products = _products(program, moving, single) if dialect.fused else frozenset()
     text: dict[int, tuple[str, int]] = {}
-    lines: list[tuple[str, str]] = []
-    assigned: list[int] = []
-    functions: dict[str, None] = {}
+    sources: dict[int, str] = {}
     for i in live:
         step = steps[i]
         if step.operation == "constant":
@@ -173,33 +166,48 @@ def print_block(
         if i in given:
             text[i] = (names[i], _ATOM)
             continue
-        if step.operation in FUNCTIONS:
-            functions[step.operation] = None
-        source, level = _expression(step.operation, [text[o] for o in step.operands], dialect)
-        product = next((o for o in step.operands if o in products), None)
-        if product is not None and step.operation in ("add", "sub"):
-            factors = [text[o] for o in steps[product].operands]
-            source, level = _fused(step, product, factors, text, dialect)
+        source, level = _source(program, i, products, text, dialect)
         long = len(source) > LONGEST_INLINE and i not in results and i not in products
         if i in kept or uses[i] > 1 or long or step.operation in dialect.assigned:
-            lines.append((names[i], source))
-            assigned.append(i)
+            sources[i] = source
             text[i] = (names[i], _ATOM)
         else:
             text[i] = (source, level)
+    operations = (steps[i].operation for i in moving)
+    read = [i for i in live if steps[i].operation == "input" and steps[i].stage > Stage.PARAMETERS]
     return Block(
-        lines=tuple(lines),
+        lines=tuple((names[i], source) for i, source in sources.items()),
         results=tuple(text[n][0] for n in nodes),
         constants=tuple(i for i in live if i in given and steps[i].stage <= Stage.PARAMETERS),
-        inputs=tuple(
-            str(steps[i].value)
-            for i in live
-            if steps[i].operation == "input" and steps[i].stage > Stage.PARAMETERS
-        ),
-        functions=tuple(functions),
-        nodes=tuple(assigned),
+        inputs=tuple(str(steps[i].value) for i in read),
+        functions=tuple(dict.fromkeys(f for f in operations if f in FUNCTIONS)),
+        nodes=tuple(sources),
         taken=tuple(i for i in live if i in known),
     )
+
+
+def _source(
+    program: Program,
+    i: int,
+    products: Collection[int],
+    text: Mapping[int, tuple[str, int]],
+    dialect: Dialect,
+) -> tuple[str, int]:
+    """The expression of a step and its precedence; one of its `products` is fused with the sum."""
+    step = program.steps[i]
+    product = next((o for o in step.operands if o in products), None)
+    if product is not None and step.operation in ("add", "sub"):
+        factors = [text[o] for o in program.steps[product].operands]
+        return _fused(step, product, factors, text, dialect)
+    return _expression(step.operation, [text[o] for o in step.operands], dialect)
+
+
+def _products(program: Program, moving: Iterable[int], single: Collection[int]) -> frozenset[int]:
+    """The products among `single`, nodes that are used once, which are terms of `moving` sums."""
+    steps = program.steps
+    sums = (steps[i] for i in moving if steps[i].operation in ("add", "sub"))
+    terms = (o for step in sums for o in step.operands)
+    return frozenset(o for o in terms if o in single and steps[o].operation == "mul")
 
 
 def _fused(

@@ -1,6 +1,6 @@
 """What the page of a run knows of its mechanism, as a table for JSON: names, units, values."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -63,19 +63,8 @@ def live_table(
             for i, s in enumerate(states)
         ],
         "quaternions": [list(four) for four in live.quaternions],
-        "parameters": [
-            {"name": p.name, "value": p.default, "unit": p.unit, "about": p.about}
-            for p in live.parameters
-        ],
-        "inputs": [
-            {
-                "name": i.name,
-                "value": given.get(i.name, i.default),
-                "unit": i.unit,
-                "about": i.about,
-            }
-            for i in live.inputs
-        ],
+        "parameters": set_by_hand(live.parameters),
+        "inputs": set_by_hand(live.inputs, given),
         "bodies": [body.name for body in live.bodies],
         "joints": list(live.force_joints),
         "effects": [
@@ -99,6 +88,34 @@ def live_table(
         "integrator": _integrator(simulation),
         "meanStep": mean_step,
     }
+
+
+class Settable(Protocol):
+    """A parameter or an input."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def default(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def about(self) -> str: ...
+
+
+def set_by_hand(
+    every: Iterable[Settable], given: Mapping[str, float] | None = None
+) -> list[dict[str, Any]]:
+    """The entries of parameters or inputs, whose values may be `given`."""
+    return [
+        {
+            "name": each.name,
+            "value": (given or {}).get(each.name, each.default),
+            "unit": each.unit,
+            "about": each.about,
+        }
+        for each in every
+    ]
 
 
 def velocity_rows(

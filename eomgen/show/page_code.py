@@ -14,7 +14,7 @@ from eomgen.run.module import load_module
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.schema import Simulation
 from eomgen.show.drawing_data import drawing_data
-from eomgen.show.live import live_table, velocity_rows
+from eomgen.show.live import live_table, set_by_hand, velocity_rows
 from eomgen.show.motion import Array, Motion
 from eomgen.show.page import PageCode
 from eomgen.store import LiveCode, interfaced_program_of, live_code
@@ -129,19 +129,8 @@ def _recorded(run: Ran, why: str) -> PageCode:
     table = {
         "states": [{"name": s.name, "unit": s.unit, "kind": "other"} for s in interface.states],
         "quaternions": [],
-        "parameters": [
-            {"name": p.name, "value": p.default, "unit": p.unit, "about": p.about}
-            for p in interface.parameters
-        ],
-        "inputs": [
-            {
-                "name": i.name,
-                "value": run.inputs.get(i.name, i.default),
-                "unit": i.unit,
-                "about": i.about,
-            }
-            for i in interface.inputs
-        ],
+        "parameters": set_by_hand(interface.parameters),
+        "inputs": set_by_hand(interface.inputs, run.inputs),
         "effects": [],
         "loads": [],
         "operations": 0,

@@ -166,41 +166,7 @@ def _draw_errors(
     axes.set_xscale("log")
     axes.set_yscale("log")
     for method, own in _by_method(works).items():
-        right = [work for work in own if work.status == "ok"]
-        axes.plot(
-            [cost(work) for work in right],
-            [work.error for work in right],
-            label=method,
-            **_line(method),  # type: ignore[arg-type]
-        )
-        if spread:
-            axes.hlines(
-                [work.error for work in right],
-                [cost(work) for work in right],
-                [cost(work) + (work.spread if work.spread > 0 else 0.0) for work in right],
-                color=colour(method),
-                linewidth=0.8,
-            )
-        bounds = [work for work in right if work.at_most[0]]
-        axes.plot(
-            [cost(work) for work in bounds],
-            [work.error for work in bounds],
-            AT_MOST,
-            color=colour(method),
-            markerfacecolor="white",
-            markersize=7,
-        )
-        for status, (marker, _) in TROUBLES.items():
-            marks = [work for work in own if work.status == status and cost(work) > 0]
-            axes.plot(
-                [cost(work) for work in marks],
-                [min(work.error, TOP) if work.error > 0 else TOP for work in marks],
-                marker,
-                color=colour(method),
-                markersize=6,
-                clip_on=False,
-                in_layout=False,
-            )
+        _draw_method(axes, method, own, cost, spread=spread)
     known = [work.error for work in works if work.status == "ok" and work.error > 0]
     low = min(known, default=1e-3) / 4
     axes.axhspan(WRONG, TOP, color=ALARM, alpha=0.07, linewidth=0)
@@ -216,6 +182,47 @@ def _draw_errors(
         text.set_in_layout(False)
     axes.set_ylim(low, TOP)
     _ticks(axes)
+
+
+def _draw_method(
+    axes: Axes, method: str, own: Sequence[Work], cost: Value, *, spread: bool
+) -> None:
+    """Draw the line of a method through its "ok" runs, and marks at the others."""
+    right = [work for work in own if work.status == "ok"]
+    axes.plot(
+        [cost(work) for work in right],
+        [work.error for work in right],
+        label=method,
+        **_line(method),  # type: ignore[arg-type]
+    )
+    if spread:
+        axes.hlines(
+            [work.error for work in right],
+            [cost(work) for work in right],
+            [cost(work) + (work.spread if work.spread > 0 else 0.0) for work in right],
+            color=colour(method),
+            linewidth=0.8,
+        )
+    bounds = [work for work in right if work.at_most[0]]
+    axes.plot(
+        [cost(work) for work in bounds],
+        [work.error for work in bounds],
+        AT_MOST,
+        color=colour(method),
+        markerfacecolor="white",
+        markersize=7,
+    )
+    for status, (marker, _) in TROUBLES.items():
+        marks = [work for work in own if work.status == status and cost(work) > 0]
+        axes.plot(
+            [cost(work) for work in marks],
+            [min(work.error, TOP) if work.error > 0 else TOP for work in marks],
+            marker,
+            color=colour(method),
+            markersize=6,
+            clip_on=False,
+            in_layout=False,
+        )
 
 
 def _draw_evaluations(diagram: Diagram, works: Sequence[Work], axes: Axes) -> None:

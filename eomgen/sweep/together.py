@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from eomgen.native import adaptive_lanes, lanes
 from eomgen.native.accelerator import library_key
@@ -62,17 +63,11 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
         "status": np.full(count, FINISHED, dtype=np.int8),
         "message": np.full(count, ""),
     }
-    many = len(task.times) > 2
-    if many:
+    if len(task.times) > 2:
         found["rows"] = rows.transpose(2, 0, 1).copy()
     for name in task.outputs:
-        chosen = zip(task.times, rows, strict=True) if many else [(task.t_end, rows[-1])]
-        each = []
-        for t, states in chosen:
-            value, valid = kernels.output(name, t, states, k, u)
-            sound &= valid
-            each.append(np.moveaxis(value, -1, 0))
-        found[name] = np.stack(each, axis=1) if many else each[0]
+        found[name], valid = _output(task, kernels, name, rows, k, u)
+        sound &= valid
     left = np.flatnonzero(~sound)
     if not left.size:
         return found
@@ -83,6 +78,23 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
     for name, array in alone.items():
         found[name][left] = array
     return found
+
+
+def _output(
+    task: Task,
+    kernels: Lanes | AdaptiveLanes,
+    name: str,
+    rows: FloatArray,
+    k: FloatArray,
+    u: FloatArray,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """An output of all members at the times of rows that are kept, and where it is a number."""
+    many = len(task.times) > 2
+    chosen = zip(task.times, rows, strict=True) if many else [(task.t_end, rows[-1])]
+    found = [kernels.output(name, t, states, k, u) for t, states in chosen]
+    each = [np.moveaxis(value, -1, 0) for value, _ in found]
+    sound = np.logical_and.reduce([valid for _, valid in found])
+    return np.stack(each, axis=1) if many else each[0], sound
 
 
 def run_chunk(task: Task, values: FloatArray, counter: Counter | None = None) -> Arrays:

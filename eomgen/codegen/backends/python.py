@@ -95,41 +95,11 @@ def module(program: Program, interface: Interface) -> str:
     matrices = [k.function.name for k in kernels if k.function.matrix]
     special = {"initial_state", "derivative", *matrices, *(name for name, _, _ in dynamics)}
     special |= {"impact", "held"}
-    context: dict[str, Any] = {
-        "title": plain(interface.title),
-        "scene": interface.name,
+    context = _facts(interface) | {
         "about": document(interface, costs["derivative"]),
-        "form": interface.form,
-        "dimensions": interface.dimensions,
-        "states": interface.states,
-        "ny": len(interface.states),
-        "nq": interface.coordinates,
-        "nv": interface.velocities,
-        "nx": interface.others,
-        "forces": interface.forces,
-        "positions": repr(tuple(i for i, s in enumerate(interface.states) if s.position)),
-        "quaternions": repr(interface.quaternions),
-        "parameters": interface.parameters,
         "parameter_names": ", ".join(constants.parameters),
         "refused": refused.lines,
         "tests": [(_test(test), _words(test)) for test in refused.tests],
-        "inputs": interface.inputs,
-        "units": units(interface),
-        "effects": repr(tuple(kind for _, kind in interface.effects)),
-        "effect_names": repr(tuple(name for name, _ in interface.effects)),
-        "bodies": repr(interface.bodies),
-        "joints": repr(interface.joints),
-        "drives": len(interface.driven),
-        "driven": repr(tuple(c.name for c in interface.driven)) if interface.driven else "",
-        "points": repr(interface.points),
-        "contacts": [(c.name, c.effect) for c in interface.contacts],
-        "constraints": repr(tuple(n for n, _ in interface.constraints)),
-        "constrained": bool(interface.constraints),
-        "velocity_rows": repr(interface.velocity_rows) if interface.velocity_rows else "",
-        "ranged": repr(interface.ranged) if interface.ranged else "",
-        "following": repr(tuple(n for n, _, _ in interface.following))
-        if interface.following
-        else "",
         "impact": written.get("impact"),
         "held": written.get("held"),
         "costs": [(name, json.dumps(counts)) for name, counts in costs.items()],
@@ -152,6 +122,42 @@ def module(program: Program, interface: Interface) -> str:
         "fixed": constants.lines,
     }
     return render(TEMPLATES, "module.py.jinja", context)
+
+
+def _facts(interface: Interface) -> dict[str, Any]:
+    """What the template needs of the mechanism: names, sizes and units."""
+    return {
+        "title": plain(interface.title),
+        "scene": interface.name,
+        "form": interface.form,
+        "dimensions": interface.dimensions,
+        "states": interface.states,
+        "ny": len(interface.states),
+        "nq": interface.coordinates,
+        "nv": interface.velocities,
+        "nx": interface.others,
+        "forces": interface.forces,
+        "positions": repr(tuple(i for i, s in enumerate(interface.states) if s.position)),
+        "quaternions": repr(interface.quaternions),
+        "parameters": interface.parameters,
+        "inputs": interface.inputs,
+        "units": units(interface),
+        "effects": repr(tuple(kind for _, kind in interface.effects)),
+        "effect_names": repr(tuple(name for name, _ in interface.effects)),
+        "bodies": repr(interface.bodies),
+        "joints": repr(interface.joints),
+        "drives": len(interface.driven),
+        "driven": repr(tuple(c.name for c in interface.driven)) if interface.driven else "",
+        "points": repr(interface.points),
+        "contacts": [(c.name, c.effect) for c in interface.contacts],
+        "constraints": repr(tuple(n for n, _ in interface.constraints)),
+        "constrained": bool(interface.constraints),
+        "velocity_rows": repr(interface.velocity_rows) if interface.velocity_rows else "",
+        "ranged": repr(interface.ranged) if interface.ranged else "",
+        "following": repr(tuple(n for n, _, _ in interface.following))
+        if interface.following
+        else "",
+    }
 
 
 def _written(kernel: Kernel) -> Written:

@@ -251,14 +251,7 @@ class Elimination:
         at = self._links[heaviest].arm if heaviest >= 0 else self._centre(k)
         columns = self._columns[k]
         about = columns | point_columns(columns, at, s)
-        centre = self._centre(k)
-        linear = {
-            j: self._rows.of(about, shifted(row, sub(centre, at))) for j, row in own[0].items()
-        }
-        angular = {j: self._rows.of(about, row) for j, row in own[1].items()}
-        loose = [self._rows.of(about, shifted(row, self._arm(n, at))) for row, n in rows]
-        # Rows without an arm come first. They keep no arm, even if there are more than columns.
-        loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
+        linear, angular, loose = self._rows_about(k, own, rows, at, about)
         along = self._aligned.along[k]
         translations = translation_order(link, at, loose, self._planar, s)
         order = rotation_order(link, self._planar, along)
@@ -280,11 +273,10 @@ class Elimination:
         kept = {(False, j): shifted(linear[j], at) for j in orders[0] if j in linear}
         kept |= {(True, j): angular[j] for j in orders[1] if j in angular}
         kept = {column: self._rows.of(columns, row) for column, row in kept.items()}
-        free = [shifted(row, at) for row in loose if not self._rows.is_empty(row)]
-        free = [self._rows.of(columns, row) for row in free]
+        free = [row for row in loose if not self._rows.is_empty(row)]
+        free = [self._rows.of(columns, shifted(row, at)) for row in free]
         # Rows of angular accelerations alone come first, and stay free of linear ones.
         free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
-        empty = [row for row in loose if self._rows.is_empty(row)]
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
             first, sources, kept, free, gathered = self._pivot_row(axis[0], held, kept, free)
@@ -296,11 +288,28 @@ class Elimination:
             taken.append(replace(one, rows=sources, gathered=gathered, before=tuple(rotations)))
             rotations.clear()
         rest = [*kept.values(), *free]
-        holding_rows = [row for row in rest if not self._rows.is_empty(row)]
-        empty += [row for row in rest if self._rows.is_empty(row)]
-        return EliminatedLink(
-            tuple(taken), tuple(rotations), tuple(holding_rows), tuple(empty)
-        ), term
+        empty = tuple(row for row in (*loose, *rest) if self._rows.is_empty(row))
+        holding = tuple(row for row in rest if not self._rows.is_empty(row))
+        return EliminatedLink(tuple(taken), tuple(rotations), holding, empty), term
+
+    def _rows_about(
+        self,
+        k: int,
+        own: tuple[dict[int, Row], dict[int, Row]],
+        rows: Sequence[tuple[Row, int]],
+        at: Vec,
+        about: Collection[Column],
+    ) -> tuple[dict[int, Row], dict[int, Row], list[Row]]:
+        """A link's linear and angular rows and those of its children, about a point of it."""
+        s, centre = self._scalars, self._centre(k)
+        linear = {
+            j: self._rows.of(about, shifted(row, sub(centre, at))) for j, row in own[0].items()
+        }
+        angular = {j: self._rows.of(about, row) for j, row in own[1].items()}
+        loose = [self._rows.of(about, shifted(row, self._arm(n, at))) for row, n in rows]
+        # Rows without an arm come first. They keep no arm, even if there are more than columns.
+        loose.sort(key=lambda row: not all(s.is_zero(x) for x in row.angular))
+        return linear, angular, loose
 
     def _triangular(
         self,

@@ -7,7 +7,7 @@ orientation is given by formulas of parameters has a fixed frame for it, before 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from eomgen.dynamics.tree.axes import (
     is_graded,
@@ -40,6 +40,7 @@ from eomgen.scalars import exact
 from eomgen.scalars.exact import EYE, ZERO, Matrix, Real
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.protocol import Scalar, Scalars
+from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import Primitive, WithRotor
 
 
@@ -82,55 +83,38 @@ def _drafted(
 
     drafts: list[Frame] = []
     mounts: list[Mount] = []
-    locked = dict(model.locked)
     nv = len(model.velocities)
     for index in model.joint_indices:
         body = index.body
-        frame, axes, angle, at = -1, EYE, ZERO, zeros(scalars)
-        if body.parent >= 0:
-            parent = mounts[body.parent]
-            frame, axes, angle, at = parent.frame, parent.axes, parent.angle, parent.at
         joint, point, armature = body.joint, zeros(scalars), scalars.number(0.0)
+        place = _place_of(mounts[body.parent]) if body.parent >= 0 else _origin(-1, scalars)
         if joint.holds:
-            at = add(at, times(constant(axes, scalars), vector(joint.r_parent)))
-            axes = exact.product(axes, exact.orientation(joint.orientation_deg))
-            if model.dimensions == 2:
-                assert isinstance(joint.orientation_deg, float | int)
-                angle = exact.total(angle, exact.radians(joint.orientation_deg))
+            place = _at_joint(place, joint, vector(joint.r_parent), model.dimensions, scalars)
             point = vector(joint.r_child)
             if isinstance(joint, WithRotor):
                 armature = joint.reflected_inertia(value)
             if joint.orientation is not None:
-                held = _held(rows_of(joint.orientation), value, scalars)
-                place = {"parent": frame, "offset": at, "fixed": axes, "angle": angle}
-                drafts.append(replace(held, name=f"{body.name}_orientation", **place))
-                frame, axes, angle, at = len(drafts) - 1, EYE, ZERO, zeros(scalars)
+                drafts.append(_held(place, body, rows_of(joint.orientation), value, scalars))
+                place = _origin(len(drafts) - 1, scalars)
         primitives = joint.primitives(model.dimensions)
         for i, primitive in enumerate(primitives):
-            to_axis, k = _to_coordinate_axis(primitive)
             name = body.positions[i].name
-            if name in locked and primitive.kind == "prismatic":
-                offset = exact.image_of_axis(exact.product(axes, to_axis), k, locked[name])
-                at = add(at, _numbers(offset, scalars))
+            if name in dict(model.locked):
+                place = _locked(place, primitive, name, model, scalars)
                 continue
-            if name in locked:
-                held = model.locked_angle(name)
-                back = exact.product(exact.rotation_about(k, held), exact.transposed(to_axis))
-                axes = exact.product(axes, exact.product(to_axis, back))
-                angle = exact.total(angle, held if primitive.axis[2] > 0 else exact.opposite(held))
-                continue
+            to_axis, k = _to_coordinate_axis(primitive)
             tilt = exact.angle_of(to_axis[0][0], to_axis[1][0])
             spins = primitive.kind == "spherical"
             v = index.spin if spins else index.v[i : i + 1]
             drafts.append(
                 Frame(
                     name=body.name if i == len(primitives) - 1 else f"{body.name}_{i + 1}",
-                    parent=frame,
-                    offset=at,
-                    fixed=exact.product(axes, to_axis),
+                    parent=place.frame,
+                    offset=place.at,
+                    fixed=exact.product(place.axes, to_axis),
                     kind=primitive.kind,
                     axis=k,
-                    angle=exact.total(angle, tilt),
+                    angle=exact.total(place.angle, tilt),
                     lead=ZERO,
                     q=index.quaternion if spins else index.q[i : i + 1],
                     v=v,
@@ -139,35 +123,78 @@ def _drafted(
                     driven=v[0] >= nv,
                 )
             )
-            frame, at = len(drafts) - 1, zeros(scalars)
             axes, angle = exact.transposed(to_axis), exact.opposite(tilt)
-        at = sub(at, times(constant(axes, scalars), point))
-        mounts.append(
-            Mount(
-                frame,
-                axes,
-                angle,
-                at,
-                point,
-                value(body.mass),
-                _inertia(body, [value(entry) for entry in body.inertia_com], scalars),
-            )
-        )
+            place = _Place(len(drafts) - 1, axes, angle, zeros(scalars))
+        at = sub(place.at, times(constant(place.axes, scalars), point))
+        mass, entries = value(body.mass), [value(entry) for entry in body.inertia_com]
+        inertia = _inertia(body, entries, scalars)
+        mounts.append(Mount(place.frame, place.axes, place.angle, at, point, mass, inertia))
     return drafts, mounts
 
 
+@dataclass(frozen=True)
+class _Place:
+    """A point `at` on a frame with axes; see `Mount`."""
+
+    frame: int
+    axes: Matrix
+    angle: Real
+    at: Vec
+
+
+def _origin(frame: int, scalars: Scalars) -> _Place:
+    """That of a frame, or of the world."""
+    return _Place(frame, EYE, ZERO, zeros(scalars))
+
+
+def _place_of(mount: Mount) -> _Place:
+    """A body's centre of mass."""
+    return _Place(mount.frame, mount.axes, mount.angle, mount.at)
+
+
+def _at_joint(place: _Place, joint: Joint, r: Vec, dimensions: int, scalars: Scalars) -> _Place:
+    """The place of a joint, at `r` from its parent's, with its fixed orientation."""
+    angle = place.angle
+    if dimensions == 2:
+        assert isinstance(joint.orientation_deg, float | int)
+        angle = exact.total(angle, exact.radians(joint.orientation_deg))
+    axes = exact.product(place.axes, exact.orientation(joint.orientation_deg))
+    at = add(place.at, times(constant(place.axes, scalars), r))
+    return replace(place, axes=axes, angle=angle, at=at)
+
+
+def _locked(
+    place: _Place, primitive: Primitive, name: str, model: Model, scalars: Scalars
+) -> _Place:
+    """The place behind a locked coordinate."""
+    to_axis, k = _to_coordinate_axis(primitive)
+    if primitive.kind == "prismatic":
+        length = dict(model.locked)[name]
+        offset = exact.image_of_axis(exact.product(place.axes, to_axis), k, length)
+        return replace(place, at=add(place.at, _numbers(offset, scalars)))
+    held = model.locked_angle(name)
+    back = exact.product(exact.rotation_about(k, held), exact.transposed(to_axis))
+    axes = exact.product(place.axes, exact.product(to_axis, back))
+    turned = held if primitive.axis[2] > 0 else exact.opposite(held)
+    return replace(place, axes=axes, angle=exact.total(place.angle, turned))
+
+
 def _held(
-    rows: Sequence[Sequence[Formula]], value: Callable[[Formula], Scalar], scalars: Scalars
+    place: _Place,
+    body: Body,
+    rows: Sequence[Sequence[Formula]],
+    value: Callable[[Formula], Scalar],
+    scalars: Scalars,
 ) -> Frame:
-    """A frame without name, in the axes of its parent, but for a rotation by formulas."""
+    """A frame at a place, rotated by formulas."""
     return Frame(
-        name="",
-        parent=-1,
-        offset=zeros(scalars),
-        fixed=EYE,
+        name=f"{body.name}_orientation",
+        parent=place.frame,
+        offset=place.at,
+        fixed=place.axes,
         kind="fixed",
         axis=2,
-        angle=ZERO,
+        angle=place.angle,
         lead=ZERO,
         q=(),
         v=(),
