@@ -11,6 +11,7 @@ from eomgen.base.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from eomgen.api.accuracy import accuracy, arithmetic
+    from eomgen.api.derivation import Derivation
     from eomgen.api.deriving import derive
     from eomgen.api.effects import effects
     from eomgen.api.environments import environment
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from eomgen.api.importing import import_robot
     from eomgen.api.linearising import linearise
     from eomgen.api.reopening import load_run
+    from eomgen.api.runs import Run
     from eomgen.api.simulating import simulate
     from eomgen.api.stepping import Stepper, stepper
     from eomgen.api.sweeping import Ensemble, ensemble, grid, sampled
@@ -28,8 +30,7 @@ if TYPE_CHECKING:
     from eomgen.api.systems import nonlinear_system, state_space
     from eomgen.api.verifying import horizon, verify
     from eomgen.base.errors import EomgenError, RunError, SceneError
-    from eomgen.equations import Derivation
-    from eomgen.results import Module, Run
+    from eomgen.results.module import Module
     from eomgen.scene.built_in import built_in_names
     from eomgen.scene.schema import Scene
 
@@ -73,7 +74,7 @@ __all__ = [
 _PLACES = {
     **dict.fromkeys(("check", "read"), "api.given"),
     **dict.fromkeys(("generate", "load"), "api.generating"),
-    "Derivation": "equations",
+    "Derivation": "api.derivation",
     "derive": "api.deriving",
     "environment": "api.environments",
     "export": "api.exporting",
@@ -89,7 +90,8 @@ _PLACES = {
     **dict.fromkeys(("horizon", "verify"), "api.verifying"),
     **dict.fromkeys(("accuracy", "arithmetic"), "api.accuracy"),
     "effects": "api.effects",
-    **dict.fromkeys(("Module", "Run"), "results"),
+    "Module": "results.module",
+    "Run": "api.runs",
     **dict.fromkeys(("EomgenError", "RunError", "SceneError"), "base.errors"),
     "Scene": "api.given",
     "built_in_names": "scene.built_in",

@@ -49,7 +49,7 @@ AFTER = (
         "sweep",
         "show",
         "exports",
-        "results.py",
+        "results",
     ),
     *("api", "commands", "__main__.py", "__init__.py"),
 )

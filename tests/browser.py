@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.results import Run
+from eomgen.api.runs import Run
 from eomgen.show.framing import bounds_of
 from eomgen.show.view import eye_axes
 

@@ -73,7 +73,11 @@ def functions_page() -> str:
     for name, each in things:
         if inspect.isclass(each) and each.__module__ != "eomgen.scene.schema":
             lines += _entry("class", f"eomgen.{name}", None, each.__doc__)
-            for part, value in vars(each).items():
+            own = (c for c in reversed(each.__mro__) if c.__module__.startswith("eomgen."))
+            parts: dict[str, Any] = {}
+            for owner in own:
+                parts |= vars(owner)
+            for part, value in parts.items():
                 if part.startswith("_") and part != "__call__":
                     continue
                 if isinstance(value, property):

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
+from eomgen.api.derivation import Derivation
 from eomgen.api.given import Source, checked, modelled, read
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
-from eomgen.equations import Derivation
 from eomgen.model.model import Model
 from eomgen.scene.schema import Form
 from eomgen.tables.details import Detail

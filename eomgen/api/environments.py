@@ -13,10 +13,10 @@ from eomgen.base.errors import RunError
 from eomgen.base.options import taking
 from eomgen.language.base import identifier
 from eomgen.language.formula import FormulaError, evaluate, names_in, parse
+from eomgen.results.design import Law
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 from eomgen.scalars.floats import ArrayScalars
-from eomgen.sweep.design import Law
 
 NEEDED = "environment: needs Gymnasium; run: pip install 'eomgen[gym]'"
 Columns = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
@@ -99,11 +99,11 @@ def _stacked(parts: Sequence[Columns]) -> Columns:
 
 def _laws(
     start: Mapping[str, Law | tuple[str, float, float]], module: GeneratedModule
-) -> dict[int, Law]:
-    """The distributions by the index of their state."""
-    found = {}
+) -> dict[int, Callable[[FloatArray], FloatArray]]:
+    """The values of each distribution at shares of them, by the index of its state."""
+    found: dict[int, Callable[[FloatArray], FloatArray]] = {}
     for given, law in start.items():
         name = identifier(given)
         check_name(name, list(module.STATES), "start", "state")
-        found[module.STATES.index(name)] = law if isinstance(law, Law) else Law(*law)
+        found[module.STATES.index(name)] = (law if isinstance(law, Law) else Law(*law)).at
     return found

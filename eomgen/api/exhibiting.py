@@ -10,10 +10,10 @@ from eomgen.api.given import Source, read
 from eomgen.api.options import RunOptions
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter
+from eomgen.api.runs import Run
 from eomgen.api.simulating import plan_of, run_plan
 from eomgen.base.errors import RunError
 from eomgen.base.files import check_folder, check_writable, write_whole
-from eomgen.results import Run
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.schema import Scene
 from eomgen.show.gallery import Exhibit, gallery_page, thumbnail

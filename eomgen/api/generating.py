@@ -13,7 +13,7 @@ from eomgen.api.reporter import SILENT, Reporter
 from eomgen.base.errors import RunError, SceneError
 from eomgen.base.files import read_plain
 from eomgen.model.model import Model
-from eomgen.results import Module
+from eomgen.results.module import Module
 from eomgen.run.module import GeneratedModule, load_module
 from eomgen.scene.schema import Form, Route
 from eomgen.store import Code, bytecode_of, generated_code, interfaced_program_of

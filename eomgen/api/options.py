@@ -16,12 +16,12 @@ from eomgen.tables.routes import ROUTES
 if TYPE_CHECKING:
     from eomgen.api.given import Outputs, Source, Values
     from eomgen.api.inputs import Inputs
+    from eomgen.api.runs import Run
     from eomgen.exports import Number
-    from eomgen.results import Run
+    from eomgen.results.design import Design, Law
     from eomgen.run.problem import FloatArray
     from eomgen.run.tally import Follow
     from eomgen.scene.schema import Form, Route
-    from eomgen.sweep.design import Design, Law
 
 GuardMode = Literal["stop", "repair"]
 Backend = Literal["auto", "numpy", "c"]

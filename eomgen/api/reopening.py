@@ -5,8 +5,8 @@ from os import PathLike
 from pathlib import Path
 
 from eomgen.api.generating import module_of
+from eomgen.api.runs import Run
 from eomgen.base.errors import RunError
-from eomgen.results import Run
 from eomgen.run.trajectory import load_npz
 from eomgen.scene.appearance import appearance_of
 
@@ -39,10 +39,10 @@ def load_run(path: str | PathLike[str]) -> Run:
         model,
         module_of(run.code, model),
         trajectory,
-        observe(model, run.functions, trajectory, appearance_of(run.scene), pushing),
-        "",
-        math.nan,
-        tuple(model.notices),
+        motion=observe(model, run.functions, trajectory, appearance_of(run.scene), pushing),
+        options="",
+        error=math.nan,
+        warnings=tuple(model.notices),
         simulation=run.scene.simulation,
         inputs=run.setup.inputs,
         varying=run.setup.varying is not None,

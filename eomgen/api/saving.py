@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from eomgen.api.runs import Run
 from eomgen.base.errors import EomgenError
 from eomgen.base.files import (
     check_folder,
@@ -17,11 +18,10 @@ from eomgen.base.files import (
     write_pieces,
     write_whole,
 )
-from eomgen.results import Run
 from eomgen.run.trajectory import is_own_table, save_csv, save_npz
 
 if TYPE_CHECKING:
-    from eomgen.sweep.ensemble import Ensemble
+    from eomgen.results.ensemble import Ensemble
 
 KINDS = ("py", "npz", "csv", "png", "html")
 PICTURES = ("png", "html")
@@ -129,7 +129,7 @@ def save_sweep(
 
 def _member_lines(found: "Ensemble") -> Iterator[str]:
     """The table of a sweep, in pieces."""
-    from eomgen.sweep.members import WORDS
+    from eomgen.results.ensemble import WORDS
 
     single = [name for name in found.outputs if found.of(name).ndim == 1]
     names = [*found.design.names, *(f"{name} (end)" for name in (*found.states, *single))]
@@ -155,7 +155,7 @@ def save_statistics(found: "Ensemble", path: Path, *, force: bool = False) -> No
 
     Raises `RunError` if the file cannot be written.
     """
-    from eomgen.sweep.ensemble import SHARES
+    from eomgen.results.ensemble import SHARES
 
     single = [name for name in found.outputs if found.of(name).ndim == 1]
     lines: list[Sequence[object]] = [

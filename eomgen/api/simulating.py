@@ -13,11 +13,12 @@ from eomgen.api.options import RunOptions
 from eomgen.api.planning import Plan, plan_run
 from eomgen.api.public import public
 from eomgen.api.reporter import SILENT, Reporter, logger
+from eomgen.api.runs import Run
 from eomgen.api.states import initial_with, origin_from, split
 from eomgen.base.options import taking
 from eomgen.model.elaborate import expanded
 from eomgen.model.model import Model
-from eomgen.results import Module, Run
+from eomgen.results.module import Module
 from eomgen.run.inputs import ModuleWithInputs, with_corners
 from eomgen.run.module import GeneratedModule, as_powers
 from eomgen.run.problem import Problem
@@ -196,10 +197,10 @@ def _run(plan: Plan, follow: "Follow | None", reporter: Reporter) -> Run:
         model,
         module,
         trajectory,
-        observe(model, functions, trajectory, appearance_of(expanded(plan.scene)), pushing),
-        trial.setting.options,
-        error,
-        every,
+        motion=observe(model, functions, trajectory, appearance_of(expanded(plan.scene)), pushing),
+        options=trial.setting.options,
+        error=error,
+        warnings=every,
         choice=choice,
         estimate=estimate,
         begun=ready.start.reported(trajectory) if ready.start else "",

@@ -21,7 +21,9 @@ from eomgen.base.options import taking
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
 from eomgen.native import equal_steps
-from eomgen.results import Module
+from eomgen.results.design import Design, Law, grid, in_radians, listed, sampled
+from eomgen.results.ensemble import Ensemble
+from eomgen.results.module import Module
 from eomgen.run.checks import (
     check_no_step,
     check_samples,
@@ -34,8 +36,6 @@ from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.integrators.fixed_step import count_steps
 from eomgen.scene.schema import Scene
 from eomgen.study.accuracy.trial import Setting
-from eomgen.sweep.design import Design, Law, grid, in_radians, listed, sampled
-from eomgen.sweep.ensemble import Ensemble
 from eomgen.sweep.execute import chunk_size, execute
 from eomgen.sweep.layout import Memory, bytes_each, layout_of, worded
 from eomgen.sweep.members import Task

@@ -4,8 +4,8 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
+from eomgen.api.runs import Run
 from eomgen.commands.shared import Arguments
-from eomgen.results import Run
 
 if TYPE_CHECKING:
     from eomgen.study.accuracy.estimate import Estimate

@@ -7,7 +7,7 @@ from eomgen.api.generating import check_backend, compiled, freshness, translated
 from eomgen.base.errors import EomgenError, InterruptedRunError, RunError, report_refusal
 from eomgen.base.files import check_folder, check_writable
 from eomgen.commands.shared import Arguments, read_model, reporter_of, required
-from eomgen.results import Module
+from eomgen.results.module import Module
 from eomgen.scene.built_in import built_in_names
 from eomgen.show.terms import explained
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from eomgen.api.options import RunOptions
 from eomgen.api.planning import plan_run
 from eomgen.api.reopening import load_run
+from eomgen.api.runs import Run
 from eomgen.api.simulating import run_plan
 from eomgen.base.errors import RunError
 from eomgen.base.files import check_folder
@@ -16,7 +17,6 @@ from eomgen.commands.shared import (
     reporter_of,
 )
 from eomgen.commands.usage import taken
-from eomgen.results import Run
 from eomgen.run.progress import terminal_notice, terminal_progress
 from eomgen.show.filming import FilmOptions
 

@@ -10,6 +10,7 @@ import numpy as np
 from eomgen.api.inputs import applied
 from eomgen.api.options import RunOptions
 from eomgen.api.planning import plan_run
+from eomgen.api.runs import Run
 from eomgen.api.saving import output_paths, save_run
 from eomgen.api.simulating import run_plan
 from eomgen.api.states import state_names
@@ -28,7 +29,6 @@ from eomgen.commands.shared import (
     shortened,
 )
 from eomgen.commands.usage import taken
-from eomgen.results import Run
 from eomgen.run.parquet import check_parquet
 from eomgen.run.trajectory import Trajectory
 

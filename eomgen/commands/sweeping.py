@@ -35,9 +35,9 @@ from eomgen.commands.shared import (
 )
 from eomgen.commands.usage import taken
 from eomgen.language.base import identifier
+from eomgen.results.design import MOST
 from eomgen.run.problem import FloatArray
 from eomgen.run.progress import terminal_progress
-from eomgen.sweep.design import MOST
 from eomgen.sweep.storage import kept_members
 
 FEW = 5

@@ -12,7 +12,6 @@ from numpy.random import Generator
 
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
-from eomgen.sweep.design import Law
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +26,7 @@ class Task:
     observed   (t, y, u) -> (no, k)
     reward     (t, y, u) -> (k,), after a step
     failed     (t, y, u) -> (k,), whether an episode ends there
-    start      what of the first state is drawn, by the index of the state
+    start      by the index of a state what draws its first values, from shares between 0 and 1
     dt         length of a step, s
     length     steps after which an episode is cut off
     """
@@ -40,7 +39,7 @@ class Task:
     observed: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     reward: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     failed: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-    start: Mapping[int, Law]
+    start: Mapping[int, Callable[[FloatArray], FloatArray]]
     dt: float
     length: int
 
@@ -66,8 +65,8 @@ class Task:
     def begun(self, count: int, random: Generator) -> FloatArray:
         """First states (ny, count), drawn."""
         y = np.repeat(self.initial[:, None], count, axis=1)
-        for i, law in self.start.items():
-            y[i] = law.at(random.random(count))
+        for i, drawn in self.start.items():
+            y[i] = drawn(random.random(count))
         return self.projected(y) if self.start else y
 
 

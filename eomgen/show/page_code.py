@@ -1,8 +1,7 @@
 """What the page of a run computes with: the functions of its mechanism, in JavaScript."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -10,9 +9,8 @@ from eomgen.base.errors import EomgenError
 from eomgen.codegen.backends.javascript import mechanism
 from eomgen.language.formula import Formula
 from eomgen.model.model import Model
+from eomgen.results.simulated import Simulated
 from eomgen.run.module import load_module
-from eomgen.run.trajectory import Trajectory
-from eomgen.scene.schema import Simulation
 from eomgen.show.drawing_data import drawing_data
 from eomgen.show.live import live_table, set_by_hand, velocity_rows
 from eomgen.show.motion import Array, Motion
@@ -25,36 +23,8 @@ LONGEST = 1_500_000
 """A page with longer functions than these characters is live only on request."""
 
 
-class Sources(Protocol):
-    """The sources of a module: that of a compiled one is Python in `reference`."""
-
-    @property
-    def source(self) -> str: ...
-    @property
-    def reference(self) -> str: ...
-
-
-class Ran(Protocol):
-    """What a page needs of a `Run`."""
-
-    @property
-    def model(self) -> Model: ...
-    @property
-    def module(self) -> Sources: ...
-    @property
-    def trajectory(self) -> Trajectory: ...
-    @property
-    def motion(self) -> Motion: ...
-    @property
-    def simulation(self) -> Simulation: ...
-    @property
-    def inputs(self) -> Mapping[str, float]: ...
-    @property
-    def varying(self) -> bool: ...
-
-
-def page_code(run: Ran, *, live: bool | None = None) -> PageCode:
-    """The mechanism of the page of a run.
+def page_code(run: Simulated, motion: Motion, *, live: bool | None = None) -> PageCode:
+    """The mechanism of the page of a run and its motion.
 
     A live one has functions for everything that the page can change. Otherwise they are those of
     the generated module; Taylor series, about as long as all the rest, are in the page of a run by
@@ -66,7 +36,7 @@ def page_code(run: Ran, *, live: bool | None = None) -> PageCode:
         for event in run.trajectory.events
         if event.kind != "impact"
     )
-    geometry = drawing_data(run.motion)[1]
+    geometry = drawing_data(motion)[1]
     series = run.simulation.integrator == "taylor"
     found, why = _live(run.model, geometry, live, series)
     code = _recorded(run, why) if found is None else _going_on(run, found)
@@ -90,7 +60,7 @@ def _live(
     return None, f"its functions would take {len(code.source) / 1e6:.1f} MB"
 
 
-def _going_on(run: Ran, code: LiveCode) -> PageCode:
+def _going_on(run: Simulated, code: LiveCode) -> PageCode:
     """A mechanism that goes on from a run."""
     t, steps = run.trajectory.t, run.trajectory.counts["steps"]
     table = live_table(
@@ -104,7 +74,7 @@ def _going_on(run: Ran, code: LiveCode) -> PageCode:
     return PageCode(code.source, table, live=True, y=rows)
 
 
-def _all_coordinates(run: Ran) -> Array | None:
+def _all_coordinates(run: Simulated) -> Array | None:
     """The rows of a run with what follows from its states; None if nothing does."""
     ran = run.trajectory
     following = ran.saved.get(FOLLOWING)
@@ -115,7 +85,7 @@ def _all_coordinates(run: Ran) -> Array | None:
     return np.column_stack([columns[name] for name in names_of(run.model)])
 
 
-def _velocity_rows(run: Ran) -> Array:
+def _velocity_rows(run: Simulated) -> Array:
     """The rows of a run in momenta as [q, v]."""
     ran = run.trajectory
     module = load_module(run.module.reference or run.module.source)
@@ -123,7 +93,7 @@ def _velocity_rows(run: Ran) -> Array:
     return velocity_rows(run.model, ran.states, ran.y, rates)
 
 
-def _recorded(run: Ran, why: str) -> PageCode:
+def _recorded(run: Simulated, why: str) -> PageCode:
     """The functions of the generated module: enough to show a run."""
     program, interface = interfaced_program_of(run.model)
     table = {

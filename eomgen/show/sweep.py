@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from eomgen.results.ensemble import Ensemble
 from eomgen.run.problem import FloatArray
 from eomgen.show.style import ALARM, FAINT, PALETTE, plain, style, symbol, write_figure
-from eomgen.sweep.ensemble import Ensemble
 
 LINES = 200
 """Greatest number of trajectories in a fan."""

@@ -7,10 +7,10 @@ from contextlib import closing
 from itertools import islice
 from typing import Protocol
 
+from eomgen.results.design import Design
 from eomgen.run.progress import Progress
 from eomgen.sweep.cluster import by_dask
 from eomgen.sweep.counter import Counter
-from eomgen.sweep.design import Design
 from eomgen.sweep.members import Arrays, Task
 from eomgen.sweep.processes import PAUSE, Job, by_processes
 from eomgen.sweep.together import run_chunk

@@ -14,6 +14,7 @@ from eomgen.base.errors import EomgenError
 from eomgen.model.model import Model
 from eomgen.native.accelerator import Accelerator
 from eomgen.native.needed import needed_by
+from eomgen.results.ensemble import FINISHED, REFUSED, STOPPED
 from eomgen.run.inputs import InputsOfTime, ModuleWithInputs, with_corners
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import find_integrator
@@ -27,9 +28,6 @@ from eomgen.study.whole import initial_of, names_of, on_branch
 from eomgen.sweep.counter import Counter
 
 Arrays = dict[str, NDArray[Any]]
-FINISHED, STOPPED, REFUSED = 0, 1, 2
-"""How a member ended: at its end time, before it, or not at all."""
-WORDS = ("finished", "stopped", "refused")
 Values = tuple[Mapping[str, float] | None, Mapping[str, float] | None]
 """Parameters and inputs by name."""
 

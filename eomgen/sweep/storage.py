@@ -26,9 +26,10 @@ from numpy.lib import format as npy
 from eomgen.base.errors import RunError
 from eomgen.base.files import UNFINISHED, check_folder, is_kept, open_kept, write_whole
 from eomgen.base.text import LONGEST_LINE, brief
-from eomgen.sweep.design import Design
+from eomgen.results.design import Design
+from eomgen.results.ensemble import WORDS
 from eomgen.sweep.layout import Column, Layout, said
-from eomgen.sweep.members import WORDS, Arrays, Task
+from eomgen.sweep.members import Arrays, Task
 
 ABOUT, FORMAT = "sweep.json", 3
 CHUNK = re.compile(r"chunk_\d{6,}\.json")

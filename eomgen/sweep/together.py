@@ -11,13 +11,14 @@ from eomgen.native import adaptive_lanes, lanes
 from eomgen.native.accelerator import library_key
 from eomgen.native.adaptive_lanes import AdaptiveLanes
 from eomgen.native.lanes import Lanes
+from eomgen.results.ensemble import FINISHED
 from eomgen.run.checks import errors_of_sizes
 from eomgen.run.module import as_problem, given_values
 from eomgen.run.problem import USUAL_LENGTH, FloatArray, Problem
 from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.store import interfaced_program_of
 from eomgen.sweep.counter import Counter
-from eomgen.sweep.members import FINISHED, Arrays, Task, compile_steps, module_of, run_members
+from eomgen.sweep.members import Arrays, Task, compile_steps, module_of, run_members
 
 METHODS = ("rk4", "DOP853")
 """The methods that run members together."""

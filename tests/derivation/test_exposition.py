@@ -16,6 +16,7 @@ from effect_cases import CASES, TRIED, Case
 from followed import follow_effects, follow_recursion, instant
 
 import eomgen
+from eomgen.api.derivation import Derivation
 from eomgen.commands.main import main
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import derived_effects
@@ -25,7 +26,6 @@ from eomgen.derivation.impacts import impact_steps
 from eomgen.derivation.steps import at_detail
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
-from eomgen.equations import Derivation
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scene

@@ -10,8 +10,8 @@ import sympy as sp
 from campaign import some
 
 import eomgen
+from eomgen.api.derivation import Derivation
 from eomgen.derivation.simplified import simplified
-from eomgen.equations import Derivation
 
 FALL = 'effects = [{ type = "gravity", g = "g" }%s]'
 

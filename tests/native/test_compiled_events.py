@@ -14,10 +14,10 @@ from test_compiled_runs import EXPLICIT, assert_same, both, compiler
 from test_stepper import BLOCK
 
 import eomgen
+from eomgen.api.runs import Run
 from eomgen.engine.printed import text
 from eomgen.engine.roots import FOUND, RTOL, WANTED, Search, begun, gone_on
 from eomgen.native import equal_steps
-from eomgen.results import Run
 from eomgen.run.integrators import strides
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.scene.built_in import built_in_names

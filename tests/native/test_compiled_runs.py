@@ -18,6 +18,7 @@ from eomgen.api.generating import compiled as generated
 from eomgen.api.given import check, read
 from eomgen.api.options import RunOptions
 from eomgen.api.planning import plan_run
+from eomgen.api.runs import Run
 from eomgen.base.errors import RunError
 from eomgen.codegen import jacobians
 from eomgen.codegen.backends import c, c_directions
@@ -27,7 +28,6 @@ from eomgen.native import accelerator, functions
 from eomgen.native.accelerator import Accelerator
 from eomgen.native.library import built
 from eomgen.pipeline import compile_program
-from eomgen.results import Run
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.integrators.stability import StabilityMonitor
 from eomgen.run.module import GeneratedModule

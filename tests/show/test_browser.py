@@ -12,7 +12,7 @@ import pytest
 from browser import check_page, chromium, missing, opened
 
 import eomgen
-from eomgen.results import Run
+from eomgen.api.runs import Run
 from eomgen.show.gallery import Exhibit, gallery_page, thumbnail
 from eomgen.show.page import render_page, save_page
 

@@ -16,9 +16,9 @@ import pytest
 from live import NODE, run_in_node
 
 import eomgen
+from eomgen.api.runs import Run
 from eomgen.base.files import is_ours
 from eomgen.base.templating import templates_folder
-from eomgen.results import Run
 from eomgen.show.page import PageCode, page_data, render_page, save_page
 
 NASTY = "</script><img src=x onerror=alert(1)> <!-- $x^2$ \u2028 鎖 {{ t }}"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import eomgen
-from eomgen.study import labelled
+from eomgen.results import labelled
 
 
 def test_a_run_as_table_and_dataset() -> None:

@@ -21,10 +21,11 @@ from eomgen.api.saving import save_statistics, save_sweep
 from eomgen.base.errors import RunError
 from eomgen.commands.main import main
 from eomgen.native import accelerator
+from eomgen.results import ensemble
+from eomgen.results.design import Law
+from eomgen.results.ensemble import Ensemble
 from eomgen.show.sweep import draw_sweep
-from eomgen.sweep import ensemble, execute, members, storage, together
-from eomgen.sweep.design import Law
-from eomgen.sweep.ensemble import Ensemble
+from eomgen.sweep import execute, members, storage, together
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 MASSES = (0.5, 1.0, 1.7)

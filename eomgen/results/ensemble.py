@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 
 from eomgen.base.errors import RunError, nearest
 from eomgen.language.base import identifier
+from eomgen.results.design import Design
+from eomgen.results.labelled import need_package
 from eomgen.run.problem import FloatArray
-from eomgen.study.labelled import need_package
-from eomgen.sweep.design import Design
-from eomgen.sweep.members import FINISHED, WORDS
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
+FINISHED, STOPPED, REFUSED = 0, 1, 2
+"""How a member ended: at its end time, before it, or not at all."""
+WORDS = ("finished", "stopped", "refused")
 SHARES = (0.05, 0.5, 0.95)
 """Shares of the members below the quantiles that are given if no others are asked for."""
 MOST_NUMBERS = 2**22

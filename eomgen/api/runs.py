@@ -1,18 +1,16 @@
-"""Results of the public functions, which can be pickled and displayed in a notebook."""
+"""The result of a simulation, which can be pickled, plotted, and displayed in a notebook."""
 
-import html
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from eomgen.base.files import check_writable, write_whole
 from eomgen.language.base import identifier
-from eomgen.model.model import Model
+from eomgen.results.labelled import dataframe, dataset, units_of
+from eomgen.results.simulated import Simulated
 from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import FloatArray
-from eomgen.run.trajectory import Outcome, Trajectory, save_csv, save_npz
-from eomgen.scene.schema import Simulation
+from eomgen.run.trajectory import save_csv, save_npz
 from eomgen.study.diagnosis import joint_limits, locks
 from eomgen.study.recording import FOLLOWING
 
@@ -21,7 +19,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from eomgen.program.passes import PassReport
     from eomgen.run.progress import Progress
     from eomgen.show.balance import Imbalance
     from eomgen.show.motion import Motion
@@ -32,54 +29,8 @@ if TYPE_CHECKING:
     from eomgen.study.between import Direction
 
 
-@dataclass(frozen=True)
-class Module:
-    """A generated module.
-
-    name         name of the scene
-    source       source code
-    explanation  a line for each route, with its operations and which was chosen
-    notices      notices for the user
-    reports      steps and operations of the program after each optimisation pass
-    derived      whether it was derived now; else it comes from the store
-    backend      name of the backend that wrote it
-    others       contents of further files of the backend, by name
-    library      sources of its shared library by name, if it is to be compiled and loaded
-    reference    source of the Python module that a compiled one falls back on; "" without one
-    digits       how many of 16 digits of accelerations are right at the worst of some states; None
-                 if at least ten
-    """
-
-    name: str
-    source: str
-    explanation: tuple[str, ...]
-    notices: tuple[str, ...]
-    reports: "tuple[PassReport, ...]" = ()
-    derived: bool = field(default=True, compare=False)
-    backend: str = "numpy"
-    others: Mapping[str, str] = field(default_factory=dict)
-    library: Mapping[str, str] = field(default_factory=dict, compare=False)
-    reference: str = field(default="", compare=False)
-    digits: int | None = None
-
-    def save(self, path: str | Path, *, force: bool = False) -> None:
-        """Write the file, and further files beside it, each atomically.
-
-        Raises `RunError` if a file exists that this program did not write, unless `force`.
-        """
-        for name in self.others:
-            check_writable(Path(path).with_name(name), force=force)
-        write_whole(Path(path), self.source, force=force)
-        for name, text in self.others.items():
-            write_whole(Path(path).with_name(name), text, force=force)
-
-    def _repr_html_(self) -> str:
-        lines = "\n".join(self.explanation)
-        return f"<b>{html.escape(self.name)}.py</b><pre>{html.escape(lines)}</pre>"
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run(Simulated):
     """The result of a simulation.
 
     model       the mechanism, with the parameters of the run
@@ -98,9 +49,6 @@ class Run:
     varying     whether inputs were tables or functions of time
     """
 
-    model: Model
-    module: Module
-    trajectory: Trajectory
     motion: "Motion"
     options: str
     error: float
@@ -109,49 +57,11 @@ class Run:
     estimate: "Estimate | None" = None
     begun: str = ""
     compiled: bool = False
-    simulation: Simulation = field(default_factory=Simulation)
-    inputs: Mapping[str, float] = field(default_factory=dict)
-    varying: bool = False
-
-    @property
-    def t(self) -> FloatArray:
-        """Times, (n,), s."""
-        return self.trajectory.t
-
-    @property
-    def y(self) -> FloatArray:
-        """States, (n, ny), SI units, in the order of `states`."""
-        return self.trajectory.y
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the states."""
-        return self.trajectory.states
-
-    @property
-    def finished(self) -> bool:
-        """Whether the run reached its end time."""
-        return self.trajectory.finished
-
-    @property
-    def outcome(self) -> Outcome:
-        """How the run ended: kind, reason, and what to change."""
-        return self.trajectory.outcome
-
-    @property
-    def message(self) -> str:
-        """Why the run ended early, and what to change; "" if there is nothing to report."""
-        return self.trajectory.message
 
     @property
     def energy(self) -> FloatArray:
         """Total mechanical energy, (n,), J."""
         return self.motion.kinetic_energy + self.motion.potential_energy
-
-    @property
-    def saved(self) -> Mapping[str, FloatArray]:
-        """What `save` asked for, (n, …) each, by output."""
-        return {name: each.values for name, each in self.trajectory.saved.items()}
 
     @property
     def imbalance(self) -> "Imbalance | None":
@@ -211,7 +121,7 @@ class Run:
         """The functions of the page of this run, in JavaScript: `show.page_code.page_code`."""
         from eomgen.show.page_code import page_code
 
-        return page_code(self, live=live)
+        return page_code(self, self.motion, live=live)
 
     def plot(
         self,
@@ -313,8 +223,6 @@ class Run:
     @property
     def units(self) -> Mapping[str, str]:
         """The unit of each column of the table of the run, by name; without those of none."""
-        from eomgen.study.labelled import units_of
-
         both = (*self.model.coordinates, *self.model.velocities)
         following = {each.name: each.unit for each in both}
         of_states = dict(zip(self.motion.states, self.motion.units, strict=True))
@@ -324,16 +232,12 @@ class Run:
         """States, works and what was saved as pandas' DataFrame over `t`: the columns of the table
         that `save` writes, their units in `attrs["units"]`. Raises `RunError` without pandas.
         """
-        from eomgen.study.labelled import dataframe
-
         return dataframe(self.trajectory, self.units)
 
     def to_xarray(self) -> "Dataset":
         """The same as an xarray.Dataset over `t`, each variable with its attribute `units`. Raises
         `RunError` without xarray.
         """
-        from eomgen.study.labelled import dataset
-
         return dataset(self.trajectory, self.units)
 
     def view(self, *, height: int = 620, live: bool | None = None) -> "Cell":
