@@ -103,7 +103,8 @@ class Rodas:
 class RodasRecords:
     """Of each step its end, the length of the next one, its own length and error, the state at its
     end and what rounding took from it, the least margin of constraints, and derivatives, Jacobians,
-    factorisations and rows so far; the rows at given times; how many steps were made.
+    factorisations and rows so far; the rows at given times; the four states of each quaternion; how
+    many steps were made.
     """
 
     ends: Annotated[Vector, "most"]
@@ -119,6 +120,8 @@ class RodasRecords:
     sampled: Annotated[Whole, "most"]
     times: Annotated[Vector, "count"]
     rows: Annotated[Matrix, "count", "STATES"]
+    quaternions: Annotated[Whole, "4 * many"]
+    many: int
     count: int
     most: int
     made: int = 0
@@ -306,8 +309,6 @@ def rodas_many(
     factors: Factors,
     begun: float,
     smooth: float,
-    many: int,
-    quaternions: Annotated[Whole, "4 * many"],
     state: Annotated[Vector, "STATES"],
     kept: RodasRecords,
 ) -> int:
@@ -331,12 +332,16 @@ def rodas_many(
         while passed < kept.count and kept.times[passed] < run.end:
             now = kept.times[passed]
             rodas_within(run, y, (now - t) / run.h_last, place)
-            if not normalised(many, quaternions, place) or not held.projected(now, place):
+            if not normalised(kept.many, kept.quaternions, place):
+                return UNUSUAL
+            if not held.projected(now, place):
                 return UNUSUAL
             kept.rows[passed] = place
             passed += 1
         place[:] = run.last
-        if not normalised(many, quaternions, place) or not held.projected(run.end, place):
+        if not normalised(kept.many, kept.quaternions, place):
+            return UNUSUAL
+        if not held.projected(run.end, place):
             return UNUSUAL
         while passed < kept.count and kept.times[passed] <= run.end:
             kept.rows[passed] = place

@@ -26,6 +26,7 @@ from eomgen.codegen.series import recurrences_of
 from eomgen.model.model import Model
 from eomgen.native import contact_runs, equal_steps, functions, implicit, runs, taylor
 from eomgen.native.library import compiled_library, kept_library
+from eomgen.native.mechanism import FUNCTIONS, Given, Mechanism, mechanism
 from eomgen.program.program import Program
 from eomgen.run.compiled import Compiled, EqualSteps, Series, Steps, Strikes
 from eomgen.run.problem import Problem
@@ -146,61 +147,53 @@ class Accelerator:
         """
         origin, module = module and self._module, module or self._module
         made: dict[Any, Any] = {}
-        projects = PROJECTS if problem.projection else ()
         problem = self._compilable(module, origin).problem(problem)
+        projects = PROJECTS if problem.projection else ()
+        contacts = contact_runs.FUNCTIONS if problem.contacts else ()
 
-        def once(needed: tuple[str, ...], make: Callable[[Libraries], Any]) -> Any:
-            """What is made of libraries, as soon as they are there."""
-            if needed not in made and (libraries := self._found(needed)):
-                made[needed] = make(libraries)
-            return made.get(needed)
-
-        def explicit_steps(more: tuple[str, ...] = ()) -> runs.CompiledSteps | None:
-            def make(of: Libraries) -> runs.CompiledSteps:
-                beside = {name: of[name] for name in more}
-                return runs.CompiledSteps(module, of["derivative"], *self._values, beside)
-
-            found: runs.CompiledSteps | None = once(("derivative", *more), make)
+        def once(name: str, needed: tuple[str, ...], make: Callable[..., Any]) -> Any:
+            """What is made of a mechanism and of the library of a method, as soon as all libraries
+            are there; None before that, and if kernels cannot compute what steps need.
+            """
+            if (name, needed) not in made and (libraries := self._found(needed)):
+                of = mechanism(Given(module, libraries, self._values, origin))
+                own = libraries[needed[-1] if needed[-1] not in FUNCTIONS else "derivative"]
+                made[name, needed] = of and make(of, own)
+            found = made.get((name, needed))
+            self.used = self.used or found is not None
             return found
 
         @cache
         def series() -> taylor.CompiledTaylor | None:
             return self._taylor(module)
 
-        def implicit_steps(name: str) -> Any:
-            needed = implicit.needed(name, problem)
-
-            def make(of: Libraries) -> Any:
-                given = problem, module, of[needed[-1]], of, self._values, origin
-                return implicit.steps(name, implicit.Given(*given))
-
-            return once(needed, make)
-
         def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
             if name == "taylor":  # its steps are not checked
                 return of.steps if not needed and (of := series()) else None
-            if name == "Rodas5P":
-                found = None if set(needed) - set(projects) else implicit_steps(name)
-            else:
-                found = held.named(name, needed) if (held := explicit_steps(needed)) else None
-            self.used = self.used or found is not None
+            found: Steps | None = None
+            if name == "DOP853":
+                found = once(name, ("derivative", *needed), partial(partial, runs.dop853))
+            elif not set(needed) - set(projects):
+                make = partial(partial, implicit.rodas_5p, problem)
+                found = once(name, implicit.needed(name, problem), make)
             return found
 
         def equal(name: str) -> EqualSteps | None:
-            if problem.contacts and (problem.projection or name in implicit.GAUSS):
+            solves = name in implicit.GAUSS
+            if contacts and (projects or solves):
                 return None
-            found: EqualSteps | None
-            if name in implicit.GAUSS or (problem.projection and name in equal_steps.LEAPFROGS):
-                found = implicit_steps(name)
-            else:
-                needed = (*projects, *(contact_runs.FUNCTIONS if problem.contacts else ()))
-                found = held.equal(name, problem) if (held := explicit_steps(needed)) else None
-            self.used = self.used or found is not None
+            needed, make = ("derivative", *projects, *contacts), equal_steps.steps
+            if solves or (projects and name in equal_steps.LEAPFROGS):
+                needed, make = implicit.needed(name, problem), implicit.equal
+            found: EqualSteps | None = once(name, needed, partial(make, name, problem))
             return found
 
         def strikes() -> Strikes | None:
-            held = explicit_steps(contact_runs.FUNCTIONS)
-            return held.strikes() if held else None
+            def make(of: Mechanism, library: ctypes.CDLL) -> Strikes:
+                return partial(contact_runs.strikes, library.strikes, of)
+
+            found: Strikes | None = once("strikes", ("derivative", *contacts), make)
+            return found
 
         def of_solutions() -> Series:
             found = series()

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from eomgen.codegen.interface import Interface
 from eomgen.engine import contact_runs, equal_steps
-from eomgen.native.checked import Function, FunctionStructure
 from eomgen.run.compiled import Array, Touched, Whole
 from eomgen.subset.structures import filled, take
 
@@ -22,8 +21,7 @@ class Events(ctypes.Structure):
     """`Events` of `templates/c/contact_runs.c.jinja`."""
 
     _fields_ = (
-        *((name, FunctionStructure) for name in FUNCTIONS),
-        *((name, _POINTER) for name in ("inputs", "sizes", "now", "at", "slack", "y", "last")),
+        *((name, _POINTER) for name in ("of", "sizes", "now", "at", "slack", "y", "last")),
         *((name, _REAL) for name in ("t", "end")),
         *(("calls", _POINTER), ("called", _WHOLE * 3), ("made", _WHOLE), ("sound", _WHOLE)),
         ("method", _POINTER),
@@ -44,44 +42,36 @@ def context(interface: Interface) -> dict[str, Any]:
     return {**sizes(interface), **codes, "event": equal_steps.EVENT}
 
 
-def events(functions: Mapping[str, Function], touched: Touched, inputs: Array) -> Events:
-    """What C is given."""
+def events(of: ctypes.Structure, touched: Touched) -> Events:
+    """What C is given of the contacts of a `native.mechanism.Mechanism`."""
     now, at = filled(touched.now), filled(touched.at)
     start = touched.at.y.copy()
     made = Events(
-        *(FunctionStructure(*functions[name]) for name in FUNCTIONS),
-        *(array.ctypes.data for array in (inputs, touched.sizes)),
+        *(ctypes.addressof(of), touched.sizes.ctypes.data),
         *(ctypes.addressof(record) for record in (now, at)),
         *(array.ctypes.data for array in (touched.slack, start)),
         calls=touched.calls.ctypes.data,
         sound=1,
     )
-    made.kept = now, at, start, inputs, touched
+    made.kept = now, at, start
     return made
 
 
 def taken(touched: Touched, made: Events) -> None:
     """Give it the numbers that C has computed."""
-    now, at, *_ = made.kept
+    now, at, _ = made.kept
     take(touched.now, now)
     take(touched.at, at)
 
 
 def strikes(
-    library: ctypes.CDLL,
-    functions: Mapping[str, Function],
-    inputs: Array,
-    touched: Touched,
-    closed: Whole,
-    speeds: Array,
-    least: Array,
+    call: Any, of: ctypes.Structure, touched: Touched, closed: Whole, speeds: Array, least: Array
 ) -> int | None:
     """Let contacts strike at the place of `touched`, see `engine.contacts.strike`; None if Python
     must.
     """
-    call = library.strikes
     call.restype, call.argtypes = _WHOLE, [_POINTER, _REAL, *[_POINTER] * 4]
-    made = events(functions, touched, inputs)
+    made = events(of, touched)
     arrays: tuple[NDArray[Any], ...] = (touched.at.y, closed, speeds, least)
     addresses = (array.ctypes.data for array in arrays)
     answer: int = call(ctypes.byref(made), touched.at.t, *addresses)

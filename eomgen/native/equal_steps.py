@@ -5,8 +5,7 @@ derivative.
 """
 
 import ctypes
-from collections.abc import Mapping, Sequence
-from functools import partial
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,8 @@ from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.methods import EQUAL, Root
 from eomgen.engine.sums import Sum
 from eomgen.native import contact_runs
-from eomgen.native.checked import Function
-from eomgen.native.constrained import address, constraints
-from eomgen.run.compiled import Array, Constrained, EqualSteps, Touched
+from eomgen.native.mechanism import Mechanism
+from eomgen.run.compiled import Constrained, EqualSteps, Touched
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.problem import Problem
 from eomgen.subset.structures import filled, take
@@ -51,12 +49,6 @@ CALLS = {
 }
 
 
-class System(ctypes.Structure):
-    """See `templates/c/runs.c.jinja`."""
-
-    _fields_ = tuple((name, _POINTER) for name in ("k", "u", "rates", "events"))
-
-
 def context(interface: Interface) -> dict[str, Any]:
     """The values of the template."""
     states = list(enumerate(interface.states))
@@ -67,67 +59,49 @@ def context(interface: Interface) -> dict[str, Any]:
     }
 
 
-def steps(
-    library: ctypes.CDLL,
-    name: str,
-    constants: Any,
-    inputs: Array,
-    functions: Mapping[str, Function],
-    problem: Problem,
-) -> EqualSteps:
-    """The steps of a method, at the constants of parameters and at inputs; `functions` keep
-    constraints, and are those of rigid contacts.
-    """
+def steps(name: str, problem: Problem, of: Mechanism, library: ctypes.CDLL) -> EqualSteps:
+    """The steps of a method of `METHODS`."""
     rates = split_of(problem).rates if name in LEAPFROGS else np.empty(0)
-    system = System(ctypes.cast(constants, _POINTER), inputs.ctypes.data, rates.ctypes.data)
-    system.kept = constants, inputs, rates
-    held = inputs, functions, sum(problem.quaternions, ())
-    return EqualSteps(partial(made, library[f"steps_{name}"], system, *held), METHODS[name])
+    own = of.having(rates, rates=rates.ctypes.data)
+    call = Call(library[f"steps_{name}"], own, np.array(sum(problem.quaternions, ()), np.int64))
+    return EqualSteps(call.made, METHODS[name])
 
 
-def made(
-    call: Any,
-    system: ctypes.Structure,
-    inputs: Array | None,
-    functions: Mapping[str, Function],
-    quaternions: Sequence[int],
-    t: float,
-    at: Sum,
-    course: Course,
-    kept: Kept,
-    constrained: Constrained | None,
-    touched: Touched | None = None,
-) -> int:
-    """Make steps, with the arguments of `run.compiled.EqualSteps`.
-
-    call    the method's function
-    system  what the method is given
-    functions    that keep constraints, and those of rigid contacts, by name
-    quaternions  the four states of each, one after another
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A function that makes steps of a mechanism. `quaternions` are the four states of each, one
+    after another; none if the method is one that has none.
     """
-    call.restype = ctypes.c_int64
-    call.argtypes = [_POINTER, _POINTER, _POINTER, _REAL, *[_POINTER] * 4]
-    keeps = constraints(functions, constrained, inputs, len(at.value))
-    ends = None
-    if touched is not None and inputs is not None:
-        ends = contact_runs.events(functions, touched, inputs)
-        system.events = ctypes.addressof(ends)
-    start = [np.ascontiguousarray(array) for array in (at.value, at.lost)]
-    places = np.array(quaternions, np.int64)
-    limits = np.array(course.rate), np.ascontiguousarray(course.allowed)
-    course.rate, course.allowed = limits
-    course.many, course.quaternions = len(quaternions) // 4, places
-    left = filled(kept)
-    why: int = call(
-        ctypes.byref(system),
-        address(keeps),
-        None if ends is None else ctypes.addressof(ends),
-        t,
-        *(array.ctypes.data for array in start),
-        ctypes.byref(filled(course)),
-        ctypes.byref(left),
-    )
-    take(kept, left)
-    if touched is not None and ends is not None:
-        contact_runs.taken(touched, ends)
-    return why
+
+    function: Any
+    of: Mechanism
+    quaternions: Any
+
+    def made(
+        self,
+        t: float,
+        at: Sum,
+        course: Course,
+        kept: Kept,
+        constrained: Constrained | None,
+        touched: Touched | None = None,
+    ) -> int:
+        """Make steps: see `run.compiled.EqualSteps`."""
+        self.function.restype = ctypes.c_int64
+        self.function.argtypes = [_POINTER, _REAL, *[_POINTER] * 4]
+        of = self.of.holding(len(at.value), constrained, touched)
+        start = [np.ascontiguousarray(array) for array in (at.value, at.lost)]
+        course.rate, course.allowed = np.array(course.rate), np.ascontiguousarray(course.allowed)
+        course.many, course.quaternions = len(self.quaternions) // 4, self.quaternions
+        left = filled(kept)
+        why: int = self.function(
+            ctypes.byref(of),
+            t,
+            *(array.ctypes.data for array in start),
+            ctypes.byref(filled(course)),
+            ctypes.byref(left),
+        )
+        take(kept, left)
+        if touched is not None:
+            contact_runs.taken(touched, of.kept[-1])
+        return why

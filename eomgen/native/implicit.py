@@ -6,9 +6,8 @@ Jacobian of the scene, which are libraries of their own.
 
 import ctypes
 import math
-from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -17,20 +16,14 @@ from eomgen.codegen.backends import c
 from eomgen.engine.adaptive import UNUSUAL
 from eomgen.engine.elimination import Factors
 from eomgen.engine.few import plain_factors
-from eomgen.engine.implicit import Stages
 from eomgen.engine.methods import EQUAL, Root
-from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import RodasRecords
-from eomgen.engine.symmetric import Projected
-from eomgen.native import checked, equal_steps
-from eomgen.native.checked import Function, FunctionStructure
-from eomgen.native.constrained import address, constraints, made_margins
-from eomgen.native.constrained import context as of_constraints
-from eomgen.native.functions import constants_of
+from eomgen.native import equal_steps
+from eomgen.native.mechanism import KERNELS, Mechanism, made_margins
+from eomgen.native.mechanism import context as of_mechanism
 from eomgen.native.memory import room
-from eomgen.native.module import Kernels
 from eomgen.native.strides import stride
-from eomgen.run.compiled import Array, EqualSteps, Stretch, Stride
+from eomgen.run.compiled import EqualSteps, Stretch, Stride
 from eomgen.run.integrators import rattle
 from eomgen.run.integrators.implicit_stages import projected_of, stages_of
 from eomgen.run.integrators.rodas_5p import rodas
@@ -39,8 +32,6 @@ from eomgen.run.projection import PROJECTS
 from eomgen.subset.structures import filled, take
 
 MAIN = "implicit.c"
-NEEDED = ("derivative", "jacobian")
-"""The functions that the methods call."""
 EQUAL_STEPS: Root = ("equal_steps", {})
 SYMMETRIC = ("constraint_jacobian", "constraint_rates")
 """Further functions for symmetric projection."""
@@ -48,14 +39,6 @@ RATTLE = ("derivative", "mass_matrix", "kinetic_slopes", "constraint_jacobian")
 """The functions that a step of RATTLE calls, beside those that keep constraints."""
 DERIVATIVES = 2
 """Derivatives in such a step."""
-LINKED = {
-    "rates": "derivative",
-    "inertia": "mass_matrix",
-    "slopes": "kinetic_slopes",
-    "gradients": "constraint_jacobian",
-    "drift": "constraint_rates",
-}
-"""The functions of `Linkage` in C, and those of a module that they are."""
 GAUSS = {
     name: known["method"] for name, (what, known) in EQUAL.items() if what == "implicit_change"
 }
@@ -67,7 +50,8 @@ OPERATIONS = 1200, 5000
 many states."""
 MANY = 16
 """From so many states on loops over them gain from vectors."""
-_POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+_NO_QUATERNIONS = np.empty(0, np.int64)
+_POINTER, _REAL = ctypes.c_void_p, ctypes.c_double
 
 
 def library_of(name: str, constrained: bool) -> str:
@@ -90,80 +74,14 @@ def sources(library: str, states: int) -> Mapping[str, str]:
         elif name == "leapfrog":
             del roots[0]
     context = {
-        **of_constraints(),
+        **of_mechanism(),
         "engine": C.prelude + c_source(roots),
         "name": name,
         "root": roots[0][0],
         "states": states,
         "many": states >= MANY,
-        "linked": [*LINKED],
     }
     return {MAIN: render(c.TEMPLATES, "implicit.c.jinja", context)}
-
-
-class System(ctypes.Structure):
-    """`problem` of `templates/c/implicit.c.jinja`."""
-
-    _fields_ = (
-        *((name, _POINTER) for name in NEEDED),
-        *((name, _POINTER) for name in ("constants", "jacobian_constants", "inputs")),
-        ("quaternions", _POINTER),
-        *((name, _WHOLE) for name in ("count", "states", "positions", "timed")),
-    )
-    kept: Any
-
-
-class Solver(ctypes.Structure):
-    """`Solver` of `templates/c/linkage.c.jinja`."""
-
-    _fields_ = (
-        *((name, _POINTER) for name in ("system", "held")),
-        *((name, FunctionStructure) for name in LINKED),
-        *((name, _WHOLE) for name in ("states", "coordinates", "velocities", "rows")),
-        *((name, _POINTER) for name in ("stages", "newton", "room", "first", "second", "third")),
-    )
-    kept: Any
-
-
-def solver(
-    system: System,
-    functions: Mapping[str, Function],
-    sizes: tuple[int, int, int],
-    stages: Stages | None = None,
-    newton: Factors | None = None,
-    room: Linked | Projected | None = None,
-    factors: Sequence[Factors] = (),
-) -> Solver:
-    """What the steps of a system are made with: the numbers of its coordinates, velocities and
-    constraints; stages and their factors; room and factors for the constraints.
-    """
-    records = [None if x is None else filled(x) for x in (stages, newton, room, *factors)]
-    found = (functions.get(name) for name in LINKED.values())
-    made = Solver(
-        ctypes.addressof(system),
-        None,
-        *(FunctionStructure(*of) if of else FunctionStructure() for of in found),
-        *(system.states, *sizes),
-        *(None if x is None else ctypes.addressof(x) for x in records),
-    )
-    made.kept = system, functions, stages, newton, room, factors, records
-    return made
-
-
-class Given(NamedTuple):
-    """A problem of a module at given parameters and inputs, and compiled code for it.
-
-    library    that of the method
-    functions  those of the functions that it needs
-    origin     the module that had the constants of its parameters, if this one has perturbed ones
-    """
-
-    problem: Problem
-    module: Any
-    library: ctypes.CDLL
-    functions: Mapping[str, ctypes.CDLL]
-    values: tuple[Any, Any]
-    origin: Any
 
 
 def needed(name: str, problem: Problem) -> tuple[str, ...]:
@@ -172,95 +90,63 @@ def needed(name: str, problem: Problem) -> tuple[str, ...]:
     if name in equal_steps.LEAPFROGS:
         return (*RATTLE, *projects, library_of(name, True))
     held = bool(projects) and name in GAUSS
-    return (*NEEDED, *projects, *(SYMMETRIC if held else ()), library_of(name, held))
+    return (*KERNELS, *projects, *(SYMMETRIC if held else ()), library_of(name, held))
 
 
-def steps(name: str, given: Given) -> Any:
-    """The steps of a method, or those of leapfrog with constraints: `Steps` of Rodas5P, and
-    `EqualSteps`; None if there are none for these parameters or inputs.
-    """
-    problem, module, libraries, (p, u) = given.problem, given.module, given.functions, given.values
-    leaps = equal_steps.LEAPFROGS.get(name, 0)
-    called = (*PROJECTS, *(RATTLE if leaps else SYMMETRIC))
-    names = [name for name in libraries if name in called]
-    functions = checked.functions(module, {name: libraries[name] for name in names}, p)
-    kernels, call = Kernels(module, libraries["derivative"]), given.library.steps
-    inputs = kernels.given(u)
-    if len(functions) < len(names) or inputs is None:
-        return None
-    if leaps:
+def equal(name: str, problem: Problem, of: Mechanism, library: ctypes.CDLL) -> EqualSteps:
+    """The steps of a Gauss method, or of leapfrog with constraints."""
+    if leaps := equal_steps.LEAPFROGS.get(name):
         n, rows = rattle.sizes_of(problem)
-        system = System(inputs=inputs.ctypes.data, states=len(problem.states), positions=n)
-        room, factors = rattle.linked(n, rows), [plain_factors(k) for k in (n, n, rows)]
-        with_room = solver(system, functions, (n, n, rows), room=room, factors=factors)
-        with_room.libraries = given, inputs
-        held = with_room, inputs, functions, ()
-        return EqualSteps(partial(equal_steps.made, call, *held), DERIVATIVES * leaps)
-    constants = constants_of(kernels, "derivative", p, given.origin)
-    others = constants_of(Kernels(module, libraries["jacobian"]), "jacobian", p, given.origin)
-    if constants is None or others is None:
-        return None
-    quaternions = np.array(problem.quaternions, np.int64)
-    system = System(
-        *(ctypes.cast(libraries[name][f"{module.NAME}_{name}"], _POINTER) for name in NEEDED),
-        *(ctypes.cast(each, _POINTER) for each in (constants, others)),
-        *(inputs.ctypes.data, quaternions.ctypes.data),
-        *(len(problem.quaternions), len(problem.states)),
-        *(problem.leading_positions, problem.timed),
-    )
-    system.kept = constants, others, inputs, quaternions, given
-    if name in GAUSS:
-        return _gauss(name, problem, call, system, (inputs, functions))
-    call.restype = ctypes.c_int64
-    call.argtypes = [*[_POINTER] * 4, _REAL, _REAL, _POINTER, _POINTER]
-    return partial(_rodas_5p, call, system, functions, inputs)
-
-
-def _gauss(
-    name: str, problem: Problem, call: Any, system: System, given: tuple[Array, Any]
-) -> EqualSteps:
-    """Steps of a Gauss method, with inputs and functions that keep constraints."""
-    many, n = len(GAUSS[name].b), system.states
-    stages, newton = stages_of(many, n, system.positions), plain_factors(many * n)
-    room, factors, sizes = None, list[Factors](), (0, 0, 0)
+        room = {"room": rattle.linked(n, rows), **_factors(n, n, rows)}
+        call = equal_steps.Call(library.steps, _with(of, room), _NO_QUATERNIONS)
+        return EqualSteps(call.made, DERIVATIVES * leaps)
+    many, n = len(GAUSS[name].b), len(problem.states)
+    room = {"stages": stages_of(many, n, problem.leading_positions)}
+    room["newton"] = plain_factors(many * n)
     if problem.projection:
-        room = projected_of(many, problem)
-        sizes = room.n, room.nv, room.rows
-        factors = [plain_factors(k) for k in (n, 2 * room.rows)]
-    held = solver(system, given[1], sizes, stages, newton, room, factors)
-    of = held, *given, sum(problem.quaternions, ())
-    return EqualSteps(partial(equal_steps.made, call, *of), many, iterates=True)
+        projected = projected_of(many, problem)
+        room |= {"room": projected, **_factors(n, 2 * projected.rows)}
+    quaternions = np.array(sum(problem.quaternions, ()), np.int64)
+    call = equal_steps.Call(library.steps, _with(of, room), quaternions)
+    return EqualSteps(call.made, many, iterates=True)
 
 
-def _rodas_5p(
-    call: Any,
-    system: System,
-    functions: Mapping[str, Function],
-    inputs: Array | None,
-    stretch: Stretch,
-) -> Stride:
+def _factors(*sizes: int) -> dict[str, Factors]:
+    """Room for factors of so many unknowns each."""
+    return dict(zip(("first", "second", "third"), map(plain_factors, sizes), strict=False))
+
+
+def _with(of: Mechanism, room: Mapping[str, Any]) -> Mechanism:
+    """A mechanism with records to work in."""
+    made = {name: filled(record) for name, record in room.items()}
+    pointers = {name: ctypes.addressof(record) for name, record in made.items()}
+    return of.having(room, made, **pointers)
+
+
+def rodas_5p(problem: Problem, of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
     """Steps of Rodas5P, which may be watched with switching functions of time alone only, and have
     no `sizes`; none if they are to be `dense`.
     """
     watched, solver, held = stretch.watched, stretch.solver, stretch.constrained
     assert stretch.sizes is None and not (watched and watched.ends)
-    ny, most = system.states, 0 if stretch.dense else stretch.most
+    ny, most = len(problem.states), 0 if stretch.dense else stretch.most
     limits = stretch.until, stretch.longest, stretch.rtol
-    run = rodas(ny, stretch.atol, limits, system.positions, bool(system.timed))
+    run = rodas(ny, stretch.atol, limits, problem.leading_positions, problem.timed)
     run.h_abs, run.h_last, run.error = solver.h_abs, solver.h_last, solver.error
     run.lost[:] = solver.lost
     margins = made_margins(held, most)
     sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
-    kept, records = room(
-        RodasRecords, rows=np.empty((len(stretch.times), ny)), margins=margins[1:], **sizes
-    )
-    keeps = constraints(functions, held, inputs, ny)
-    factors, clear = plain_factors(ny), watched.clear if watched else math.inf
-    start = np.ascontiguousarray(solver.y)
+    quaternions = np.array(sum(problem.quaternions, ()), np.int64)
+    given = {"quaternions": quaternions, "many": len(problem.quaternions), **sizes}
+    rows = np.empty((len(stretch.times), ny))
+    kept, records = room(RodasRecords, rows=rows, margins=margins[1:], **given)
+    system = _with(of, {"newton": plain_factors(ny)}).holding(ny, held, None)
+    start, clear = np.ascontiguousarray(solver.y), watched.clear if watched else math.inf
+    call = library.steps
+    call.restype = ctypes.c_int64
+    call.argtypes = [*[_POINTER] * 2, _REAL, _REAL, *[_POINTER] * 2]
     why = call(
-        ctypes.byref(system),
-        address(keeps),
-        *(ctypes.byref(filled(record)) for record in (run, factors)),
+        *map(ctypes.byref, (system, filled(run))),
         *(solver.t, clear, start.ctypes.data),
         ctypes.byref(records),
     )

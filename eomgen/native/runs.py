@@ -2,9 +2,9 @@
 
 import ctypes
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,22 +16,16 @@ from eomgen.engine.branches import Switches
 from eomgen.engine.crossings import Watch
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.methods import Root
-from eomgen.native import checked, contact_runs, equal_steps
-from eomgen.native.checked import FunctionStructure
-from eomgen.native.constrained import address as where
-from eomgen.native.constrained import constraints, made_margins
-from eomgen.native.constrained import context as of_constraints
+from eomgen.native import contact_runs, equal_steps
 from eomgen.native.functions import restricted
+from eomgen.native.mechanism import Mechanism, made_margins
+from eomgen.native.mechanism import context as of_mechanism
 from eomgen.native.memory import room
-from eomgen.native.module import Kernels, usual_constants
 from eomgen.native.strides import stride
 from eomgen.program.program import Program
 from eomgen.run import branches
-from eomgen.run.compiled import Array, EqualSteps, Steps, Stretch, Stride, Strikes, Watched
+from eomgen.run.compiled import Array, Stretch, Stride, Watched
 from eomgen.run.integrators.dormand_prince_8 import interpolated
-from eomgen.run.integrators.strides import OF_CONTACTS, OF_STATE
-from eomgen.run.problem import Problem
-from eomgen.run.projection import PROJECTS
 from eomgen.subset.structures import address, filled
 
 MAIN = "runs.c"
@@ -57,7 +51,7 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "quaternions": interface.quaternions,
         "engine": C.prelude + c_source(roots),
         **of_contacts,
-        **of_constraints(),
+        **of_mechanism(),
         **equal_steps.context(interface),
     }
     main = render(c.TEMPLATES, "runs.c.jinja", context)
@@ -68,9 +62,7 @@ class _Checks(ctypes.Structure):
     """`Checks` of `templates/c/checks.c.jinja`, without what C begins with."""
 
     _fields_ = (
-        *((name, _POINTER) for name in ("system", "run", "held", "watch", "found")),
-        *((name, FunctionStructure) for name in ("switching", "gaps", "rates")),
-        ("sizes", _POINTER),
+        *((name, _POINTER) for name in ("system", "run", "watch", "found", "sizes")),
         ("clear", _REAL),
         *((name, _POINTER) for name in ("margins", "switched", "values")),
         *((name, _POINTER) for name in ("switches", "gap_checks", "helds")),
@@ -80,111 +72,43 @@ class _Checks(ctypes.Structure):
     )
 
 
-class CompiledSteps:
-    """The compiled steps of a module at given parameters and inputs.
-
-    The constants are those that the module computes, also where it is a perturbed one. `beside` are
-    the libraries of the functions that steps are checked with, by name.
-    """
-
-    def __init__(
-        self,
-        module: Any,
-        library: ctypes.CDLL,
-        p: Any,
-        u: Any,
-        beside: Mapping[str, ctypes.CDLL] | None = None,
-    ) -> None:
-        kernels = Kernels(module, library)
-        self._checks = checked.functions(module, beside or {}, p)
-        self._constants = usual_constants(module, "derivative", p)
-        self._inputs = kernels.given(u)
-        self._states = kernels.states
-        self._unwatched = _Checked.of(None, self._states)
-        self._held = 0, 0
-        if self._constants is not None and self._inputs is not None:
-            self._held = ctypes.addressof(self._constants), self._inputs.ctypes.data
-        self._library, self._call = library, library.dop853
-        self._call.restype, self._call.argtypes = _WHOLE, [_POINTER] * 8
-
-    def named(self, name: str, needed: Sequence[str] = ()) -> Steps | None:
-        """The steps of a method that are checked with some functions; None if there are none for
-        it, for these functions, parameters or inputs.
-        """
-        if self._constants is None or self._inputs is None or name != "DOP853":
-            return None
-        if not set(needed) <= self._checks.keys():
-            return None
-        return self._dop853
-
-    def equal(self, name: str, problem: Problem) -> EqualSteps | None:
-        """The same for methods with equal steps."""
-        if self._constants is None or self._inputs is None or name not in equal_steps.METHODS:
-            return None
-        if problem.projection and not set(PROJECTS) <= self._checks.keys():
-            return None
-        if problem.contacts and not set(contact_runs.FUNCTIONS) <= self._checks.keys():
-            return None
-        held = self._constants, self._inputs, self._checks
-        return equal_steps.steps(self._library, name, *held, problem)
-
-    def strikes(self) -> Strikes | None:
-        """The strikes of rigid contacts; None if there are none for these parameters or inputs."""
-        if self._inputs is None or not set(contact_runs.FUNCTIONS) <= self._checks.keys():
-            return None
-        return partial(contact_runs.strikes, self._library, self._checks, self._inputs)
-
-    def _dop853(self, stretch: Stretch) -> Stride:
-        """Steps of DOP853."""
-        ny, most, watched, solver = self._states, stretch.most, stretch.watched, stretch.solver
-        seen = _Checked.of(watched, ny) if watched else self._unwatched
-        functions = [self._checks.get(name) for name in (*OF_STATE, *OF_CONTACTS)]
-        sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
-        if not stretch.dense:
-            sizes["terms"] = np.empty((0, ny))
-        kept, records = room(Records, rows=np.empty((len(stretch.times), ny)), **sizes)
-        switched, values = np.empty(most), np.empty((most, seen.watch.many))
-        switches, gap_checks, helds = np.zeros((3, most), np.int64)
-        margins = made_margins(stretch.constrained, most)
-        keeps = constraints(self._checks, stretch.constrained, self._inputs, ny)
-        system, ends = equal_steps.System(*self._held), None
-        if stretch.touched and self._inputs is not None:
-            ends = contact_runs.events(self._checks, stretch.touched, self._inputs)
-            system.events = ctypes.addressof(ends)
-        run = filled(
-            Bounds(
-                stretch.atol,
-                stretch.rtol,
-                stretch.longest,
-                stretch.until,
-                stretch.dense,
-                stretch.reaches,
-            )
-        )
-        at = filled(Progress(solver.t, length=float(solver.h_abs)))
-        checks = _Checks(
-            *(ctypes.addressof(each) for each in (system, run)),
-            *(where(keeps), *map(ctypes.addressof, seen[2:])),
-            *(FunctionStructure(*each) if each else FunctionStructure() for each in functions),
-            None if stretch.sizes is None else address(stretch.sizes),
-            watched.clear if watched else math.inf,
-            *map(address, (margins[1:], switched, values, switches, gap_checks, helds)),
-        )
-        begun = [np.ascontiguousarray(array) for array in (solver.y, solver.f, solver.lost)]
-        why = self._call(
-            *(ctypes.addressof(each) for each in (system, checks, run, at)),
-            *map(address, begun),
-            ctypes.addressof(records),
-        )
-        n: int = at.made
-        counts = {"switches": switches, "gap_checks": gap_checks, "held": helds}
-        return stride(
-            *(kept, n, ("h_abs", "f", "lost"), why != UNUSUAL, counts),
-            switched=switched[:n],
-            values=values[:n],
-            within=partial(_within, (solver.t, solver.y), kept) if stretch.dense else None,
-            margins=margins[: n + 1] if stretch.constrained else None,
-        )
+def dop853(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
+    """Steps of DOP853."""
+    watched, solver, most = stretch.watched, stretch.solver, stretch.most
+    ny = len(solver.y)
+    seen = _Checked.of(watched, ny)
+    sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
+    if not stretch.dense:
+        sizes["terms"] = np.empty((0, ny))
+    kept, records = room(Records, rows=np.empty((len(stretch.times), ny)), **sizes)
+    switched, values = np.empty(most), np.empty((most, seen.watch.many))
+    switches, gap_checks, helds = np.zeros((3, most), np.int64)
+    margins = made_margins(stretch.constrained, most)
+    system = of.holding(ny, stretch.constrained, stretch.touched)
+    bounds = stretch.atol, stretch.rtol, stretch.longest, stretch.until
+    run = filled(Bounds(*bounds, stretch.dense, stretch.reaches))
+    at = filled(Progress(solver.t, length=float(solver.h_abs)))
+    checks = _Checks(
+        *map(ctypes.addressof, (system, run, *seen[2:])),
+        None if stretch.sizes is None else address(stretch.sizes),
+        watched.clear if watched else math.inf,
+        *map(address, (margins[1:], switched, values, switches, gap_checks, helds)),
+    )
+    begun = [np.ascontiguousarray(array) for array in (solver.y, solver.f, solver.lost)]
+    call = library.dop853
+    call.restype, call.argtypes = _WHOLE, [_POINTER] * 6
+    why = call(
+        *map(ctypes.addressof, (checks, at)), *map(address, begun), ctypes.addressof(records)
+    )
+    n: int = at.made
+    counts = {"switches": switches, "gap_checks": gap_checks, "held": helds}
+    return stride(
+        *(kept, n, ("h_abs", "f", "lost"), why != UNUSUAL, counts),
+        switched=switched[:n],
+        values=values[:n],
+        within=partial(_within, (solver.t, solver.y), kept) if stretch.dense else None,
+        margins=margins[: n + 1] if stretch.constrained else None,
+    )
 
 
 class _Checked(NamedTuple):

@@ -18,11 +18,13 @@ from eomgen.codegen.interface import Interface
 from eomgen.engine.contacts import TOLERANCE
 from eomgen.engine.printed import CONTACT_STEPS, c_source
 from eomgen.model.model import Model
-from eomgen.native import checked, constrained, contact_runs, equal_steps, functions
+from eomgen.native import contact_runs, equal_steps, functions
 from eomgen.native.accelerator import library_key
 from eomgen.native.compiler import NOT_JOINED, find_compiler
 from eomgen.native.lanes import FLAGS, Columns, Lanes, columns_of, width
 from eomgen.native.library import compiled_library
+from eomgen.native.mechanism import Given, Mechanism, mechanism
+from eomgen.native.mechanism import context as of_mechanism
 from eomgen.program.ordering import ordered
 from eomgen.program.program import Program
 from eomgen.program.tape import TIME
@@ -67,7 +69,7 @@ def sources(
         **c_lanes.columns(
             program, interface, context, c.VECTORS, ("derivative", *law), USUAL_LENGTH
         ),
-        **constrained.context(),
+        **of_mechanism(),
         **of_contacts,
         "gap_sizes": list(map(repr, limits[0])),
         "rest": list(map(repr, limits[1])),
@@ -140,7 +142,7 @@ class CompiledSteps(Lanes):
             )
             for name in (PROJECTS if projection else ())
         }
-        self._own = checked.functions(module, self._beside, None)
+        self._own = mechanism(Given(module, self._beside, (None, None)))
 
     def __call__(
         self,
@@ -174,7 +176,7 @@ class CompiledSteps(Lanes):
             self._dt,
             steps,
             None if self._rates is None else self._rates.ctypes.data,
-            constrained.address(keeps),
+            keeps and keeps.onto,
             *(t, states, k, u, first or states),
             None if again is None else again.ctypes.data,
             out.ctypes.data,
@@ -184,19 +186,17 @@ class CompiledSteps(Lanes):
         self._call(ctypes.byref(call), n)
         return sound
 
-    def _constraints(self, p: FloatArray | None) -> constrained.Constraints | None:
-        """What C is given of the constraints, without inputs; None if there are none, or no kernels
-        for them.
-        """
+    def _constraints(self, p: FloatArray | None) -> Mechanism | None:
+        """What C is given of the constraints; None if there are none, or no kernels for them."""
         if self._projection is None or (p is not None and p.ndim == 2):
             return None
-        found = self._own if p is None else checked.functions(self._module, self._beside, p)
-        if len(found) < len(PROJECTS):
+        found = self._own if p is None else mechanism(Given(self._module, self._beside, (p, None)))
+        if found is None:
             return None
         of, rows = self._projection, len(self._projection.names)
         none = (np.zeros(rows), np.zeros(rows), ((0.0, 0.0), (0.0, 0.0)))
         given = Constrained(of.sizes, of.quaternions, *none)
-        return constrained.constraints(found, given, np.empty(0), self.states)
+        return found.holding(self.states, given, None)
 
 
 def _function(model: Model, name: str) -> Mapping[str, str]:

@@ -62,7 +62,7 @@ RK4, _, DOP853, _, RODAS, GAUSS, *_ = METHODS
 def compiled_steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     """The numbers of steps that C has made at once."""
     made: list[int] = []
-    adaptive, equal = Strides.made, equal_steps.made
+    adaptive, equal = Strides.made, equal_steps.Call.made
 
     def adaptive_noted(*given: Any) -> Any:
         stride = adaptive(*given)
@@ -71,11 +71,11 @@ def compiled_steps(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
 
     def equal_noted(*given: Any) -> int:
         why = equal(*given)
-        made.append(given[8].made)
+        made.append(given[4].made)
         return why
 
     monkeypatch.setattr(Strides, "made", adaptive_noted)
-    monkeypatch.setattr(equal_steps, "made", equal_noted)
+    monkeypatch.setattr(equal_steps.Call, "made", equal_noted)
     yield made
 
 
