@@ -16,7 +16,7 @@ from eomgen.run.noise import step_noise
 from eomgen.run.origin import Origin
 from eomgen.run.problem import Contacts, Explain, FloatArray, Problem, Switching, unexplained
 from eomgen.run.projection import projection_of
-from eomgen.run.sizes import mechanism_size, state_sizes
+from eomgen.run.sizes import mechanism_size, row_sizes, state_sizes
 from eomgen.run.works import Powers
 
 COUNTED = frozenset({"derivative", "jacobian"})
@@ -237,7 +237,7 @@ def _contacts(module: Any, parameters: Any, inputs: Any, size: float) -> Contact
             for name, kind in zip(module.EFFECT_NAMES, module.EFFECTS, strict=True)
             if kind == "driven"
         ),
-        sizes=tuple(size if module.UNITS[name] == "m" else 1.0 for name in names),
+        sizes=tuple(row_sizes(module.UNITS, "contact", names, "m", size)),
     )
 
 

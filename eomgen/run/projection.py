@@ -13,6 +13,7 @@ from eomgen.engine.projection import PROJECTED, moved_onto
 from eomgen.run.compiled import Constrained
 from eomgen.run.failure import StepFailure
 from eomgen.run.margins import Seen
+from eomgen.run.sizes import row_sizes
 
 FloatArray = NDArray[np.float64]
 
@@ -206,7 +207,7 @@ def projection_of(module: Any, parameters: Any, inputs: Any, size: float) -> Pro
 
     return Projection(
         tuple(names),
-        np.array([size if module.UNITS[name] == "N" else 1.0 for name in names]),
+        np.array(row_sizes(module.UNITS, "constraint", names, "N", size)),
         residuals=of("constraint_residuals"),
         rates=of("constraint_rates"),
         jacobian=lambda t, y: jacobian(t, y, parameters, inputs),

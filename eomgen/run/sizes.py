@@ -4,12 +4,12 @@ All sizes scale with the units of a scene: if units change by powers of two, run
 powers of ten, identical but for rounding.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from eomgen.run.problem import FloatArray
-
+FloatArray = NDArray[np.float64]
 Numbers = Mapping[str, float | FloatArray]
 """Numbers by name, or arrays (n,) of them for n mechanisms at once."""
 FAR = 64 * np.finfo(float).eps / 1e-9
@@ -34,6 +34,16 @@ def mechanism_size(units: Mapping[str, str], parameters: Numbers, start: Numbers
         if units.get(name) == "m":
             far = np.maximum(far, _finite(np.abs(value)))
     return _or_one(np.where(near > 0, np.maximum(near, FAR * far), far))
+
+
+def row_sizes(
+    units: Mapping[str, str], kind: str, names: Iterable[str], unit: str, size: float
+) -> list[float]:
+    """The size of each contact or constraint: that of the mechanism, m, if it has this unit,
+    else 1. Where another variable has its name, `units` have it under its kind and its name.
+    """
+    own = (units.get(f"{kind} {name}", units[name]) for name in names)
+    return [size if each == unit else 1.0 for each in own]
 
 
 def state_sizes(

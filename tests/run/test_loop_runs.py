@@ -55,6 +55,16 @@ def test_matrix_of_large_mechanisms() -> None:
     )
 
 
+def test_sizes_of_rows_with_names_of_parameters() -> None:
+    """A constraint has the size of its own unit, not of that of a parameter."""
+    scene = four_bar()
+    named = scene.replace("mass = 1.0", 'mass = "C_x"').replace("1.0*a**2", "C_x*a**2")
+    named = named.replace("[parameters]\n", '[parameters]\nC_x = { value = 1.0, unit = "kg" }\n')
+    for text in (scene, named):
+        projection = as_problem(eomgen.load(eomgen.generate(text))).projection
+        assert projection and projection.sizes.tolist() == [B, B]
+
+
 @pytest.mark.every(2)
 @pytest.mark.parametrize("route", ["independent", "aba"])
 def test_symmetric_projection_keeps_energy(route: str) -> None:

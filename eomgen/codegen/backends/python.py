@@ -267,14 +267,17 @@ def plain(text: str) -> str:
 
 
 def units(interface: Interface) -> list[tuple[str, str]]:
-    """The entries of `UNITS`: names of all variables with their units."""
+    """The entries of `UNITS`: names of all variables with their units. A contact or a constraint
+    with the name of a variable of another unit is under its kind and its name.
+    """
     entries = [(s.name, s.unit) for s in (*interface.states, *interface.inputs)]
     entries += [(p.name, plain(p.unit)) for p in interface.parameters]
-    # Of a contact and a parameter of the same name, UNITS has the unit of the parameter.
-    taken = {name for name, _ in entries}
-    others = [(c.name, c.unit) for c in interface.contacts]
-    others += [*interface.constraints, *((n, unit) for n, unit, _ in interface.following)]
-    return entries + [pair for pair in others if pair[0] not in taken]
+    taken = dict(entries)
+    rows = [("contact", c.name, c.unit) for c in interface.contacts]
+    rows += [("constraint", *pair) for pair in interface.constraints]
+    rows = [row for row in rows if taken.get(row[1]) != row[2]]
+    entries += [(f"{kind} {n}" if n in taken else n, unit) for kind, n, unit in rows]
+    return entries + [(n, unit) for n, unit, _ in interface.following if n not in taken]
 
 
 def document(interface: Interface, counts: Mapping[str, int]) -> list[str]:
