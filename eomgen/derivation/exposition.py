@@ -37,7 +37,7 @@ from eomgen.derivation.poses import poses
 from eomgen.derivation.projected.derive import balanced
 from eomgen.derivation.projected.derive import solved as solved_projected
 from eomgen.derivation.projected.steps import projected_steps
-from eomgen.derivation.reading import numbered, read_all, reading_names, renumbered
+from eomgen.derivation.reading import is_of_handout, numbered, read_all, reading_names, renumbered
 from eomgen.derivation.recursion import recursive_steps
 from eomgen.derivation.simplified import simplified, solved_directly, tidied
 from eomgen.derivation.state_forms import form_step, momentum_form, plain_form, velocity_form
@@ -192,14 +192,6 @@ def _with(found: Matrices, direct: Sequence[Expr]) -> Matrices:
     """Matrices with a solution."""
     solution = zip(found.a, direct, strict=True)
     return replace(found, definitions=(*found.definitions, *solution))
-
-
-def is_of_handout(model: Model) -> bool:
-    """Whether a mechanism is the handout's: two bodies with one pin, free in the plane."""
-    if len(model.bodies) != 2 or model.dimensions != 2:
-        return False
-    first, second = model.bodies
-    return not first.joint.holds and second.parent == 0
 
 
 def _each(found: Any, change: Callable[[Expr], Expr]) -> Any:
@@ -420,8 +412,9 @@ def _symmetry(equations: Equations) -> Iterator[Step]:
 
 
 def _names(model: Model, shown: dict[Expr, Expr]) -> dict[str, str]:
-    own = {symbol.name: other.name for symbol, other in shown.items()}
-    return {**reading_names(model), **own}
+    names = reading_names(model)
+    own = {x.name: names.get(other.name, other.name) for x, other in shown.items()}
+    return {**names, **own}
 
 
 def _renamed(step: Step, names: dict[str, str]) -> Step:

@@ -12,9 +12,24 @@ from eomgen.derivation.symbols import Expr
 from eomgen.model.model import Model
 
 
+def is_of_handout(model: Model) -> bool:
+    """Whether a mechanism is the handout's: two bodies with one pin, free in the plane."""
+    if len(model.bodies) != 2 or model.dimensions != 2:
+        return False
+    first, second = model.bodies
+    return not first.joint.holds and second.parent == 0
+
+
 def reading_names(model: Model) -> dict[str, str]:
-    """How each name of a scene is written: `theta_dot` as θ with a dot."""
+    """How each name of a scene is written: `theta_dot` as θ with a dot; the handout's mechanism has
+    the handout's names for the joint force and its arms.
+    """
     names: dict[str, str] = {}
+    if is_of_handout(model):
+        (first, second), pin = model.bodies, model.bodies[1].joint.name
+        whole = {f"f_{pin}": "f_j", f"r_{pin},parent": f"r_{first.name}"}
+        whole[f"r_{pin},child"] = f"r_{second.name}"
+        names = {f"{a}{end}": f"{b}{end}" for a, b in whole.items() for end in ("", ",x", ",y")}
     taken = {p.name for p in model.parameters} | {i.name for i in model.inputs}
     for body in model.bodies:
         for c in body.positions[body.plain :]:  # a quaternion, named <prefix>_qw

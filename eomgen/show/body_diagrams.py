@@ -47,6 +47,9 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Draw
         x, y = fit.at(p)
         return (x + shift, y + shift)
 
+    def joint_force(joint: str) -> Expr:
+        return read(sp.Symbol(f"f_{joint}"), names)
+
     forces: list[tuple[Point, Point, Expr, str]] = []
     torques: dict[Point, dict[Expr, None]] = {}
     for start, direction, label, style in found:
@@ -56,9 +59,9 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Draw
             forces.append((at(start), direction, label, style))
     if shape.own is not None:
         name = body.joint.name
-        forces.append((at(shape.own), _unknown(name, -1), -sp.Symbol(f"f_{name}"), "force"))
+        forces.append((at(shape.own), _unknown(name, -1), -joint_force(name), "force"))
     for name, p in shape.others:
-        forces.append((at(p), _unknown(name, 1), sp.Symbol(f"f_{name}"), "force"))
+        forces.append((at(p), _unknown(name, 1), joint_force(name), "force"))
     items: list[Item] = [*skeleton(shape, at)]
     items.append(Dot(at(shape.centre), 3.2, True))
     items += (Dot(at(p), 4.2, False, "arm") for p in shape.joints)

@@ -4,13 +4,14 @@ In space it is oblique: y to the right, z up, x towards the lower left at half i
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 
 from eomgen.derivation.effects import DerivedEffect
+from eomgen.derivation.reading import read, reading_names
 from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
 from eomgen.model.model import Body, Model
 from eomgen.scalars.floats import FloatScalars
@@ -126,14 +127,14 @@ def mechanism_sketch(model: Model, effects: Sequence[DerivedEffect]) -> Drawing:
     items: list[Item] = []
     for shape in shapes:
         items += skeleton(shape, fit.at)
-    few = len(shapes) <= MOST_NAMED
+    few, names = len(shapes) <= MOST_NAMED, reading_names(model)
     if model.dimensions == 2:
         for shape in shapes:
             items += _angle(pose, shapes, shape, fit.at)
     taken = [item.at for item in items if isinstance(item, Label)]
     taken += [fit.at(shape.centre) for shape in shapes]
     for shape in shapes:
-        items += _arms(shape, fit.at, taken if few else None)
+        items += _arms(shape, fit.at, taken if few else None, names)
     for shape in shapes:
         items += _marks(shape, fit.at, model, few)
     items += _world_axes(pose)
@@ -173,7 +174,9 @@ def skeleton(shape: Shape, at: Any) -> Iterator[Item]:
         yield Dot((x, y), 13.0, False, "body")
 
 
-def _arms(shape: Shape, at: Any, taken: list[Point] | None) -> Iterator[Item]:
+def _arms(
+    shape: Shape, at: Any, taken: list[Point] | None, names: Mapping[str, str]
+) -> Iterator[Item]:
     """Arms, with names away from the places that are taken; without names if these are None."""
     arms = [(name, p, "parent") for name, p in shape.others]
     if shape.own is not None:
@@ -187,7 +190,7 @@ def _arms(shape: Shape, at: Any, taken: list[Point] | None) -> Iterator[Item]:
             sides = _beside(start, end, 5.0 * (len(name) + len(role) + 2))
             place = max(sides, key=lambda x: min((apart(x, p) for p in taken), default=0.0))
             taken.append(place)
-            yield Label(place, sp.Symbol(f"r_{name},{role}"), "arm")
+            yield Label(place, read(sp.Symbol(f"r_{name},{role}"), names), "arm")
 
 
 def _angle(pose: Pose, shapes: Sequence[Shape], shape: Shape, at: Any) -> Iterator[Item]:

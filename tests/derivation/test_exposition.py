@@ -357,9 +357,9 @@ def test_forces_in_sketches_have_the_names_of_the_equations() -> None:
     texts = [
         re.sub("<title>.*?</title>|<[^>]*>|\u200b", "", d.replace("</text>", "|")) for d in drawings
     ]
-    assert {"rhinge, parent", "rhinge, child", "θ", "φ"} <= set(labels(texts[0]))
-    assert {"mA\u2009g", "fhinge", "fA", "−τ"} <= set(labels(texts[1]))
-    assert {"mB\u2009g", "−fhinge", "fB", "τ"} <= set(labels(texts[2]))
+    assert {"rA", "rB", "θ", "φ"} <= set(labels(texts[0]))
+    assert {"mA\u2009g", "fj", "fA", "−τ"} <= set(labels(texts[1]))
+    assert {"mB\u2009g", "−fj", "fB", "τ"} <= set(labels(texts[2]))
 
 
 def labels(text: str) -> list[str]:
@@ -456,7 +456,7 @@ def test_forms_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
     """`derive --form`, and what has no such state."""
     assert main(["derive", "bouncing_two_body", "--form", "redundant"]) == 0
     end = capsys.readouterr().out.split("State form redundant")[1]
-    assert "12 numbers" in end and "Ṗ_A,x = f_hinge,x" in end and "L̇_B" in end
+    assert "12 numbers" in end and "Ṗ_A,x = f_j,x" in end and "L̇_B" in end
     assert main(["derive", "furuta_pendulum", "--form", "momentum"]) == 1
     assert "derived in the plane; use velocity" in capsys.readouterr().err
 

@@ -100,7 +100,7 @@ def collect(
     # In the bodies' own angles and rates, expanding does not break up terms such as (θ̇ + φ̇)².
     # (22) and (23) are substituted from the leaves to the root.
     inward, outward = over_bodies(model, symbols), over_coordinates(model, symbols)
-    rows = [row.xreplace(inward) for row in _rows(model, kinematics, inertial)]
+    rows = [row.xreplace(inward) for row in rows_without_forces(model, kinematics, inertial)]
     for k in reversed(range(len(model.bodies))):
         if model.bodies[k].joint.holds:
             ddx, ddy = (e.xreplace(inward) for e in kinematics.acceleration[k])
@@ -116,12 +116,14 @@ def collect(
             slope = sp.diff(row, z).xreplace(outward)
             for j, a in enumerate(symbols.a):
                 mass[i, j] += slope * over.coeff(a)
-    gravity = -sp.Matrix(_rows(model, kinematics, free_bodies.gravity))
-    applied = sp.Matrix(_rows(model, kinematics, free_bodies.applied))
+    gravity = -sp.Matrix(rows_without_forces(model, kinematics, free_bodies.gravity))
+    applied = sp.Matrix(rows_without_forces(model, kinematics, free_bodies.applied))
     return Collected(mass, velocity, gravity, applied)
 
 
-def _rows(model: Model, kinematics: Kinematics, wrenches: Sequence[Wrench]) -> list[Expr]:
+def rows_without_forces(
+    model: Model, kinematics: Kinematics, wrenches: Sequence[Wrench]
+) -> list[Expr]:
     """The rows that the elimination gives for one wrench on each body, one for each coordinate.
 
     The elimination is linear, so inertia, gravity and applied forces pass through it one by one.

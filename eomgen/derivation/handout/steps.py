@@ -6,7 +6,7 @@ import sympy as sp
 
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.handout.closed import Equations
-from eomgen.derivation.handout.elimination import trees
+from eomgen.derivation.handout.elimination import rows_without_forces, trees
 from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
@@ -159,19 +159,13 @@ def _redundant_state(equations: Equations) -> Expr:
 def _equations_of_motion(equations: Equations) -> Iterator[Titled]:
     """The joint forces eliminated, and M, V, G, F."""
     floating = any(tree.floating for tree in trees(equations.model))
-    force = (
-        "f_j accelerates the bodies on the inner"
-        if floating
-        else ("-f_j accelerates the bodies on the outer")
-    )
+    yield from _eliminated(equations)
     sums = ", a floating tree's first rows being the sum of its forces." if floating else "."
     yield (
         "(24), (25)",
         "equations",
         "Elimination",
-        f"The joint force {force} side of its joint. Put into the torque equations, with the "
-        "dependent accelerations replaced by (22) and (23), this leaves M a + V + G = F in the "
-        f"accelerations a of the coordinates{sums}",
+        "In matrices this is M a + V + G = F in the accelerations a of the coordinates" + sums,
         [_system(equations), (sp.Symbol("a"), sp.Matrix(equations.symbols.a))],
     )
     collected = equations.collected
@@ -187,6 +181,46 @@ def _equations_of_motion(equations: Equations) -> Iterator[Titled]:
         "Applied forces",
         words,
         [(sp.Symbol("F"), collected.F), *efforts],
+    )
+
+
+def _eliminated(equations: Equations) -> Iterator[Titled]:
+    """The elimination line by line: joint forces, then dependent accelerations."""
+    model, s, kin = equations.model, equations.symbols, equations.kinematics
+    force = "f_j accelerates the bodies on the inner side of its joint"
+    if not any(tree.floating for tree in trees(model)):
+        force = "-f_j accelerates the bodies on the outer side of its joint"
+    if not equations.joint_force:
+        return
+    yield "", "balance", "The joint forces", f"{force}.", list(equations.joint_force)
+    bodies = range(len(model.bodies))
+    inertia = [
+        ((s.mass[k] * s.xdd[k], s.mass[k] * s.ydd[k]), s.inertia[k] * kin.alpha[k]) for k in bodies
+    ]
+    left = rows_without_forces(model, kin, inertia)
+    free = equations.free_bodies
+    right = [
+        sum(pair)
+        for pair in zip(
+            rows_without_forces(model, kin, free.gravity),
+            rows_without_forces(model, kin, free.applied),
+            strict=True,
+        )
+    ]
+    yield (
+        "",
+        "balance",
+        "Without joint forces",
+        "Put into the equations of the other bodies and into the torque equations.",
+        list(zip(left, right, strict=True)),
+    )
+    a, whole = sp.Matrix(s.a), equations.collected
+    yield (
+        "",
+        "balance",
+        "Without dependent accelerations",
+        "With (22) and (23), collected by the accelerations of the coordinates.",
+        list(zip(whole.F, whole.M * a + whole.V + whole.G, strict=True)),
     )
 
 
