@@ -156,13 +156,11 @@ def _polygon(
     K, kappa = whole
     lengths, positions = _positions(model, group)
     independent = [model.velocities[j] for j in model.state_velocities]
-    still = {real(c.name) for c in (*model.coordinates, *model.velocities)}
-    moving = {*still, *(s for s, _ in lengths)}
     ratios: list[Definition] = []
     drifts: list[Definition] = []
 
     def named(found: list[Definition], name: str, value: Expr) -> Expr:
-        if size(value) <= SHORT and not value.free_symbols & moving:
+        if size(value) <= SHORT:
             return value
         found.append((real(name), value))
         return real(name)

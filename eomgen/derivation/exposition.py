@@ -36,7 +36,7 @@ from eomgen.derivation.mechanism import NamingMechanism, Notes
 from eomgen.derivation.poses import poses
 from eomgen.derivation.projected.derive import balanced
 from eomgen.derivation.projected.derive import solved as solved_projected
-from eomgen.derivation.projected.steps import projected_steps
+from eomgen.derivation.projected.steps import projected_steps, state_words
 from eomgen.derivation.reading import is_of_handout, numbered, read_all, reading_names, renumbered
 from eomgen.derivation.recursion import recursive_steps
 from eomgen.derivation.simplified import simplified, solved_directly, tidied
@@ -272,10 +272,8 @@ def _recursive(model: Model, parts: Parts) -> Exposition:
         for letter, group in (("q", model.coordinates), ("v", model.velocities))
     ]
     state += prescribed_motion(model)
-    words = "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
-    words += "axes of the body to which it belongs."
     steps = [
-        Step("state", "State", words, tuple(state)),
+        Step("state", "State", state_words(model), tuple(state)),
         Step("bodies", "Free bodies", _free_words(model), ()),
     ]
     effects = _effect_steps(model, parts, every=True)

@@ -11,6 +11,7 @@ from eomgen.derivation.projected.simplify import gathered
 from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
+from eomgen.model.model import Model
 from eomgen.scene.joints.base import WORLD
 
 DIGITS = 6
@@ -50,8 +51,7 @@ def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
     yield (
         "state",
         "State",
-        "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
-        "axes of the body to which it belongs.",
+        state_words(model),
         [
             (sp.Symbol("q"), sp.Matrix([s.q])),
             (sp.Symbol("v"), sp.Matrix([s.v])),
@@ -84,6 +84,16 @@ def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
             + (f", by those of `{parent}`." if body.parent >= 0 else "."),
             _differentiated(c, still),
         )
+
+
+def state_words(model: Model) -> str:
+    """What q and v are."""
+    if not model.quaternions:
+        return "Coordinates q and velocities v."
+    return (
+        "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
+        "axes of the body to which it belongs."
+    )
 
 
 def _joint_words(name: str, parent: str) -> str:
