@@ -86,13 +86,13 @@ class Factors:
     """
 
     n: int
-    first: int
-    diagonal: float
     right: Annotated[Matrix, "n", "n"]
     columns: Annotated[Matrix, "n", "n"]
     entries: Annotated[Whole, "n * n"]
     ends: Annotated[Whole, "n"]
     order: Annotated[Whole, "n"]
+    first: int = 0
+    diagonal: float = 0.0
 
 
 def _decoupled(n: int, positions: int, jacobian: Matrix) -> int:

@@ -6,9 +6,8 @@ The operations are those of `eomgen.engine.elimination`.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from eomgen.engine.elimination import Factors
+from eomgen.subset.structures import with_room
 from eomgen.subset.words import Vector
 
 FEW = 20
@@ -19,17 +18,7 @@ def factors_of(n: int, positions: int = 0) -> Factors:
     """Room for the factors of n unknowns, of which as many as there are positions may be eliminated
     first.
     """
-    return _empty(_Few, n) if n - positions <= FEW else plain_factors(n)
-
-
-def plain_factors(n: int) -> Factors:
-    """The same, of arrays alone."""
-    return _empty(Factors, n)
-
-
-def _empty(kind: type[Factors], n: int) -> Factors:
-    wholes = (np.zeros(size, np.int64) for size in (n * n, n, n))
-    return kind(n, 0, 0.0, np.zeros((n, n)), np.zeros((n, n)), *wholes)
+    return with_room(_Few if n - positions <= FEW else Factors, n=n)
 
 
 @dataclass(slots=True)

@@ -84,6 +84,8 @@ class Stages:
     Jacobians J_i there, one below the other; the h b_i a_ij / b_j, and their products with J_i, in
     rows and columns of which the positions of all stages come first.
 
+    newton       the factors of its matrix
+    change       that of the state
     simplified   whether iterations go on with the factors of an earlier one, if there are such:
                  more of them, but without a Jacobian. Hairer, Wanner, Solving ODEs II, section IV.8
     has_factors  whether there are such, of a step of the same length
@@ -96,6 +98,8 @@ class Stages:
     jacobians: Annotated[Matrix, "many * STATES", "STATES"]
     couplings: Annotated[Matrix, "many", "many"]
     matrix: Annotated[Matrix, "many * STATES", "many * STATES"]
+    newton: Annotated[Factors, "many * STATES"]
+    change: Annotated[Vector, "STATES"]
     simplified: bool = False
     has_factors: bool = False
 
@@ -250,7 +254,6 @@ def improved(
     h: float,
     start: Annotated[Vector, "STATES"],
     stages: Stages,
-    factors: Factors,
 ) -> bool:
     """An iteration of Newton's method for the changes d_i = h b_i f(t + c_i h, Y_i) with
     Y_i = start + Σ share_ij d_j; False if its matrix is singular.
@@ -266,12 +269,12 @@ def improved(
         stages.update[i, :] = h * method.b[i] * slope - stages.changes[i]
     if not stages.has_factors:
         couple(many, n, stages.positions, stages.couplings, stages.jacobians, stages.matrix)
-        if not factored(factors, 1.0, many * stages.positions, stages.matrix):
+        if not factored(stages.newton, 1.0, many * stages.positions, stages.matrix):
             return False
         stages.has_factors = stages.simplified
-    missing = zeros(factors.n)
+    missing = zeros(stages.many * len(start))
     arrange(many, n, stages.positions, stages.update, missing)
-    solve_by(factors, missing)
+    solve_by(stages.newton, missing)
     spread(many, n, stages.positions, missing, stages.update)
     stages.changes[:, :] += stages.update
     return True
@@ -294,8 +297,6 @@ def implicit_change(
     h: float,
     y: Annotated[Vector, "STATES"],
     stages: Stages,
-    factors: Factors,
-    change: Annotated[Vector, "STATES"],
 ) -> int:
     """The change of the state in a step of length h: the sum of the stages' changes d. Returns the
     number of iterations, or why there is none.
@@ -303,7 +304,7 @@ def implicit_change(
     begin_stages(system, method, h, stages)
     previous = 0.0
     for count in range(1, MAX_ITERATIONS + 1):
-        if not improved(system, method, t, h, y, stages, factors):
+        if not improved(system, method, t, h, y, stages):
             return SINGULAR
         size = largest_update(stages.many, len(y), stages.update)
         if not isfinite(size):
@@ -316,9 +317,9 @@ def implicit_change(
             solved = is_solved(stages.many, len(y), scale, stages.update, size, previous)
         if solved:
             # Linear convergence ends not far below roundoff.
-            if stages.simplified and not improved(system, method, t, h, y, stages, factors):
+            if stages.simplified and not improved(system, method, t, h, y, stages):
                 return SINGULAR
-            change[:] = added(stages.changes[i] for i in range(len(method.b)))
+            stages.change[:] = added(stages.changes[i] for i in range(len(method.b)))
             return count
         previous = size
     return UNSOLVED

@@ -36,7 +36,7 @@ from eomgen.engine.embedded import DOP853
 from eomgen.engine.methods import EQUAL, Root, Roots
 from eomgen.subset.languages import JAVASCRIPT, C, Language
 from eomgen.subset.printing import printed
-from eomgen.subset.structures import arrays_of
+from eomgen.subset.structures import arrays_of, records_of
 from eomgen.subset.text import Text, own_name
 from eomgen.subset.unrolled import unrolled_functions
 
@@ -59,6 +59,7 @@ RECORDS: tuple[type, ...] = (
     *(adaptive.Bounds, adaptive.Progress, contacts.Touching, contact_runs.Place),
     *(branches.Switches, crossings.Watch, elimination.Factors, explicit.Split, explicit.Step),
     *(implicit.Stages, rattle.Linked, rosenbrock.Rodas, symmetric.Projected, taylor.Terms),
+    projection.Residuals,
 )
 """What it gives them."""
 SIZES = ("STATES", "POSITIONS", "OTHERS", "CONTACTS", "PRESSED", "FIRST", "PRODUCTS", "ORDERS")
@@ -106,10 +107,10 @@ def steps_of_pages() -> str:
     """
     names = ", ".join(dict.fromkeys(own_name(*root) for root in ON_PAGES))
     codes = "".join(f", {name}: {value!r}" for name, value in CODES.items())
-    records = ", ".join(map(record_of_pages, RECORDS))
+    records = f"const records = {{ {', '.join(map(record_of_pages, RECORDS))} }};\n"
     source = JAVASCRIPT.prelude + printed(text(), ON_PAGES, JAVASCRIPT)
     head = f"const makeSteps = ({{ {', '.join(SIZES)} }}) =>"
-    return f"{head} {{\n{source}return {{ {names}{codes}, records: {{ {records} }} }};\n}};\n"
+    return f"{head} {{\n{source}{records}return {{ {names}{codes}, records }};\n}};\n"
 
 
 def record_of_pages(kind: type) -> str:
@@ -128,6 +129,9 @@ def record_of_pages(kind: type) -> str:
         name: f"new {'Int32' if is_whole else 'Float64'}Array({' * '.join(map(size, sizes))})"
         for name, is_whole, sizes in arrays_of(kind)
     }
+    for name, (of, of_size) in records_of(kind).items():
+        unknowns = " * ".join([str(of_size.factor), *map(size, of_size.names)])
+        arrays[name] = f"records.{of.__name__}({{ n: {unknowns} }})"
     plain = "".join(f"{f.name}: 0, " for f in fields(kind) if f.name not in arrays)
     roomy = ", ".join(f"{name}: given.{name} ?? {made}" for name, made in arrays.items())
     return f"{kind.__name__}: (given) => ({{ {plain}...given, {roomy} }})"

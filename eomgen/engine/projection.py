@@ -6,6 +6,7 @@ of the mass matrix (Hairer and Wanner II, VII.2; Eich 1993). The order of the me
 error of the constraints adds up.
 """
 
+from dataclasses import dataclass
 from typing import Annotated, Protocol
 
 import numpy as np
@@ -24,25 +25,25 @@ function has no valid result."""
 
 
 class Constraints(Protocol):
-    """The constraints of a mechanism with n states, and with residuals in rows. Each function
-    returns whether its result is valid.
+    """The constraints of a mechanism, with residuals in rows. Each function returns whether its
+    result is valid.
     """
 
     def residuals_at(
-        self, t: float, y: Annotated[Vector, "n"], out: Annotated[Vector, "rows"]
+        self, t: float, y: Annotated[Vector, "STATES"], out: Annotated[Vector, "rows"]
     ) -> bool:
         """The residuals, m or rad."""
         ...
 
     def move_closer(
-        self, t: float, y: Annotated[Vector, "n"], there: Annotated[Vector, "n"]
+        self, t: float, y: Annotated[Vector, "STATES"], there: Annotated[Vector, "STATES"]
     ) -> bool:
         """Give `there`, a copy of y, the coordinates after a step of Newton's method, with unit
         quaternions.
         """
         ...
 
-    def hold_velocities(self, t: float, y: Annotated[Vector, "n"]) -> bool:
+    def hold_velocities(self, t: float, y: Annotated[Vector, "STATES"]) -> bool:
         """Give y the velocities that meet the constraints."""
         ...
 
@@ -109,36 +110,37 @@ def worst_off(
     return largest + nothing
 
 
-def moved_onto(
-    held: Constraints,
-    n: int,
-    rows: int,
-    t: float,
-    y: Annotated[Vector, "n"],
-    sizes: Annotated[Vector, "rows"],
-    first: Annotated[Vector, "rows"],
-    left: Annotated[Vector, "rows"],
-    after: Annotated[Vector, "rows"],
-    there: Annotated[Vector, "n"],
-) -> int:
-    """Move a state with unit quaternions onto the constraints; `first` are the residuals before,
-    `left` those of the coordinates found.
+@dataclass(slots=True)
+class Residuals:
+    """The residuals of constraints, in rows: their sizes; those of a state before it is moved onto
+    the constraints, and those that are left; and room for those `after` a move to `there`.
     """
-    if not held.residuals_at(t, y, left):
+
+    rows: int
+    sizes: Annotated[Vector, "rows"]
+    first: Annotated[Vector, "rows"]
+    left: Annotated[Vector, "rows"]
+    after: Annotated[Vector, "rows"]
+    there: Annotated[Vector, "STATES"]
+
+
+def moved_onto(held: Constraints, t: float, y: Annotated[Vector, "STATES"], off: Residuals) -> int:
+    """Move a state with unit quaternions onto the constraints."""
+    if not held.residuals_at(t, y, off.left):
         return INVALID
-    first[:] = left
-    far = worst_off(rows, left, sizes)
+    off.first[:] = off.left
+    far = worst_off(off.rows, off.left, off.sizes)
     for _ in range(MOST):
         if far <= MET:
             break
-        there[:] = y
-        if not held.move_closer(t, y, there) or not held.residuals_at(t, there, after):
+        off.there[:] = y
+        if not held.move_closer(t, y, off.there) or not held.residuals_at(t, off.there, off.after):
             return INVALID
-        nearer = worst_off(rows, after, sizes)
+        nearer = worst_off(off.rows, off.after, off.sizes)
         if not nearer < far:  # rounding, or no way towards the constraints
             break
-        y[:] = there
-        left[:] = after
+        y[:] = off.there
+        off.left[:] = off.after
         far = nearer
     if not far <= CLOSE:
         return FAR

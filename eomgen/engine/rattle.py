@@ -35,7 +35,8 @@ iterations before. From one to the next it may grow while the iteration converge
 @dataclass(slots=True)
 class Linked:
     """Room for a step of n coordinates with constraints in rows: mass matrices and the rows J at
-    its beginning and at its end, M⁻¹ Jᵀ as rows, and the matrix J M⁻¹ Jᵀ.
+    its beginning and at its end, M⁻¹ Jᵀ as rows, and the matrix J M⁻¹ Jᵀ; and for the factors of
+    two mass matrices and of this one.
     """
 
     n: int
@@ -46,6 +47,9 @@ class Linked:
     after: Annotated[Matrix, "rows", "n"]
     ways: Annotated[Matrix, "rows", "n"]
     matrix: Annotated[Matrix, "rows", "rows"]
+    first: Annotated[Factors, "n"]
+    second: Annotated[Factors, "n"]
+    third: Annotated[Factors, "rows"]
 
 
 def _largest_of(n: int, x: Vector) -> float:
@@ -104,90 +108,78 @@ def force_at(
 
 
 def rattle(
-    system: Linkage,
-    n: int,
-    rows: int,
-    t: float,
-    y: Annotated[Vector, "STATES"],
-    h: float,
-    room: Linked,
-    first: Factors,
-    second: Factors,
-    third: Factors,
-    step: Step,
+    system: Linkage, t: float, y: Annotated[Vector, "STATES"], h: float, room: Linked, step: Step
 ) -> int:
-    """A step of length h from y. The factors are those of two mass matrices and of J M⁻¹ Jᵀ.
-    Returns the number of iterations, or why there is no step.
-    """
+    """A step of length h from y. Returns the number of iterations, or why there is no step."""
     half = h / 2.0
-    q = copy(y[:n])
-    v = copy(y[n : 2 * n])
+    q = copy(y[: room.n])
+    v = copy(y[room.n : 2 * room.n])
     still = zeros(len(y))
     slope = zeros(len(y))
     there = zeros(len(y))
     at = zeros(len(y))
-    force = zeros(n)
-    bend = zeros(n)
-    middle = zeros(n)
+    force = zeros(room.n)
+    bend = zeros(room.n)
+    middle = zeros(room.n)
     a = copy(v)
     b = copy(v)
-    off = zeros(rows)
-    multipliers = zeros(rows)
+    off = zeros(room.rows)
+    multipliers = zeros(room.rows)
     if not system.inertia_at(t, y, room.here) or not system.rows_at(t, y, room.before):
         return INVALID
-    if not factorised(first, room.here):
+    if not factorised(room.first, room.here):
         return SINGULAR
-    solve_rows(rows, first, room.before, room.ways)
-    still[:n] = q
-    if not force_at(system, n, t, room.here, still, slope, force):
+    solve_rows(room.rows, room.first, room.before, room.ways)
+    still[: room.n] = q
+    if not force_at(system, room.n, t, room.here, still, slope, force):
         return INVALID
     begun = product(room.here, v)
     begun = begun + half * force
     move = h * v
-    there[:n] = q + move
-    there[n : 2 * n] = b
-    at[:n] = q
+    there[: room.n] = q + move
+    there[room.n : 2 * room.n] = b
+    at[: room.n] = q
     earlier = inf
     before = inf
     iterations = 0
     while iterations < MOST:
         iterations += 1
-        at[n : 2 * n] = a
+        at[room.n : 2 * room.n] = a
         if not system.slopes_at(t, at, bend):
             return INVALID
         held = product(transposed(room.before), multipliers)
         middle = begun + half * bend + held  # (1)
         if not system.rows_at(t, there, room.after) or not system.inertia_at(t, there, room.mass):
             return INVALID
-        if not factorised(second, room.mass):
+        if not factorised(room.second, room.mass):
             return SINGULAR
         a = copy(middle)
         b = copy(middle)
-        solve_by(first, a)
-        solve_by(second, b)
+        solve_by(room.first, a)
+        solve_by(room.second, b)
         found = half * (a + b)  # (2)
         change = found - move
         move = copy(found)
-        there[:n] = q + move
-        there[n : 2 * n] = b
+        there[: room.n] = q + move
+        there[room.n : 2 * room.n] = b
         if not system.off_by(t, there, off):
             return INVALID
-        across(rows, n, h, room.after, room.ways, room.matrix)
-        if not factorised(third, room.matrix):
+        across(room.rows, room.n, h, room.after, room.ways, room.matrix)
+        if not factorised(room.third, room.matrix):
             return SINGULAR
-        solve_by(third, off)
+        solve_by(room.third, off)
         multipliers = multipliers - off
         back = product(transposed(room.ways), off)
         back = h * back
-        moved = largest_of(n, change)
-        far = largest_of(n, back)
+        moved = largest_of(room.n, change)
+        far = largest_of(room.n, back)
         moved = max(moved, far)
-        size = largest_of(n, move)
+        size = largest_of(room.n, move)
         if not isfinite(moved + far + size):
             return DIVERGES
         if moved <= ROUNDOFF * size:
             break
-        if earlier <= moved and moved <= NOISE * (largest_of(n, q) + size):
+        if earlier <= moved and moved <= NOISE * (largest_of(room.n, q) + size):
             break
         earlier = before
         before = moved
@@ -195,25 +187,25 @@ def rattle(
             return UNSOLVED
     if not system.inertia_at(t, there, room.mass):
         return INVALID
-    still[:n] = there[:n]
-    if not force_at(system, n, t, room.mass, still, slope, force):
+    still[: room.n] = there[: room.n]
+    if not force_at(system, room.n, t, room.mass, still, slope, force):
         return INVALID
     if not system.slopes_at(t, there, bend):
         return INVALID
-    if not factorised(first, room.mass):
+    if not factorised(room.first, room.mass):
         return SINGULAR
     last = middle + half * (force + bend)  # (3)
-    solve_by(first, last)
-    solve_rows(rows, first, room.after, room.ways)
-    across(rows, n, 1.0, room.after, room.ways, room.matrix)
-    if not factorised(third, room.matrix):
+    solve_by(room.first, last)
+    solve_rows(room.rows, room.first, room.after, room.ways)
+    across(room.rows, room.n, 1.0, room.after, room.ways, room.matrix)
+    if not factorised(room.third, room.matrix):
         return SINGULAR
     off = product(room.after, last)
-    solve_by(third, off)
+    solve_by(room.third, off)
     back = product(transposed(room.ways), off)
     total = zeros(len(y))
-    total[:n] = move
-    total[n : 2 * n] = last - back - v
+    total[: room.n] = move
+    total[room.n : 2 * room.n] = last - back - v
     step.change = total
     step.place = still
     step.slope = slope

@@ -66,53 +66,46 @@ def kept_by(
     x[:] = x - along
 
 
-def moved_force(
-    system: Linkage,
-    n: int,
-    rows: int,
-    y: Annotated[Vector, "STATES"],
-    room: Linked,
-    factors: Factors,
-) -> int:
+def moved_force(system: Linkage, y: Annotated[Vector, "STATES"], room: Linked) -> int:
     """The number of the coordinate on which a force depends on velocities; or `NONE`, `UNKNOWN`.
 
     At the velocities of y, or those that keep the constraints, M v̇ + Ṁ v - ∂T/∂q, up to what acts
-    along Jᵀ, is compared with that at rest. The factors are those of J Jᵀ.
+    along Jᵀ, is compared with that at rest.
     """
     still = copy(y)
     moving = copy(y)
     near = copy(y)
     slope = zeros(len(y))
-    at_rest = zeros(n)
-    bend = zeros(n)
-    change = zeros(n)
+    at_rest = zeros(room.n)
+    bend = zeros(room.n)
+    change = zeros(room.n)
     if not system.inertia_at(0.0, y, room.here) or not system.rows_at(0.0, y, room.before):
         return UNKNOWN
-    across(rows, n, 1.0, room.before, room.before, room.matrix)
-    if not factorised(factors, room.matrix):
+    across(room.rows, room.n, 1.0, room.before, room.before, room.matrix)
+    if not factorised(room.third, room.matrix):
         return UNKNOWN
-    if not force_at(system, n, 0.0, room.here, still, slope, at_rest):
+    if not force_at(system, room.n, 0.0, room.here, still, slope, at_rest):
         return UNKNOWN
-    v = copy(y[n : 2 * n])
-    kept_by(rows, n, room.before, factors, v)
-    moving[n : 2 * n] = v
+    v = copy(y[room.n : 2 * room.n])
+    kept_by(room.rows, room.n, room.before, room.third, v)
+    moving[room.n : 2 * room.n] = v
     if not system.rates_at(0.0, moving, slope) or not system.slopes_at(0.0, moving, bend):
         return UNKNOWN
-    change[:] = product(room.here, slope[n : 2 * n])
-    near[:n] = y[:n] + NEAR * v
+    change[:] = product(room.here, slope[room.n : 2 * room.n])
+    near[: room.n] = y[: room.n] + NEAR * v
     if not system.inertia_at(0.0, near, room.mass):
         return UNKNOWN
     ahead = product(room.mass, v)
-    near[:n] = y[:n] - NEAR * v
+    near[: room.n] = y[: room.n] - NEAR * v
     if not system.inertia_at(0.0, near, room.mass):
         return UNKNOWN
     behind = product(room.mass, v)
     change[:] = change + (ahead - behind) / (2.0 * NEAR)
     left = change - bend - at_rest
-    kept_by(rows, n, room.before, factors, left)
-    size = largest_of(n, change) + largest_of(n, at_rest)
+    kept_by(room.rows, room.n, room.before, room.third, left)
+    size = largest_of(room.n, change) + largest_of(room.n, at_rest)
     worst = 0
-    for i in range(1, n):
+    for i in range(1, room.n):
         if abs(left[i]) > abs(left[worst]):
             worst = i
     return worst if abs(left[worst]) > SAME * size else NONE

@@ -58,6 +58,8 @@ class Projected:
     half, whole
             half the step times the Jacobian of the rates, without and with 1 on the diagonal
     updates  the last update of the stages, and that of the end
+    first, second
+            factors of `half` and of `matrix`
     """
 
     n: int
@@ -77,84 +79,78 @@ class Projected:
     half: Annotated[Matrix, "states", "states"]
     whole: Annotated[Matrix, "states", "states"]
     updates: Annotated[Matrix, "stages", "states"]
+    first: Annotated[Factors, "states"]
+    second: Annotated[Factors, "2 * rows"]
 
 
 def normals_at(
     system: Linkage,
-    n: int,
-    nv: int,
-    rows: int,
     t: float,
     y: Annotated[Vector, "STATES"],
     room: Projected,
-    normals: Annotated[Matrix, "2 * rows", "room.states"],
+    normals: Annotated[Matrix, "2 * room.rows", "room.states"],
 ) -> bool:
     """Directions that lead off the constraints: of positions, then of velocities."""
     if not system.rows_at(t, y, room.jacobian):
         return False
-    tangents(n, nv, room.many, room.quaternions, y, 1.0, room.basis)
+    tangents(room.n, room.nv, room.many, room.quaternions, y, 1.0, room.basis)
     normals[:, :] = 0.0
-    for k in range(rows):
+    for k in range(room.rows):
         along = product(room.basis, room.jacobian[k])
-        normals[k, :n] = along
-        normals[rows + k, n : n + nv] = room.jacobian[k]
+        normals[k, : room.n] = along
+        normals[room.rows + k, room.n : room.n + room.nv] = room.jacobian[k]
     return True
 
 
 def carried(
     h: float,
-    jacobian: Annotated[Matrix, "factors.n", "factors.n"],
+    jacobian: Annotated[Matrix, "room.states", "room.states"],
     positions: int,
     room: Projected,
-    factors: Factors,
 ) -> bool:
     """The ways of the end when the start moves along its normals, about: by the implicit midpoint
     rule, with the Jacobian of the last stage. False if its matrix is singular.
     """
     room.half[:, :] = 0.5 * h * jacobian
     room.whole[:, :] = room.half
-    for i in range(factors.n):
+    for i in range(room.states):
         room.whole[i, i] += 1.0
-    if not factored(factors, 1.0, positions, room.half):
+    if not factored(room.first, 1.0, positions, room.half):
         return False
     for k in range(2 * room.rows):
         way = product(room.whole, room.normals[k])
-        solve_by(factors, way)
+        solve_by(room.first, way)
         room.ways[k, :] = way + room.beyond[k]
     return True
 
 
 def multipliers_at(
     system: Linkage,
-    n: int,
-    nv: int,
-    rows: int,
     t: float,
     y: Annotated[Vector, "STATES"],
     room: Projected,
-    factors: Factors,
-    off: Annotated[Vector, "2 * rows"],
+    off: Annotated[Vector, "2 * room.rows"],
 ) -> int:
     """How far a state is off the constraints, along `ways`, to first order; returns 1, or why that
     is not known. The Jacobian and the displacements are those at the state.
     """
-    sizes = zeros(nv)
-    for i in range(n):
+    sizes = zeros(room.nv)
+    for i in range(room.n):
         sizes = sizes + room.basis[i] * room.basis[i]
-    for k in range(2 * rows):
-        moved = copy(room.ways[k, :nv])
+    for k in range(2 * room.rows):
+        moved = copy(room.ways[k, : room.nv])
         if room.many > 0:
-            moved = product(transposed(room.basis), room.ways[k, :n])
+            moved = product(transposed(room.basis), room.ways[k, : room.n])
             moved = moved / sizes
         column = product(room.jacobian, moved)
-        room.matrix[:rows, k] = column
-        column = product(room.jacobian, room.ways[k, n : n + nv])
-        room.matrix[rows:, k] = column
-    if not system.off_by(t, y, off[:rows]) or not system.drift_at(t, y, off[rows:]):
+        room.matrix[: room.rows, k] = column
+        column = product(room.jacobian, room.ways[k, room.n : room.n + room.nv])
+        room.matrix[room.rows :, k] = column
+    if not system.off_by(t, y, off[: room.rows]) or not system.drift_at(t, y, off[room.rows :]):
         return INVALID
-    if not factorised(factors, room.matrix):
+    if not factorised(room.second, room.matrix):
         return SINGULAR
-    solve_by(factors, off)
+    solve_by(room.second, off)
     return 1
 
 
@@ -162,27 +158,20 @@ def projected_change(
     system: StiffSystem,
     linkage: Linkage,
     method: Known,
-    n: int,
-    nv: int,
-    rows: int,
     t: float,
     h: float,
     y: Annotated[Vector, "STATES"],
     stages: Stages,
-    factors: Factors,
     room: Projected,
-    end_factors: Factors,
-    row_factors: Factors,
-    change: Annotated[Vector, "STATES"],
 ) -> int:
     """The change of the state in a step of length h. Returns the number of iterations, or why there
     is none.
     """
     many = stages.many
     end = t + h
-    off = zeros(2 * rows)
-    multipliers = zeros(2 * rows)
-    if not normals_at(linkage, n, nv, rows, end, y, room, room.normals):
+    off = zeros(2 * room.rows)
+    multipliers = zeros(2 * room.rows)
+    if not normals_at(linkage, end, y, room, room.normals):
         return INVALID
     room.beyond[:, :] = room.normals
     begin_stages(system, method, h, stages)
@@ -190,18 +179,16 @@ def projected_change(
     for count in range(1, MOST_PROJECTED + 1):
         aside = product(transposed(room.normals), multipliers)
         place = y + aside
-        if not improved(system, method, t, h, place, stages, factors):
+        if not improved(system, method, t, h, place, stages):
             return SINGULAR
         step = aside + added(stages.changes[i] for i in range(len(method.b)))
         last = product(transposed(room.beyond), multipliers)
         last = y + step + last
-        if not normals_at(linkage, n, nv, rows, end, last, room, room.beyond):
+        if not normals_at(linkage, end, last, room, room.beyond):
             return INVALID
-        if not carried(
-            h, stages.jacobians[(many - 1) * len(y) :], stages.positions, room, end_factors
-        ):
+        if not carried(h, stages.jacobians[(many - 1) * len(y) :], stages.positions, room):
             return SINGULAR
-        made = multipliers_at(linkage, n, nv, rows, end, last, room, row_factors, off)
+        made = multipliers_at(linkage, end, last, room, off)
         if made != 1:
             return made
         off = 0.0 - off
@@ -221,7 +208,7 @@ def projected_change(
             room.both[:, :] = room.normals + room.beyond
             ahead = product(transposed(room.both), off)
             behind = product(transposed(room.beyond), before)
-            change[:] = step + ahead + behind
+            stages.change[:] = step + ahead + behind
             return count
         previous = size
     return UNSOLVED

@@ -48,12 +48,11 @@ def _step(method: Method, interface: Interface, size: float) -> str:
     from eomgen.subset.printing import printed
 
     values = method.values(interface)
-    call = _CASTS.sub("", values["call"]).replace("->", ".")
     context: dict[str, Any] = {
         **sizes_of(method, interface, size),
         "states": len(interface.states),
         "engine": JAVASCRIPT.prelude + printed(text(), roots_of(method, interface), JAVASCRIPT),
-        "method": {**values, "call": call},
+        "method": {**values, "call": _of_c(values["call"])},
         "parts": [{"name": p.name, "fields": _fields(p)} for p in method.parts(interface)],
         "rates": list(map(repr, method.rates)),
         "tangent": any(f.name == "jacobian" and f.tangent for f in interface.functions),
@@ -63,7 +62,9 @@ def _step(method: Method, interface: Interface, size: float) -> str:
     return render(javascript.TEMPLATES, "step.js.jinja", context)
 
 
-_CASTS = re.compile(r"&|\(real \*\)")
+def _of_c(text: str) -> str:
+    """JavaScript of what C is given."""
+    return re.sub(r"&|\(\w+ \*\)", "", text).replace("->", ".")
 
 
 def _fields(part: Part) -> str:
@@ -74,5 +75,5 @@ def _fields(part: Part) -> str:
         for kind, name, size in part.arrays
     }
     numbers = {name: str(x) for name, x in part.own.items()}
-    given = dict.fromkeys(part.given, "quaternions")
+    given = {name: _of_c(value) for name, value in part.given.items()}
     return ", ".join(f"{name}: {value}" for name, value in {**numbers, **arrays, **given}.items())

@@ -31,6 +31,7 @@ from eomgen.run.sizes import mechanism_size
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import generated_code
 from eomgen.subset.languages import Language
+from eomgen.subset.structures import records_of
 from eomgen.subset.text import Text
 from eomgen.subset.words import Whole
 from eomgen.tables.integrators import INTEGRATORS as SPECS
@@ -39,10 +40,9 @@ _CALLS = {
     "runge_kutta": "system, t, y, h, step",
     "semi_implicit_euler": "system, positions, t, y, h, step",
     "leapfrog": "system, &split, t, y, h, step",
-    "implicit_change": "system, t, h, y, &stages, &newton, step->change",
-    "projected_change": "system, system, {n}, {nv}, ROWS, t, h, (real *)y, &stages, &newton, "
-    "&room_of, &first, &second, step->change",
-    "rattle": "system, {n}, ROWS, t, (real *)y, h, &room_of, &first, &second, &third, step",
+    "implicit_change": "system, t, h, y, &stages",
+    "projected_change": "system, system, t, h, (real *)y, &stages, &room_of",
+    "rattle": "system, t, (real *)y, h, &room_of, step",
 }
 """What functions of the engine are given that make a step."""
 _LINKAGE = {
@@ -116,16 +116,15 @@ class Method:
         found = []
         if function in ("implicit_change", "projected_change"):
             numbers = {"many": many, "positions": leading(interface), "STATES": n}
-            found.append(Part("stages", Stages, numbers))
-        factors: dict[str, int] = {"newton": many * n} if function in _IMPLICIT else {}
+            found.append(Part("stages", Stages, numbers, {"change": "step->change"}))
         if function == "projected_change":
             count = len(interface.quaternions)
             numbers = {"n": nq, "nv": nv, "rows": rows, "many": count, "stages": many + 1}
             given = {"quaternions": "(int64_t *)quaternions" if count else "0"}
             found.append(Part("room_of", Projected, numbers | {"states": n}, given))
-            factors |= {"first": n, "second": 2 * rows}
         if function == "rodas_step":
             found.append(Part("rodas", Rodas, {"positions": leading(interface), "STATES": n}))
+            found.append(Part("newton", Factors, {"n": n}))
         if series:
             found.append(
                 Part(
@@ -136,8 +135,7 @@ class Method:
             )
         if function == "rattle":
             found.append(Part("room_of", Linked, {"n": nv, "rows": rows}))
-            factors = {"first": nv, "second": nv, "third": rows}
-        return [*found, *(Part(name, Factors, {"n": m}) for name, m in factors.items())]
+        return [part for each in found for part in each.with_records()]
 
     def values(self, interface: Interface) -> dict[str, Any]:
         """Values for the template."""
@@ -145,8 +143,7 @@ class Method:
         if self.of:
             composed = "_".join([self.root[0], *(each.name for each in self.root[1].values())])
         own = "_".join([function, *(each.name for each in known.values())])
-        sizes = {"n": interface.coordinates, "nv": interface.velocities}
-        call = f"{own}({_CALLS[function].format(**sizes)})" if function in _CALLS else ""
+        call = f"{own}({_CALLS[function]})" if function in _CALLS else ""
         return {
             "call": call,
             "composed": composed,
@@ -162,7 +159,7 @@ class Part:
     """A record of the engine for a step.
 
     numbers  of its fields, and those of which its arrays' sizes are made
-    given    C of the arrays for which it has no room
+    given    C of the arrays and records for which it has no room
     """
 
     name: str
@@ -174,6 +171,15 @@ class Part:
     def record(self) -> str:
         """Its type."""
         return self.of.__name__
+
+    def with_records(self) -> Iterator["Part"]:
+        """The records in it, and then it."""
+        given = dict(self.given)
+        for name, (of, size) in records_of(self.of).items():
+            own = Part(f"{self.name}_{name}", of, {"n": size.of(self.numbers)})
+            given[name] = f"&{own.name}"
+            yield own
+        yield replace(self, given=given)
 
     @property
     def arrays(self) -> Iterator[tuple[str, str, str]]:

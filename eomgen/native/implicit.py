@@ -15,8 +15,8 @@ from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.engine.adaptive import UNUSUAL
 from eomgen.engine.elimination import Factors
-from eomgen.engine.few import plain_factors
 from eomgen.engine.methods import EQUAL, Root
+from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import RodasRecords
 from eomgen.native import equal_steps
 from eomgen.native.mechanism import KERNELS, Mechanism, made_margins
@@ -29,7 +29,7 @@ from eomgen.run.integrators.implicit_stages import projected_of, stages_of
 from eomgen.run.integrators.rodas_5p import rodas
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
-from eomgen.subset.structures import filled, take
+from eomgen.subset.structures import filled, take, with_room
 
 MAIN = "implicit.c"
 EQUAL_STEPS: Root = ("equal_steps", {})
@@ -97,26 +97,19 @@ def equal(name: str, problem: Problem, of: Mechanism, library: ctypes.CDLL) -> E
     """The steps of a Gauss method, or of leapfrog with constraints."""
     if leaps := equal_steps.LEAPFROGS.get(name):
         n, rows = rattle.sizes_of(problem)
-        room = {"room": rattle.linked(n, rows), **_factors(n, n, rows)}
-        call = equal_steps.Call(library.steps, _with(of, room), _NO_QUATERNIONS)
+        room = _with(of, room=with_room(Linked, n=n, rows=rows))
+        call = equal_steps.Call(library.steps, room, _NO_QUATERNIONS)
         return EqualSteps(call.made, DERIVATIVES * leaps)
-    many, n = len(GAUSS[name].b), len(problem.states)
-    room = {"stages": stages_of(many, n, problem.leading_positions)}
-    room["newton"] = plain_factors(many * n)
+    many = len(GAUSS[name].b)
+    room = _with(of, stages=stages_of(many, problem))
     if problem.projection:
-        projected = projected_of(many, problem)
-        room |= {"room": projected, **_factors(n, 2 * projected.rows)}
+        room = _with(room, room=projected_of(many, problem))
     quaternions = np.array(sum(problem.quaternions, ()), np.int64)
-    call = equal_steps.Call(library.steps, _with(of, room), quaternions)
+    call = equal_steps.Call(library.steps, room, quaternions)
     return EqualSteps(call.made, many, iterates=True)
 
 
-def _factors(*sizes: int) -> dict[str, Factors]:
-    """Room for factors of so many unknowns each."""
-    return dict(zip(("first", "second", "third"), map(plain_factors, sizes), strict=False))
-
-
-def _with(of: Mechanism, room: Mapping[str, Any]) -> Mechanism:
+def _with(of: Mechanism, **room: Any) -> Mechanism:
     """A mechanism with records to work in."""
     made = {name: filled(record) for name, record in room.items()}
     pointers = {name: ctypes.addressof(record) for name, record in made.items()}
@@ -140,7 +133,7 @@ def rodas_5p(problem: Problem, of: Mechanism, library: ctypes.CDLL, stretch: Str
     given = {"quaternions": quaternions, "many": len(problem.quaternions), **sizes}
     rows = np.empty((len(stretch.times), ny))
     kept, records = room(RodasRecords, rows=rows, margins=margins[1:], **given)
-    system = _with(of, {"newton": plain_factors(ny)}).holding(ny, held, None)
+    system = _with(of, room=with_room(Factors, n=ny)).holding(ny, held, None)
     start, clear = np.ascontiguousarray(solver.y), watched.clear if watched else math.inf
     call = library.steps
     call.restype = ctypes.c_int64

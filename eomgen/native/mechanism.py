@@ -28,7 +28,7 @@ FUNCTIONS = (
     *contact_runs.FUNCTIONS,
 )
 """The functions that steps call."""
-ROOM = ("rates", "stages", "newton", "room", "first", "second", "third")
+ROOM = ("rates", "stages", "room")
 """What steps of some methods work with."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 

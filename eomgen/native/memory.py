@@ -20,7 +20,7 @@ def room(record: type[T], **given: Any) -> tuple[T, ctypes.Structure]:
     places = {name: address(x) if x.size else 0 for name, x in made.items() if hasattr(x, "size")}
     for kind in (np.float64, np.int64):
         own = [
-            (name, [(given[n] if n else 1) * factor for n, factor in sizes])
+            (name, [size.of(given) for size in sizes])
             for name, sizes, of in arrays
             if of is kind and name not in made
         ]

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.engine.projection import PROJECTED, moved_onto
+from eomgen.engine.projection import PROJECTED, Residuals, moved_onto
 from eomgen.run.compiled import Constrained
 from eomgen.run.failure import StepFailure
 from eomgen.run.margins import Seen
@@ -88,15 +88,15 @@ class Projection:
         Raises `StepFailure` if the constraints cannot be met near the state.
         """
         y, (first, left, after) = y.copy(), np.empty((3, len(self.names)))
-        room = self.sizes, first, left, after, np.empty_like(y)
-        if moved_onto(_Held(self, unit), len(y), len(self.names), t, y, *room) != PROJECTED:
-            worst = int(np.argmax(np.abs(left) / self.sizes))
+        off = Residuals(len(self.names), self.sizes, first, left, after, np.empty_like(y))
+        if moved_onto(_Held(self, unit), t, y, off) != PROJECTED:
+            worst = int(np.argmax(np.abs(off.left) / self.sizes))
             raise StepFailure(
                 f"constraint {self.names[worst]} cannot be met near t = {t:.6g} s",
                 "take shorter steps, or a start farther from a singular position",
             )
         if self.violations:
-            self.violations.add(first, left)
+            self.violations.add(off.first, off.left)
         return y
 
     def scaled_jacobian(self, t: float, y: FloatArray) -> FloatArray:

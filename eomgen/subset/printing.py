@@ -47,7 +47,12 @@ def functions_of_text(
 
 def _structures(text: Text, functions: Iterable[Function], language: Language) -> Iterable[str]:
     """C's structures of the records that are arguments."""
-    for name in dict.fromkeys(x.of for f in functions for x in f.arguments.values()):
+    names = [x.of for f in functions for x in f.arguments.values()]
+    for name in reversed(names):  # records in records come first
+        record = text.classes.get(name)
+        if record and functions_of(record) is None:
+            names = [*(kind.of for kind in fields_of(record).values()), *names]
+    for name in dict.fromkeys(names):
         record = text.classes.get(name)
         if record and functions_of(record) is None:
             yield f"typedef struct {name} {{"

@@ -1,10 +1,11 @@
 """The engine's records as C's structures, for `ctypes`."""
 
 import ctypes
-from collections.abc import Iterator
-from dataclasses import fields
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from math import prod
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,55 +18,78 @@ TYPES: dict[Any, Any] = {float: ctypes.c_double, int: ctypes.c_int64, bool: ctyp
 
 @cache
 def structure(record: type) -> type[ctypes.Structure]:
-    """The structure of a record: numbers, and the addresses of its arrays."""
+    """The structure of a record: numbers, and the addresses of its arrays and records."""
     hints = get_type_hints(record, include_extras=True)
-    given = [
-        (f.name, ctypes.c_void_p if _is_array(hints[f.name]) else TYPES[hints[f.name]])
-        for f in fields(record)
-    ]
+    given = [(f.name, TYPES.get(hints[f.name], ctypes.c_void_p)) for f in fields(record)]
     return type(record.__name__, (ctypes.Structure,), {"_fields_": given})
 
 
-def _is_array(hint: Any) -> bool:
-    return get_origin(hint) is Annotated and len(get_args(hint)) > 1
-
-
 def with_room(record: type[T], **given: Any) -> T:
-    """A record with these numbers and arrays; its other arrays are of zeros, in the sizes that it
-    states, of which those that are not its fields are given, too.
+    """A record with these numbers, arrays and records; its other arrays are of zeros, in the sizes
+    that it states, of which those that are not its fields are given, too. Its other records have
+    room for n unknowns, as it states.
     """
     names, arrays = fields_of(record)  # type: ignore[arg-type]
     made = {name: x for name, x in given.items() if name in names}
     for name, sizes, kind in arrays:
         if name not in made:
-            made[name] = np.zeros([(given[n] if n else 1) * factor for n, factor in sizes], kind)
+            made[name] = np.zeros([size.of(given) for size in sizes], kind)
+    for name, (of, size) in records_of(record).items():  # type: ignore[arg-type]
+        if name not in made:
+            made[name] = with_room(of, n=size.of(given))
     return record(**made)
 
 
 def arrays_of(record: Any) -> Iterator[tuple[str, bool, list[str]]]:
     """The arrays of a record: their names, whether they hold whole numbers, and their sizes."""
-    hints = get_type_hints(record, include_extras=True)
-    for f in fields(record):
-        if _is_array(hints[f.name]):
-            array, *sizes = get_args(hints[f.name])
-            yield f.name, array == Whole, sizes
+    for name, (of, *sizes) in _annotated(record):
+        if not is_dataclass(of):
+            yield name, of == Whole, sizes
 
 
 @cache
-def fields_of(record: Any) -> tuple[set[str], list[tuple[str, list[tuple[str, int]], Any]]]:
-    """The names of a record's fields, and its arrays: their names, sizes, each a name times a
-    number, and kinds.
-    """
+def records_of(record: Any) -> "dict[str, tuple[Any, Size]]":
+    """The records in a record: their types, and for how many unknowns they have room."""
+    found = _annotated(record)
+    return {name: (of, Size.of_text(*sizes)) for name, (of, *sizes) in found if is_dataclass(of)}
+
+
+def _annotated(record: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    hints = get_type_hints(record, include_extras=True)
+    for f in fields(record):
+        if get_origin(hints[f.name]) is Annotated:
+            yield f.name, get_args(hints[f.name])
+
+
+class Size(NamedTuple):
+    """A number, and names by whose values it is multiplied."""
+
+    factor: int
+    names: tuple[str, ...]
+
+    @classmethod
+    def of_text(cls, text: str) -> "Size":
+        """That of a text such as "2 * rows"."""
+        parts = text.split(" * ")
+        numbers = (int(part) for part in parts if part.isdigit())
+        return cls(prod(numbers), tuple(part for part in parts if not part.isdigit()))
+
+    def of(self, given: Mapping[str, Any]) -> int:
+        """Its value."""
+        value = self.factor
+        for name in self.names:
+            value *= given[name]
+        return value
+
+
+@cache
+def fields_of(record: Any) -> tuple[set[str], list[tuple[str, list[Size], Any]]]:
+    """The names of a record's fields, and its arrays: their names, sizes and kinds."""
     arrays = [
-        (name, [_size(size) for size in sizes], np.int64 if is_whole else np.float64)
+        (name, list(map(Size.of_text, sizes)), np.int64 if is_whole else np.float64)
         for name, is_whole, sizes in arrays_of(record)
     ]
     return {f.name for f in fields(record)}, arrays
-
-
-def _size(text: str) -> tuple[str, int]:
-    factor, _, name = text.rpartition(" * ")
-    return ("", int(name)) if name.isdigit() else (name, int(factor or 1))
 
 
 def address(array: NDArray[Any]) -> int:
@@ -79,18 +103,28 @@ def address(array: NDArray[Any]) -> int:
 
 def filled(record: Any) -> ctypes.Structure:
     """A structure with the numbers of a record and the addresses of its arrays, which must lie
-    together and live as long.
+    together and live as long, and of its records.
     """
     kind: Any = type(record)
-    made = structure(kind)
-    values = (getattr(record, name) for name, *_ in made._fields_)
-    return made(
-        *((address(x) if x.size else 0) if isinstance(x, np.ndarray) else x for x in values)
-    )
+    of_c: Any = structure(kind)
+    own = {name: filled(getattr(record, name)) for name in records_of(kind)}
+    values = (own.get(name, getattr(record, name)) for name, _ in of_c._fields_)
+    made: ctypes.Structure = of_c(*map(_given, values))
+    made.kept = own
+    return made
+
+
+def _given(x: Any) -> Any:
+    """A number, or where an array or a record lies."""
+    if isinstance(x, np.ndarray):
+        return address(x) if x.size else 0
+    return ctypes.addressof(x) if isinstance(x, ctypes.Structure) else x
 
 
 def take(record: Any, made: ctypes.Structure) -> None:
     """Give a record the numbers of its structure; those in its arrays have changed in place."""
     for f in fields(record):
-        if not isinstance(value := getattr(record, f.name), np.ndarray):
+        if isinstance(value := getattr(record, f.name), float | int):
             setattr(record, f.name, type(value)(getattr(made, f.name)))
+        elif is_dataclass(value):
+            take(value, made.kept[f.name])  # type: ignore[attr-defined]

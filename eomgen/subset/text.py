@@ -85,6 +85,8 @@ def kind_of(annotation: ast.expr | None) -> Kind:
         case ast.Name(name):
             return Kind(name)
         case ast.Subscript(ast.Name("Annotated"), ast.Tuple([ast.Name(name), *sizes])):
+            if name not in ARRAYS:  # a record with its size
+                return Kind(name)
             return Kind(ARRAYS[name], tuple(ast.literal_eval(size) for size in sizes))
     raise NotInSubsetError(annotation, "not a kind of the subset")
 

@@ -2,7 +2,8 @@
 
 The text is ordinary Python with few kinds of things:
 
-- numbers: `float`, `int`, `bool`; records, which are dataclasses of numbers and arrays;
+- numbers: `float`, `int`, `bool`; records, which are dataclasses of numbers, of arrays, and of
+  records, with their size n: `Annotated[Factors, "2 * rows"]`;
 - arrays of floats, `Vector` and `Matrix`, and of whole numbers, `Whole`, with their sizes:
   `Annotated[Matrix, "n", "n"]`, where n is an argument, or a size that the printer is given;
 - `Known`: what is a Python object when the text is printed, such as a tableau. Functions are

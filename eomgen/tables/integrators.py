@@ -53,10 +53,10 @@ _OWN: Mapping[str, IntegratorSpec] = {
     ),
     "rk4": IntegratorSpec("classical Runge-Kutta method, order 4", "explicit", "explicit:RK4"),
     "implicit_midpoint": IntegratorSpec(
-        "implicit midpoint rule, order 2", "symplectic", "implicit_midpoint:INTEGRATOR"
+        "implicit midpoint rule, order 2", "symplectic", "implicit_stages:MIDPOINT"
     ),
-    "gauss_4": IntegratorSpec("Gauss collocation, order 4", "symplectic", "gauss_4:INTEGRATOR"),
-    "gauss_6": IntegratorSpec("Gauss collocation, order 6", "symplectic", "gauss_6:INTEGRATOR"),
+    "gauss_4": IntegratorSpec("Gauss collocation, order 4", "symplectic", "implicit_stages:FOUR"),
+    "gauss_6": IntegratorSpec("Gauss collocation, order 6", "symplectic", "implicit_stages:SIX"),
     "RK45": IntegratorSpec("Dormand-Prince 5(4), by SciPy", "explicit", "from_scipy:RK45"),
     "DOP853": IntegratorSpec("Dormand-Prince 8(5,3)", "explicit", "dormand_prince_8:INTEGRATOR"),
     "taylor": IntegratorSpec("Taylor series, order 8 to 24", "explicit", "taylor:INTEGRATOR"),

@@ -7,7 +7,7 @@
 const makeClosure = (mechanism, steps, size, { positions, others, kinds, quaternions, unit, given, derivative }) => {
   const sizes = Float64Array.from(mechanism.constraints, (force) => (force === "N" ? size : 1));
   const [n, nv, rows, ny] = [positions.length, kinds.filter((kind) => kind === "velocity").length, sizes.length, kinds.length];
-  const room = [rows, rows, rows, ny].map((many) => new Float64Array(many));
+  const off = steps.records.Residuals({ rows, sizes });
   const written = (values, out, each = 0) => {
     values.forEach((x, i) => (out[i] = each ? x / sizes[Math.floor(i / each)] : x));
     return true;
@@ -45,7 +45,7 @@ const makeClosure = (mechanism, steps, size, { positions, others, kinds, quatern
     inertia_at: (t, y, out) => written(mechanism.massMatrix(t, y, ...given()), out),
     slopes_at: (t, y, out) => written(mechanism.kineticSlopes(t, y, ...given()), out),
     placed(t, y) {
-      const why = steps.moved_onto(held, ny, rows, t, unit(y), sizes, ...room);
+      const why = steps.moved_onto(held, t, unit(y), off);
       if (why === steps.PROJECTED) return y;
       throw new Error("the loops do not close here: take a smaller step or other lengths");
     },

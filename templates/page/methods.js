@@ -57,8 +57,8 @@ const methods = (() => {
       return { changed: (t, z, h, step) => (steps.leapfrog(system, split, t, z, h, step), 1) };
     }
     const { nv, rows } = held;
-    const [room, ...factors] = [steps.records.Linked({ n: nv, rows }), ...[nv, nv, rows].map((n) => steps.records.Factors({ n }))];
-    return { changed: (t, z, h, step) => steps.rattle(held, nv, rows, t, z, h, room, ...factors, step) };
+    const room = steps.records.Linked({ n: nv, rows });
+    return { changed: (t, z, h, step) => steps.rattle(held, t, z, h, room, step) };
   };
   const leapfrog = explicit((...given) => leapfrogs(...given).changed);
   const composed = (name) => explicit((system, free, y) => {
@@ -79,32 +79,30 @@ const methods = (() => {
     if (!held.mechanism.kineticSlopes || free.ny !== 2 * nv) return false;
     const [early, late] = [0.1, 1.7].map((t) => Array.from(free.f(t, states[0])));
     if (early.some((x, i) => x !== late[i])) return false;
-    const [room, factors] = [steps.records.Linked({ n: nv, rows }), steps.records.Factors({ n: rows })];
+    const room = steps.records.Linked({ n: nv, rows });
     const moving = (k) => states[0].map((x, i) => (i < nv ? x : Math.cos(i + k)));
-    return [...Array(VELOCITIES).keys()].every((k) => steps.moved_force(held, nv, rows, moving(k), room, factors) === -1);
+    return [...Array(VELOCITIES).keys()].every((k) => steps.moved_force(held, moving(k), room) === -1);
   };
 
   // Implicit methods: with loops, with symmetric projection. Else the factors of a step are kept while they
   // serve: they affect how fast the iteration converges, not where to.
   const implicit = (name, many) => (free) => {
     const { ny, steps, held, positions } = free;
-    const { Stages, Factors, Projected } = steps.records;
-    const [system, change] = [systemOf(free), new Float64Array(ny)];
+    const { Stages, Projected } = steps.records;
+    const system = systemOf(free);
     const stages = Stages({ many, positions: positions.length });
-    const factors = Factors({ n: many * ny });
     if (held) {
       const { n, nv, rows, quaternions } = held;
       const room = Projected({ n, nv, rows, many: quaternions.length / 4, stages: many + 1, states: ny, quaternions });
-      const given = [stages, factors, room, Factors({ n: ny }), Factors({ n: 2 * rows }), change];
       return (problem, t, y, h) => {
         system.of = problem;
-        checked(steps[`projected_change_${name}`](system, held, n, nv, rows, t, h, y, ...given));
-        return change;
+        checked(steps[`projected_change_${name}`](system, held, t, h, y, stages, room));
+        return stages.change;
       };
     }
     let [length, count] = [0, 0];
     return (problem, t, y, h) => {
-      const make = () => steps[`implicit_change_${name}`](system, t, h, y, stages, factors, change);
+      const make = () => steps[`implicit_change_${name}`](system, t, h, y, stages);
       stages.has_factors = problem === system.of && h === length && 0 < count && count <= SLOW;
       stages.simplified = true;
       [system.of, length] = [problem, h];
@@ -114,7 +112,7 @@ const methods = (() => {
         count = make();
       }
       checked(count);
-      return change;
+      return stages.change;
     };
   };
 

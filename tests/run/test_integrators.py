@@ -20,16 +20,10 @@ from eomgen.engine import dop853_coefficients as coefficients
 from eomgen.engine.explicit import RUNGE_KUTTA_4 as TABLEAU
 from eomgen.engine.tableau import ButcherTableau, density, size, trees
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import (
-    INTEGRATORS,
-    FixedStep,
-    StepFailure,
-    gauss_4,
-    gauss_6,
-    implicit_midpoint,
-)
+from eomgen.run.integrators import INTEGRATORS, FixedStep, StepFailure
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.integrators.explicit import runge_kutta
+from eomgen.run.integrators.implicit_stages import METHODS as GAUSS
 from eomgen.run.integrators.implicit_stages import ImplicitMethod
 from eomgen.run.problem import Problem
 from eomgen.run.progress import terminal_progress
@@ -42,7 +36,6 @@ ALL = [*FIXED, *ADAPTIVE]
 # Leapfrog and its compositions can integrate few problems.
 GENERAL = [name for name in ALL if not name.startswith("leapfrog")]
 LEAPFROGS = [name for name in ALL if name.startswith("leapfrog")]
-GAUSS = {"implicit_midpoint": implicit_midpoint, "gauss_4": gauss_4, "gauss_6": gauss_6}
 
 PENDULUM = Problem(
     name="pendulum",
@@ -282,7 +275,7 @@ def test_gauss_is_stable_where_stiff(name):
     }[name]
     assert trajectory.y[-1, 0] == pytest.approx(((even + odd) / (even - odd)) ** 100, rel=1e-10)
     # On a linear problem the first iteration is exact, and the second only confirms it.
-    stages = len(GAUSS[name].METHOD.of.b)
+    stages = len(GAUSS[name].of.b)
     assert trajectory.counts["jacobians"] <= 2 * stages * trajectory.counts["steps"]
 
 
@@ -334,13 +327,13 @@ def test_newton_is_not_blurred_by_a_large_state():
 
 def test_singular_newton_matrix_says_what_to_change():
     with pytest.raises(StepFailure, match=r"Newton's matrix is singular; take a smaller --dt"):
-        implicit_midpoint.METHOD.change(stiff(2.0), 0.0, np.array([1.0]), 1.0)
+        GAUSS["implicit_midpoint"].change(stiff(2.0), 0.0, np.array([1.0]), 1.0)
 
 
 def test_newton_does_not_iterate_on_nan():
     lost = replace(BLOW_UP, derivative=lambda t, y: y * np.nan)
     with pytest.raises(StepFailure, match=r"Newton's iteration diverges; take a smaller --dt"):
-        implicit_midpoint.METHOD.change(lost, 0.0, np.array([1.0]), 0.1)
+        GAUSS["implicit_midpoint"].change(lost, 0.0, np.array([1.0]), 0.1)
 
 
 # --- steps, samples, times ----------------------------------------------------------------------
@@ -695,7 +688,7 @@ PROVED = {
     "rk4": {"a": TABLEAU.a, "b": TABLEAU.b, "c": TABLEAU.c, "order": 4},
     "RK45": scipys(RK45, 5),
     "DOP853": dormand_prince(coefficients.END, 8),
-    **{name: collocation(module.METHOD.of, module.METHOD.order) for name, module in GAUSS.items()},
+    **{name: collocation(method.of, method.order) for name, method in GAUSS.items()},
 }
 
 
@@ -765,9 +758,9 @@ def test_dop853_makes_the_steps_of_scipys():
 def test_a_method_of_shares_is_checked_too():
     shares = ((1 / 2, -0.07), (1.07, 1 / 2))
     with pytest.raises(ValueError, match="tableau: "):
-        ImplicitMethod(replace(gauss_4.METHOD.of, shares=shares), 4)
-    for module in GAUSS.values():
-        shares = np.array(module.METHOD.of.shares)
+        ImplicitMethod(replace(GAUSS["gauss_4"].of, shares=shares), 4)
+    for method in GAUSS.values():
+        shares = np.array(method.of.shares)
         assert (shares + shares.T == 1).all(), "to the last digit"
 
 

@@ -34,10 +34,18 @@ class Memory:
     """Numbers and arrays."""
 
     n: int
-    t: float
-    steps: int
     y: Annotated[Vector, "n"]
     order: Annotated[Whole, "n"]
+    t: float = 0.5
+    steps: int = 0
+
+
+@dataclass(slots=True)
+class Book:
+    """A number, and a record of numbers for so many."""
+
+    t: float
+    memory: Annotated[Memory, "2 * many"]
 
 
 class System(Protocol):
@@ -165,6 +173,12 @@ def records(memory: Memory, h: float) -> bool:
     memory.y = there
     moved(memory.n, memory.y)
     return memory.steps > 3
+
+
+def records_in_records(book: Book, h: float) -> bool:
+    """A record of a record, which functions are given."""
+    book.t += h
+    return records(book.memory, book.t)
 
 
 def moved(n: int, x: Annotated[Vector, "n"]) -> None:

@@ -11,6 +11,7 @@ from languages import NONE, Given, results
 
 from eomgen.subset.languages import JAVASCRIPT, C
 from eomgen.subset.printing import printed
+from eomgen.subset.structures import with_room
 from eomgen.subset.text import NotInSubsetError, Text
 
 TEXT = Text.of(constructs)
@@ -79,7 +80,10 @@ CASES: dict[str, list[list[Any]]] = {
     "chosen": [[N + 1, np.array(which), 3, some(N + 1)] for which in ([4, 0, 2], [1, 2, 4])],
     "whole_numbers": [[N, np.array([2, 0, 3, 1]), some(N)]],
     "records": [
-        [constructs.Memory(N, 0.5, steps, some(N), np.arange(N)), 0.25] for steps in (0, 3)
+        [constructs.Memory(N, some(N), np.arange(N), steps=steps), 0.25] for steps in (0, 3)
+    ],
+    "records_in_records": [
+        [constructs.Book(0.5, constructs.Memory(N, some(N), np.arange(N), steps=3)), 0.25]
     ],
     "listed": [[N, some(N), some(N)] for _ in range(3)],
     "with_given": [[GIVEN, 0.3, some(2)]],
@@ -93,6 +97,11 @@ def test_the_same_bits(name: str) -> None:
         TEXT, name, CASES[name], given=GIVEN if name == "with_given" else NONE
     )
     assert others == [python, python]
+
+
+def test_room_for_records_in_records() -> None:
+    book = with_room(constructs.Book, t=0.0, many=3)
+    assert book.memory.y.shape == book.memory.order.shape == (6,)
 
 
 @pytest.mark.parametrize("extra", [False, True])

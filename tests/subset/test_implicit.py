@@ -12,8 +12,9 @@ from languages import NONE, Given, results
 
 from eomgen.engine import few
 from eomgen.engine.differences import differences
-from eomgen.engine.elimination import factored, solve_by
+from eomgen.engine.elimination import Factors, factored, solve_by
 from eomgen.engine.printed import text
+from eomgen.subset.structures import with_room
 
 TEXT = text()
 SEEDED = np.random.default_rng(1)
@@ -35,10 +36,10 @@ def test_elimination(n: int, positions: int) -> None:
     jacobians = SEEDED.normal(size=(4, n, n)) * SEEDED.integers(0, 2, size=(4, n, n))
     jacobians[1:, :positions, :positions] = 0.0
     jacobians[-1] = np.diag([0.0] * positions + [0.25] * (n - positions))
-    same("factored", [[few.plain_factors(n), 0.25, positions, a] for a in jacobians])
+    same("factored", [[with_room(Factors, n=n), 0.25, positions, a] for a in jacobians])
     assert not factored(few.factors_of(n, n), 0.25, positions, jacobians[-1])
     for jacobian in jacobians[:-1]:
-        factors, lists = few.plain_factors(n), few.factors_of(n, n)
+        factors, lists = with_room(Factors, n=n), few.factors_of(n, n)
         b = SEEDED.normal(size=n)
         x, y = b.copy(), b.copy()
         assert factored(factors, 0.25, positions, jacobian)

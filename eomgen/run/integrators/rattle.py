@@ -14,6 +14,7 @@ from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Change
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.projection import Linkage, Projection, without
+from eomgen.subset.structures import with_room
 
 CHECKS = 3
 """Velocities at which forces are checked."""
@@ -36,13 +37,10 @@ def prepare(problem: Problem) -> Change:
             f"integrator: leapfrog takes mechanisms with constraints whose forces depend on "
             f"positions alone, and {why}; take --integrator implicit_midpoint or gauss_4"
         )
-    n, rows = sizes_of(problem)
-    room, step = linked(n, rows), Step()
-    first, second, third = (few.factors_of(k) for k in (n, n, rows))
+    room, step = linked(problem), Step()
 
     def change(problem: Problem, t: float, y: FloatArray, h: float) -> FloatArray:
-        linkage = linkage_of(problem)
-        made = rattle(linkage, n, rows, t, y, h, room, first, second, third, step)
+        made = rattle(linkage_of(problem), t, y, h, room, step)
         if made in WHY:
             raise StepFailure(WHY[made], REMEDY)
         return step.change
@@ -61,11 +59,11 @@ def linkage_of(problem: Problem) -> Linkage:
     return Linkage(cast(Projection, problem.projection), problem.derivative)
 
 
-def linked(n: int, rows: int) -> Linked:
-    """Room for steps of n coordinates with constraints in rows."""
-    here, mass = np.zeros((2, n, n))
-    before, after, ways = np.zeros((3, rows, n))
-    return Linked(n, rows, here, mass, before, after, ways, np.zeros((rows, rows)))
+def linked(problem: Problem) -> Linked:
+    """Room for steps of a problem that has constraints."""
+    n, rows = sizes_of(problem)
+    factors = {"first": few.factors_of(n), "second": few.factors_of(n)}
+    return with_room(Linked, n=n, rows=rows, third=few.factors_of(rows), **factors)
 
 
 def _refused(problem: Problem) -> str:
@@ -86,12 +84,12 @@ def _refused(problem: Problem) -> str:
 
 def _forces_of_velocity(problem: Problem) -> str:
     """Why forces are not those at rest, at seeded velocities; "" if they are."""
-    y, (n, rows) = problem.initial, sizes_of(problem)
-    linkage, room, factors = linkage_of(problem), linked(n, rows), few.factors_of(rows)
+    y, linkage, room = problem.initial, linkage_of(problem), linked(problem)
+    n = room.n
     seeded = np.random.default_rng(1)
     for _ in range(CHECKS):
         moving = np.concatenate((y[:n], seeded.normal(size=n)))
-        found = moved_force(linkage, n, rows, moving, room, factors)
+        found = moved_force(linkage, moving, room)
         if found >= 0:
             return f"that on {problem.states[found]} depends on velocities"
     return ""
