@@ -80,23 +80,23 @@ class Rodas:
     derivatives, factorisations  how many there were
     """
 
-    t_bound: float
-    longest: float
-    rtol: float
-    positions: int
-    timed: bool
-    h_abs: float
-    h_last: float
-    error: float
-    end: float
-    derivatives: int
-    factorisations: int
     atol: Annotated[Vector, "STATES"]
     lost: Annotated[Vector, "STATES"]
     last: Annotated[Vector, "STATES"]
     change: Annotated[Vector, "STATES"]
     solutions: Annotated[Matrix, "STAGES", "STATES"]
     dense: Annotated[Matrix, "3", "STATES"]
+    t_bound: float
+    longest: float
+    rtol: float
+    positions: int
+    timed: bool
+    h_abs: float = 0.0
+    h_last: float = 0.0
+    error: float = 1.0
+    end: float = 0.0
+    derivatives: int = 0
+    factorisations: int = 0
 
 
 @dataclass(slots=True)

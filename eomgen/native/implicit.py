@@ -13,7 +13,7 @@ import numpy as np
 
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
-from eomgen.engine.adaptive import UNUSUAL
+from eomgen.engine.adaptive import UNUSUAL, Bounds
 from eomgen.engine.elimination import Factors
 from eomgen.engine.methods import EQUAL, Root
 from eomgen.engine.rattle import Linked
@@ -123,8 +123,8 @@ def rodas_5p(problem: Problem, of: Mechanism, library: ctypes.CDLL, stretch: Str
     watched, solver, held = stretch.watched, stretch.solver, stretch.constrained
     assert stretch.sizes is None and not (watched and watched.ends)
     ny, most = len(problem.states), 0 if stretch.dense else stretch.most
-    limits = stretch.until, stretch.longest, stretch.rtol
-    run = rodas(ny, stretch.atol, limits, problem.leading_positions, problem.timed)
+    bounds = Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until)
+    run = rodas(ny, bounds, problem.leading_positions, problem.timed)
     run.h_abs, run.h_last, run.error = solver.h_abs, solver.h_last, solver.error
     run.lost[:] = solver.lost
     margins = made_margins(held, most)

@@ -127,4 +127,4 @@ def take(record: Any, made: ctypes.Structure) -> None:
         if isinstance(value := getattr(record, f.name), float | int):
             setattr(record, f.name, type(value)(getattr(made, f.name)))
         elif is_dataclass(value):
-            take(value, made.kept[f.name])  # type: ignore[attr-defined]
+            take(value, made.kept[f.name])

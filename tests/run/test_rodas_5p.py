@@ -177,7 +177,7 @@ def test_the_order_is_five() -> None:
             positions=1,
         )  # fmt: skip
         for _ in range(count):
-            solver.h_abs = solver.max_step = 4.0 / count
+            solver.h_abs = solver.bounds.longest = 4.0 / count
             solver.step()
         errors.append(float(np.abs(solver.y - (math.cos(4), -math.sin(4))).max()))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])

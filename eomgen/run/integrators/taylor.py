@@ -6,17 +6,16 @@ ours is higher.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from eomgen.engine.adaptive import Bounds
 from eomgen.engine.sums import round_off
 from eomgen.engine.taylor import change_after, reach
 from eomgen.run.compiled import Series
-from eomgen.run.integrators.dormand_prince_8 import TOO_SHORT, DormandPrince8
+from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.integrators.interface import Adaptive
+from eomgen.run.integrators.solver import Solver, States
 from eomgen.run.problem import FloatArray
 
 HIGHEST = 24
@@ -31,40 +30,19 @@ def order_of(rtol: float) -> int:
     return min(HIGHEST, max(8, math.ceil(5 - math.log(rtol) / 2)))
 
 
-class TaylorSeries:
-    """A solver of y' = fun(t, y) from `t0` on, with the interface of SciPy's.
-
-    Its state consists of `t`, `y`, and what rounding took from y, `lost`, which is added to the
-    next change. The length `h_abs` of the next step in s follows from them.
+class TaylorSeries(Solver):
+    """The length `h_abs` of the next step in s follows from its state.
 
     series    the Taylor coefficients of the solution
     expanded  coefficients computed for the last step; each takes at least one derivative
     """
 
-    nlu = 0
-
-    def __init__(
-        self,
-        fun: Callable[[float, FloatArray], FloatArray],
-        t0: float,
-        y0: FloatArray,
-        t_bound: float,
-        *,
-        rtol: float,
-        atol: float | FloatArray,
-        series: Series,
-        max_step: float = math.inf,
-    ) -> None:
-        self.fun = fun
-        self._bounds = Bounds(np.zeros(len(y0)) + atol, rtol, max_step)
-        self.t, self.y, self.t_bound = float(t0), y0, t_bound
-        self.t_old = self.t
-        self.status: Literal["running", "finished", "failed"] = "running"
-        self.lost = np.zeros(len(y0))
-        self.order = self.expanded = order_of(rtol)
+    def __init__(self, *given: Any, series: Series, **options: Any) -> None:
+        super().__init__(*given, **options)
+        self.order = self.expanded = order_of(self.bounds.rtol)
         self._series = series
         self._known: tuple[float, FloatArray, FloatArray] | None = None
-        self._taken = (self.t, np.zeros((1, len(y0))))
+        self._taken = (self.t, np.zeros((1, len(self.y))))
 
     def _terms(self) -> FloatArray:
         """The coefficients at t, y."""
@@ -77,34 +55,30 @@ class TaylorSeries:
     @property
     def h_abs(self) -> float:
         """The length of the next step, s."""
-        return reach(self._bounds, self.order, self._terms(), self.y)
+        return reach(self.bounds, self.order, self._terms(), self.y)
 
     @h_abs.setter
     def h_abs(self, length: float) -> None:
         """Runs that continue give what was kept; it follows from the state."""
 
-    def step(self) -> str | None:
-        """Make a step; returns why it failed, or None."""
+    def made(self) -> tuple[float, FloatArray] | None:
+        """See `Solver`."""
         t, y, terms, length = self.t, self.y, self._terms(), self.h_abs
         shortest = 10 * abs(math.nextafter(t, math.inf) - t)
         if not length >= shortest or not np.isfinite(terms).all():
-            self.fun(t, y)  # raises its own error where it has no value
-            self.status = "failed"
-            return TOO_SHORT
+            self.derivative(t, y)  # raises its own error where it has no value
+            return None
         end = min(t + length, self.t_bound)
         change, lost = np.empty(len(y)), np.empty(len(y))
         change_after(end - t, self.order, terms, change)
         change += self.lost
         last = y + change
         round_off(y, last, change, lost)
-        self.lost = lost
-        self.t_old, self.t, self.y, self._taken = t, end, last, (t, terms)
-        if end >= self.t_bound:
-            self.status = "finished"
-        return None
+        self.lost, self._taken = lost, (t, terms)
+        return end, last
 
-    def dense_output(self) -> Callable[[FloatArray | float], FloatArray]:
-        """The states within the last step, as a function of times: (m,) -> (ny, m), or one."""
+    def dense_output(self) -> States:
+        """See `Solver`."""
         start, terms = self._taken
 
         def states(times: FloatArray | float) -> FloatArray:
@@ -119,9 +93,10 @@ class TaylorSeries:
 class _Held(DormandPrince8):
     """Steps where contacts are held: their forces have no series. The slope is not kept."""
 
-    def step(self) -> str | None:
-        self.f = self.fun(self.t, self.y)
-        return super().step()
+    def made(self) -> tuple[float, FloatArray] | None:
+        """See `Solver`."""
+        self.f = self.derivative(self.t, self.y)
+        return super().made()
 
 
 def _solver(*given: Any, series: Series | None, **options: Any) -> TaylorSeries | _Held:
