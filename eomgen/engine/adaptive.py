@@ -83,6 +83,15 @@ class Records:
     most: int
 
 
+@dataclass(slots=True)
+class Start:
+    """The state from which steps begin, its slope if that is known, and what rounding took."""
+
+    state: Annotated[Vector, "STATES"]
+    slope: Annotated[Vector, "STATES"]
+    lost: Annotated[Vector, "STATES"]
+
+
 class Checks(Protocol):
     """What the place where steps are made says of them; false for what it cannot do."""
 
@@ -273,23 +282,20 @@ def made_many(
     checks: Checks,
     run: Bounds,
     at: Progress,
-    state: Annotated[Vector, "STATES"],
-    slope: Annotated[Vector, "STATES"],
-    loss: Annotated[Vector, "STATES"],
+    start: Start,
     kept: Records,
 ) -> int:
-    """Up to `kept.most` steps from a state at `at.t`, with its slope and what rounding took from
-    it. They end at the end, or before one that reaches it if none may, or that anything is unusual
-    in. Returns why.
+    """Up to `kept.most` steps from `at.t` on. They end at the end, or before one that reaches it if
+    none may, or that anything is unusual in. Returns why.
     """
-    y = copy(state)
-    lost = copy(loss)
+    y = copy(start.state)
+    lost = copy(start.lost)
     change = zeros(len(y))
     raw = zeros(len(y))
     place = zeros(len(y))
     k = matrix(16, len(y))
     terms = matrix(7, len(y))
-    k[0] = slope
+    k[0] = start.slope
     passed = 0
     while at.made < kept.most and at.t < run.until:
         length = min(at.length, run.longest)

@@ -16,6 +16,7 @@ from eomgen.engine.adaptive import Bounds
 from eomgen.engine.crossings import (
     MOST_FIRST,
     Along,
+    Between,
     Watch,
     are_far,
     begin_at,
@@ -65,62 +66,48 @@ def passed_over(
     given: Along,
     run: Bounds,
     search: Search,
-    start: float,
-    end: float,
-    y: Annotated[Vector, "STATES"],
-    last: Annotated[Vector, "STATES"],
+    step: Between,
     follows: bool,
 ) -> int:
-    """What a step from y to `last` passes over. Of its switches `found.many` are known, which are
-    all of those of time alone if it `follows` them; `found.now` is then the time of the last one.
+    """What a step passes over. Of its switches `found.many` are known, which are all of those of
+    time alone if it `follows` them; `found.now` is then the time of the last one.
     """
-    length = end - start
     follows_all = follows
     if of.many > 0:
-        follows_all = followed(of, found, given, search, start, end, y, last) and follows
+        follows_all = followed(of, found, given, search, step) and follows
     found.now = found.last
     for n in range(found.many):
         after = found.times[n]
-        found.until = cut(of, found, given, run, start, end, after)
+        found.until = cut(of, found, given, run, step, after)
         if found.until < inf:
             return PASSED_OVER
         found.now = max(found.now, after)
-    if not follows_all and length > found.unseen * (1.0 + TOGETHER):
-        found.until = start + found.unseen
+    if not follows_all and step.end - step.start > found.unseen * (1.0 + TOGETHER):
+        found.until = step.start + found.unseen
         return UNFOLLOWED
     return PASSES_NOTHING
 
 
-def followed(
-    of: Watch,
-    found: Switches,
-    given: Along,
-    search: Search,
-    start: float,
-    end: float,
-    y: Annotated[Vector, "STATES"],
-    last: Annotated[Vector, "STATES"],
-) -> bool:
+def followed(of: Watch, found: Switches, given: Along, search: Search, step: Between) -> bool:
     """Add the switches of the state to those that are known, and say whether these are all. A
     single one is not located exactly if that does not matter.
     """
-    length = end - start
-    begin_at(of, given, start, y)
-    evaluate(of, given, end, last, of.last)
-    parts = turned(of, y, last)
-    if parts <= 1.0 and of.marked == 0 and are_far(of, given, start, length, y, last):
+    begin_at(of, given, step.start, step.first)
+    evaluate(of, given, step.end, step.last, of.last)
+    parts = turned(of, step)
+    if parts <= 1.0 and of.marked == 0 and are_far(of, given, step):
         return True
     if parts > MOST_FIRST:
         return False
     of.parts = of.marked
     if of.marked == 0:
         divide(of, parts)
-    follows = searched(of, given, start, length)
-    alone = of.found + found.many == 1 and is_seen(found.last, start, of.closes[0])
+    follows = searched(of, given, step)
+    alone = of.found + found.many == 1 and is_seen(found.last, step.start, of.closes[0])
     for k in range(of.found):
         at = (of.opens[k] + of.closes[k]) / 2.0
         if not alone:
-            at = located(of, given, search, start, length, k)
+            at = located(of, given, search, step, k)
         if at != at:
             follows = False
         else:
@@ -145,17 +132,13 @@ def is_seen(before: float, between: float, after: float) -> bool:
 
 
 def cut(
-    of: Watch,
-    found: Switches,
-    given: Along,
-    run: Bounds,
-    start: float,
-    end: float,
-    after: float,
+    of: Watch, found: Switches, given: Along, run: Bounds, step: Between, after: float
 ) -> float:
     """The time at which a step must end because of a switch and the one before it; infinity if it
     need not.
     """
+    start = step.start
+    end = step.end
     before = found.now
     gap = after - before
     least = TOGETHER * (end - start)

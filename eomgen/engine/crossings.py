@@ -100,6 +100,16 @@ class Watch:
     found: int = 0
 
 
+@dataclass(slots=True)
+class Between:
+    """A step: when it starts and ends, s, and the states there."""
+
+    start: float
+    end: float
+    first: Annotated[Vector, "STATES"]
+    last: Annotated[Vector, "STATES"]
+
+
 class Along(Protocol):
     """A step, and what can be known along it. What cannot be evaluated is not a number."""
 
@@ -150,41 +160,28 @@ def evaluate(
 
 
 def evaluate_within(
-    of: Watch,
-    given: Along,
-    start: float,
-    length: float,
-    share: float,
-    to: Annotated[Vector, "of.many"],
+    of: Watch, given: Along, step: Between, share: float, to: Annotated[Vector, "of.many"]
 ) -> None:
     """The functions at a fraction of the step."""
-    of.moments[0] = start + length * share
+    of.moments[0] = step.start + (step.end - step.start) * share
     given.states_at(1, of.moments, of.places)
     evaluate(of, given, of.moments[0], of.places[0], to)
 
 
-def turned(of: Watch, y: Annotated[Vector, "STATES"], last: Annotated[Vector, "STATES"]) -> float:
-    """The greatest change of an angle in a step from y to `last`, in parts of which each is
-    resolved.
-    """
+def turned(of: Watch, step: Between) -> float:
+    """The greatest change of an angle in a step, in parts of which each is resolved."""
     change = 0.0
     for i in range(of.turning):
-        change = max(change, abs(last[of.angles[i]] - y[of.angles[i]]))
+        change = max(change, abs(step.last[of.angles[i]] - step.first[of.angles[i]]))
     return change / LARGEST_ANGLE if isfinite(change) else 1.0
 
 
-def are_far(
-    of: Watch,
-    given: Along,
-    start: float,
-    length: float,
-    y: Annotated[Vector, "STATES"],
-    last: Annotated[Vector, "STATES"],
-) -> bool:
-    """Whether all functions are so far from 0 that none crosses it in a step from y to `last`."""
-    if not of.earlier < start:
+def are_far(of: Watch, given: Along, step: Between) -> bool:
+    """Whether all functions are so far from 0 that none crosses it in a step."""
+    if not of.earlier < step.start:
         return False
-    ratio = length / (start - of.earlier)
+    length = step.end - step.start
+    ratio = length / (step.start - of.earlier)
     moved = abs(of.last - of.first) + abs(of.first - of.before) * ratio
     is_start = all_within(FAR * moved, abs(of.first))
     is_end = all_within(FAR * moved, abs(of.last))
@@ -193,8 +190,8 @@ def are_far(
     # A function that is periodic in time may have the same value at the ends of all steps.
     if of.timed:
         for share in unrolled(IRREGULAR):
-            of.places[0] = y + share * (last - y)
-            evaluate(of, given, start + share * length, of.places[0], of.values[0])
+            of.places[0] = step.first + share * (step.last - step.first)
+            evaluate(of, given, step.start + share * length, of.places[0], of.values[0])
             is_slow = all_within(FAR * abs(of.values[0] - of.first), abs(of.first))
             if not is_slow:
                 return False
@@ -212,9 +209,10 @@ def divide(of: Watch, least: float) -> None:
     of.marks[of.parts] = 1.0
 
 
-def searched(of: Watch, given: Along, start: float, length: float) -> bool:
+def searched(of: Watch, given: Along, step: Between) -> bool:
     """Bracket the zeros in the step, and say whether all of it was searched."""
-    waiting = first_parts(of, given, start, length)
+    length = step.end - step.start
+    waiting = first_parts(of, given, step)
     while waiting > 0:
         p = waiting - 1
         a = of.starts[p]
@@ -227,21 +225,21 @@ def searched(of: Watch, given: Along, start: float, length: float) -> bool:
                 if of.asked[p, i] == PASSING:
                     if of.found == of.room:
                         return False
-                    of.opens[of.found] = start + a * length
-                    of.closes[of.found] = start + b * length
+                    of.opens[of.found] = step.start + a * length
+                    of.closes[of.found] = step.start + b * length
                     of.which[of.found] = i
                     of.found += 1
         else:
             if of.left < 6:
                 return False
             halve(of, p)
-            fill_part(of, given, start, length, p)
-            fill_part(of, given, start, length, waiting)
+            fill_part(of, given, step, p)
+            fill_part(of, given, step, waiting)
             waiting += 1
     return True
 
 
-def first_parts(of: Watch, given: Along, start: float, length: float) -> int:
+def first_parts(of: Watch, given: Along, step: Between) -> int:
     """The parts with which the search begins, the earliest last; returns their number."""
     end = copy(of.last)
     for p in range(of.parts):
@@ -251,13 +249,13 @@ def first_parts(of: Watch, given: Along, start: float, length: float) -> int:
         of.ends[p] = of.marks[i + 1]
         of.values[row + 4] = end
         if i > 0:
-            evaluate_within(of, given, start, length, of.starts[p], of.values[row])
+            evaluate_within(of, given, step, of.starts[p], of.values[row])
         else:
             of.values[row] = of.first
         end = copy(of.values[row])
         for j in range(of.many):
             of.asked[p, j] = UNCLEAR
-        fill_part(of, given, start, length, p)
+        fill_part(of, given, step, p)
     return of.parts
 
 
@@ -279,13 +277,14 @@ def halve(of: Watch, p: int) -> None:
         of.asked[p + 1, j] = of.asked[p, j]
 
 
-def fill_part(of: Watch, given: Along, start: float, length: float, p: int) -> None:
+def fill_part(of: Watch, given: Along, step: Between, p: int) -> None:
     """Evaluate the functions at the inner points of a part."""
     a = of.starts[p]
     size = of.ends[p] - a
+    length = step.end - step.start
     row = 5 * p + 1
     for m, share in unrolled(SHARES):
-        of.moments[m] = start + length * (a + size * share)
+        of.moments[m] = step.start + length * (a + size * share)
     given.states_at(3, of.moments, of.places)
     for m in range(3):
         evaluate(of, given, of.moments[m], of.places[m], of.values[row + m])
@@ -335,14 +334,16 @@ def classified(
     return is_clear
 
 
-def located(of: Watch, given: Along, search: Search, start: float, length: float, k: int) -> float:
+def located(of: Watch, given: Along, search: Search, step: Between, k: int) -> float:
     """The time at which the function of bracket k crosses 0, not a number if it is not found."""
     i = of.which[k]
     a = of.opens[k]
     b = of.closes[k]
-    evaluate_within(of, given, start, length, (a - start) / length, of.values[0])
+    start = step.start
+    length = step.end - start
+    evaluate_within(of, given, step, (a - start) / length, of.values[0])
     at_a = of.values[0, i]
-    evaluate_within(of, given, start, length, (b - start) / length, of.values[0])
+    evaluate_within(of, given, step, (b - start) / length, of.values[0])
     at_b = of.values[0, i]
     if not at_a * at_b < 0.0:  # 0 at an end
         return a if at_a == 0.0 else b
@@ -350,6 +351,6 @@ def located(of: Watch, given: Along, search: Search, start: float, length: float
     search.rtol = RTOL
     answer = begun(search, a, b, at_a, at_b)
     while answer == WANTED:
-        evaluate_within(of, given, start, length, (search.here - start) / length, of.values[0])
+        evaluate_within(of, given, step, (search.here - start) / length, of.values[0])
         answer = gone_on(search, of.values[0, i])
     return search.here if answer == FOUND else nan

@@ -24,6 +24,7 @@ from eomgen.engine.adaptive import (
     Checks,
     Progress,
     Records,
+    Start,
 )
 from eomgen.engine.sums import round_off
 from eomgen.subset.words import (
@@ -87,12 +88,15 @@ class Recurrences(Protocol):
 
 @dataclass(slots=True)
 class Terms:
-    """Where coefficients are computed: the first ones, sums of products, and those of factors."""
+    """Where coefficients are computed: the first ones, sums of products, and those of factors; and
+    the order of steps.
+    """
 
     first: Annotated[Vector, "FIRST"]
     sums: Annotated[Vector, "PRODUCTS"]
     left: Annotated[Matrix, "ORDERS", "PRODUCTS"]
     right: Annotated[Matrix, "ORDERS", "PRODUCTS"]
+    order: int = 0
 
 
 @cache
@@ -211,19 +215,18 @@ def taylor_steps(
     of: Recurrences,
     checks: Checks,
     run: Bounds,
-    order: int,
     at: Progress,
-    state: Annotated[Vector, "STATES"],
-    loss: Annotated[Vector, "STATES"],
+    start: Start,
     room: Terms,
     rows: Annotated[Matrix, "ORDERS", "STATES"],
     kept: Records,
 ) -> int:
-    """Up to `kept.most` steps from a state at `at.t`, with what rounding took from it. They end at
-    the end of the run, or before one that anything is unusual in. Returns why.
+    """Up to `kept.most` steps from `at.t` on. They end at the end of the run, or before one that
+    anything is unusual in. Returns why.
     """
-    y = copy(state)
-    lost = copy(loss)
+    order = room.order
+    y = copy(start.state)
+    lost = copy(start.lost)
     raw = zeros(len(y))
     change = zeros(len(y))
     passed = 0

@@ -11,7 +11,7 @@ import numpy as np
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
-from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
+from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records, Start
 from eomgen.engine.branches import Switches
 from eomgen.engine.crossings import Watch
 from eomgen.engine.embedded import DOP853
@@ -94,12 +94,11 @@ def dop853(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
         watched.clear if watched else math.inf,
         *map(address, (margins[1:], switched, values, switches, gap_checks, helds)),
     )
-    begun = [np.ascontiguousarray(array) for array in (solver.y, solver.f, solver.lost)]
+    begun = Start(*map(np.ascontiguousarray, (solver.y, solver.f, solver.lost)))
+    start = filled(begun)
     call = library.dop853
-    call.restype, call.argtypes = _WHOLE, [_POINTER] * 6
-    why = call(
-        *map(ctypes.addressof, (checks, at)), *map(address, begun), ctypes.addressof(records)
-    )
+    call.restype, call.argtypes = _WHOLE, [_POINTER] * 4
+    why = call(*map(ctypes.addressof, (checks, at, start, records)))
     n: int = at.made
     counts = {"switches": switches, "gap_checks": gap_checks, "held": helds}
     return stride(

@@ -12,7 +12,7 @@ from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.series import recurrences_of, series_functions
-from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records
+from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records, Start
 from eomgen.engine.taylor import Terms, convolved, expanded
 from eomgen.native.memory import room
 from eomgen.native.strides import stride
@@ -24,7 +24,7 @@ from eomgen.run.compiled import Array, Series, Stretch, Stride
 from eomgen.run.integrators.taylor import HIGHEST, order_of
 from eomgen.run.module import given_values
 from eomgen.scalars.floats import FloatScalars
-from eomgen.subset.structures import address, filled
+from eomgen.subset.structures import filled
 
 MAIN = "taylor.c"
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -128,7 +128,7 @@ class CompiledTaylor:
         self._at = self._fixed.ctypes.data
         self._series, self._steps = library.series, library.steps
         self._series.argtypes = [_POINTER, _REAL, _POINTER, _WHOLE, _POINTER]
-        self._steps.argtypes = [*[_POINTER] * 2, _WHOLE, *[_POINTER] * 4]
+        self._steps.argtypes = [*[_POINTER] * 2, _WHOLE, *[_POINTER] * 3]
         self._steps.restype = _WHOLE
 
     def series(self, t: float, y: Array, order: int) -> Array:
@@ -150,9 +150,10 @@ class CompiledTaylor:
         kept, records = room(Records, slopes=none, terms=none, rows=rows, **sizes)
         run = filled(Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until))
         at = filled(Progress(solver.t))
-        start = [np.ascontiguousarray(array) for array in (solver.y, solver.lost)]
+        begun = Start(*map(np.ascontiguousarray, (solver.y, none, solver.lost)))
+        start = filled(begun)
         why = self._steps(
-            *(self._at, ctypes.addressof(run), order_of(stretch.rtol), ctypes.addressof(at)),
-            *(*map(address, start), ctypes.addressof(records)),
+            *(self._at, ctypes.addressof(run), order_of(stretch.rtol)),
+            *map(ctypes.addressof, (at, start, records)),
         )
         return stride(kept, at.made, ("h_abs", "lost"), why != UNUSUAL)

@@ -20,7 +20,15 @@ from eomgen.engine.branches import (
     Switches,
     passed_over,
 )
-from eomgen.engine.crossings import MOST_FIRST, MOST_PARTS, Watch, divide, end_at, turned
+from eomgen.engine.crossings import (
+    MOST_FIRST,
+    MOST_PARTS,
+    Between,
+    Watch,
+    divide,
+    end_at,
+    turned,
+)
 from eomgen.engine.roots import Search
 from eomgen.run.compiled import Watched
 from eomgen.run.localised import FREE, Features, Smooth, slope
@@ -47,16 +55,12 @@ class Tolerances(Protocol):
     def allowed(self, y: FloatArray) -> FloatArray: ...
 
 
-@dataclass(frozen=True)
-class Step:
-    """A step of a method: from `start` to `end`, s, the states there, those between and, if they
-    are known, the derivatives at both ends (2, ny).
+@dataclass(slots=True)
+class Step(Between):
+    """A step of a method: also the states between and, if they are known, the derivatives at both
+    ends (2, ny).
     """
 
-    start: float
-    end: float
-    first: FloatArray
-    last: FloatArray
     states: States
     slopes: FloatArray | None = None
 
@@ -216,8 +220,7 @@ class BranchMonitor:
         of = self._watching(step, marks)
         found = self._known(times, of.room)
         along = _Along(step, self.problem, self.switching)
-        given = Search(), step.start, step.end, step.first, step.last, follows
-        why = passed_over(of, found, along, self._bounds, *given)
+        why = passed_over(of, found, along, self._bounds, Search(), step, follows)
         if why != PASSES_NOTHING:
             return Retry(found.until, seen=why == PASSED_OVER)
         found.last = found.now
@@ -239,7 +242,7 @@ class BranchMonitor:
             of.here, of.first[:] = step.start, first
         of.marked = 0
         if marks and of.many:
-            least = turned(of, step.first, step.last)
+            least = turned(of, step)
             if least <= MOST_FIRST:
                 divide(of, least)
                 shares = sorted({*of.marks[: of.parts + 1].tolist(), *marks})

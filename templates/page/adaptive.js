@@ -128,7 +128,7 @@ const adaptive = (() => {
         step = { t, y, ...made };
         step.last = of.placed(step.end, step.raw.slice());
         Object.assign(found, { until: Infinity, many: 0 });
-        if (!steps.passed_over(watch, found, along, run, {}, t, step.end, y, step.last, 1)) break;
+        if (!steps.passed_over(watch, found, along, run, {}, { start: t, end: step.end, first: y, last: step.last }, 1)) break;
         run.until = found.until; // it passed over a corner: it is repeated
       }
       steps.end_at(watch, step.end);
