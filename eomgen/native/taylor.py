@@ -98,7 +98,8 @@ class InPython:
 def room_of(text: SeriesText, kind: Any = float) -> Terms:
     """Room for the series of a text, in numbers of a kind."""
     shapes = (text.first,), (text.products,), *[(HIGHEST + 1, text.products)] * 2
-    return Terms(*(np.zeros(shape, kind) for shape in shapes))
+    first, sums, left, right = (np.zeros(shape, kind) for shape in shapes)
+    return Terms(first, sums, left, right)
 
 
 def plain_series(program: Program, interface: Interface, module: Any, p: Any, u: Any) -> Series:

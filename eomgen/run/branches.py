@@ -8,7 +8,7 @@ their sign (`schedule`).
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from eomgen.engine.crossings import (
 )
 from eomgen.engine.roots import Search
 from eomgen.run.compiled import Watched
+from eomgen.run.integrators.interface import Tolerances
 from eomgen.run.localised import FREE, Features, Smooth, slope
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.schedule import Schedule
@@ -41,18 +42,6 @@ MOST_BRACKETS = 32
 """Most zeros in a step that compiled code finds."""
 States = Callable[[Any], FloatArray]
 """The states (n, ny) at times (n,) within a step, or the state (ny,) at a single time."""
-
-
-class Tolerances(Protocol):
-    """What the error of steps may be; see `integrators.adaptive.Bounds`."""
-
-    @property
-    def rtol(self) -> float: ...
-    @property
-    def atol(self) -> float | FloatArray: ...
-    @property
-    def unseen(self) -> float: ...
-    def allowed(self, y: FloatArray) -> FloatArray: ...
 
 
 @dataclass(slots=True)

@@ -36,8 +36,12 @@ class Passage:
     def beyond(
         self, seen: Seen, start: tuple[float, FloatArray], advance: Advance | None
     ) -> tuple[Sequence[Advance], Iterator[Advance]] | None:
-        """See `singular.Passing`. The way through begins at the end of `advance`, unless that is
-        too near to the change point, or beyond it.
+        """The steps that take the place of the one from `start`, `advance`, or of one that failed,
+        and lead through a singular position, and those of the run that follow; None if there is no
+        such position, or no way through.
+
+        The way begins at the end of `advance`, unless that is too near to the change point, or
+        beyond it.
         """
         held = _held(self.problem)
         self._made += advance.steps if advance else 0

@@ -1,15 +1,15 @@
 """Singular positions of a mechanism with constraints, at which a run stops."""
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import Protocol, TypeVar
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.run.closed_form import ClosedForm
-from eomgen.run.compiled import Margins
 from eomgen.run.failure import EndedRunError, StepFailure
+from eomgen.run.integrators.interface import Advance
 from eomgen.run.margins import IN_CLOSED_FORM, NEAR, SINGULAR, Seen, rank_margin, stays_away
+from eomgen.run.passage import Passage
 from eomgen.run.projection import Projection, without
 
 FloatArray = NDArray[np.float64]
@@ -62,36 +62,13 @@ class SingularPositionError(StepFailure):
         return StepFailure, (self.reason, self.remedy)
 
 
-class Part(Protocol):
-    """A step, as far as it is watched."""
-
-    @property
-    def t(self) -> float:
-        """Its end."""
-
-    @property
-    def y(self) -> FloatArray:
-        """The state there."""
-
-    @property
-    def within(self) -> Callable[[float], FloatArray]:
-        """The state at a time within it."""
-
-    @property
-    def margins(self) -> Margins | None:
-        """Of several steps that have been watched, those of the last one."""
-
-
-Steps = TypeVar("Steps", bound=Part)
-
-
 def watched(
     projection: Projection | ClosedForm,
-    advances: Iterator[Steps],
+    advances: Iterator[Advance],
     t: float,
     y: FloatArray,
-    passage: "Passing[Steps] | None" = None,
-) -> Iterator[Steps]:
+    passage: Passage | None = None,
+) -> Iterator[Advance]:
     """The steps of a run from (t, y), which ends where the mechanism is singular, unless a
     `passage` leads on from there.
 
@@ -128,31 +105,19 @@ def watched(
         watch.begin(t, y)
 
 
-class Passing(Protocol[Steps]):
-    """What leads through singular positions where the motion is determined."""
-
-    def beyond(
-        self, seen: Seen, start: tuple[float, FloatArray], advance: Steps | None
-    ) -> tuple[Sequence[Steps], Iterator[Steps]] | None:
-        """The steps that take the place of the one from `start`, `advance`, or of one that failed,
-        and lead through a singular position, and those of the run that follow; None if there is no
-        such position, or no way through.
-        """
-
-
 class _Watch:
     """The margins of a run, as its steps are taken."""
 
     def __init__(self, projection: Projection | ClosedForm, seen: Seen) -> None:
         self._projection, self._seen = projection, seen
-        self._last: Part | None = None
+        self._last: Advance | None = None
 
     def begin(self, t: float, y: FloatArray) -> None:
         """Begin with a state that ends no step."""
         self._seen.begin(t, _least(self._projection, t, y))
         self._last = None
 
-    def take(self, advance: Part) -> None:
+    def take(self, advance: Advance) -> None:
         """Take account of a step. Raises `StepFailure` if it ends or passes where the mechanism is
         singular.
         """
@@ -183,7 +148,9 @@ class _Watch:
         return near
 
 
-def _search(projection: Projection | ClosedForm, start: float, last: Part, advance: Part) -> None:
+def _search(
+    projection: Projection | ClosedForm, start: float, last: Advance, advance: Advance
+) -> None:
     """Look for a singular position in two steps, of which the first begins at `start`, by golden
     section. It ends where none can be.
     """

@@ -25,9 +25,9 @@ from eomgen.run.checks import (
 from eomgen.run.compiled import Compiled, Strikes
 from eomgen.run.integrators import FixedStep, adaptive, find_integrator, fixed_step
 from eomgen.run.integrators.fixed_step import Grid
-from eomgen.run.integrators.interface import Adaptive, Begin, Remark, Resume
+from eomgen.run.integrators.interface import Adaptive, Begin, Remark, Resume, Tolerances
 from eomgen.run.integrators.stability import StabilityMonitor
-from eomgen.run.integrators.stepper import Bounds, Settings
+from eomgen.run.integrators.stepper import Settings
 from eomgen.run.options import Wanted
 from eomgen.run.problem import FloatArray, Problem
 
@@ -161,7 +161,7 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
     if asked.resume is not None and asked.max_step is None:
         longest, unseen = float(asked.resume["longest"]), float(asked.resume["unseen"])
     atol = allowed_errors(problem, asked.integrator, asked.rtol, asked.atol, asked.span)
-    bounds = Bounds(asked.rtol, atol, longest, unseen, asked.max_steps)
+    bounds = Tolerances(asked.rtol, atol, longest, unseen, asked.max_steps)
     compiled = None if asked.guard else _compiled(problem)
     settings = Settings(
         *(method, bounds, asked.t_end, times, remark, compiled.steps if compiled else None),

@@ -96,6 +96,27 @@ class Adaptive:
     smallest_rtol: float = SMALLEST_RTOL
 
 
+@dataclass(frozen=True)
+class Tolerances:
+    """What the steps of a run by an adaptive method may be.
+
+    rtol, atol  tolerances for the error of a step
+    longest     the longest step, s
+    unseen      the longest step, s, if it cannot be checked for branches that it passes over
+    most        greatest number of steps
+    """
+
+    rtol: float
+    atol: float | FloatArray
+    longest: float
+    unseen: float
+    most: int
+
+    def allowed(self, y: FloatArray) -> FloatArray:
+        """The error allowed in a step that ends in the state y (ny,), (ny,)."""
+        return self.atol + self.rtol * np.abs(y)
+
+
 class Advance(NamedTuple):
     """A step, or several, from the end of the one before: the state `y` (ny,) at the end, time `t`.
 

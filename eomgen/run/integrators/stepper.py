@@ -10,7 +10,7 @@ import numpy as np
 from eomgen.run.branches import BranchMonitor, Retry, Step
 from eomgen.run.compiled import Steps
 from eomgen.run.failure import NOT_FINITE, StepFailure
-from eomgen.run.integrators.interface import Adaptive, Remark, Resume
+from eomgen.run.integrators.interface import Adaptive, Remark, Resume, Tolerances
 from eomgen.run.integrators.portions import Portion
 from eomgen.run.problem import FloatArray, Problem, Switching
 from eomgen.run.rows import Row, all_finite
@@ -19,27 +19,6 @@ from eomgen.run.shaking import Shaken
 _STALLED = 100
 """A run stops after this many steps in a row that do not advance the time."""
 _NONE: Mapping[str, Any] = {}
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """Bounds on the steps of a run.
-
-    rtol, atol  tolerances for the error of a step
-    longest     the longest step, s
-    unseen      the longest step, s, if it cannot be checked for branches that it passes over
-    most        greatest number of steps
-    """
-
-    rtol: float
-    atol: float | FloatArray
-    longest: float
-    unseen: float
-    most: int
-
-    def allowed(self, y: FloatArray) -> FloatArray:
-        """The error allowed in a step that ends in the state y (ny,), (ny,)."""
-        return self.atol + self.rtol * np.abs(y)
 
 
 @dataclass(frozen=True)
@@ -55,7 +34,7 @@ class Settings:
     """
 
     method: Adaptive
-    bounds: Bounds
+    bounds: Tolerances
     t_end: float
     times: FloatArray
     remark: Remark
