@@ -51,7 +51,7 @@ class Bounds:
 @dataclass(slots=True)
 class Progress:
     """A step of h s from t to `end`, and the greatest length of the next one, s; the derivatives so
-    far; whether the terms are those of this step; the number of steps made.
+    far; whether the terms are those of this step.
     """
 
     t: float = 0.0
@@ -60,18 +60,25 @@ class Progress:
     length: float = 0.0
     derivatives: int = 0
     is_dense: bool = False
-    made: int = 0
 
 
 @dataclass(slots=True)
 class Records:
-    """Of each step its end, the greatest length of the next one, derivatives and rows so far, the
-    state, slope and lost part at its end, and its terms if wanted; and the rows at given times.
+    """Of each step its end, the greatest length of the next one, its own length and error, the
+    least margin of constraints, what it has counted and how many rows there are so far, the state,
+    slope and lost part at its end, and its terms if wanted. The rows at given times. The four
+    states of each quaternion. How many rows are passed, and steps made. A method leaves out what it
+    does not need.
     """
 
     ends: Annotated[Vector, "most"]
     lengths: Annotated[Vector, "most"]
+    last_lengths: Annotated[Vector, "most"]
+    errors: Annotated[Vector, "most"]
+    margins: Annotated[Vector, "most"]
     derivatives: Annotated[Whole, "most"]
+    jacobians: Annotated[Whole, "most"]
+    factorisations: Annotated[Whole, "most"]
     sampled: Annotated[Whole, "most"]
     states: Annotated[Matrix, "most", "STATES"]
     slopes: Annotated[Matrix, "most", "STATES"]
@@ -79,8 +86,32 @@ class Records:
     terms: Annotated[Matrix, "7 * most", "STATES"]
     times: Annotated[Vector, "count"]
     rows: Annotated[Matrix, "count", "STATES"]
+    quaternions: Annotated[Whole, "4 * many"]
+    many: int
     count: int
     most: int
+    passed: int = 0
+    made: int = 0
+
+
+def keep(
+    kept: Records,
+    end: float,
+    length: float,
+    y: Annotated[Vector, "STATES"],
+    lost: Annotated[Vector, "STATES"],
+) -> None:
+    """Keep a step, whose last state is also that of rows at its end."""
+    while kept.passed < kept.count and kept.times[kept.passed] <= end:
+        kept.rows[kept.passed] = y
+        kept.passed += 1
+    i = kept.made
+    kept.ends[i] = end
+    kept.lengths[i] = length
+    kept.sampled[i] = kept.passed
+    kept.states[i] = y
+    kept.losses[i] = lost
+    kept.made += 1
 
 
 @dataclass(slots=True)
@@ -120,8 +151,8 @@ class Checks(Protocol):
         """
         ...
 
-    def keeps(self, at: Progress, last: Annotated[Vector, "STATES"]) -> bool:
-        """A step to this state is kept, or is not."""
+    def keeps(self, i: int, at: Progress, last: Annotated[Vector, "STATES"]) -> bool:
+        """Step i, to this state, is kept, or is not."""
         ...
 
 
@@ -296,8 +327,7 @@ def made_many(
     k = matrix(16, len(y))
     terms = matrix(7, len(y))
     k[0] = start.slope
-    passed = 0
-    while at.made < kept.most and at.t < run.until:
+    while kept.made < kept.most and at.t < run.until:
         length = min(at.length, run.longest)
         if not length >= 10.0 * abs(next_after(at.t) - at.t):
             return UNUSUAL
@@ -314,38 +344,30 @@ def made_many(
         why = checks.seen(at, y, raw, last, k, terms)
         if why != MADE:
             return why
-        first = passed
-        while passed < kept.count and kept.times[passed] < at.end:
-            passed += 1
-        if passed > first or run.dense:
+        has_rows = kept.passed < kept.count and kept.times[kept.passed] < at.end
+        if has_rows or run.dense:
             interpolate(method, system, at, y, raw, k, terms)
-        for row in range(first, passed):
-            within(at, y, terms, kept.times[row], place)
-            if not checks.placed(kept.times[row], place):
+        while kept.passed < kept.count and kept.times[kept.passed] < at.end:
+            now = kept.times[kept.passed]
+            within(at, y, terms, now, place)
+            if not checks.placed(now, place):
                 return UNUSUAL
-            kept.rows[row] = place
-        while passed < kept.count and kept.times[passed] <= at.end:
-            kept.rows[passed] = last
-            passed += 1
+            kept.rows[kept.passed] = place
+            kept.passed += 1
         past = method.last + 1
         if at.is_dense:
             past = len(method.nodes)
-        if not checks.are_usual(k, method.last + 1, past) or not checks.keeps(at, last):
+        if not checks.are_usual(k, method.last + 1, past) or not checks.keeps(kept.made, at, last):
             return UNUSUAL
         round_off(y, raw, change, lost)
         y = copy(last)
         k[0] = k[method.last]
         at.t = at.end
-        i = at.made
-        kept.ends[i] = at.t
-        kept.lengths[i] = at.length
+        i = kept.made
+        keep(kept, at.t, at.length, y, lost)
         kept.derivatives[i] = at.derivatives
-        kept.sampled[i] = passed
-        kept.states[i] = y
         kept.slopes[i] = k[0]
-        kept.losses[i] = lost
         if run.dense:
             for term in range(7):
                 kept.terms[7 * i + term] = terms[term]
-        at.made += 1
     return MADE

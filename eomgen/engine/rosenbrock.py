@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from eomgen.engine.adaptive import AT_END, MADE, UNUSUAL
+from eomgen.engine.adaptive import AT_END, MADE, UNUSUAL, Records, keep
 from eomgen.engine.elimination import Factors, factored, solve_by
 from eomgen.engine.equal_steps import Constrained
 from eomgen.engine.quaternions import normalised
@@ -30,7 +30,6 @@ from eomgen.subset.words import (
     Matrix,
     Row,
     Vector,
-    Whole,
     combined,
     copy,
     inf,
@@ -97,34 +96,6 @@ class Rodas:
     end: float = 0.0
     derivatives: int = 0
     factorisations: int = 0
-
-
-@dataclass(slots=True)
-class RodasRecords:
-    """Of each step its end, the length of the next one, its own length and error, the state at its
-    end and what rounding took from it, the least margin of constraints, and derivatives, Jacobians,
-    factorisations and rows so far; the rows at given times; the four states of each quaternion; how
-    many steps were made.
-    """
-
-    ends: Annotated[Vector, "most"]
-    lengths: Annotated[Vector, "most"]
-    last_lengths: Annotated[Vector, "most"]
-    errors: Annotated[Vector, "most"]
-    states: Annotated[Matrix, "most", "STATES"]
-    losses: Annotated[Matrix, "most", "STATES"]
-    margins: Annotated[Vector, "most"]
-    derivatives: Annotated[Whole, "most"]
-    jacobians: Annotated[Whole, "most"]
-    factorisations: Annotated[Whole, "most"]
-    sampled: Annotated[Whole, "most"]
-    times: Annotated[Vector, "count"]
-    rows: Annotated[Matrix, "count", "STATES"]
-    quaternions: Annotated[Whole, "4 * many"]
-    many: int
-    count: int
-    most: int
-    made: int = 0
 
 
 def rms(n: int, x: Annotated[Vector, "n"], scale: Annotated[Vector, "n"]) -> float:
@@ -310,7 +281,7 @@ def rodas_many(
     begun: float,
     smooth: float,
     state: Annotated[Vector, "STATES"],
-    kept: RodasRecords,
+    kept: Records,
 ) -> int:
     """Up to `kept.most` steps from a state at the time `begun` to the end, or before one that
     anything is unusual in, or that ends after `smooth`: up to there no branch of the derivative
@@ -319,7 +290,6 @@ def rodas_many(
     t = begun
     y = copy(state)
     place = zeros(len(y))
-    passed = 0
     while kept.made < kept.most and t < run.t_bound:
         length = min(run.h_abs, run.longest)
         if not length >= 10.0 * abs(next_after(t) - t):
@@ -329,37 +299,29 @@ def rodas_many(
             return UNUSUAL
         if not run.end <= smooth:
             return AT_END
-        while passed < kept.count and kept.times[passed] < run.end:
-            now = kept.times[passed]
+        while kept.passed < kept.count and kept.times[kept.passed] < run.end:
+            now = kept.times[kept.passed]
             rodas_within(run, y, (now - t) / run.h_last, place)
             if not normalised(kept.many, kept.quaternions, place):
                 return UNUSUAL
             if not held.projected(now, place):
                 return UNUSUAL
-            kept.rows[passed] = place
-            passed += 1
+            kept.rows[kept.passed] = place
+            kept.passed += 1
         place[:] = run.last
         if not normalised(kept.many, kept.quaternions, place):
             return UNUSUAL
         if not held.projected(run.end, place):
             return UNUSUAL
-        while passed < kept.count and kept.times[passed] <= run.end:
-            kept.rows[passed] = place
-            passed += 1
         i = kept.made
         if held.is_raised() or not held.keep_step(run.end, place, kept.margins[i:]):
             return UNUSUAL
         t = run.end
         y[:] = place
-        kept.ends[i] = t
-        kept.lengths[i] = run.h_abs
+        keep(kept, t, run.h_abs, y, run.lost)
         kept.last_lengths[i] = run.h_last
         kept.errors[i] = run.error
-        kept.states[i] = y
-        kept.losses[i] = run.lost
         kept.derivatives[i] = run.derivatives
         kept.jacobians[i] = i + 1
         kept.factorisations[i] = run.factorisations
-        kept.sampled[i] = passed
-        kept.made += 1
     return MADE

@@ -25,6 +25,7 @@ from eomgen.engine.adaptive import (
     Progress,
     Records,
     Start,
+    keep,
 )
 from eomgen.engine.sums import round_off
 from eomgen.subset.words import (
@@ -229,26 +230,25 @@ def taylor_steps(
     lost = copy(start.lost)
     raw = zeros(len(y))
     change = zeros(len(y))
-    passed = 0
     while True:
         expanded(of, at.t, y, order, room, rows)
         at.length = reach(run, order, rows, y)
-        if at.made > 0:
-            kept.lengths[at.made - 1] = at.length
-        if at.made >= kept.most:
+        if kept.made > 0:
+            kept.lengths[kept.made - 1] = at.length
+        if kept.made >= kept.most:
             return MADE
         if not at.length >= 10.0 * abs(next_after(at.t) - at.t):
             return UNUSUAL
         at.end = min(at.t + at.length, run.until)
         at.h = at.end - at.t
-        row = passed
-        while row < kept.count and kept.times[row] < at.end:
-            change_after(kept.times[row] - at.t, order, rows, change)
+        while kept.passed < kept.count and kept.times[kept.passed] < at.end:
+            now = kept.times[kept.passed]
+            change_after(now - at.t, order, rows, change)
             raw[:] = y + change
-            if not checks.placed(kept.times[row], raw):
+            if not checks.placed(now, raw):
                 return UNUSUAL
-            kept.rows[row] = raw
-            row += 1
+            kept.rows[kept.passed] = raw
+            kept.passed += 1
         change_after(at.h, order, rows, change)
         change[:] = change + lost
         raw[:] = y + change
@@ -256,20 +256,10 @@ def taylor_steps(
         wrong = ordered(raw * 0.0)
         if wrong != 0.0 or not checks.placed(at.end, raw):
             return UNUSUAL
-        while row < kept.count and kept.times[row] <= at.end:
-            kept.rows[row] = raw
-            row += 1
-        passed = row
         y[:] = raw
         at.t = at.end
         at.derivatives += order
-        i = at.made
-        kept.ends[i] = at.t
-        kept.derivatives[i] = at.derivatives
-        kept.sampled[i] = passed
-        kept.states[i] = y
-        kept.losses[i] = lost
-        at.made += 1
+        kept.derivatives[kept.made] = at.derivatives
+        keep(kept, at.t, at.length, y, lost)
         if not at.end < run.until:
-            kept.lengths[i] = at.length
             return AT_END

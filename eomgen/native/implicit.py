@@ -17,19 +17,17 @@ from eomgen.engine.adaptive import UNUSUAL, Bounds
 from eomgen.engine.elimination import Factors
 from eomgen.engine.methods import EQUAL, Root
 from eomgen.engine.rattle import Linked
-from eomgen.engine.rosenbrock import RodasRecords
 from eomgen.native import equal_steps
 from eomgen.native.mechanism import KERNELS, Mechanism, made_margins
 from eomgen.native.mechanism import context as of_mechanism
-from eomgen.native.memory import room
-from eomgen.native.strides import stride
+from eomgen.native.strides import records_of, stride
 from eomgen.run.compiled import EqualSteps, Stretch, Stride
 from eomgen.run.integrators import rattle
 from eomgen.run.integrators.implicit_stages import projected_of, stages_of
 from eomgen.run.integrators.rodas_5p import rodas
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
-from eomgen.subset.structures import filled, take, with_room
+from eomgen.subset.structures import filled, with_room
 
 MAIN = "implicit.c"
 EQUAL_STEPS: Root = ("equal_steps", {})
@@ -128,11 +126,9 @@ def rodas_5p(problem: Problem, of: Mechanism, library: ctypes.CDLL, stretch: Str
     run.h_abs, run.h_last, run.error = solver.h_abs, solver.h_last, solver.error
     run.lost[:] = solver.lost
     margins = made_margins(held, most)
-    sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
     quaternions = np.array(sum(problem.quaternions, ()), np.int64)
-    given = {"quaternions": quaternions, "many": len(problem.quaternions), **sizes}
-    rows = np.empty((len(stretch.times), ny))
-    kept, records = room(RodasRecords, rows=rows, margins=margins[1:], **given)
+    given = {"quaternions": quaternions, "many": len(problem.quaternions)}
+    kept, records = records_of(stretch, most, margins=margins[1:], **given)
     system = _with(of, room=with_room(Factors, n=ny)).holding(ny, held, None)
     start, clear = np.ascontiguousarray(solver.y), watched.clear if watched else math.inf
     call = library.steps
@@ -143,6 +139,7 @@ def rodas_5p(problem: Problem, of: Mechanism, library: ctypes.CDLL, stretch: Str
         *(solver.t, clear, start.ctypes.data),
         ctypes.byref(records),
     )
-    take(kept, records)
-    n, memory = kept.made, ("h_abs", "h_last", "error", "lost")
-    return stride(kept, n, memory, why != UNUSUAL, margins=margins[: n + 1] if held else None)
+    counts = {"jacobians": kept.jacobians, "factorisations": kept.factorisations}
+    least = margins[: records.made + 1] if held else None
+    memory = "h_abs", "h_last", "error", "lost"
+    return stride(kept, records, memory, why != UNUSUAL, counts, margins=least)

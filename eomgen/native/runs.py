@@ -20,8 +20,7 @@ from eomgen.native import contact_runs, equal_steps
 from eomgen.native.functions import restricted
 from eomgen.native.mechanism import Mechanism, made_margins
 from eomgen.native.mechanism import context as of_mechanism
-from eomgen.native.memory import room
-from eomgen.native.strides import stride
+from eomgen.native.strides import records_of, stride
 from eomgen.program.program import Program
 from eomgen.run import branches
 from eomgen.run.compiled import Array, Stretch, Stride, Watched
@@ -77,10 +76,9 @@ def dop853(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
     watched, solver, most = stretch.watched, stretch.solver, stretch.most
     ny = len(solver.y)
     seen = _Checked.of(watched, ny)
-    sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
-    if not stretch.dense:
-        sizes["terms"] = np.empty((0, ny))
-    kept, records = room(Records, rows=np.empty((len(stretch.times), ny)), **sizes)
+    kept, records = records_of(
+        stretch, most, **({} if stretch.dense else {"terms": np.empty((0, ny))})
+    )
     switched, values = np.empty(most), np.empty((most, seen.watch.many))
     switches, gap_checks, helds = np.zeros((3, most), np.int64)
     margins = made_margins(stretch.constrained, most)
@@ -99,10 +97,9 @@ def dop853(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
     call = library.dop853
     call.restype, call.argtypes = _WHOLE, [_POINTER] * 4
     why = call(*map(ctypes.addressof, (checks, at, start, records)))
-    n: int = at.made
-    counts = {"switches": switches, "gap_checks": gap_checks, "held": helds}
+    counts, n = {"switches": switches, "gap_checks": gap_checks, "held": helds}, records.made
     return stride(
-        *(kept, n, ("h_abs", "f", "lost"), why != UNUSUAL, counts),
+        *(kept, records, ("h_abs", "f", "lost"), why != UNUSUAL, counts),
         switched=switched[:n],
         values=values[:n],
         within=partial(_within, (solver.t, solver.y), kept) if stretch.dense else None,

@@ -12,10 +12,9 @@ from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.series import recurrences_of, series_functions
-from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Records, Start
+from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Start
 from eomgen.engine.taylor import Terms, convolved, expanded
-from eomgen.native.memory import room
-from eomgen.native.strides import stride
+from eomgen.native.strides import records_of, stride
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 from eomgen.program.taylor import Recurrences
@@ -146,9 +145,7 @@ class CompiledTaylor:
         most = 0 if stretch.dense or checked else stretch.most
         ny, solver = self._states, stretch.solver
         none = np.empty((0, ny))
-        sizes = {"most": most, "STATES": ny, "count": len(stretch.times), "times": stretch.times}
-        rows = np.empty((len(stretch.times), ny))
-        kept, records = room(Records, slopes=none, terms=none, rows=rows, **sizes)
+        kept, records = records_of(stretch, most, slopes=none, terms=none)
         run = filled(Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until))
         at = filled(Progress(solver.t))
         begun = Start(*map(np.ascontiguousarray, (solver.y, none, solver.lost)))
@@ -157,4 +154,4 @@ class CompiledTaylor:
             *(self._at, ctypes.addressof(run), order_of(stretch.rtol)),
             *map(ctypes.addressof, (at, start, records)),
         )
-        return stride(kept, at.made, ("h_abs", "lost"), why != UNUSUAL)
+        return stride(kept, records, ("h_abs", "lost"), why != UNUSUAL, {})
