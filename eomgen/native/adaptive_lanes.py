@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c, c_lanes
 from eomgen.codegen.interface import Interface
+from eomgen.engine.adaptive import Bounds
 from eomgen.engine.embedded import DOP853
 from eomgen.native import lanes
 from eomgen.native.lanes import Columns, Lanes, columns_of
@@ -77,18 +78,15 @@ class AdaptiveLanes(Lanes):
         y: FloatArray,
         k: FloatArray,
         u: FloatArray,
-        atol: FloatArray,
-        *,
-        rtol: float,
-        longest: float,
+        bounds: Bounds,
         times: FloatArray,
         addresses: tuple[int, int] | None = None,
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Runs from states (ny, n) at time 0 to the last of `times` (m,), s, ascending.
 
-        atol (ny, n) or (ny, 1) and `rtol` are the tolerances for the error of a step, `longest` is
-        the longest step, s. Of two 64-bit integers at `addresses`, members that have ended are
-        counted in the first, and all runs end early once the second is not 0.
+        The absolute tolerances are (ny, n) or (ny, 1). Of two 64-bit integers at `addresses`,
+        members that have ended are counted in the first, and all runs end early once the second is
+        not 0.
 
         Returns rows (m, ny, n) at these times, and which runs are valid: finite, without a flag,
         and with steps that are neither too short nor too many.
@@ -98,9 +96,9 @@ class AdaptiveLanes(Lanes):
         rows, found = np.empty((len(times), self.states, n)), np.zeros(n, dtype=np.int8)
         idle = np.zeros(2, dtype=np.int64)
         shared = addresses or (idle.ctypes.data, idle.ctypes.data + 8)
-        common = _Common(rtol, longest, float(times[-1]), times.ctypes.data, *shared)
+        common = _Common(bounds.rtol, bounds.longest, float(times[-1]), times.ctypes.data, *shared)
         call = self.library.dop853
         call.argtypes, call.restype = [_POINTER, _LONG, *[Columns] * 4, *[_POINTER] * 2], None
-        arguments = columns_of(y, k, u, atol)
+        arguments = columns_of(y, k, u, bounds.atol)
         call(ctypes.byref(common), n, *arguments, rows.ctypes.data, found.ctypes.data)
         return rows, found == _VALID

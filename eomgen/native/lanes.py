@@ -19,7 +19,7 @@ from eomgen.native.compiler import find_compiler
 from eomgen.native.library import compiled_library
 from eomgen.native.module import USUAL, USUAL_CONSTANT
 from eomgen.program.program import Program
-from eomgen.run.integrators.fixed_step import count_steps
+from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.integrators.stability import HARM, TRIED
 from eomgen.run.problem import USUAL_LENGTH, FloatArray
 
@@ -139,32 +139,31 @@ class Lanes:
         y: FloatArray,
         k: FloatArray,
         u: FloatArray,
+        grid: Grid,
         *,
-        t_end: float,
-        dt: float,
-        every: int,
         sizes: FloatArray,
         unstable: bool = False,
         addresses: tuple[int, int] | None = None,
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Runs from states (ny, n) at 0 to `t_end` by the classical Runge-Kutta method, with steps
-        of `dt`: rows (r, ny, n) after each `every`-th step and at the end, and which runs are
-        valid: finite and, unless `unstable`, with steps that are short enough for stability, or
-        such that growing modes do no harm; `sizes` are those of the states, (ny, n) or (ny, 1).
+        """Runs from states (ny, n) along a grid by the classical Runge-Kutta method: its rows
+        (r, ny, n), without that at the start, and which runs are valid: finite and, unless
+        `unstable`, with steps that are short enough for stability, or such that growing modes do no
+        harm; `sizes` are those of the states, (ny, n) or (ny, 1).
 
         Of two 64-bit integers at `addresses`, members that have ended are counted in the first, and
         all runs end early once the second is not 0.
         """
         y = np.ascontiguousarray(y, dtype=float)
-        n, steps = y.shape[1], int(count_steps(t_end, dt))
-        whole = abs(steps * dt - t_end) <= 4 * math.ulp(t_end)
-        last = dt if whole else t_end - (steps - 1) * dt
-        rows = np.empty((math.ceil(steps / every), self.states, n))
+        n, steps, dt = y.shape[1], grid.steps, grid.dt
+        is_whole = grid.end(steps)[1] is not None
+        last = dt if is_whole else grid.t_end - grid.end(steps - 1)[0]
+        rows = np.empty((math.ceil(steps / grid.every), self.states, n))
         sound = np.zeros(n, dtype=np.int8)
         idle = np.zeros(2, dtype=np.int64)
         shared = addresses or (idle.ctypes.data, idle.ctypes.data + 8)
-        numbers = 0.0, t_end, dt, last, HARM, steps, every, 0 if unstable else TRIED
-        times = _Times(*numbers, *shared, *columns_of(sizes))
+        numbers = grid.t_start, grid.t_end, dt, last, HARM, steps, grid.every
+        tried = 0 if unstable else TRIED
+        times = _Times(*numbers, tried, *shared, *columns_of(sizes))
         call = self.library.rk4
         call.argtypes, call.restype = [_POINTER, _LONG, *[Columns] * 3, *[_POINTER] * 2], None
         call(

@@ -7,12 +7,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from eomgen.engine.adaptive import Bounds
 from eomgen.native import adaptive_lanes, lanes
 from eomgen.native.accelerator import library_key
 from eomgen.native.adaptive_lanes import AdaptiveLanes
 from eomgen.native.lanes import Lanes
 from eomgen.results.ensemble import FINISHED
 from eomgen.run.checks import errors_of_sizes
+from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.module import as_problem, given_values
 from eomgen.run.problem import USUAL_LENGTH, FloatArray, Problem
 from eomgen.run.sizes import mechanism_size, state_sizes
@@ -30,28 +32,25 @@ def run_together(task: Task, values: FloatArray, counter: Counter | None = None)
     Members that overflow, or whose steps seem too long for stability or too many, are run one by
     one: so their messages are the same. Raises `RunError` if there is no compiler.
     """
-    counter, kernels = counter or Counter(), _library(task)
+    counter, kernels, settings = counter or Counter(), _library(task), task.settings
     starts = _Starts(task, values, kernels)
     k, u, y, sound = starts.k, starts.u, starts.y, starts.sound
     if isinstance(kernels, AdaptiveLanes):
         rows, valid = kernels.dop853(
-            y,
-            k,
-            u,
-            starts.allowed(),
-            rtol=task.settings["rtol"],
-            longest=task.settings["max_step"] or math.inf,
+            *(
+                y,
+                k,
+                u,
+                Bounds(starts.allowed(), settings["rtol"], settings["max_step"] or math.inf),
+            ),
             times=np.array(task.times[1:]),
             addresses=counter.addresses,
         )
     else:
         rows, valid = kernels.rk4(
-            *(y, k, u),
-            t_end=task.t_end,
-            dt=task.dt,
-            every=task.every,
+            *(y, k, u, Grid(0.0, task.t_end, task.dt, task.every)),
             sizes=starts.sizes(),
-            unstable=task.settings["unstable"],
+            unstable=settings["unstable"],
             addresses=counter.addresses,
         )
     counter.check()

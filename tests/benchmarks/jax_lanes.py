@@ -24,6 +24,7 @@ import numpy as np
 import eomgen
 from eomgen.api.given import check, read
 from eomgen.base.errors import RunError
+from eomgen.run.integrators.fixed_step import Grid
 from eomgen.store import interfaced_program_of
 
 DT = 1e-3
@@ -70,7 +71,7 @@ def in_c(scene: str, y: np.ndarray, steps: int) -> tuple[float, np.ndarray] | No
     rows = []
 
     def call() -> None:
-        rows[:] = [ours.rk4(y, k, u, t_end=steps * DT, dt=DT, every=steps)[0][-1]]
+        rows[:] = [ours.rk4(y, k, u, Grid(0.0, steps * DT, DT, steps))[0][-1]]
 
     return least(call)[1], rows[0]
 

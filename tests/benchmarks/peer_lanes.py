@@ -14,6 +14,7 @@ import eomgen
 from eomgen.model.model import Model
 from eomgen.native.lanes import Lanes, columns_of, sources
 from eomgen.program.kernel import kernel
+from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.module import load_module
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import generated_code, interfaced_program_of
@@ -185,7 +186,7 @@ def ensembles(models: Sequence[tuple[str, Model]], cores: int, rounds: int) -> N
         ]
 
         def part(y: np.ndarray, k: Any = k, u: Any = u, ours: Any = ours) -> None:
-            _, sound = ours.rk4(y, k, u, t_end=steps * 1e-3, dt=1e-3, every=steps)
+            _, sound = ours.rk4(y, k, u, Grid(0.0, steps * 1e-3, 1e-3, steps))
             assert sound.all()
 
         with ThreadPoolExecutor(cores) as pool:

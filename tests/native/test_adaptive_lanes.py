@@ -13,10 +13,12 @@ from test_lanes import WIDTHS, members
 
 import eomgen
 from eomgen.api.given import check, read
+from eomgen.engine.adaptive import Bounds
 from eomgen.native import adaptive_lanes, lanes
 from eomgen.native.adaptive_lanes import AdaptiveLanes
 from eomgen.run.checks import allowed_errors
 from eomgen.run.integrate import integrate
+from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.module import as_problem, load_module
 from eomgen.store import generated_code, interfaced_program_of
 
@@ -49,7 +51,8 @@ def run(
     k, _, _ = ours.prepare(p.T)
     options = {"longest": math.inf, **LOOSE, **options}
     atol = np.full((ours.states, 1), options.pop("atol"))
-    return ours.dop853(y, k, u, atol, times=times, **options)
+    bounds = Bounds(atol, options.pop("rtol"), options.pop("longest"))
+    return ours.dop853(y, k, u, bounds, times, **options)
 
 
 @pytest.mark.every(2)
@@ -120,7 +123,7 @@ def test_runs_are_counted_and_can_be_stopped(method: str) -> None:
         y, p, u = map(np.ascontiguousarray, columns)
         k, _, _ = ours.prepare(p.T)
         sizes = np.ones((len(y), 1))
-        return ours.rk4(y, k, u, t_end=0.5, dt=0.01, every=50, sizes=sizes, addresses=places)[1]
+        return ours.rk4(y, k, u, Grid(0.0, 0.5, 0.01, 50), sizes=sizes, addresses=places)[1]
 
     assert valid().all() and shared.tolist() == [count, 0]
     shared[1] = 1
@@ -154,7 +157,7 @@ def test_default_tolerances_are_those_of_a_single_run(
     once = AdaptiveLanes.dop853
 
     def watching(self: Any, *given: Any, **options: Any) -> Any:
-        taken.append(given[3])
+        taken.append(given[3].atol)
         return once(self, *given, **options)
 
     monkeypatch.setattr(AdaptiveLanes, "dop853", watching)

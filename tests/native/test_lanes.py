@@ -20,6 +20,7 @@ from eomgen.model.elaborate import in_order
 from eomgen.native import compiler, lanes
 from eomgen.native.lanes import Lanes
 from eomgen.native.library import compiled_library
+from eomgen.run.integrators.fixed_step import Grid
 from eomgen.run.module import load_module
 from eomgen.run.sine import cosine, sine
 from eomgen.scene.built_in import built_in_names
@@ -227,9 +228,7 @@ def test_a_lane_has_the_same_bits_at_every_width_and_beside_any_others(scene: st
         for order in (np.arange(13), np.arange(13)[::-1]):
             given = [np.ascontiguousarray(array[:, order]) for array in (y, k, u)]
             slopes, sound = ours.output("derivative", 0.0, *given)
-            rows, stable = ours.rk4(
-                *given, sizes=np.ones((len(y), 1)), t_end=0.25, dt=0.01, every=10
-            )
+            rows, stable = ours.rk4(*given, Grid(0.0, 0.25, 0.01, 10), sizes=np.ones((len(y), 1)))
             back = np.argsort(order)
             good = [j for j in range(13) if j not in (4, 6)]
             assert not sound[back][4] and stable[back][good].all() and not stable[back][4]
@@ -245,7 +244,7 @@ def test_runs_are_those_of_a_plain_loop(scene: str) -> None:
     ours, module = kernels(scene)
     y, p, u = members(module, 5)
     k, _, _ = ours.prepare(p.T)
-    rows, sound = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=0.253, dt=0.01, every=5)
+    rows, sound = ours.rk4(y, k, u, Grid(0.0, 0.253, 0.01, 5), sizes=np.ones((len(y), 1)))
     assert sound.all() and rows.shape[0] == 6
     for j in range(5):
         state, t = y[:, j], 0.0
@@ -311,7 +310,7 @@ def test_steps_that_are_too_long_are_found(scene: str) -> None:
     nearly = [] if scene == STIFF else [(2.5, True)]
     for steps, stable in ((1.5, True), *nearly, (3.2, False), (6.0, False)):
         dt = steps / fastest
-        _, sound = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=200 * dt, dt=dt, every=200)
+        _, sound = ours.rk4(y, k, u, Grid(0.0, 200 * dt, dt, 200), sizes=np.ones((len(y), 1)))
         assert bool(sound[0]) is stable, steps
 
 
@@ -330,7 +329,7 @@ def test_steps_are_too_long_if_they_do_harm(effect: str, dt: float, sound: bool)
     ours, module = kernels(STIFF.replace(spring, effect))
     k, _, _ = ours.prepare(np.array([[*module.PARAMETERS.values()]]))
     given = (np.array([[0.0], [1.0]]), k, np.zeros((len(module.INPUTS), 1)))
-    _, found = ours.rk4(*given, sizes=np.ones((2, 1)), t_end=400 * dt, dt=dt, every=400)
+    _, found = ours.rk4(*given, Grid(0.0, 400 * dt, dt, 400), sizes=np.ones((2, 1)))
     assert bool(found[0]) is sound
 
 
@@ -347,7 +346,7 @@ def test_stable_runs_are_not_taken_for_unstable(scene: str) -> None:
     ours, module = kernels(scene)
     y, p, u = members(module, 16)
     k, _, _ = ours.prepare(p.T)
-    _, sound = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=0.2, dt=2e-4, every=1000)
+    _, sound = ours.rk4(y, k, u, Grid(0.0, 0.2, 2e-4, 1000), sizes=np.ones((len(y), 1)))
     assert sound.all()
 
 
@@ -362,6 +361,6 @@ def test_no_optimisation_changes_a_bit(request: pytest.FixtureRequest) -> None:
             request.getfixturevalue("optimised")
         ours = Lanes(texts, lanes.width(), about)
         k, _, _ = ours.prepare(p.T)
-        rows, _ = ours.rk4(y, k, u, sizes=np.ones((len(y), 1)), t_end=0.2, dt=0.01, every=5)
+        rows, _ = ours.rk4(y, k, u, Grid(0.0, 0.2, 0.01, 5), sizes=np.ones((len(y), 1)))
         found.append((rows.tobytes(), ours.output("derivative", 0.0, y, k, u)[0].tobytes()))
     assert found[0] == found[1]
