@@ -19,12 +19,14 @@ def templates_folder() -> Path:
 
 @cache
 def environment(folder: str, *, html: bool = False) -> "Environment":
-    """The Jinja2 environment of the templates in `folder`; with `html` it escapes all values."""
+    """The Jinja2 environment of the templates in `folder`; with `html` it escapes all values. They
+    may include others as `FOLDER/NAME`.
+    """
     # Imported here because some callers need the folder only and render nothing.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(
-        loader=FileSystemLoader(templates_folder() / folder),
+        loader=FileSystemLoader([templates_folder() / folder, templates_folder()]),
         undefined=StrictUndefined,
         autoescape=html,
         trim_blocks=True,

@@ -10,7 +10,7 @@ between the two, so that the method evaluates the derivative on that branch.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Protocol
+from typing import Annotated
 
 from eomgen.engine.adaptive import Bounds
 from eomgen.engine.crossings import (
@@ -27,7 +27,7 @@ from eomgen.engine.crossings import (
     turned,
 )
 from eomgen.engine.roots import Search
-from eomgen.subset.words import Matrix, Vector, all_within, inf, zeros
+from eomgen.subset.words import Matrix, Vector, all_within, inf
 
 PASSES_NOTHING, PASSED_OVER, UNFOLLOWED = 0, 1, 2
 """What is found of a step: it passes over nothing; it passes over a branch, or is so long that the
@@ -168,27 +168,3 @@ def matters(of: Watch, found: Switches, given: Along, run: Bounds, length: float
     allowed = run.atol + run.rtol * abs(of.places[1])
     is_allowed = all_within(missed, allowed)
     return not is_allowed
-
-
-class Apart(Protocol):
-    """A step, and the gaps of rigid contacts along it."""
-
-    def gaps_at(self, s: float, gap: Annotated[Vector, "n"], rate: Annotated[Vector, "n"]) -> None:
-        """The gaps, in sizes, and their rates some seconds after its start."""
-
-
-def stay_apart(given: Apart, n: int, length: float) -> bool:
-    """Whether n contacts, none of which is held, are apart all along a step as far as quarters of
-    it show: else one may close, and when is to be found.
-    """
-    gap = zeros(n)
-    before = zeros(n)
-    after = zeros(n)
-    given.gaps_at(0.0, gap, before)
-    for part in range(1, 5):
-        given.gaps_at(0.25 * part * length, gap, after)
-        for c in range(n):
-            if gap[c] < 0.0 or (before[c] < 0.0 and after[c] > 0.0):
-                return False
-        before[:] = after
-    return True

@@ -60,31 +60,60 @@ def through(
     least: Annotated[Vector, "CONTACTS"],
 ) -> int:
     """Go to `end`, about a length from here. WHOLE, or why that is not possible."""
-    n = len(least)
     now.alpha = ALPHA * nothing_held(law, now, at.t, at.y)
     at.since = at.t
     at.events = 0
+    why = met(law, now, at, speeds, least)
+    h = length
+    while why <= OPENED and at.t < end:
+        if not way.go(at.t, at.y, h, end):
+            return NO_STEP
+        why = ended(law, way, within, now, search, at, end, 1.0, speeds, least)
+        h = end - at.t
+    return why if why > OPENED else WHOLE
+
+
+def met(
+    law: ContactLaw,
+    now: Touching,
+    at: Place,
+    speeds: Annotated[Vector, "CONTACTS"],
+    least: Annotated[Vector, "CONTACTS"],
+) -> int:
+    """Let contacts that touch at the start strike, or hold them. WHOLE, or why that is not
+    possible.
+    """
     touching = 0
     gap = law.gaps(at.t, at.y)
-    for c in range(n):
+    for c in range(len(least)):
         at.closed[c] = 0
         if gap[c] <= TOLERANCE:
             at.closed[c] = 1
             touching += 1
-    h = length
-    why = WHOLE
-    if touching > 0:
-        why = struck(law, now, at, speeds, least)
-    while why <= OPENED and at.t < end:
-        if not way.go(at.t, at.y, h, end):
-            return NO_STEP
-        why = taken(law, within, now, search, at, end, 1.0)
-        if why != WHOLE:
-            way.part()
-        if why == CLOSED:
-            why = struck(law, now, at, speeds, least)
-        h = end - at.t
-    return why if why > OPENED else WHOLE
+    if touching == 0:
+        return WHOLE
+    return struck(law, now, at, speeds, least)
+
+
+def ended(
+    law: ContactLaw,
+    way: Way,
+    within: Within,
+    now: Touching,
+    search: Search,
+    at: Place,
+    end: float,
+    share: float,
+    speeds: Annotated[Vector, "CONTACTS"],
+    least: Annotated[Vector, "CONTACTS"],
+) -> int:
+    """Go to the end of a step that was made, or to the first event in it, see `taken`, and let
+    contacts strike that close. WHOLE or OPENED, or why that is not possible.
+    """
+    why = taken(law, within, now, search, at, end, share)
+    if why != WHOLE:
+        way.part()
+    return struck(law, now, at, speeds, least) if why == CLOSED else why
 
 
 def struck(

@@ -11,6 +11,9 @@ from eomgen.subset.words import Vector, Whole, copy, inf, nan, zeros
 
 TOGETHER_CLOSED, TOGETHER_OPENED = 1e-12, 1e-9
 """Contacts that close, or open, within these fractions of a step do so together."""
+SHARE = 0.25
+"""The part of a step by a method with a tolerance at whose ends gaps are checked; those of equal
+length are checked as a whole."""
 GAP, RATE, PUSH = 0, 1, 2
 """What is searched for its zero: the gap of a contact with its slack, its rate, how it is pressed.
 """

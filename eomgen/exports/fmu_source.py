@@ -7,17 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from eomgen.base.templating import render, templates_folder
 from eomgen.codegen.backends import c
 from eomgen.codegen.series import series_functions
-from eomgen.engine import contact_runs, contacts
+from eomgen.engine import contact_runs, contact_times, contacts
 from eomgen.engine.crossings import MOST_PARTS
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.methods import Root
 from eomgen.engine.printed import CONTACTS, text
 from eomgen.exports.fmu_unit import Observed, Unit
-from eomgen.exports.steps import Method, step_of
+from eomgen.exports.steps import Method, contacts_of, step_of
 from eomgen.native.functions import restricted
 from eomgen.program.ordering import ordered
 from eomgen.program.tape import TIME
-from eomgen.run import events
 from eomgen.run.integrators.taylor import HIGHEST
 from eomgen.subset.languages import C
 
@@ -58,7 +57,6 @@ def _main(unit: Unit, token: str, method: Method) -> str:
         "inputs": len(interface.inputs),
         "parameters": len(interface.parameters),
         "outputs": sum(len(o.picks) for o in unit.outputs),
-        "contacts": len(interface.contacts),
         "indicators": sum(len(o.picks) for o in unit.indicators),
         "constants": len(held),
         "nominals": [repr(x) for x in unit.nominals],
@@ -124,7 +122,7 @@ def _more(unit: Unit, method: Method) -> Iterator[Root]:
     if method.adapts and unit.switches:
         yield "passed_over", {}
     if contacts:
-        yield from CONTACTS
+        yield from [*CONTACTS, ("met", {}), ("ended", {})]
         if "jacobian" in method.needed:
             yield "differences", {}
 
@@ -147,19 +145,10 @@ def _observed(parts: Sequence[Observed], start: int) -> list[tuple[str, int, int
 
 
 def _contacts(unit: Unit, method: Method) -> dict[str, object]:
-    held, rest = unit.function("held"), unit.simulation.rest_speed
-    sizes = [unit.size if contact.unit == "m" else 1.0 for contact in unit.interface.contacts]
     return {
-        "held_size": held.shape[0] if held else 0,
+        **contacts_of(unit.interface, unit.size, unit.simulation.rest_speed),
         "contact_names": [contact.name for contact in unit.interface.contacts],
-        "gap_sizes": list(map(repr, sizes)),
-        "rest": ["-1.0" if rest is None else repr(rest / size) for size in sizes],
         "tolerance": repr(contacts.TOLERANCE),
-        "struck": contacts.STRUCK,
-        "endless": contacts.ENDLESS,
-        "no_forces": contacts.NO_FORCES,
-        "share": repr(events.GAP_CHECKS[1] if method.adapts else 1.0),
-        "whole": contact_runs.WHOLE,
-        "closed": contact_runs.CLOSED,
+        "share": repr(contact_times.SHARE if method.adapts else 1.0),
         "opened": contact_runs.OPENED,
     }

@@ -1,26 +1,20 @@
 """What a unit for co-simulation is made of: its program, variables, sizes and start values."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
-from eomgen.base.errors import RunError, SceneError
+from eomgen.base.errors import SceneError
 from eomgen.codegen.interface import Function, Interface, Variable
 from eomgen.codegen.series import FIXED, with_series
 from eomgen.exports.directions import with_directions
-from eomgen.exports.steps import size_of, start_of
+from eomgen.exports.steps import nominals_of, size_of, start_of
 from eomgen.exports.units import rate_of
 from eomgen.model.model import Model
 from eomgen.native.functions import restricted
-from eomgen.program.program import Program, interpret
+from eomgen.program.program import Program
 from eomgen.program.switching import OF_STATE, OF_TIME
-from eomgen.program.tape import TIME
 from eomgen.program.taylor_text import SeriesText
-from eomgen.run.sizes import state_sizes
-from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.schema import Simulation
 from eomgen.store import interfaced_program_of
 from eomgen.tables.outputs import OUTPUTS
@@ -118,7 +112,8 @@ def unit_of(model: Model, simulation: Simulation, needed: Sequence[str] = ()) ->
     series = None
     if FIXED in needed:
         program, interface, series = with_series(program, interface)
-    size, nominals = _sizes(program, interface, starts)
+    size = size_of(interface, starts)
+    nominals = nominals_of(program, interface, starts, size)
     observed = (*_energies(), *_positions(interface))
     gaps = _gaps(interface)
     switches = tuple(_switches(program))
@@ -130,32 +125,6 @@ def unit_of(model: Model, simulation: Simulation, needed: Sequence[str] = ()) ->
     program, interface = with_directions(program, interface, entries)
     sizes = starts, nominals, size
     return Unit(program, interface, simulation, *sizes, observed, gaps, switches, series)
-
-
-def _sizes(
-    program: Program, interface: Interface, starts: tuple[float, ...]
-) -> tuple[float, tuple[float, ...]]:
-    """The size of the mechanism, m, and the sizes of the states."""
-    variables = (*interface.states, *interface.inputs, *interface.parameters)
-    names = [state.name for state in interface.states]
-    units = {v.name: v.unit for v in variables}
-    first = dict(zip(names, starts, strict=True))
-    given = {**{i.name: i.default for i in interface.inputs}, **_defaults(interface), **first}
-    given[TIME] = 0.0
-    try:
-        slope = interpret(program, "derivative", given, FloatScalars())
-    except (ArithmeticError, ValueError):
-        slope = [math.nan]
-    if not all(map(math.isfinite, slope)):
-        raise RunError("the equations have no solution at the initial state; change that state")
-    size = size_of(interface, starts)
-    sizes = state_sizes(names, units, np.array(starts), np.array(slope), size)
-    return size, tuple(sizes.tolist())
-
-
-def _defaults(interface: Interface) -> dict[str, float]:
-    """The scene's values of the parameters, by name."""
-    return {p.name: p.default for p in interface.parameters}
 
 
 def _energies() -> Iterator[Observed]:

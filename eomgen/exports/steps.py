@@ -1,10 +1,13 @@
 """Steps of exported C: those of the engine, onto unit quaternions and the constraints of loops."""
 
+import math
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import numpy as np
 
 from eomgen.base.errors import RunError, nearest
 from eomgen.base.templating import render
@@ -21,13 +24,14 @@ from eomgen.engine.symmetric import Projected
 from eomgen.engine.taylor import Terms
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
+from eomgen.program.tape import TIME
 from eomgen.program.taylor_text import SeriesText
 from eomgen.run.integrators import INTEGRATORS, Adaptive, rattle
 from eomgen.run.integrators.leapfrog import split_of
 from eomgen.run.integrators.taylor import HIGHEST
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
-from eomgen.run.sizes import mechanism_size
+from eomgen.run.sizes import mechanism_size, state_sizes
 from eomgen.scalars.floats import FloatScalars
 from eomgen.store import generated_code
 from eomgen.subset.languages import Language
@@ -311,10 +315,44 @@ def sizes_of(method: Method, interface: Interface, size: float) -> dict[str, Any
 
 
 def contacts_left_out(interface: Interface) -> tuple[str, ...]:
-    """A remark on rigid contacts, which steps alone do not have."""
+    """A remark on rigid contacts, where steps do not have them."""
     return ("steps know no impacts: rigid contacts are left out of them",) * bool(
         interface.contacts
     )
+
+
+def contacts_of(interface: Interface, size: float, rest: float | None) -> dict[str, Any]:
+    """Values for templates: the rigid contacts of a mechanism of this size, m; `rest` is the speed
+    below which they do not bounce, m/s or rad/s, or None.
+    """
+    sizes = [size if contact.unit == "m" else 1.0 for contact in interface.contacts]
+    pressed = [f.shape[0] for f in interface.functions if f.name == "held"]
+    return {
+        "contacts": len(sizes),
+        "pressed": pressed[0] if sizes else 0,
+        "gap_sizes": list(map(repr, sizes)),
+        "rest": ["-1.0" if rest is None else repr(rest / size) for size in sizes],
+    }
+
+
+def nominals_of(
+    program: Program, interface: Interface, starts: tuple[float, ...], size: float
+) -> tuple[float, ...]:
+    """The sizes of the states of a mechanism of this size, m. Raises `RunError` if there is no
+    derivative at the initial state.
+    """
+    names = [state.name for state in interface.states]
+    units = {v.name: v.unit for v in (*interface.states, *interface.inputs, *interface.parameters)}
+    given = {v.name: v.default for v in (*interface.inputs, *interface.parameters)}
+    given |= {TIME: 0.0, **dict(zip(names, starts, strict=True))}
+    try:
+        slope = interpret(program, "derivative", given, FloatScalars())
+    except (ArithmeticError, ValueError):
+        slope = [math.nan]
+    if not all(map(math.isfinite, slope)):
+        raise RunError("the equations have no solution at the initial state; change that state")
+    sizes = state_sizes(names, units, np.array(starts), np.array(slope), size)
+    return tuple(sizes.tolist())
 
 
 def step_of(

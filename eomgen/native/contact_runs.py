@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from eomgen.codegen.interface import Interface
 from eomgen.engine import contact_runs, equal_steps
+from eomgen.engine.contact_times import SHARE
 from eomgen.run.compiled import Array, Touched, Whole
 from eomgen.subset.structures import filled, take
 
@@ -21,10 +22,10 @@ class Events(ctypes.Structure):
     """`Events` of `templates/c/contact_runs.c.jinja`."""
 
     _fields_ = (
-        *((name, _POINTER) for name in ("of", "sizes", "now", "at", "slack", "y", "last")),
+        *((name, _POINTER) for name in ("of", "sizes", "now", "at", "slack")),
         *((name, _REAL) for name in ("t", "end")),
         *(("calls", _POINTER), ("called", _WHOLE * 3), ("made", _WHOLE), ("sound", _WHOLE)),
-        ("method", _POINTER),
+        *((name, _POINTER) for name in ("y", "last", "method", "checks")),
     )
     kept: Any
 
@@ -39,27 +40,26 @@ def sizes(interface: Interface) -> dict[str, int]:
 def context(interface: Interface) -> dict[str, Any]:
     """The values of the template."""
     codes = {"whole": contact_runs.WHOLE, "opened": contact_runs.OPENED}
-    return {**sizes(interface), **codes, "event": equal_steps.EVENT}
+    return {**sizes(interface), **codes, "event": equal_steps.EVENT, "share": repr(SHARE)}
 
 
 def events(of: ctypes.Structure, touched: Touched) -> Events:
     """What C is given of the contacts of a `native.mechanism.Mechanism`."""
     now, at = filled(touched.now), filled(touched.at)
-    start = touched.at.y.copy()
     made = Events(
         *(ctypes.addressof(of), touched.sizes.ctypes.data),
         *(ctypes.addressof(record) for record in (now, at)),
-        *(array.ctypes.data for array in (touched.slack, start)),
+        touched.slack.ctypes.data,
         calls=touched.calls.ctypes.data,
         sound=1,
     )
-    made.kept = now, at, start
+    made.kept = now, at
     return made
 
 
 def taken(touched: Touched, made: Events) -> None:
     """Give it the numbers that C has computed."""
-    now, at, _ = made.kept
+    now, at = made.kept
     take(touched.now, now)
     take(touched.at, at)
 

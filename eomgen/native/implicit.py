@@ -116,10 +116,10 @@ def _with(of: Mechanism, **room: Any) -> Mechanism:
 
 def rodas_5p(problem: Problem, of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
     """Steps of Rodas5P, which may be watched with switching functions of time alone only, and have
-    no `sizes`; none if they are to be `dense`.
+    no rigid contacts; none if they are to be `dense`.
     """
     watched, solver, held = stretch.watched, stretch.solver, stretch.constrained
-    assert stretch.sizes is None and not (watched and watched.ends)
+    assert stretch.touched is None and not (watched and watched.ends)
     ny, most = len(problem.states), 0 if stretch.dense else stretch.most
     bounds = Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until)
     run = rodas(ny, bounds, problem.leading_positions, problem.timed)

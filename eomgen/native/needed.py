@@ -6,8 +6,6 @@ from eomgen.run.integrators.interface import Adaptive, FixedStep
 from eomgen.run.integrators.strides import OF_CONTACTS, OF_STATE
 from eomgen.run.projection import PROJECTS
 
-OF_EVENTS = (*OF_CONTACTS, "impact", "held")
-
 
 def needed_by(method: FixedStep | Adaptive, module: Any) -> tuple[str, ...]:
     """The names of the functions of a module that runs by a method call at each step or event."""
@@ -17,7 +15,7 @@ def needed_by(method: FixedStep | Adaptive, module: Any) -> tuple[str, ...]:
     elif not method.explicit:
         names.append("jacobian")
     if getattr(module, "CONTACTS", ()):
-        names += OF_EVENTS
+        names += OF_CONTACTS
     if getattr(module, "CONSTRAINTS", ()):
         names += PROJECTS
     return tuple(name for name in names if hasattr(module, name))

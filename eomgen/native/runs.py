@@ -28,7 +28,7 @@ from eomgen.run.integrators.dormand_prince_8 import interpolated
 from eomgen.subset.structures import address, filled
 
 MAIN = "runs.c"
-CHECKS: list[Root] = [(name, {}) for name in ("passed_over", "end_at", "stay_apart")]
+CHECKS: list[Root] = [(name, {}) for name in ("passed_over", "end_at")]
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
@@ -61,11 +61,10 @@ class _Checks(ctypes.Structure):
     """`Checks` of `templates/c/checks.c.jinja`, without what C begins with."""
 
     _fields_ = (
-        *((name, _POINTER) for name in ("system", "run", "watch", "found", "sizes")),
+        *((name, _POINTER) for name in ("system", "run", "watch", "found")),
         ("clear", _REAL),
-        *((name, _POINTER) for name in ("margins", "switched", "values")),
-        *((name, _POINTER) for name in ("switches", "gap_checks", "helds")),
-        *((name, _WHOLE) for name in ("switching_calls", "gap_calls")),
+        *((name, _POINTER) for name in ("margins", "switched", "values", "switches")),
+        ("switching_calls", _WHOLE),
         *((name, _POINTER) for name in ("at", "y", "raw", "last", "k", "terms")),
         ("sound", _WHOLE),
     )
@@ -80,24 +79,24 @@ def dop853(of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
         stretch, most, **({} if stretch.dense else {"terms": np.empty((0, ny))})
     )
     switched, values = np.empty(most), np.empty((most, seen.watch.many))
-    switches, gap_checks, helds = np.zeros((3, most), np.int64)
+    switches, touched = np.zeros(most, np.int64), stretch.touched
     margins = made_margins(stretch.constrained, most)
-    system = of.holding(ny, stretch.constrained, stretch.touched)
+    system = of.holding(ny, stretch.constrained, touched)
     bounds = stretch.atol, stretch.rtol, stretch.longest, stretch.until
     run = filled(Bounds(*bounds, stretch.dense, stretch.reaches))
     at = filled(Progress(solver.t, length=float(solver.h_abs)))
     checks = _Checks(
         *map(ctypes.addressof, (system, run, *seen[2:])),
-        None if stretch.sizes is None else address(stretch.sizes),
         watched.clear if watched else math.inf,
-        *map(address, (margins[1:], switched, values, switches, gap_checks, helds)),
+        *map(address, (margins[1:], switched, values, switches)),
     )
     begun = Start(*map(np.ascontiguousarray, (solver.y, solver.f, solver.lost)))
     start = filled(begun)
     call = library.dop853
     call.restype, call.argtypes = _WHOLE, [_POINTER] * 4
     why = call(*map(ctypes.addressof, (checks, at, start, records)))
-    counts, n = {"switches": switches, "gap_checks": gap_checks, "held": helds}, records.made
+    counts, n = {"switches": switches}, records.made
+    counts |= touched.called_by(most) if touched else {}
     return stride(
         *(kept, records, ("h_abs", "f", "lost"), why != UNUSUAL, counts),
         switched=switched[:n],

@@ -65,6 +65,7 @@ def sources(
     (derivative,) = (f["operations"] for f in context["kernels"] if f["name"] == "derivative")
     parts = method in ("leapfrog_4", "leapfrog_6")
     call = f"composed_{method}(m, t, y, h, step)" if parts else equal_steps.CALLS[method]
+    contact_steps = (*CONTACT_STEPS, ("add_compensated", {}))
     values: dict[str, Any] = {
         **c_lanes.columns(
             program, interface, context, c.VECTORS, ("derivative", *law), USUAL_LENGTH
@@ -74,7 +75,7 @@ def sources(
         "gap_sizes": list(map(repr, limits[0])),
         "rest": list(map(repr, limits[1])),
         "tolerance": repr(TOLERANCE),
-        "of_numbers": C.prelude + c_source([("normalised", {}), *(CONTACT_STEPS if law else ())]),
+        "of_numbers": C.prelude + c_source([("normalised", {}), *(contact_steps if law else ())]),
         "engine": c_source(equal_steps.roots_of(method), VECTORS),
         "positions": [i + n * states for n in range(together) for i in own["positions"]],
         "others": [i + n * states for n in range(together) for i in own["others"]],

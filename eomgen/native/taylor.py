@@ -141,7 +141,7 @@ class CompiledTaylor:
         """Steps. None are made if they must be checked or keep constraints, or if states within
         them are wanted.
         """
-        checked = stretch.watched or stretch.constrained or stretch.sizes is not None
+        checked = stretch.watched or stretch.constrained or stretch.touched
         most = 0 if stretch.dense or checked else stretch.most
         ny, solver = self._states, stretch.solver
         none = np.empty((0, ny))

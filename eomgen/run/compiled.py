@@ -112,9 +112,7 @@ class Stretch:
     dense       whether states within the steps are wanted
     times       ascending times of the rows wanted, after t
     watched     given to make no step that may pass over a branch of the derivative
-    sizes       given (nc,) to make no step in which a rigid contact may close; its gap is relative
-                to its size
-    touched     given if rigid contacts are held, to make no step in which one opens
+    touched     given to make no step in which a rigid contact closes or opens
     constrained the constraints to keep, if there are any
     """
 
@@ -128,7 +126,6 @@ class Stretch:
     dense: bool
     times: Array
     watched: Watched | None
-    sizes: Array | None
     touched: "Touched | None"
     constrained: Constrained | None
 
@@ -179,6 +176,10 @@ class Touched:
     def called(self, n: int) -> dict[str, Any]:
         """The calls in step n."""
         return dict(zip(CALLS, (self.calls[n + 1] - self.calls[n]).tolist(), strict=True))
+
+    def called_by(self, n: int) -> dict[str, Whole]:
+        """The calls of what contacts are checked with, up to the ends of n steps."""
+        return dict(zip(CALLS[1:], self.calls[1 : n + 1, 1:].T, strict=True))
 
     def take(self, made: "Touched") -> None:
         """Take what is known of the contacts after an event."""

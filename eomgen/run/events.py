@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eomgen.engine.contact_runs import CLOSED, OPENED, WHOLE, Place, taken
+from eomgen.engine.contact_times import SHARE
 from eomgen.engine.contacts import ENDLESS, NO_FORCES, TOLERANCE, Touching, begin, strike, weigh
 from eomgen.engine.roots import Search
 from eomgen.run.compiled import Strikes, Touched
@@ -41,9 +42,6 @@ from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import Event, Kind
 
 _NOTHING = np.empty(0), np.empty(0, np.int64)
-GAP_CHECKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Points of an adaptive step at which the gaps of contacts are checked; for equal steps, the ends.
-"""
 
 
 @dataclass(frozen=True)
@@ -115,7 +113,7 @@ def advances(
                 why = CLOSED if now.closed.any() else OPENED if now.opened.any() else WHOLE
             else:
                 within = Within(now.t, now.y, step.y, step.t, step.within)
-                why = taken(contacts, within, held, Search(), now, step.t, GAP_CHECKS[1])
+                why = taken(contacts, within, held, Search(), now, step.t, SHARE)
             if why not in (WHOLE, CLOSED, OPENED):
                 raise not_taken(contacts.names, held, why, (start, step.t), now)
             if why == WHOLE:

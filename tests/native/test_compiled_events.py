@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import FULL, some
+from falling_block import BLOCK
 from scipy.optimize import brentq
 from test_compiled_runs import EXPLICIT, assert_same, both, compiler
-from test_stepper import BLOCK
 
 import eomgen
 from eomgen.api.runs import Run
@@ -234,9 +234,9 @@ def test_a_check_left_out_is_noticed(
         other = {**of.constants[name], fault: {"FAR": 0.0, "TOGETHER": 2.0}.get(fault)}
         monkeypatch.setitem(of.constants, name, other)
     if not fault:
-        closes = deepcopy(of.functions["stay_apart"])
-        closes.body = ast.parse("return True").body
-        monkeypatch.setitem(of.functions, "stay_apart", closes)
+        closes = deepcopy(of.functions["closing"])
+        closes.body = ast.parse("return inf").body
+        monkeypatch.setitem(of.functions, "closing", closes)
     options: dict[str, Any] = {"rtol": 1e-9}
     if scene == WHEEL:
         options = {"rtol": 1e-3, "parameters": {"w": 1e-2}}

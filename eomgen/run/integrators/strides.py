@@ -15,10 +15,8 @@ from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS, constrained_by
 from eomgen.run.rows import Rows
 
-OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates")
+OF_STATE, OF_CONTACTS = ("switching_functions",), ("gaps", "gap_rates", "held", "impact")
 """Functions of a module that steps are checked with."""
-OF_HELD = ("held", "impact")
-"""Those that are called for rigid contacts which are held, beside those."""
 
 
 class Strides:
@@ -35,17 +33,12 @@ class Strides:
         self._stepper, self._steps = stepper, steps
         self._dense = stepper.settings.dense or self._looked is not None
         self._atol = np.zeros(problem.initial.shape) + stepper.bounds.atol
-        held = touched and touched.now.holds.any()
-        self._touched = touched if held else None
+        self._touched = touched
         self._needed = (
             *(OF_STATE if switching and switching.of_state else ()),
             *(OF_CONTACTS if contacts else ()),
-            *(OF_HELD if held else ()),
             *(PROJECTS if problem.projection else ()),
         )
-        self._sizes = None
-        if contacts:
-            self._sizes = np.array(contacts.sizes or np.ones(len(contacts.names)))
         self._usual, self._size = True, Size()
 
     def made(self, most: int) -> Portion | None:
@@ -69,8 +62,8 @@ class Strides:
         along = solver, *until, bounds.rtol, self._atol, stepper.longest, most, self._dense
         held = constrained_by(stepper.problem.projection)
         times = stepper.times[stepper.sampled :]
-        touched = self._touched and self._touched.copy(solver.t, solver.y, 1)
-        stride = steps(Stretch(*along, times, watched, self._sizes, touched, held))
+        touched = self._touched and self._touched.copy(solver.t, solver.y, most)
+        stride = steps(Stretch(*along, times, watched, touched, held))
         if not len(stride.ends):
             return None
         if branches and features and not self._size.fits(_are_tame(branches, solver, stride)):
@@ -81,6 +74,8 @@ class Strides:
             if not self._size.fits(margins is not None):
                 return None
         self._usual = stride.usual
+        if self._touched and touched:
+            self._touched.now.slack[:] = touched.slack
         return self._portion(stride, watched, margins)
 
     def _portion(self, stride: Stride, watched: Watched | None, margins: Array | None) -> Portion:
