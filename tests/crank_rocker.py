@@ -35,3 +35,20 @@ def four_bar(
         text += f'child = "{child}"\nr_parent = {at_parent}\nr_child = {at_child}\n{more}\n'
     text += '[[effects]]\ntype = "gravity"\ng = 9.81\n'
     return text + f"{effects}[initial]\n{initial}\n"
+
+
+STOPPED = four_bar(
+    effects="""
+[[effects]]
+type = "contact"
+name = "wall"
+law = "impact"
+body = "coupler"
+normal = [-1, 0]
+offset = -0.58
+restitution = 0.3
+friction = 0.2
+slip_speed = 0.01
+"""
+)
+"""It falls, and its coupler strikes a wall until it rests there."""

@@ -12,8 +12,18 @@ from eomgen.base.errors import SceneError
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.engine import implicit, printed, projection
+from eomgen.engine.contact_runs import MOST_EVENTS
 from eomgen.exports import Number, Options, Written
-from eomgen.exports.steps import contacts_left_out, method_of, model_for, size_of, start_of, step_of
+from eomgen.exports.steps import (
+    contacts_left_out,
+    contacts_of,
+    method_of,
+    model_for,
+    nominals_of,
+    size_of,
+    start_of,
+    step_of,
+)
 from eomgen.model.model import Model
 from eomgen.program.ordering import ordered
 from eomgen.store import interfaced_program_of
@@ -58,6 +68,8 @@ LIMITS = {
     f"{implicit.MAX_ITERATIONS}; it works in memory of its own, so one is made at a time",
 }
 """What holds of explicit steps, of those with loops, and of implicit ones."""
+AT_EVENTS = f"; rigid contacts may strike or open {MOST_EVENTS} times in a step"
+"""What holds beside that of steps with rigid contacts."""
 IN_FLOAT = {
     "ROUNDOFF": 4 * 2.0**-23,
     "NOISE": 1e-4,
@@ -80,8 +92,12 @@ def files(model: Model, options: Options) -> Written:
     values = c.context(ordered(program), interface)
     number = options.number
     method = method_of(name, model, interface)
-    name, size = interface.name, size_of(interface, start_of(program, interface))
-    step = step_of(method, interface, size, REALS, _text(number))
+    name, start = interface.name, start_of(program, interface)
+    size = size_of(interface, start)
+    rest = options.simulation.rest_speed if options.simulation else None
+    meets = interface.contacts and number == "double"
+    more = [*printed.CONTACT_STEPS, ("add_compensated", {}), ("differences", {})] if meets else []
+    step = step_of(method, interface, size, REALS, _text(number), more)
     called = {f: name for f, name in values["functions"] if f not in (*CIRCULAR, "abs")}
     called |= {"sqrt": "sqrt"} if "sqrt_(" in step or method.needed else {}
     circular = [f for f in CIRCULAR if f in {f for f, _ in values["functions"]}]
@@ -97,6 +113,9 @@ def files(model: Model, options: Options) -> Written:
         "farthest": FARTHEST[number],
         "sine_error": ERRORS[number],
         "step": step,
+        **contacts_of(interface, size, rest),
+        "contacts": len(interface.contacts) if meets else 0,
+        "nominals": list(map(repr, nominals_of(program, interface, start, size))) if meets else [],
         "solves": bool(method.needed),
         "implicit": "jacobian" in method.needed,
     }
@@ -105,7 +124,9 @@ def files(model: Model, options: Options) -> Written:
         "real": number,
         "functions": circular,
         "method": INTEGRATORS[method.name].about,
-        "limits": LIMITS["solves" if method.needed else "closes" if interface.projected else ""],
+        "contacts": meets,
+        "limits": LIMITS["solves" if method.needed else "closes" if interface.projected else ""]
+        + AT_EVENTS * bool(meets),
     }
     example = {
         "scene": name,
@@ -123,7 +144,7 @@ def files(model: Model, options: Options) -> Written:
             f"{name}.h": render(c.TEMPLATES, "firmware.h.jinja", header),
             f"{name}_observer.c": render(c.TEMPLATES, "firmware_example.c.jinja", example),
         },
-        contacts_left_out(interface),
+        () if meets else contacts_left_out(interface),
     )
 
 

@@ -24,6 +24,8 @@ MATH = """
 #define sqrt __builtin_sqrt
 #define fabs __builtin_fabs
 #define INFINITY __builtin_inf()
+#define NAN __builtin_nan("")
+#define isfinite(x) __builtin_isfinite(x)
 """
 """What there is of <math.h>: the instructions of WebAssembly."""
 

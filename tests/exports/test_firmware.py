@@ -1,11 +1,13 @@
 """Firmware computes what the module does, in double and in float, and steps as Runge-Kutta 4."""
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from crank_rocker import four_bar
+from crank_rocker import STOPPED, four_bar
+from falling_block import BLOCK
 from firmware import Firmware
 
 import eomgen
@@ -13,6 +15,7 @@ from eomgen.base.errors import RunError
 from eomgen.engine.methods import EQUAL
 from eomgen.exports import Number
 from eomgen.exports.firmware import ERRORS, FARTHEST
+from eomgen.run.columns import FUNCTIONS
 
 LIMITS: dict[Number, float] = {"double": 1e-13, "float": 3e-5}
 
@@ -83,16 +86,44 @@ def test_each_method_with_equal_steps(method: str) -> None:
         Firmware("pendulum", "float", "DOP853")
 
 
-@pytest.mark.parametrize(("scene", "method"), [("four_bar", "rk4"), ("pendulum", "leapfrog_4")])
-def test_a_step_is_that_of_the_stepper(scene: str, method: str) -> None:
-    """The same bits, with the sines of the library."""
+@pytest.mark.parametrize(
+    ("scene", "method", "dt"),
+    [
+        ("four_bar", "rk4", 1e-3),
+        ("pendulum", "leapfrog_4", 1e-3),
+        (BLOCK, "rk4", 0.02),
+        (STOPPED, "semi_implicit_euler", 0.02),
+    ],
+)
+def test_a_step_is_that_of_the_stepper(
+    scene: str, method: str, dt: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same bits, with the sines of the library; rigid contacts strike, are held and open."""
+    for name, function in (("sin", math.sin), ("cos", math.cos)):
+        of_each = np.frompyfunc(function, 1, 1)
+        monkeypatch.setitem(FUNCTIONS, name, lambda x, of=of_each: of(x).astype(float))
     made = Firmware(scene, "double", method, "-DLIBM")
-    step = eomgen.stepper(scene, dt=1e-3, method=method, backend="numpy")
-    y = step.initial()
-    for i in range(20):
-        after = step(y, t=i * 1e-3)
-        assert made.stepped(y, [], 1e-3, 1, i).tolist() == after.tolist()
+    step = eomgen.stepper(scene, dt=dt, method=method, backend="numpy")
+    y, moved = step.initial(), 0
+    u = np.zeros(len(step.inputs))
+    for i in range(50):
+        u[:] = 12.0 * (i > 45)  # which lifts the block
+        after = step(y, u, t=i * dt)
+        assert made.stepped(y, u, dt, 1, i).tolist() == after.tolist()
+        moved += np.abs(after - y).max() > 1e-6
         y = after
+    assert moved > 20
+
+
+def test_gauss_steps_hold_contacts() -> None:
+    """A block falls on two feet and stands, as by rk4; in `float` it falls on, which is said."""
+    made = [Firmware(BLOCK, "double", method) for method in ("gauss_4", "rk4")]
+    y = np.array([0.0, 0.1, 0.2, 0.5, 0.0, 0.0])
+    found, other = (each.stepped(y, [0.0], 1e-3, 1000) for each in made)
+    np.testing.assert_allclose(found, other, atol=1e-5)
+    assert 0.02 < found[0] < 0.5 and (abs(found[[1, 2, 4, 5]]) < 1e-9).all()
+    with pytest.warns(UserWarning, match="steps know no impacts"):
+        assert Firmware(BLOCK, "float").stepped(y, [0.0], 1e-3, 1000)[1] < -4
 
 
 def test_a_step_that_is_not_found_leaves_the_state(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import some
-from crank_rocker import four_bar
+from crank_rocker import STOPPED, four_bar
+from falling_block import BLOCK
 
 import eomgen
 from eomgen.api.given import check
@@ -29,38 +30,6 @@ LARGE = (
 FEW = ("cart_pole", "tumbling_body", "slider_crank", "steering_particles")
 SOME = some(FEW, [name for name in built_in_names() if name not in LARGE])
 LOOP = four_bar()
-BLOCK = """
-name = "block"
-dimensions = 2
-bodies = [{ name = "block", mass = 1.0, inertia_com = 0.1 }]
-points = [
-    { name = "left", body = "block", at = [-0.3, 0.0] },
-    { name = "right", body = "block", at = [0.3, 0.0] },
-]
-inputs = [{ name = "lift", default = 0.0 }]
-joints = [{ name = "flight", type = "free", child = "block" }]
-[[effects]]
-type = "gravity"
-g = 9.81
-[[effects]]
-type = "external_force"
-name = "crane"
-body = "block"
-force = [1, "lift"]
-[[effects]]
-type = "contact"
-name = "floor"
-law = "impact"
-points = ["left", "right"]
-restitution = 0.3
-friction = 0.5
-slip_speed = 0.01
-[initial]
-q = { block_y = 0.1, block_angle = 0.2 }
-[simulation]
-t_end = 1.0
-"""
-"""It falls on two feet, which bounce until they stand, and is pushed and lifted."""
 FUNCTIONS = """\
 name = "functions"
 inputs = [{ name = "thrust", default = 1.5 }]
@@ -209,6 +178,21 @@ def test_loops_stay_closed(backend: Any) -> None:
     assert np.array_equal(once[:, 2], after[:, 0])
     far = step(np.full((6, 4), 1e3))
     assert np.isnan(far).all() or np.abs(step.module.constraint_residuals(0.0, far)).max() < 1e-9
+
+
+@compiled
+def test_loops_strike_and_rest() -> None:
+    """On rigid stops, with the bits of NumPy, to the motion of `simulate`."""
+    run = eomgen.simulate(STOPPED, integrator="rk4", dt=5e-3, t_end=1.0, backend="numpy")
+    assert {event.kind for event in run.trajectory.events} == {"impact", "rest"}
+    c, python = (eomgen.stepper(STOPPED, dt=5e-3, backend=name) for name in ("c", "numpy"))
+    y, t = c.initial(), 0.0
+    for steps in (52, 28, 24, 96):
+        assert c(y, t=t, steps=3).tobytes() == python(y, t=t, steps=3).tobytes()
+        y, t = c(y, t=t, steps=steps), t + steps * 5e-3
+        there = run.y[np.flatnonzero(abs(run.t - t) < 1e-9)[-1]]
+        np.testing.assert_allclose(y, there, atol=1e-11)
+    assert (abs(y[3:]) < 1e-12).all()
 
 
 def test_without_a_compiler_it_is_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
