@@ -180,7 +180,7 @@ class Accelerator:
 
         def equal(name: str) -> EqualSteps | None:
             solves = name in implicit.GAUSS
-            if contacts and (projects or solves):
+            if contacts and (solves or (projects and name in equal_steps.LEAPFROGS)):
                 return None
             needed, make = ("derivative", *projects, *contacts), equal_steps.steps
             if solves or (projects and name in equal_steps.LEAPFROGS):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import FULL, some
+from crank_rocker import STOPPED
 from falling_block import BLOCK
 from scipy.optimize import brentq
 from test_compiled_runs import EXPLICIT, assert_same, both, compiler
@@ -244,11 +245,9 @@ def test_a_check_left_out_is_noticed(
         alike(scene, **options)
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("scene", [HELD, "bouncing_two_body"])
-@pytest.mark.parametrize("method", EXPLICIT)
-def test_rigid_contacts_end_steps(scene: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They strike, are held and open. Python makes the first step, the last, and what it checks."""
+@pytest.fixture
+def equal(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The numbers of steps of equal length that were made in C at once."""
     made, steps = equal_steps.Call.made, list[int]()
 
     def noted(*given: Any) -> int:
@@ -257,10 +256,25 @@ def test_rigid_contacts_end_steps(scene: str, method: str, monkeypatch: pytest.M
         return why
 
     monkeypatch.setattr(equal_steps.Call, "made", noted)
+    return steps
+
+
+def test_contacts_of_loops_end_steps(equal: list[int]) -> None:
+    """On the way states are put on the constraints, at events too."""
+    run = alike(STOPPED, integrator="rk4", t_end=1.0, dt=5e-3, samples=37)
+    assert {event.kind for event in run.trajectory.events} == {"impact", "rest"}
+    assert sum(equal) > 0.97 * run.trajectory.counts["steps"]
+
+
+@pytest.mark.every(4)
+@pytest.mark.parametrize("scene", [HELD, "bouncing_two_body"])
+@pytest.mark.parametrize("method", EXPLICIT)
+def test_rigid_contacts_end_steps(scene: str, method: str, equal: list[int]) -> None:
+    """They strike, are held and open. Python makes the first step, the last, and what it checks."""
     compiled, python = both(scene, integrator=method, t_end=3.0, dt=1e-3, samples=77)
     assert_same(compiled, python)
     assert {event.kind for event in python.trajectory.events} >= {"impact"}
-    assert sum(steps) > 0.97 * python.trajectory.counts["steps"]
+    assert sum(equal) > 0.97 * python.trajectory.counts["steps"]
     for first, second in ((compiled, "numpy"), (python, "c")):
         begun = eomgen.simulate(scene, integrator=method, t_end=1.5, dt=1e-3, backend="c")
         run = eomgen.simulate(
