@@ -3,13 +3,10 @@
 Between two events the motion is smooth, and whoever runs it makes the steps.
 """
 
-from dataclasses import dataclass
-from typing import Annotated
-
 from eomgen.engine.contact_times import NO_ZERO, UNHELD, Within, closing, opening
-from eomgen.engine.contacts import ContactLaw, Touching, release, settle
+from eomgen.engine.contacts import ContactLaw, Place, Touching, release, settle
 from eomgen.engine.roots import Search
-from eomgen.subset.words import Vector, Whole, inf
+from eomgen.subset.words import inf
 
 WHOLE, CLOSED, OPENED, NOT_FOUND, NOT_KEPT, ENDLESSLY = 0, 1, 2, 3, 4, 5
 """How a step ends: whole; where contacts close, which then strike; where held ones open, which then
@@ -17,21 +14,6 @@ are let go. Or why it fails: the time of a contact is not found, no forces keep 
 closing, events do not end."""
 MOST_EVENTS = 10_000
 """Greatest number of events within `least` s."""
-
-
-@dataclass(slots=True)
-class Place:
-    """Where a run is: time and state, and flags of the contacts that have just closed or opened.
-    There were `events` within `least` s `since` a time.
-    """
-
-    t: float
-    y: Annotated[Vector, "STATES"]
-    closed: Annotated[Whole, "CONTACTS"]
-    opened: Annotated[Whole, "CONTACTS"]
-    least: float
-    since: float
-    events: int
 
 
 def taken(
@@ -49,8 +31,8 @@ def taken(
     comes before what opens at the same time.
     """
     length = end - at.t
-    closes = closing(law, within, now, search, at.t, length, share, at.closed)
-    opens = opening(law, within, now, search, at.t, length, at.opened)
+    closes = closing(law, within, now, search, at, length, share)
+    opens = opening(law, within, now, search, at, length)
     if opens == UNHELD:
         return NOT_KEPT
     if closes == NO_ZERO or opens == NO_ZERO:

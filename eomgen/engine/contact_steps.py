@@ -12,7 +12,6 @@ from eomgen.engine.contact_runs import (
     NOT_KEPT,
     OPENED,
     WHOLE,
-    Place,
     taken,
 )
 from eomgen.engine.contact_times import Within
@@ -22,6 +21,7 @@ from eomgen.engine.contacts import (
     STRUCK,
     TOLERANCE,
     ContactLaw,
+    Place,
     Touching,
     nothing_held,
     strike,
@@ -56,19 +56,17 @@ def through(
     at: Place,
     length: float,
     end: float,
-    speeds: Annotated[Vector, "CONTACTS"],
-    least: Annotated[Vector, "CONTACTS"],
 ) -> int:
     """Go to `end`, about a length from here. WHOLE, or why that is not possible."""
     now.alpha = ALPHA * nothing_held(law, now, at.t, at.y)
     at.since = at.t
     at.events = 0
-    why = met(law, now, at, speeds, least)
+    why = met(law, now, at)
     h = length
     while why <= OPENED and at.t < end:
         if not way.go(at.t, at.y, h, end):
             return NO_STEP
-        why = ended(law, way, within, now, search, at, end, 1.0, speeds, least)
+        why = ended(law, way, within, now, search, at, end, 1.0)
         h = end - at.t
     return why if why > OPENED else WHOLE
 
@@ -77,22 +75,20 @@ def met(
     law: ContactLaw,
     now: Touching,
     at: Place,
-    speeds: Annotated[Vector, "CONTACTS"],
-    least: Annotated[Vector, "CONTACTS"],
 ) -> int:
     """Let contacts that touch at the start strike, or hold them. WHOLE, or why that is not
     possible.
     """
     touching = 0
     gap = law.gaps(at.t, at.y)
-    for c in range(len(least)):
+    for c in range(len(at.closed)):
         at.closed[c] = 0
         if gap[c] <= TOLERANCE:
             at.closed[c] = 1
             touching += 1
     if touching == 0:
         return WHOLE
-    return struck(law, now, at, speeds, least)
+    return struck(law, now, at)
 
 
 def ended(
@@ -104,8 +100,6 @@ def ended(
     at: Place,
     end: float,
     share: float,
-    speeds: Annotated[Vector, "CONTACTS"],
-    least: Annotated[Vector, "CONTACTS"],
 ) -> int:
     """Go to the end of a step that was made, or to the first event in it, see `taken`, and let
     contacts strike that close. WHOLE or OPENED, or why that is not possible.
@@ -113,18 +107,16 @@ def ended(
     why = taken(law, within, now, search, at, end, share)
     if why != WHOLE:
         way.part()
-    return struck(law, now, at, speeds, least) if why == CLOSED else why
+    return struck(law, now, at) if why == CLOSED else why
 
 
 def struck(
     law: ContactLaw,
     now: Touching,
     at: Place,
-    speeds: Annotated[Vector, "CONTACTS"],
-    least: Annotated[Vector, "CONTACTS"],
 ) -> int:
     """Let contacts strike that have closed. WHOLE, or why that is not possible."""
-    answer = strike(law, now, at.t, at.y, at.closed, speeds, least)
+    answer = strike(law, now, at)
     if answer == STRUCK:
         return WHOLE
     return ENDLESSLY if answer == ENDLESS else NOT_KEPT

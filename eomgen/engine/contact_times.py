@@ -5,9 +5,9 @@ Times within a step are in seconds from its start.
 
 from typing import Annotated, Protocol
 
-from eomgen.engine.contacts import TOLERANCE, ContactLaw, Touching, counted, press
+from eomgen.engine.contacts import TOLERANCE, ContactLaw, Place, Touching, counted, press
 from eomgen.engine.roots import FOUND, WANTED, Search, begun, gone_on
-from eomgen.subset.words import Vector, Whole, copy, inf, nan, zeros
+from eomgen.subset.words import Vector, copy, inf, nan, zeros
 
 TOGETHER_CLOSED, TOGETHER_OPENED = 1e-12, 1e-9
 """Contacts that close, or open, within these fractions of a step do so together."""
@@ -34,48 +34,49 @@ def closing(
     within: Within,
     now: Touching,
     search: Search,
-    t: float,
+    at: Place,
     length: float,
     share: float,
-    closed: Annotated[Whole, "CONTACTS"],
 ) -> float:
-    """The time at which contacts first close in a step from t, and which; infinity if none do.
+    """The time at which contacts first close in a step, and which; infinity if none do.
 
     Gaps are checked at the ends of parts of the step, a `share` of its length each.
     """
-    n = len(closed)
+    n = len(at.closed)
     for c in range(n):
-        closed[c] = 0
+        at.closed[c] = 0
     if counted(n, now.holds) == n:
         return inf
-    at = zeros(len(closed))
+    times = zeros(len(at.closed))
     slack = copy(now.slack)
     y = within.state(0.0)
-    gap_a = law.gaps(t, y)
-    rate_a = law.rates(t, y)
+    gap_a = law.gaps(at.t, y)
+    rate_a = law.rates(at.t, y)
     a = 0.0
     part = 1
     while a < length:
         b = share * part * length
         y = within.state(b)
-        gap_b = law.gaps(t + b, y)
-        rate_b = law.rates(t + b, y)
+        gap_b = law.gaps(at.t + b, y)
+        rate_b = law.rates(at.t + b, y)
         first = inf
         for c in range(n):
-            at[c] = inf
+            times[c] = inf
             low = gap_b[c] + slack[c] < 0.0
             dips = rate_a[c] < 0.0 and rate_b[c] > 0.0
             if now.holds[c] == 0 and (low or dips):
                 before = gap_a[c] + slack[c]
                 after = gap_b[c] + slack[c]
-                at[c] = first_zero(law, within, now, search, t, c, slack[c], a, b, before, after)
-                if at[c] < 0.0:
-                    return at[c]
-                first = min(first, at[c])
+                times[c] = first_zero(
+                    law, within, now, search, at.t, c, slack[c], a, b, before, after
+                )
+                if times[c] < 0.0:
+                    return times[c]
+                first = min(first, times[c])
         if first < inf:
             for c in range(n):
-                if at[c] <= first + TOGETHER_CLOSED * length:
-                    closed[c] = 1
+                if times[c] <= first + TOGETHER_CLOSED * length:
+                    at.closed[c] = 1
             return first
         for c in range(n):
             if gap_b[c] > TOLERANCE:
@@ -128,41 +129,33 @@ def first_zero(
 
 
 def opening(
-    law: ContactLaw,
-    within: Within,
-    now: Touching,
-    search: Search,
-    t: float,
-    length: float,
-    opened: Annotated[Whole, "CONTACTS"],
+    law: ContactLaw, within: Within, now: Touching, search: Search, at: Place, length: float
 ) -> float:
-    """The time at which held contacts first open in a step from t, and which; infinity if none do.
+    """The time at which held contacts first open in a step, and which; infinity if none do.
     A contact opens when its force has fallen to 0 and its gap begins to grow.
     """
-    n = len(opened)
+    n = len(at.opened)
     for c in range(n):
-        opened[c] = 0
+        at.opened[c] = 0
     if counted(n, now.holds) == 0:
         return inf
-    at = zeros(len(opened))
-    pushes = zeros(len(opened))
-    parts = zeros(len(opened))
+    times = zeros(len(at.opened))
     y = within.state(length)
-    if not press(law, now, t + length, y, pushes, parts):
+    if not press(law, now, at.t + length, y):
         return UNHELD
     first = inf
     for c in range(n):
-        at[c] = inf
-        if now.holds[c] == 1 and pushes[c] == 0.0 and parts[c] > 0.0:
-            at[c] = 0.0
-            if value(law, within, now, t, PUSH, c, 0.0, 0.0) > 0.0:
-                at[c] = zero(law, within, now, search, t, PUSH, c, 0.0, 0.0, length)
-                if at[c] < 0.0:
-                    return at[c]
-            first = min(first, at[c])
+        times[c] = inf
+        if now.holds[c] == 1 and now.pushes[c] == 0.0 and now.parts[c] > 0.0:
+            times[c] = 0.0
+            if value(law, within, now, at.t, PUSH, c, 0.0, 0.0) > 0.0:
+                times[c] = zero(law, within, now, search, at.t, PUSH, c, 0.0, 0.0, length)
+                if times[c] < 0.0:
+                    return times[c]
+            first = min(first, times[c])
     for c in range(n):
-        if at[c] < inf and at[c] <= first + TOGETHER_OPENED * length:
-            opened[c] = 1
+        if times[c] < inf and times[c] <= first + TOGETHER_OPENED * length:
+            at.opened[c] = 1
     return first
 
 
@@ -211,8 +204,6 @@ def value(
     if what == RATE:
         rate = law.rates(t + s, y)
         return rate[c]
-    pushes = zeros(len(now.slack))
-    parts = zeros(len(now.slack))
-    if not press(law, now, t + s, y, pushes, parts):
+    if not press(law, now, t + s, y):
         return nan
-    return pushes[c] - parts[c]
+    return now.pushes[c] - now.parts[c]

@@ -71,7 +71,10 @@ class Touching:
     slack    added to each gap: positive for contacts that have just opened, whose gaps are 0 but
              for rounding, until they exceed `TOLERANCE`
     rest     closing speeds below which contacts do not bounce, sizes/s; negative if not given
-    found    what `press` has computed
+    found, pushes, parts
+             what `press` has computed
+    speeds, least
+             the same of `strike`
     """
 
     alpha: float
@@ -81,6 +84,25 @@ class Touching:
     slack: Annotated[Vector, "CONTACTS"]
     rest: Annotated[Vector, "CONTACTS"]
     found: Annotated[Vector, "PRESSED"]
+    pushes: Annotated[Vector, "CONTACTS"]
+    parts: Annotated[Vector, "CONTACTS"]
+    speeds: Annotated[Vector, "CONTACTS"]
+    least: Annotated[Vector, "CONTACTS"]
+
+
+@dataclass(slots=True)
+class Place:
+    """Where a run is: time and state, and flags of the contacts that have just closed or opened.
+    There were `events` within `least` s `since` a time.
+    """
+
+    t: float
+    y: Annotated[Vector, "STATES"]
+    closed: Annotated[Whole, "CONTACTS"]
+    opened: Annotated[Whole, "CONTACTS"]
+    least: float
+    since: float
+    events: int
 
 
 def largest(n: int, x: Annotated[Vector, "n"]) -> float:
@@ -171,14 +193,7 @@ def weigh(law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES
             now.units[c] = top / own if own > 0.0 else 1.0
 
 
-def press(
-    law: ContactLaw,
-    now: Touching,
-    t: float,
-    y: Annotated[Vector, "STATES"],
-    pushes: Annotated[Vector, "CONTACTS"],
-    parts: Annotated[Vector, "CONTACTS"],
-) -> bool:
+def press(law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES"]) -> bool:
     """Compute, as `found`, what `ContactLaw.held` gives under the forces of the contacts that are
     held, which may open, but not close. False if no forces keep them from closing.
 
@@ -187,37 +202,30 @@ def press(
     contact `pushes` is the acceleration of its gap by its own force, and `parts` is a, or 0 if that
     is negligible.
     """
-    many = counted(len(pushes), now.holds)
-    return press_many(law, now, many, t, y, pushes, parts)
+    return press_many(law, now, counted(len(now.holds), now.holds), t, y)
 
 
 def press_many(
-    law: ContactLaw,
-    now: Touching,
-    many: int,
-    t: float,
-    y: Annotated[Vector, "STATES"],
-    pushes: Annotated[Vector, "CONTACTS"],
-    parts: Annotated[Vector, "CONTACTS"],
+    law: ContactLaw, now: Touching, many: int, t: float, y: Annotated[Vector, "STATES"]
 ) -> bool:
     """The same for `many` contacts that are held."""
     alpha = now.alpha
-    n = len(pushes)
+    n = len(now.holds)
     first = len(y)
     place = counts(many)
     a = table(many, many)
     offset = numbers(many)
     forces = numbers(many)
     w = numbers(many)
-    force = zeros(len(pushes))
+    force = zeros(len(now.holds))
     base = law.held(t, y, force)
     under = rows(many, len(base))
     gap = law.gaps(t, y)
     rate = law.rates(t, y)
     row = 0
     for c in range(n):
-        pushes[c] = 0.0
-        parts[c] = 0.0
+        now.pushes[c] = 0.0
+        now.parts[c] = 0.0
         if now.holds[c] == 1:
             place[row] = c
             offset[row] = base[first + c] + 2.0 * alpha * rate[c] + alpha * alpha * gap[c]
@@ -236,62 +244,48 @@ def press_many(
     for j in range(many):
         part = forces[j]
         now.found += part * (under[j] - base)
-        pushes[place[j]] = part * a[j][j]
+        now.pushes[place[j]] = part * a[j][j]
         if abs(w[j]) > PARTING * scale:
-            parts[place[j]] = w[j]
+            now.parts[place[j]] = w[j]
     return True
 
 
-def strike(
-    law: ContactLaw,
-    now: Touching,
-    t: float,
-    y: Annotated[Vector, "STATES"],
-    closed: Annotated[Whole, "CONTACTS"],
-    speeds: Annotated[Vector, "CONTACTS"],
-    least: Annotated[Vector, "CONTACTS"],
-) -> int:
-    """Let contacts strike at time t, and change the state: among those that touch, that have
-    `closed` or that are held, the one that closes fastest, until none closes; then hold those that
+def strike(law: ContactLaw, now: Touching, at: Place) -> int:
+    """Let contacts strike, and change the state: among those that touch, that have `closed` or that
+    are held, the one that closes fastest, until none closes; then hold those that
     stay closed.
 
     Computes the greatest closing `speeds` of those that struck, and the `least` with which each
     bounces. A contact that closes more slowly does not bounce, and after `BOUNCES` strikes per
     contact none does. Answers `STRUCK`, `ENDLESS` or `NO_FORCES`.
     """
-    n = len(closed)
-    touching = counts(len(closed))
-    gap = law.gaps(t, y)
+    n = len(at.closed)
+    touching = counts(len(at.closed))
+    gap = law.gaps(at.t, at.y)
     many = 0
     for c in range(n):
-        speeds[c] = 0.0
-        if closed[c] == 1 or now.holds[c] == 1 or gap[c] <= TOLERANCE:
+        now.speeds[c] = 0.0
+        if at.closed[c] == 1 or now.holds[c] == 1 or gap[c] <= TOLERANCE:
             touching[c] = 1
             many += 1
-    nothing = slowest(law, now, t, y, least)
+    nothing = slowest(law, now, at.t, at.y)
     count = 0
     while True:
-        rate = law.rates(t, y)
+        rate = law.rates(at.t, at.y)
         c = fastest(n, touching, rate)
         if c < 0 or not -rate[c] > nothing:
             break
         if count == STRIKES * many:
             return ENDLESS
-        bounce = 1.0 if -rate[c] >= least[c] and count < BOUNCES * many else 0.0
-        speeds[c] = max(speeds[c], -rate[c])
-        after = law.impact(t, y, c, bounce)
-        y[:] = after
+        bounce = 1.0 if -rate[c] >= now.least[c] and count < BOUNCES * many else 0.0
+        now.speeds[c] = max(now.speeds[c], -rate[c])
+        after = law.impact(at.t, at.y, c, bounce)
+        at.y = after
         count += 1
-    return hold(law, now, t, y, touching, nothing)
+    return hold(law, now, at.t, at.y, touching, nothing)
 
 
-def slowest(
-    law: ContactLaw,
-    now: Touching,
-    t: float,
-    y: Annotated[Vector, "STATES"],
-    least: Annotated[Vector, "CONTACTS"],
-) -> float:
+def slowest(law: ContactLaw, now: Touching, t: float, y: Annotated[Vector, "STATES"]) -> float:
     """The speed below which contacts do not strike, sizes/s; and the `least` with which each
     bounces: `rest` if given, else that from which it would rise by `RISE` against the accelerations
     of the gaps.
@@ -299,18 +293,18 @@ def slowest(
     A contact that opens by itself, as in grazing a curved surface, bounces at any speed: its
     bounces end anyway, and without them it would stick.
     """
-    n = len(least)
-    accelerations(law, t, y, least)
+    n = len(now.least)
+    accelerations(law, t, y, now.least)
     rate = law.rates(t, y)
-    top = largest(n, least)
+    top = largest(n, now.least)
     now.fastest = max(now.fastest, largest(n, rate))
     for c in range(n):
-        if least[c] > AWAY * top:
-            least[c] = 0.0
+        if now.least[c] > AWAY * top:
+            now.least[c] = 0.0
         elif now.rest[c] >= 0.0:
-            least[c] = now.rest[c]
+            now.least[c] = now.rest[c]
         else:
-            least[c] = sqrt(2.0 * RISE * top)  # it leaves at v against a, and rises by v²/2a
+            now.least[c] = sqrt(2.0 * RISE * top)  # it leaves at v against a, and rises by v²/2a
     return STILL * max(now.fastest, sqrt(top))
 
 
@@ -335,8 +329,6 @@ def hold(
     open without a force. Answers `STRUCK` or `NO_FORCES`.
     """
     n = len(touching)
-    pushes = zeros(len(touching))
-    parts = zeros(len(touching))
     rate = law.rates(t, y)
     for c in range(n):
         now.holds[c] = 0
@@ -347,11 +339,11 @@ def hold(
     if counted(n, now.holds) == 0:
         return STRUCK
     weigh(law, now, t, y)
-    if not press(law, now, t, y, pushes, parts):
+    if not press(law, now, t, y):
         return NO_FORCES
     gap = law.gaps(t, y)
     for c in range(n):
-        if now.holds[c] == 1 and not (pushes[c] > 0.0 or parts[c] <= 0.0):
+        if now.holds[c] == 1 and not (now.pushes[c] > 0.0 or now.parts[c] <= 0.0):
             let_go(now, c, gap[c])
     return STRUCK
 

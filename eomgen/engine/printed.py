@@ -56,7 +56,7 @@ ON_PAGES: tuple[Root, ...] = (
 )
 """What a page that goes on live calls."""
 RECORDS: tuple[type, ...] = (
-    *(adaptive.Bounds, adaptive.Progress, contacts.Touching, contact_runs.Place),
+    *(adaptive.Bounds, adaptive.Progress, contacts.Touching, contacts.Place),
     *(branches.Switches, crossings.Watch, elimination.Factors, explicit.Split, explicit.Step),
     *(implicit.Stages, rattle.Linked, rosenbrock.Rodas, symmetric.Projected, taylor.Terms),
     projection.Residuals,

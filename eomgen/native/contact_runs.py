@@ -4,12 +4,10 @@ import ctypes
 from collections.abc import Mapping
 from typing import Any
 
-from numpy.typing import NDArray
-
 from eomgen.codegen.interface import Interface
 from eomgen.engine import contact_runs, equal_steps
 from eomgen.engine.contact_times import SHARE
-from eomgen.run.compiled import Array, Touched, Whole
+from eomgen.run.compiled import Touched
 from eomgen.subset.structures import filled, take
 
 ROOTS: list[tuple[str, Mapping[str, Any]]] = [("taken", {}), ("strike", {})]
@@ -64,16 +62,12 @@ def taken(touched: Touched, made: Events) -> None:
     take(touched.at, at)
 
 
-def strikes(
-    call: Any, of: ctypes.Structure, touched: Touched, closed: Whole, speeds: Array, least: Array
-) -> int | None:
+def strikes(call: Any, of: ctypes.Structure, touched: Touched) -> int | None:
     """Let contacts strike at the place of `touched`, see `engine.contacts.strike`; None if Python
     must.
     """
-    call.restype, call.argtypes = _WHOLE, [_POINTER, _REAL, *[_POINTER] * 4]
+    call.restype, call.argtypes = _WHOLE, [_POINTER]
     made = events(of, touched)
-    arrays: tuple[NDArray[Any], ...] = (touched.at.y, closed, speeds, least)
-    addresses = (array.ctypes.data for array in arrays)
-    answer: int = call(ctypes.byref(made), touched.at.t, *addresses)
+    answer: int = call(ctypes.byref(made))
     taken(touched, made)
     return None if answer < 0 else answer

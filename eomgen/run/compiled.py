@@ -4,15 +4,15 @@
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.engine.contact_runs import Place
-from eomgen.engine.contacts import ContactLaw, Touching
+from eomgen.engine.contacts import ContactLaw, Place, Touching
 from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.sums import Sum
 
@@ -162,16 +162,9 @@ class Touched:
 
     def copy(self, t: float, y: Array, most: int) -> "Touched":
         """The same at a time and a state, for up to `most` steps."""
-        now, at = self.now, self.at
-        arrays = (x.copy() for x in (now.units, now.slack, now.rest, now.found))
-        flags = at.closed.copy(), at.opened.copy()
-        return Touched(
-            *(self.law, self.names, self.sizes),
-            Touching(now.alpha, now.fastest, now.holds.copy(), *arrays),
-            Place(t, y.copy(), *flags, at.least, at.since, at.events),
-            now.slack.copy(),
-            np.zeros((most + 1, len(CALLS)), np.int64),
-        )
+        now, at = deepcopy(self.now), replace(deepcopy(self.at), t=t, y=y.copy())
+        calls = np.zeros((most + 1, len(CALLS)), np.int64)
+        return replace(self, now=now, at=at, slack=now.slack.copy(), calls=calls)
 
     def called(self, n: int) -> dict[str, Any]:
         """The calls in step n."""
@@ -183,16 +176,14 @@ class Touched:
 
     def take(self, made: "Touched") -> None:
         """Take what is known of the contacts after an event."""
-        now, at = self.now, self.at
-        now.alpha, now.fastest = made.now.alpha, made.now.fastest
-        at.since, at.events = made.at.since, made.at.events
-        for name in ("holds", "units", "slack"):
-            getattr(now, name)[:] = getattr(made.now, name)
-        at.closed[:], at.opened[:] = made.at.closed, made.at.opened
+        for each in fields(Touching):
+            setattr(self.now, each.name, getattr(made.now, each.name))
+        self.at.since, self.at.events = made.at.since, made.at.events
+        self.at.closed, self.at.opened = made.at.closed, made.at.opened
 
 
-Strikes = Callable[[Touched, Whole, Array, Array], int | None]
-"""`(touched, closed, speeds, least)`: see `engine.contacts.strike`; None if Python must."""
+Strikes = Callable[[Touched], int | None]
+"""See `engine.contacts.strike`; None if Python must."""
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.engine.contact_runs import WHOLE, Place
+from eomgen.engine.contact_runs import WHOLE
 from eomgen.engine.contact_steps import through
-from eomgen.engine.contacts import TOLERANCE, Touching, press
+from eomgen.engine.contacts import TOLERANCE, Place, Touching, press
 from eomgen.engine.roots import Search
 from eomgen.engine.sums import Sum, add_compensated
 from eomgen.run.contacts import nothing_held, sizes_of
@@ -51,9 +51,8 @@ class Lane:
         closed, opened = np.zeros((2, n), np.int64)
         at = Place(t, y.copy(), closed, opened, length, t, 0)
         way = _Way(self, contacts, now, lost.copy())
-        room = np.empty((2, n))
         try:
-            why = through(way, way, way, now, Search(), at, length, end, *room)
+            why = through(way, way, way, now, Search(), at, length, end)
         except (ArithmeticError, ValueError):
             return None
         return (at.y, way.lost) if why == WHOLE else None
@@ -96,8 +95,7 @@ class _Way:
         if not self.now.holds.any():
             found: FloatArray = self.of.module.derivative(t, y, *self.of.given)
             return found
-        pushes, parts = np.empty((2, len(self.sizes)))
-        if not press(self, self.now, t, y[:, 0], pushes, parts):
+        if not press(self, self.now, t, y[:, 0]):
             return np.full_like(y, np.nan)
         return np.array(self.now.found[: len(y), None], dtype=np.float64)
 

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eomgen.engine.contact_runs import NOT_FOUND, NOT_KEPT, Place
-from eomgen.engine.contacts import Touching, deepest, press
+from eomgen.engine.contact_runs import NOT_FOUND, NOT_KEPT
+from eomgen.engine.contacts import Place, Touching, deepest, press
 from eomgen.engine.differences import differences
 from eomgen.run.failure import StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
+from eomgen.subset.structures import with_room
 
 Rate = Callable[[float, FloatArray], FloatArray]
 """A function of time and state, such as the derivative."""
@@ -46,14 +47,14 @@ def in_sizes(contacts: Contacts) -> Contacts:
 def nothing_held(contacts: Contacts, states: int, rest_speed: float | None) -> Touching:
     """What is known of contacts before a run. `rest_speed`, m/s or rad/s: see `integrate`."""
     n = len(contacts.names)
-    return Touching(
+    return with_room(
+        Touching,
         alpha=0.0,
         fastest=0.0,
-        holds=np.zeros(n, np.int64),
         units=np.ones(n),
-        slack=np.zeros(n),
         rest=np.full(n, -1.0) if rest_speed is None else rest_speed / sizes_of(contacts),
-        found=np.zeros(states + 2 * n + len(contacts.drives)),
+        CONTACTS=n,
+        PRESSED=states + 2 * n + len(contacts.drives),
     )
 
 
@@ -70,8 +71,7 @@ class Holding:
 
         Raises `StepFailure` if no forces keep the contacts from closing.
         """
-        pushes, parts = np.empty((2, len(self.contacts.names)))
-        if not press(self.contacts, self.held, t, y, pushes, parts):
+        if not press(self.contacts, self.held, t, y):
             raise no_forces(self.contacts.names, self.held, t)
         return self.held.found
 

@@ -19,9 +19,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.engine.contact_runs import CLOSED, OPENED, WHOLE, Place, taken
+from eomgen.engine.contact_runs import CLOSED, OPENED, WHOLE, taken
 from eomgen.engine.contact_times import SHARE
-from eomgen.engine.contacts import ENDLESS, NO_FORCES, TOLERANCE, Touching, begin, strike, weigh
+from eomgen.engine.contacts import (
+    ENDLESS,
+    NO_FORCES,
+    TOLERANCE,
+    Place,
+    Touching,
+    begin,
+    strike,
+    weigh,
+)
 from eomgen.engine.roots import Search
 from eomgen.run.compiled import Strikes, Touched
 from eomgen.run.contacts import (
@@ -165,7 +174,6 @@ def _strike(problem: Problem, touched: Touched, compiled: Strikes | None) -> Ite
     """Yield the strikes of contacts that have closed, and update state and contacts."""
     contacts, now, held, t = problem.contacts, touched.at, touched.now, touched.at.t
     assert contacts is not None
-    count = len(contacts.names)
     made: list[tuple[int | None, FloatArray]] = []
 
     def impact(t: float, y: FloatArray, contact: int, bounce: float) -> FloatArray:
@@ -175,35 +183,31 @@ def _strike(problem: Problem, touched: Touched, compiled: Strikes | None) -> Ite
     def instant(y: FloatArray, struck: int | None = None) -> Advance:
         return Advance(t, y, [], problem, lambda _: y, steps=0, struck=struck)
 
-    before, y = held.holds.copy(), now.y.copy()
-    speeds, least = np.empty((2, count))
-    answer, counts = None, dict[str, Any]()
-    if compiled:
-        met = touched.copy(t, y, 1)
-        answer = compiled(met, now.closed, speeds, least)
-        if answer is not None:
-            touched.take(met)
-            made = [(None, met.at.y)] if speeds.any() else []
-            counts = met.called(0)
+    before, counts = held.holds.copy(), dict[str, Any]()
+    met = touched.copy(t, now.y, 1)
+    answer = compiled(met) if compiled else None
     if answer is None:
-        law = replace(contacts, impact=impact)
-        answer = strike(law, held, t, y, now.closed, speeds, least)
+        answer = strike(replace(contacts, impact=impact), held, now)
+    else:
+        touched.take(met)
+        made = [(None, met.at.y)] if held.speeds.any() else []
+        counts = met.called(0)
     now.closed[:] = 0
     for contact, after in made:
         now.y = after
         yield instant(after, contact)
     if answer == ENDLESS:
-        names = ", ".join(contacts.names[k] for k in np.flatnonzero(speeds))
+        names = ", ".join(contacts.names[k] for k in np.flatnonzero(held.speeds))
         raise StepFailure(
             f"the impacts among {names} at t = {t:.6g} do not end", "take less restitution"
         )
     if answer == NO_FORCES:
         raise no_forces(contacts.names, held, t)
 
-    found = (speeds * sizes_of(contacts)).tolist()
+    found = (held.speeds * sizes_of(contacts)).tolist()
     events: list[Event] = []
     kinds: tuple[tuple[Kind, NDArray[np.bool_]], ...] = (
-        ("impact", (speeds > 0) & (speeds >= least)),
+        ("impact", (held.speeds > 0) & (held.speeds >= held.least)),
         ("rest", held.holds > before),
         ("lift", held.holds < before),
     )

@@ -43,14 +43,16 @@ const contacts = (() => {
 
     // The derivative of the state under the forces of held contacts; the next call reuses the array.
     function derivative(t, y) {
-      if (!steps.press(of, now, t, y, numbers(), numbers())) throw unheld();
+      if (!steps.press(of, now, t, y)) throw unheld();
       return now.found.subarray(0, ny);
     }
 
     // The strikes at a time: the state after them, and events; it decides which contacts are held.
     function strike(t, y, closed) {
-      const [before, after, speeds, least] = [held(), y.slice(), numbers(), numbers()];
-      const answer = steps.strike(of, now, t, after, flagged(closed), speeds, least);
+      const before = held();
+      Object.assign(place, { t, y: y.slice(), closed: flagged(closed) });
+      const answer = steps.strike(of, now, place);
+      const { speeds, least } = now;
       if (answer === steps.ENDLESS) throw new Error(`the impacts at t = ${shown(t)} do not end: take less restitution`);
       if (answer === steps.NO_FORCES) throw unheld();
       const event = (k, kind, speed = speeds[k]) => ({ t, contact: names[k], kind, speed: speed * sizes[k] });
@@ -59,7 +61,7 @@ const contacts = (() => {
         ...held().filter((k) => !before.includes(k)).map((k) => event(k, "rest")),
         ...before.filter((k) => !now.holds[k]).map((k) => event(k, "lift", 0)),
       ];
-      return { y: after, events };
+      return { y: place.y, events };
     }
 
     // Go to the end of a step from `y` at t, or to the first event in it: where that is, the contacts that close,

@@ -1,5 +1,6 @@
 """The engine's forces of contacts, in three languages and against other solvers."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -9,11 +10,11 @@ from complementarity import drawn, solution
 from languages import Given, results
 
 from eomgen.engine import complementarity, least_squares
-from eomgen.engine.contact_runs import Place
-from eomgen.engine.contacts import ALPHA, Touching
+from eomgen.engine.contacts import ALPHA, Place, Touching
 from eomgen.engine.printed import CONTACT_STEPS, CONTACTS, text
 from eomgen.engine.roots import Search
 from eomgen.run.problem import FloatArray
+from eomgen.subset.structures import with_room
 
 SEEDED = np.random.default_rng(1)
 
@@ -197,9 +198,9 @@ const system = {
 
 def known(holds: list[int]) -> Touching:
     """Contacts of the stack, of which some are held."""
-    return Touching(
-        ALPHA, 1.0, np.array(holds), np.ones(2), 1e-9 * SEEDED.random(2), -np.ones(2), np.zeros(8)
-    )
+    slack = 1e-9 * SEEDED.random(2)
+    own = {"holds": np.array(holds), "units": np.ones(2), "slack": slack, "rest": -np.ones(2)}
+    return with_room(Touching, alpha=ALPHA, fastest=1.0, **own, CONTACTS=2, PRESSED=8)
 
 
 def random_case(name: str) -> list[object]:
@@ -212,22 +213,12 @@ def random_case(name: str) -> list[object]:
     at = Place(t, y, *np.zeros((2, 2), np.int64), 1.0, t, int(SEEDED.choice([0, 10_000])))
     return {
         "begin": [STACK, known(holds), t, y, 10.0],
-        "press": [STACK, known(holds), t, y, np.zeros(2), np.zeros(2)],
-        "strike": [STACK, known(holds), t, y, np.array(holds), *np.zeros((2, 2))],
+        "press": [STACK, known(holds), t, y],
+        "strike": [STACK, known(holds), replace(at, closed=np.array(holds))],
         "release": [STACK, known(holds), t, y, np.array([*holds[:1], 0])],
         "settle": [STACK, known(holds), t, y],
         "deepest": [STACK, t, y - 1e-9],
-        "through": [
-            STACK,
-            STACK,
-            STACK,
-            known(holds),
-            Search(),
-            at,
-            end - t,
-            end,
-            *np.zeros((2, 2)),
-        ],
+        "through": [STACK, STACK, STACK, known(holds), Search(), at, end - t, end],
         "taken": [STACK, STACK, known(holds), Search(), at, end, share],
     }[name]
 
