@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 
 from eomgen.engine.contact_runs import WHOLE
 from eomgen.engine.contact_steps import through
-from eomgen.engine.contacts import TOLERANCE, Place, Touching, press
+from eomgen.engine.contacts import TOLERANCE, Place
 from eomgen.engine.roots import Search
 from eomgen.engine.sums import Sum, add_compensated
-from eomgen.run.contacts import nothing_held, sizes_of
+from eomgen.run.contacts import Holding, in_sizes, nothing_held, sizes_of
+from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Change
 from eomgen.run.problem import Contacts, FloatArray, Problem
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Lane:
     """A column whose contacts touch, or may close: what the engine is given.
 
@@ -44,79 +45,61 @@ class Lane:
         """The state after a step from t and y (ny,) to `end`, and what rounding took; None if there
         is none.
         """
-        contacts = self.problem.contacts
+        contacts, module = self.problem.contacts, self.module
         assert contacts is not None
-        n = len(contacts.names)
-        now = nothing_held(contacts, len(y), self.rest)
-        closed, opened = np.zeros((2, n), np.int64)
+        law = replace(
+            contacts,
+            gaps=self._of_one(module.gaps),
+            rates=self._of_one(module.gap_rates),
+            held=self._of_one(module.held),
+            impact=self._of_one(module.impact),
+        )
+        law, now = in_sizes(law), nothing_held(contacts, len(y), self.rest)
+        free, holding = self._of_one(module.derivative), Holding(law, now)
+
+        def derivative(t: float, y: FloatArray) -> FloatArray:
+            found = holding.derivative if now.holds.any() else free
+            return found(t, y[:, 0])[:, None]
+
+        self._moved, self._lost = replace(self.problem, derivative=derivative), lost.copy()
+        closed, opened = np.zeros((2, len(contacts.names)), np.int64)
         at = Place(t, y.copy(), closed, opened, length, t, 0)
-        way = _Way(self, contacts, now, lost.copy())
         try:
-            why = through(way, way, way, now, Search(), at, length, end)
-        except (ArithmeticError, ValueError):
+            why = through(law, self, self, now, Search(), at, length, end)
+        except (ArithmeticError, ValueError, StepFailure):
             return None
-        return (at.y, way.lost) if why == WHOLE else None
+        return (at.y, self._lost) if why == WHOLE else None
 
+    def _of_one(self, function: Callable[..., FloatArray]) -> Callable[..., FloatArray]:
+        """A function of columns for a single one; it may take further columns, and numbers."""
 
-@dataclass(eq=False)
-class _Way:
-    """The contact law of a lane, and the step being made."""
+        def value(t: float, *given: Any) -> FloatArray:
+            columns = (x[:, None] if isinstance(x, np.ndarray) else x for x in given)
+            return np.array(function(t, *columns, *self.given)[:, 0])
 
-    of: Lane
-    contacts: Contacts
-    now: Touching
-    lost: FloatArray
-    t: float = 0.0
-    end: float = 0.0
-
-    def __post_init__(self) -> None:
-        self.sizes = sizes_of(self.contacts)
-        self.problem = replace(self.of.problem, derivative=self._derivative)
-
-    def gaps(self, t: float, y: FloatArray) -> FloatArray:
-        found: FloatArray = self.of.module.gaps(t, y[:, None], *self.of.given)[:, 0]
-        return found / self.sizes
-
-    def rates(self, t: float, y: FloatArray) -> FloatArray:
-        found: FloatArray = self.of.module.gap_rates(t, y[:, None], *self.of.given)[:, 0]
-        return found / self.sizes
-
-    def held(self, t: float, y: FloatArray, forces: FloatArray) -> FloatArray:
-        found = self.of.module.held(t, y[:, None], forces[:, None], *self.of.given)[:, 0]
-        made: FloatArray = np.array(found)
-        made[len(y) : len(y) + len(forces)] /= self.sizes
-        return made
-
-    def impact(self, t: float, y: FloatArray, contact: int, bounce: float) -> FloatArray:
-        found = self.of.module.impact(t, y[:, None], contact, bounce, *self.of.given)
-        return np.asarray(found[:, 0], dtype=np.float64)
-
-    def _derivative(self, t: float, y: FloatArray) -> FloatArray:
-        if not self.now.holds.any():
-            found: FloatArray = self.of.module.derivative(t, y, *self.of.given)
-            return found
-        if not press(self, self.now, t, y[:, 0]):
-            return np.full_like(y, np.nan)
-        return np.array(self.now.found[: len(y), None], dtype=np.float64)
+        return value
 
     def go(self, t: float, y: FloatArray, length: float, end: float) -> bool:
-        self.t, self.end, self.y = t, end, y.copy()
-        total = Sum(self.y.copy(), self.lost)
-        add_compensated(total, self.of.change(self.problem, t, self.y[:, None], length)[:, 0])
-        self.lost, self.last = total.lost, self.of.placed(end, total.value[:, None])[:, 0]
-        return bool(np.isfinite(self.last).all())
+        """See `engine.contact_steps.Way`."""
+        self._t, self._end, self._y = t, end, y.copy()
+        total = Sum(y.copy(), self._lost)
+        add_compensated(total, self.change(self._moved, t, self._y[:, None], length)[:, 0])
+        self._lost, self._last = total.lost, self.placed(end, total.value[:, None])[:, 0]
+        return bool(np.isfinite(self._last).all())
 
     def part(self) -> None:
-        self.lost = np.zeros_like(self.lost)
+        """See `engine.contact_steps.Way`."""
+        self._lost = np.zeros_like(self._lost)
 
     def state(self, s: float) -> FloatArray:
-        t = self.t + s
-        if s >= self.end - self.t:
-            return self.last.copy()
-        if s <= 0 or t <= self.t:
-            return self.y.copy()
-        change = self.of.change(self.problem, self.t, self.y[:, None], t - self.t)
-        return self.of.placed(t, self.y[:, None] + change)[:, 0]
+        """See `engine.contact_times.Within`."""
+        t = self._t + s
+        if s >= self._end - self._t:
+            return self._last.copy()
+        if s <= 0 or t <= self._t:
+            return self._y.copy()
+        change = self.change(self._moved, self._t, self._y[:, None], t - self._t)
+        return self.placed(t, self._y[:, None] + change)[:, 0]
 
 
 def apart(
