@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
 from eomgen.language.base import identifier
 from eomgen.results.labelled import dataframe, dataset, units_of
 from eomgen.results.simulated import Simulated
@@ -96,6 +99,12 @@ class Run(Simulated):
         if state not in self.states:
             raise KeyError(f"no state '{state}'; known: {', '.join(self.states)}")
         return self.y[:, self.states.index(state)]
+
+    def __array__(
+        self, dtype: DTypeLike | None = None, copy: bool | None = None
+    ) -> NDArray[np.generic]:
+        """`y`, for `numpy.asarray(run)` and whatever else takes arrays."""
+        return np.array(self.y, dtype=dtype, copy=copy)
 
     @property
     def report(self) -> Mapping[str, object]:

@@ -15,7 +15,8 @@ def test_a_run_as_table_and_dataset() -> None:
     for name in run.states:
         assert np.array_equal(table[name], run[name])
         assert np.array_equal(data[name], run[name])
-    assert np.array_equal(table.index, run.t)
+    assert np.array_equal(table.index, run.t) and np.asarray(run) is run.y
+    assert np.array_equal(np.asarray(run, np.float32), run.y.astype(np.float32))
     assert np.array_equal(data.sel(t=run.t[3])["theta"], run["theta"][3])
     units = table.attrs["units"]
     assert {name: data[name].attrs["units"] for name in units} == units
