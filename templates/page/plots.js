@@ -16,12 +16,7 @@ const makePlots = (container, channels, { onSeek = () => {}, name = "plot" } = {
   let plots = [];
   let colors = new Map();
 
-  const make = (tag, className, text) => {
-    const element = document.createElement(tag);
-    if (className) element.className = className;
-    if (text !== undefined) element.textContent = text;
-    return element;
-  };
+  const make = plotElement;
   // Who says what a button shows must reach it: its name has its words.
   const named = (text, label) => (text.length === 1 || label.toLowerCase().includes(text.toLowerCase()) ? label : `${text}: ${label}`);
   function button(text, label, act, className = "small") {

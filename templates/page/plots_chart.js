@@ -83,6 +83,25 @@ const charts = (() => {
   const zoomed = ([low, high], factor, around) =>
     [around - (around - low) / factor, around + (high - around) / factor];
 
+  // What charts of both kinds begin with, and what they can do.
+  const options = (box, kind, onRight) => ({
+    width: Math.max(box.clientWidth, 120),
+    height: HEIGHT[kind],
+    padding: [20, onRight ? 0 : 22, 0, 0],
+    legend: { show: false },
+  });
+  const common = (u, box, kind) => ({
+    resize: () => u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT[kind] }),
+    canvas: () => u.ctx.canvas,
+    plot: () => u,
+    destroy: () => u.destroy(),
+  });
+  // Show the part that is chosen; once it is final, none.
+  function showChosen(u, left, top, width, height, isFinal) {
+    u.setSelect(isFinal ? { left: 0, top: 0, width: 0, height: 0 } : { left, top, width, height }, false);
+    return isFinal;
+  }
+
   // ---- Against time ----
 
   function time(place) {
@@ -97,10 +116,7 @@ const charts = (() => {
       scales[`y${i}`] = { range: (__, low, high) => rangeOf(low, high, scaleOf(place, keysOf(`y${i}`))) };
     });
     const u = new uPlot({
-      width: Math.max(box.clientWidth, 120),
-      height: HEIGHT.time,
-      padding: [20, units.length > 1 ? 0 : 22, 0, 0],
-      legend: { show: false },
+      ...options(box, "time", units.length > 1),
       scales,
       axes: [
         axis(place, "x", 2, exponents, "s"),
@@ -140,6 +156,7 @@ const charts = (() => {
       return high > low ? (u.over.clientWidth * (t - low)) / (high - low) : 0;
     };
     chart = {
+      ...common(u, box, "time"),
       refresh() {
         u.setData([samples.times(), ...samples.columns(spec.y).map(withGaps)], true);
         chart.mark();
@@ -152,13 +169,7 @@ const charts = (() => {
       hover(t) {
         u.setCursor(t === null ? { left: -10, top: -10 } : { left: positionOf(t), top: 0 });
       },
-      resize() {
-        u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT.time });
-      },
-      canvas: () => u.ctx.canvas,
-      plot: () => u,
       corners: () => units.map((unit, i) => numbers.axisUnit(unit, exponents[`y${i}`] ?? 0)),
-      destroy: () => u.destroy(),
     };
     plotGestures(u.over, box, {
       isMark: (x) => !mark.hidden && Math.abs(x - positionOf(place.mark())) <= GRAB,
@@ -167,11 +178,8 @@ const charts = (() => {
       seek: (x) => place.seek(timeAt(x)),
       select(x0, _, x1, __, isFinal, finished = true) {
         const [left, right] = [Math.max(Math.min(x0, x1), 0), Math.min(Math.max(x0, x1), u.over.clientWidth)];
-        if (!isFinal) u.setSelect({ left, top: 0, width: right - left, height: u.over.clientHeight }, false);
-        else {
-          u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-          if (finished && right > left) place.look([timeAt(left), timeAt(right)]);
-        }
+        if (!showChosen(u, left, 0, right - left, u.over.clientHeight, isFinal)) return;
+        if (finished && right > left) place.look([timeAt(left), timeAt(right)]);
       },
       zoom: (factor, x) => place.look(zoomed(place.view(), factor, timeAt(x))),
       pan(dx) {
@@ -229,10 +237,7 @@ const charts = (() => {
       [spec.y.length === 1 ? nameOf(spec.y[0]) : "", numbers.axisUnit(unit, exponents.y0 ?? 0)].filter(Boolean).join(", ");
     const u = new uPlot({
       mode: 2,
-      width: Math.max(box.clientWidth, 120),
-      height: HEIGHT.phase,
-      padding: [20, 22, 0, 0],
-      legend: { show: false },
+      ...options(box, "phase", false),
       scales: { x: { time: false, range: () => shown.x }, y0: { range: () => shown.y } },
       axes: [
         { ...axis(place, "x", 2, exponents, place.channel(spec.x).unit), label: nameOf(spec.x), labelSize: 18, labelFont: FONT },
@@ -295,6 +300,7 @@ const charts = (() => {
     }
 
     chart = {
+      ...common(u, box, "phase"),
       refresh() {
         current();
         shown = zoom ?? whole();
@@ -303,13 +309,7 @@ const charts = (() => {
       },
       mark: () => putDots("mark", place.mark()),
       hover: (t) => putDots("hover", t),
-      resize() {
-        u.setSize({ width: Math.max(box.clientWidth, 120), height: HEIGHT.phase });
-      },
-      canvas: () => u.ctx.canvas,
-      plot: () => u,
       corners: () => [aboveAxis()],
-      destroy: () => u.destroy(),
     };
     function look(next) {
       zoom = next;
@@ -330,12 +330,9 @@ const charts = (() => {
       select(x0, y0, x1, y1, isFinal, finished = true) {
         const [left, right] = [Math.min(x0, x1), Math.max(x0, x1)];
         const [top, bottom] = [Math.min(y0, y1), Math.max(y0, y1)];
-        if (!isFinal) u.setSelect({ left, top, width: right - left, height: bottom - top }, false);
-        else {
-          u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-          const [[a, d], [b, c]] = [value(left, top), value(right, bottom)];
-          if (finished && b > a && d > c) look({ x: [a, b], y: [c, d] });
-        }
+        if (!showChosen(u, left, top, right - left, bottom - top, isFinal)) return;
+        const [[a, d], [b, c]] = [value(left, top), value(right, bottom)];
+        if (finished && b > a && d > c) look({ x: [a, b], y: [c, d] });
       },
       zoom(factor, left, top) {
         const [x, y] = value(left, top);

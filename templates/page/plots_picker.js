@@ -1,12 +1,15 @@
 // `makePicker` asks for channels: a dialog with a field to search in and a list to choose from.
 
+// An element of the plots, with a class and a text.
+const plotElement = (tag, className, text) => {
+  const element = document.createElement(tag);
+  if (className) element.className = className;
+  if (text !== undefined) element.textContent = text;
+  return element;
+};
+
 const makePicker = (host, channels) => {
-  const make = (tag, className, text) => {
-    const element = document.createElement(tag);
-    if (className) element.className = className;
-    if (text !== undefined) element.textContent = text;
-    return element;
-  };
+  const make = plotElement;
   const dialog = host.appendChild(make("dialog", "picker"));
   const title = dialog.appendChild(make("h2"));
   const search = dialog.appendChild(make("input"));

@@ -54,9 +54,7 @@ const makeStage = (canvas, mechanism) => {
   let theme = 0; // how often colours were set
 
   stage.setTheme = () => {
-    const style = getComputedStyle(document.documentElement);
-    const own = drawing.camera.background;
-    paper.set(own ?? style.getPropertyValue("--stage").trim());
+    paper.set(drawing.camera.background ?? getComputedStyle(canvas.parentElement).backgroundColor);
     const dark = 0.2126 * paper.r + 0.7152 * paper.g + 0.0722 * paper.b < 0.18;
     ink.set(dark ? "#ffffff" : "#000000");
     canvas.parentElement.dataset.ink = dark ? "light" : "dark";
