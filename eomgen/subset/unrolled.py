@@ -15,7 +15,7 @@ from eomgen.subset.functions import Function, Item, Sizes
 from eomgen.subset.languages import Language
 from eomgen.subset.printing import Roots, functions_of_text
 from eomgen.subset.text import Kind, NotInSubsetError, Text
-from eomgen.subset.values import Indices, Value
+from eomgen.subset.values import TIGHT, Indices, Value
 
 PYTHON = Language(
     function="def {name}({arguments}):",
@@ -69,7 +69,8 @@ class _Unrolled(Function):
         yield self.to.function.format(name=own, arguments=", ".join(self.arguments))
         for vector, base in self.taken.items():
             if base in self.arguments:
-                yield f"    {self._all(vector)} = {_part_of(base, vector)}.tolist()"
+                part = _part_of(base, vector).removesuffix("[:]")
+                yield f"    {self._all(vector)} = {part}.tolist()"
         yield from self.written(self.body)
 
     def _named(self, e: ast.expr, name: str) -> Value:
@@ -131,11 +132,14 @@ class _Unrolled(Function):
         if sizes[0].known != self.states:
             raise self.wrong(to.base, "is not a vector of states")
         places = [[self.known(self.d, j)] for j in range(self.states)]
-        values = [x.entry(at) for at in places]
-        vector = self._begun(to, op) if to.sizes else ""
-        self.items += before
+        if not to.sizes:
+            self.items.append(
+                f" {op} ".join([*map(str, before), *(x.within(TIGHT, j) for j in places)])
+            )
+            return
+        values, vector = [x.entry(j) for j in places], self._begun(to, op)
         self.items += [f"{to.entry(j)} {op}= {y}" for j, y in zip(places, values, strict=True)]
-        if vector and to.base in self.arguments:
+        if to.base in self.arguments:
             whole = self._all(vector)
             whole = whole if vector == to.base else f"array(({whole}))"
             self.items.append(f"{_part_of(to.base, vector)} = {whole}")
