@@ -236,6 +236,7 @@ class Function(Expressions):
                 entry = self.of(x)
                 for limit in limits:
                     entry = self.both(e, "<=", entry, self.of(limit))
+                self._check_read(e, to, entry)
                 first, op = GATHERED[word]
                 start = f"{to.text} = {first}{self.to.words['end']}"
                 self.each(entry.sizes, to, op, entry, "in order", start)
@@ -282,7 +283,7 @@ class Function(Expressions):
 
     def _check_read(self, e: ast.AST, to: Value, *values: Value) -> None:
         if any(base == to.base for x in values for base, _ in x.reads):
-            raise NotInSubsetError(e, "an array would change while it is read")
+            raise NotInSubsetError(e, "would change while it is read")
 
     def _list(self, to: Value, e: ast.List) -> None:
         """The entries of an array, one after another, or four at a time."""

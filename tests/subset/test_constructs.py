@@ -1,14 +1,17 @@
 """Each construct of the engine's subset in three languages; and what is refused, with its line."""
 
 import ast
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import constructs
 import numpy as np
 import pytest
+from campaign import some as some_of
 from languages import NONE, Given, results
 
+from eomgen.base.loading import load_source
 from eomgen.subset.languages import JAVASCRIPT, C
 from eomgen.subset.printing import printed
 from eomgen.subset.structures import with_room
@@ -130,6 +133,7 @@ REFUSED = {
     "x[:] = product(a, x * 2.0)": "while it is read",
     "x[which] = x[others]": "shifted",
     "x[:] = [0.5, x[0]]": "while it is read",
+    "t = 1.0; t = ordered(t * x)": "while it is read",
     "for j_ in range(n): pass": "the name of an index",
     "i_ = 1": "the name of an index",
     "new = 1": "a word of another language",
@@ -172,3 +176,55 @@ def test_names_are_those_of_one_function() -> None:
     """Functions of two modules with one name, of which one would be lost."""
     with pytest.raises(NotInSubsetError, match=r"(?s)line .*another module"):
         Text.of(constructs, constructs)
+
+
+HEAD = (
+    'def mixed(which: int, n: int, x: Annotated[Vector, "n"], y: Annotated[Vector, "n"],'
+    ' a: Annotated[Matrix, "n", "n"], order: Annotated[Whole, "n"]) -> float:\n'
+    "    z = x - y\n    s = 0.5\n"
+)
+TYPING = "from typing import Annotated"
+WHOLE = "x y z a[0] a[n-1] a[:,0] a[:,1] x[order] s z*y".split()
+PARTS = "x[1:] y[1:] z[1:] a[1,1:] a[2,1:] x[:n-1] z[:n-1] a[:n-1,2] s y[0] a[0,2]".split()
+TARGETS = "x[:] y[:] z z[:] a[0] a[n-1] a[:,0] x[order]".split()
+
+
+def chosen(these: list[str]) -> str:
+    """One of these."""
+    return these[SEEDED.integers(len(these))]
+
+
+def statements() -> list[str]:
+    """Some that follow one another: of whole arrays and their parts, and sums of them."""
+    found: list[str] = []
+    while len(found) < 6:
+        whole = SEEDED.random() < 0.7
+        one, two, three = (chosen(WHOLE if whole else PARTS) for _ in range(3))
+        value = f"{one} * 0.5 - ({two} + 0.25 * {three})"
+        target = chosen(TARGETS) if whole else chosen([x for x in PARTS if ":" in x])
+        statement = f"{target} {chosen(['=', '=', '+=', '-='])} {value}"
+        statement = chosen([f"s = ordered({value})", *[statement] * 4])
+        text = Text()
+        text.add(f"{HEAD}    {statement}\n    return s\n")
+        with suppress(NotInSubsetError):
+            printed(text, [("mixed", {})], C)
+            found.append(statement)
+    return found
+
+
+def test_statements_share_loops_where_nothing_changes() -> None:
+    """Random ones have the bits of Python, which makes one after another."""
+    cases = [statements() for _ in range(some_of(16, 200))]
+    source = HEAD + "".join(
+        f"    if which == {i}:\n" + "".join(f"        {s}\n" for s in case)
+        for i, case in enumerate(cases)
+    )
+    source = f"{source}    return s\n"
+    module = load_source(f"from eomgen.subset.words import *\n{TYPING}\n{source}", "mixed")
+    text = Text()
+    text.add(source, python=vars(module))
+    order = np.array([2, 0, 3, 1])
+    given = [[i, N, some(N), some(N), some(N, N), order] for i in range(len(cases))]
+    python, *others = results(text, "mixed", given)
+    assert others == [python, python]
+    assert printed(text, [("mixed", {})], C).count("for (") < 6 * len(cases)
