@@ -123,7 +123,7 @@ def both_runs(name: str, method: str, dt: float, seconds: float) -> tuple[Any, T
     scene = read(name).replaced(loops="projected")
     model = model_of(scene, name)
     code, problem = live_code(model, series=method == "taylor"), in_python(model)
-    given = {
+    given: dict[str, Any] = {
         "data": live_table(model, code, scene.simulation),
         "method": method,
         "dt": dt,
@@ -131,6 +131,8 @@ def both_runs(name: str, method: str, dt: float, seconds: float) -> tuple[Any, T
         "y": problem.initial.tolist(),
     }
     found = run_in_node(other_functions.in_javascript() + code.source, RUN, given)
+    if method in ADAPTIVE:  # how long steps may be where their branches are not seen
+        given["data"] |= {"span": 1.5 * seconds}
     try:
         if method in ADAPTIVE:  # the end of a run shortens its last steps
             options = {"rtol": 1e-9, "atol": 1e-12, "samples": round(1.5 * seconds / dt) + 1}
