@@ -120,8 +120,7 @@ class Function(Expressions):
         for size in rest:
             first = self.both(self.d, "*", first, size)
         if late := {base for base, _ in first.reads} & self.locals.keys():
-            why = f"the size of {name} is known only when {late.pop()} is"
-            raise self.wrong(name, why)
+            raise self.wrong(name, f"the size of {name} is known only when {min(late)} is")
         kind = self.to.arrays[x.of == "int"]
         return self.to.array.format(type=kind, function=function, name=name, size=first.text)
 
