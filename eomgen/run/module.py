@@ -19,6 +19,8 @@ from eomgen.run.projection import projection_of
 from eomgen.run.sizes import mechanism_size, row_sizes, state_sizes
 from eomgen.run.works import Powers
 
+Rate = Callable[[float, FloatArray], FloatArray]
+"""A function of time and state."""
 COUNTED = frozenset({"derivative", "jacobian"})
 """Functions whose operations determine the cost of a run."""
 
@@ -66,7 +68,7 @@ def load_module(
     return cast(GeneratedModule, module)
 
 
-def _by_differences(module: GeneratedModule) -> Callable[[float, FloatArray], FloatArray]:
+def _by_differences(module: GeneratedModule) -> Rate:
     def jacobian(t: float, y: FloatArray) -> FloatArray:
         steps = 1e-7 * np.maximum(1.0, np.abs(y))
         ahead = module.derivative(t, y[:, None] + np.diag(steps))
@@ -104,28 +106,9 @@ def as_problem(
     Raises `RunError` if the module refuses parameters or inputs, or if it has no derivative at the
     initial state.
     """
-    if parameters is None and inputs is None:  # the module's fastest call
-        exactly = module.derivative
-        jacobian = getattr(module, "jacobian", _by_differences(module))
-    else:
-
-        def exactly(t: float, y: FloatArray) -> FloatArray:
-            return module.derivative(t, y, parameters, inputs)
-
-        def jacobian(t: float, y: FloatArray) -> FloatArray:
-            return module.jacobian(t, y, parameters, inputs)
-
-    def derivative(t: float, y: FloatArray) -> FloatArray:
-        try:
-            return exactly(t, y)
-        except FloatingPointError:  # y is too large; with nan a method rejects the step
-            return np.full(len(y), np.nan)
-        except ValueError:  # loops that are closed in closed form cannot be closed there
-            if closed_form is None:
-                raise
-            return np.full(len(y), np.nan)
-
+    exactly, jacobian = _rates(module, parameters, inputs)
     closed_form = closed_form_of(module, parameters, inputs)
+    derivative = _rejecting(exactly, closed_form is not None)
     try:
         initial = module.initial_state(parameters)
         initial = start(initial) if start else initial
@@ -162,6 +145,35 @@ def as_problem(
         projection=projection,
         closed_form=closed_form,
     )
+
+
+def _rates(module: GeneratedModule, parameters: Any, inputs: Any) -> tuple[Rate, Rate]:
+    """The derivative of a module, and its Jacobian."""
+    if parameters is None and inputs is None:  # the module's fastest call
+        return module.derivative, getattr(module, "jacobian", _by_differences(module))
+
+    def derivative(t: float, y: FloatArray) -> FloatArray:
+        return module.derivative(t, y, parameters, inputs)
+
+    def jacobian(t: float, y: FloatArray) -> FloatArray:
+        return module.jacobian(t, y, parameters, inputs)
+
+    return derivative, jacobian
+
+
+def _rejecting(exactly: Rate, closes: bool) -> Rate:
+    """A derivative that is not a number where y is too large, or loops cannot be closed in closed
+    form: then a method rejects the step.
+    """
+    refused = (FloatingPointError, ValueError) if closes else FloatingPointError
+
+    def derivative(t: float, y: FloatArray) -> FloatArray:
+        try:
+            return exactly(t, y)
+        except refused:
+            return np.full(len(y), np.nan)
+
+    return derivative
 
 
 def as_powers(module: Any, parameters: Any = None, inputs: Any = None) -> Powers | None:
