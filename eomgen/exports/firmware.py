@@ -15,7 +15,6 @@ from eomgen.engine import implicit, printed, projection
 from eomgen.engine.contact_runs import MOST_EVENTS
 from eomgen.exports import Number, Options, Written
 from eomgen.exports.steps import (
-    contacts_left_out,
     contacts_of,
     method_of,
     model_for,
@@ -68,6 +67,8 @@ LIMITS = {
     f"{implicit.MAX_ITERATIONS}; it works in memory of its own, so one is made at a time",
 }
 """What holds of explicit steps, of those with loops, and of implicit ones."""
+LEFT_OUT = ("steps know no impacts: rigid contacts are left out of them",)
+"""What is said of steps in `float` with rigid contacts."""
 AT_EVENTS = f"; rigid contacts may strike or open {MOST_EVENTS} times in a step"
 """What holds beside that of steps with rigid contacts."""
 IN_FLOAT = {
@@ -144,7 +145,7 @@ def files(model: Model, options: Options) -> Written:
             f"{name}.h": render(c.TEMPLATES, "firmware.h.jinja", header),
             f"{name}_observer.c": render(c.TEMPLATES, "firmware_example.c.jinja", example),
         },
-        () if meets else contacts_left_out(interface),
+        LEFT_OUT if interface.contacts and not meets else (),
     )
 
 

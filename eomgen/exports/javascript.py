@@ -1,20 +1,23 @@
 """An ES module of a scene: the functions of the JavaScript backend, and a step of the engine."""
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 from eomgen.base.errors import SceneError
 from eomgen.base.templating import render
 from eomgen.codegen.backends import javascript
 from eomgen.codegen.interface import Interface
-from eomgen.engine.printed import text
+from eomgen.engine.contacts import Place, Touching
+from eomgen.engine.printed import CONTACT_STEPS, text
 from eomgen.exports import Options, Written
 from eomgen.exports.steps import (
     Method,
     Part,
-    contacts_left_out,
+    contacts_of,
     method_of,
     model_for,
+    nominals_of,
     roots_of,
     size_of,
     sizes_of,
@@ -37,21 +40,36 @@ def files(model: Model, options: Options) -> Written:
     if not interface.states:
         raise SceneError("javascript: the scene has no states, so there is nothing to step")
     method = method_of(name, model, interface)
-    size = size_of(interface, start_of(program, interface))
+    start = start_of(program, interface)
+    size = size_of(interface, start)
+    rest = options.simulation.rest_speed if options.simulation else None
+    met = contacts_of(interface, size, rest)
+    sizes = {"CONTACTS": met["contacts"], "PRESSED": met["pressed"], "STATES": len(start)}
+    nominals = nominals_of(program, interface, start, size) if interface.contacts else ()
+    values = {
+        "rest_speeds": met.pop("rest"),
+        **met,
+        "now": _fields(Part("now", Touching, sizes)),
+        "at": _fields(Part("at", Place, sizes)),
+        "nominals": list(map(repr, nominals)),
+    }
     ((file, module),) = javascript.files(program, interface).items()
-    return Written({file: module + _step(method, interface, size)}, contacts_left_out(interface))
+    return Written({file: module + _step(method, interface, size, values)})
 
 
-def _step(method: Method, interface: Interface, size: float) -> str:
-    """The source of `step`."""
+def _step(method: Method, interface: Interface, size: float, contacts: Mapping[str, Any]) -> str:
+    """The source of `step`, with values for its rigid contacts."""
     # Imported here because the printer takes a while.
     from eomgen.subset.printing import printed
 
-    values = method.values(interface)
+    values, roots = method.values(interface), [*roots_of(method, interface)]
+    if contacts["contacts"]:
+        roots += [*CONTACT_STEPS, ("press", {}), ("add_compensated", {}), ("differences", {})]
     context: dict[str, Any] = {
         **sizes_of(method, interface, size),
         "states": len(interface.states),
-        "engine": JAVASCRIPT.prelude + printed(text(), roots_of(method, interface), JAVASCRIPT),
+        **contacts,
+        "engine": JAVASCRIPT.prelude + printed(text(), roots, JAVASCRIPT),
         "method": {**values, "call": _of_c(values["call"])},
         "parts": [{"name": p.name, "fields": _fields(p)} for p in method.parts(interface)],
         "rates": list(map(repr, method.rates)),

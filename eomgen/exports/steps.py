@@ -314,13 +314,6 @@ def sizes_of(method: Method, interface: Interface, size: float) -> dict[str, Any
     }
 
 
-def contacts_left_out(interface: Interface) -> tuple[str, ...]:
-    """A remark on rigid contacts, where steps do not have them."""
-    return ("steps know no impacts: rigid contacts are left out of them",) * bool(
-        interface.contacts
-    )
-
-
 def contacts_of(interface: Interface, size: float, rest: float | None) -> dict[str, Any]:
     """Values for templates: the rigid contacts of a mechanism of this size, m; `rest` is the speed
     below which they do not bounce, m/s or rad/s, or None.
