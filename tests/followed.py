@@ -121,7 +121,7 @@ class LookedUp(dict[str, Any]):
             return self[f"W_{body}"]["xyz".index(place[0]), "xyz".index(place[1])]
         if name == "h_0" and free:
             return np.vstack([self[f"h_{frame.name}"] for frame in free])
-        if name == "M" and free:
+        if name in ("M", "M_all") and free:
             rows = [[self._block(a, b) for b in free] for a in free]
             return np.block(rows)
         if letter == "J" and rest in ("d", "i"):

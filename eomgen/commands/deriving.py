@@ -16,7 +16,9 @@ def derive(given: Arguments) -> int:
     if given.output is not None:
         check_writable(given.output, force=given.force)
     reporter = reporter_of(given, given.scene)
-    found = derivation_of(model, reporter, form=given.state_form, detail=given.detail)
+    found = derivation_of(
+        model, reporter, form=given.state_form, detail=given.detail, method=given.method
+    )
     if kind == "text":
         text = found.text(encoding="utf-8" if given.output else sys.stdout.encoding)
     else:

@@ -10,7 +10,7 @@ from eomgen.api.options import FORMS, OWN, Forced, check_seed, check_time, outpu
 from eomgen.base.options import option
 from eomgen.exports import FORMATS
 from eomgen.show.filming import FilmOptions
-from eomgen.tables.details import DETAILS
+from eomgen.tables.details import DETAILS, METHODS
 
 if TYPE_CHECKING:
     from eomgen.api.given import Outputs
@@ -217,6 +217,12 @@ class Derivation(Forced):
         "summary: the equations and their solution; steps: all that leads to them; all: forces in "
         "joints and constraints, too, and other ways to write the equations",
         choices=DETAILS,
+    )
+    method: str | None = option(
+        None,
+        "how the equations are derived: from free bodies, from energies, or in the partial "
+        "velocities (by what suits the mechanism)",
+        choices=METHODS,
     )
     output: Path | None = _file("write it to a file")
 

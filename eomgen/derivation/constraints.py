@@ -197,7 +197,7 @@ class _Motion:
         bodied = {b.name for b in model.bodies}
         moving: set[Expr] = set()
         rates: dict[Expr, Expr] = {real("t"): sp.S.One}
-        rates |= _coordinate_rates(model)
+        rates |= coordinate_rates(model)
         known = {symbol for symbol, _ in definitions}
         for frame in frames:
             name = frame_name(model, frame)
@@ -240,7 +240,7 @@ class _Motion:
         return rate(expression, self.rates)
 
 
-def _coordinate_rates(model: Model) -> Iterator[tuple[Expr, Expr]]:
+def coordinate_rates(model: Model) -> Iterator[tuple[Expr, Expr]]:
     """Each coordinate and its time derivative: ½ q ∘ ω for a quaternion q."""
     for body in model.bodies:
         count = body.plain

@@ -13,16 +13,17 @@ from typing import Any
 import sympy as sp
 
 from eomgen.base.errors import SceneError
-from eomgen.derivation.composite import composite_steps
+from eomgen.derivation.composite import composite_steps, solved_algorithm
 from eomgen.derivation.constraints import DerivedConstraint, derived_constraints, tree_of
 from eomgen.derivation.effects import DerivedEffect, derived_effects, equations_of, with_symbols
-from eomgen.derivation.embedding import embedded
+from eomgen.derivation.embedding import embedded, solved_for
 from eomgen.derivation.frames import frames_of
 from eomgen.derivation.handout.closed import Equations, collected_equations
 from eomgen.derivation.handout.closed import solved as solved_pins
 from eomgen.derivation.handout.elimination import symmetric
 from eomgen.derivation.handout.steps import handout_steps, readable
 from eomgen.derivation.impacts import impact_steps
+from eomgen.derivation.lagrange import lagrangian
 from eomgen.derivation.loops import (
     bias_of,
     constraint_steps,
@@ -57,6 +58,7 @@ from eomgen.model.model import Model
 from eomgen.scene.effects.base import Load
 from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import Form
+from eomgen.tables.details import Method
 
 HANDOUT = (
     'Numbers in brackets up to (36) are those of the handout that this derivation follows: "CS229 '
@@ -84,6 +86,10 @@ SYMMETRIC = (
     "solution."
 )
 SOLVED = "The equations solved for the accelerations."
+ELIMINATED = (
+    "From the last velocity to the first each is eliminated: d is a pivot, and b what is left of "
+    "F - V - G."
+)
 PRESCRIBED = (
     "Driven coordinates follow the formulas above, and their rates are the derivatives of these; "
     "locked coordinates are constant. Neither is a state; the forces on them are whatever this "
@@ -114,10 +120,13 @@ class Exposition:
     effects: tuple[DerivedEffect, ...]
 
 
-def exposition_of(model: Model, form: Form | None = None) -> Exposition:
-    """Derive a model and explain it in a state form, by default the scene's.
+def exposition_of(
+    model: Model, form: Form | None = None, method: Method | None = None
+) -> Exposition:
+    """Derive a model and explain it in a state form, by default the scene's, and by a method, by
+    default that which suits it.
 
-    Raises `SceneError` for a form that the mechanism does not have.
+    Raises `SceneError` for a form or a method that the mechanism does not have.
     """
     form = form or model.form
     model = with_closed_form(model)
@@ -134,11 +143,18 @@ def exposition_of(model: Model, form: Form | None = None) -> Exposition:
         raise SceneError(
             f"form: no derivation in the form '{form}': {why_not}; use velocity{module}"
         )
-    if not why_not:
+    if form != "velocity" and method not in (None, "newton-euler"):
+        raise SceneError(f"method: the form '{form}' is derived by newton-euler, not by {method}")
+    if not why_not and method in (None, "newton-euler"):
         return _of_pins(model, bare, parts, form)
-    if small and not why_not_closed(bare):
-        return _of_any(model, bare, parts)
-    return _recursive(model, parts)
+    written = why_not_closed(bare) or ("" if small else long)
+    if method in ("kane", "lagrange") and written:
+        raise SceneError(
+            f"method: {model.name} is derived by newton-euler, not by {method}: {written}"
+        )
+    if written or method == "newton-euler":
+        return _recursive(model, parts, method)
+    return _of_any(model, bare, parts, method or "kane")
 
 
 def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
@@ -199,16 +215,19 @@ def _each(found: Any, change: Callable[[Expr], Expr]) -> Any:
     return replace(found, **{x: change(getattr(found, x)) for x in "MVGF"})
 
 
-def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
+def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Exposition:
     equations = balanced(bare)
     equations = replace(equations, balance=_each(equations.balance, simplified))
     tree, direct = of_projected(equations), None
+    if method == "lagrange":
+        tree, energies = lagrangian(model, tree, equations.loads.uniform)
     if not parts.constraints:
         direct = solved_directly(tree.M, tree.F - tree.V - tree.G)
-        if direct is None:
+        if direct is None and method == "kane":
             equations = solved_projected(equations)
             tree = replace(tree, definitions=projected_definitions(equations))
     names = reading_names(model)
+    said = {**names, **{s.name: text for s, text in tree.formulas.items()}}
     found = [_renamed(step, names) for step in projected_steps(equations)]
     joints = _first(found, "balance", "equations")
     words = (
@@ -219,12 +238,20 @@ def _of_any(model: Model, bare: Model, parts: Parts) -> Exposition:
         Step("bodies", "Free bodies", words, ()),
         *found[1:joints],
     ]
+    if method == "lagrange":
+        energies = [_renamed(step, said) for step in energies]
+        found = [*found[:joints], *energies, found[_first(found, "solution")]]
     place = _first(found, "solution")
     if parts.constraints:
         return _of_tied(model, parts, start, found[joints:place], tree)
     whole = _whole(tree, model, parts)
+    if direct is None and method == "lagrange":
+        solution = tuple(solved_for([x.name for x in tree.a], tree.M, tree.F - tree.V - tree.G))
+        lines = dict(solution)
+        words = f"{SOLVED} {ELIMINATED}"
+        found[place] = _renamed(replace(_directly(found[place], lines), words=words), said)
+        whole = replace(whole, definitions=(*whole.definitions, *solution))
     if direct:
-        said = {**names, **{s.name: text for s, text in tree.formulas.items()}}
         lines = dict(zip(tree.a, direct, strict=True))
         found[place] = _renamed(_directly(found[place], lines), said)
         whole = _with(whole, direct)
@@ -265,7 +292,7 @@ def _of_tied(
     return _told("", [*start, *before, *balance, *ends], matrices, parts)
 
 
-def _recursive(model: Model, parts: Parts) -> Exposition:
+def _recursive(model: Model, parts: Parts, method: Method | None) -> Exposition:
     frames = frames_of(model)
     state = [
         Equation(sp.Symbol(letter), sp.Matrix([[real(c.name) for c in group]]))
@@ -277,7 +304,10 @@ def _recursive(model: Model, parts: Parts) -> Exposition:
         Step("bodies", "Free bodies", _free_words(model), ()),
     ]
     effects = _effect_steps(model, parts, every=True)
-    if not parts.constraints:
+    if not parts.constraints and method == "newton-euler":
+        steps += [*effects, *composite_steps(model, frames, parts.effects)]
+        steps.append(solved_algorithm(model))
+    elif not parts.constraints:
         steps += [*effects, *recursive_steps(model, frames, parts.effects)]
     elif model.groups:
         found = embedded(model, parts.constraints)

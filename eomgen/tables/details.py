@@ -1,4 +1,4 @@
-"""How much of a derivation is shown."""
+"""How much of a derivation is shown, and by which method it is made."""
 
 from typing import Literal, get_args
 
@@ -8,3 +8,10 @@ steps    all that leads to them
 all      also what follows from them, as the forces in joints, and other ways to write them
 """
 DETAILS: tuple[Detail, ...] = get_args(Detail)
+
+Method = Literal["newton-euler", "lagrange", "kane"]
+"""newton-euler  free bodies and their joints' forces, or the algorithm that goes over the bodies
+lagrange      energies and their derivatives
+kane          loads and inertia in the partial velocities
+"""
+METHODS: tuple[Method, ...] = get_args(Method)

@@ -12,6 +12,7 @@ from campaign import some
 from followed import LookedUp, instant
 
 import eomgen
+from eomgen.api.derivation import Derivation
 from eomgen.derivation.dots import dotted
 from eomgen.dynamics.start.assembly import assembled
 from eomgen.dynamics.start.assur import with_closed_form
@@ -19,6 +20,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.tables.details import METHODS, Method
 
 ATWOOD = """
 name = "atwood"
@@ -43,6 +45,7 @@ effects = [{ type = "gravity", g = "g" }]
 LOOPS = ("four_bar", "slider_crank", "differential", "peaucellier", "rattleback", "bicycle",
          "car_suspension", "stewart_platform")  # fmt: skip
 SCENES = some((ATWOOD, *LOOPS, "two_body_forced", "furuta_pendulum"), (ATWOOD, *built_in_names()))
+BY_METHOD = some(("two_body_forced", "spinning_top", "four_bar"), (ATWOOD, *built_in_names()))
 
 
 @cache
@@ -66,7 +69,27 @@ def deep() -> Iterator[None]:
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_last_step_by_the_printed_equations(scene: str) -> None:
     """Each entry of Ẏ looked up, and what it needs looked up in turn; Y is the module's state."""
-    model, found = model_of(scene), eomgen.derive(scene)
+    _follow(scene, eomgen.derive(scene))
+
+
+@pytest.mark.usefixtures("deep")
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("scene", BY_METHOD)
+def test_the_same_by_each_method(scene: str, method: Method) -> None:
+    """Energies, partial velocities and free bodies give the derivative of the module; what cannot
+    be written out says so.
+    """
+    try:
+        found = eomgen.derive(scene, method=method)
+    except eomgen.SceneError as error:
+        assert method != "newton-euler" and "newton-euler" in str(error)
+        return
+    _follow(scene, found)
+
+
+def _follow(scene: str, found: Derivation) -> None:
+    """The last step at random states, beside the module."""
+    model = model_of(scene)
     module = eomgen.load(eomgen.generate(scene))
     for seed in range(2):
         at = instant(model, seed, 0.02, closed=bool(model.constraints))
