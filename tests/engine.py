@@ -126,8 +126,8 @@ def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) 
     if not route and model.route == "auto" and model.form == "velocity":
         route = "auto" if scene in built_in_names() else "aba"
     model = replace(model, outputs=outputs, route=route or model.route)
-    if model.closing == "auto" and scene not in built_in_names():
-        model = replace(model, closing="projected")
+    if model.loops_kept == "auto" and scene not in built_in_names():
+        model = replace(model, loops_kept="projected")
     with pytest.MonkeyPatch.context() as patch:
         if tangents:
             patch.setattr(jacobians, "LARGEST_JACOBIAN", -1)

@@ -11,7 +11,7 @@ from typing import Any
 from eomgen.engine.printed import steps_of_pages
 
 PAGE = Path(__file__).parent.parent / "templates" / "page"
-ENGINE = ("methods.js", "adaptive.js", "contacts.js", "closure.js", "engine.js")
+ENGINE = ("methods.js", "adaptive.js", "contacts.js", "loops.js", "engine.js")
 NODE = which("node")
 
 

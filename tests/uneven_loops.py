@@ -55,7 +55,7 @@ def drawn(seed: int) -> Model:
         bodies.append(
             replace(body, mass=Constant(factor * model.value(body.mass)), inertia_com=inertia)
         )
-    return replace(model, bodies=tuple(bodies), closing="projected")
+    return replace(model, bodies=tuple(bodies), loops_kept="projected")
 
 
 def tried(seed: int, routes: tuple[str, ...] = ROUTES) -> Outcome:

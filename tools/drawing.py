@@ -23,10 +23,12 @@ FONT = "font-family='Helvetica, Arial, sans-serif'"
 
 @cache
 def rooms() -> dict[str, list[str]]:
-    """The modules of each room, a package or a module directly in `eomgen`."""
+    """The modules of each room: a package or a module directly in `eomgen`, but not the way in by
+    `import eomgen` or `python -m eomgen`.
+    """
     found: dict[str, list[str]] = {}
     for name in modules():
-        if name:
+        if name not in ("", "__main__"):
             found.setdefault(_room(name), []).append(name)
     return found
 

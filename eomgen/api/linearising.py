@@ -56,7 +56,7 @@ def linearisable(model: Model) -> Model:
     equilibrium may be where those taken as independent are not.
     """
     needed = ("input_jacobian",) if model.inputs else ()
-    return replace(model, form="velocity", outputs=needed, closing="projected")
+    return replace(model, form="velocity", outputs=needed, loops_kept="projected")
 
 
 def linearised_at(model: Model, point: PointOptions, reporter: Reporter = SILENT) -> Linearised:

@@ -13,7 +13,7 @@ from eomgen.base.errors import RunError, nearest
 from eomgen.model.elaborate import available_in, in_order, outputs_for
 from eomgen.model.model import Model
 from eomgen.run.inputs import InputsOfTime
-from eomgen.scene.schema import SHOWN, Closing, Scene
+from eomgen.scene.schema import SHOWN, LoopsKept, Scene
 from eomgen.tables.integrators import INTEGRATORS
 from eomgen.tables.outputs import GROUPS, SAVED
 
@@ -97,7 +97,9 @@ def plan_run(
     saved = wanted_outputs(options.save, model, reporter)
     more = (*(("effect_powers",) if plan.works else ()), *_of_method(setting, model))
     needed = in_order((*model.outputs, *SHOWN, *saved, *more))
-    return replace(plan, model=replace(model, outputs=needed, closing=_closing(setting, model)))
+    return replace(
+        plan, model=replace(model, outputs=needed, loops_kept=_loops_kept(setting, model))
+    )
 
 
 def _check_varying(
@@ -159,9 +161,9 @@ def _check_aims(
         )
 
 
-def _closing(setting: "Setting | None", model: Model) -> Closing:
+def _loops_kept(setting: "Setting | None", model: Model) -> LoopsKept:
     """How loops are closed: with all coordinates as states where a method needs them."""
-    return "projected" if _is_rattle(setting) and model.closing == "auto" else model.closing
+    return "projected" if _is_rattle(setting) and model.loops_kept == "auto" else model.loops_kept
 
 
 def _is_rattle(setting: "Setting | None") -> bool:

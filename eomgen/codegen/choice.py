@@ -112,7 +112,7 @@ def without_dead_points(model: Model) -> Model:
     """The model with all coordinates as its state, by a route that takes no velocities as
     independent, so that it has no dead points: the one it names, or what `choose` takes then.
     """
-    model = replace(model, closing="projected")
+    model = replace(model, loops_kept="projected")
     if model.route not in ("auto", *BY_INDEPENDENT):
         return model
     # Without pivots the routes are tried that take no velocities as independent.
@@ -131,10 +131,10 @@ def _of_loops(model: Model, other: Model, closed: bool) -> Choice:
     try:
         in_closed_form = _chosen(model, closed)
     except SceneError:  # too few digits
-        if model.closing == "closed":
+        if model.loops_kept == "closed":
             raise
         return _chosen(with_safe_pivots(other), closed)
-    if model.closing == "closed" or len(model.rows) > MOST_DENSE:
+    if model.loops_kept == "closed" or len(model.rows) > MOST_DENSE:
         return in_closed_form
     projected = _chosen(with_safe_pivots(other), closed)
     steps = [_of_step(choice) for choice in (in_closed_form, projected)]

@@ -223,8 +223,8 @@ def model_for(name: str, model: Model) -> Model:
     if not (name in INTEGRATORS and SPECS[name].rattle and model.constraints):
         return model
     outputs = dict.fromkeys((*model.outputs, "mass_matrix", "kinetic_slopes"))
-    closing = "projected" if model.closing == "auto" else model.closing
-    return replace(model, closing=closing, outputs=tuple(outputs))
+    kept = "projected" if model.loops_kept == "auto" else model.loops_kept
+    return replace(model, loops_kept=kept, outputs=tuple(outputs))
 
 
 def method_of(name: str, model: Model, interface: Interface, *, adaptive: bool = False) -> Method:

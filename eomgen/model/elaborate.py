@@ -24,10 +24,10 @@ from eomgen.model.model import Body, Model, Point, Prescribed, prescribed_of, ve
 from eomgen.model.names import Bindings, Scope, bind, check_names, joined
 from eomgen.model.orientation import oriented
 from eomgen.model.prescribed import locked_values
-from eomgen.model.tree import Link, closes, closing_joints, links_of
+from eomgen.model.tree import Link, links_of, loop_joints
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.chains import written_out
-from eomgen.scene.constraints import Constraint, closing
+from eomgen.scene.constraints import Constraint, loop_joint
 from eomgen.scene.effects import Effect
 from eomgen.scene.schema import BodyTable, Scene
 from eomgen.tables.outputs import OUTPUTS
@@ -76,7 +76,7 @@ def elaborate(scene: Scene) -> Model:
         outputs=(),
         form=scene.form,
         route=scene.route,
-        closing=scene.loops,
+        loops_kept=scene.loops,
         locked=tuple(locked.items()),
         # A locked coordinate is given by its own name, or else in degrees.
         locked_deg=tuple(
@@ -170,7 +170,7 @@ def _moving(scene: Scene) -> tuple[str, ...]:
     """The names of all variables: time, coordinates, velocities, inputs and extra states."""
     names = ["t"]
     for joint, _ in written_out(scene)[1]:
-        if closes(joint):
+        if joint.loop:
             continue
         both = (*joint.positions(scene.dimensions), *joint.velocities(scene.dimensions))
         names += [coordinate.name for coordinate in both]
@@ -280,14 +280,14 @@ def _loops(
     """
     centres = {body.name: body.com for body in bodies if body.com}
     loops, found = list[Constraint](), list[Bindings]()
-    for joint, location in closing_joints(scene):
+    for joint, location in loop_joints(scene):
         turned, kept = oriented(joint, location, scene.dimensions, scope)
         joint = normalised_joint(turned, location, scene.dimensions)
         joint, bindings = bind(joint, joint.name, location, scope)
-        loops.append(closing(joint_from_centres(joint, centres), location, scene.dimensions))
+        loops.append(loop_joint(joint_from_centres(joint, centres), location, scene.dimensions))
         found += [bindings, Bindings(conditions=kept)]
     others, of_others = constraints_in_force(scene, bodies, scope)
-    joints = [(joint.name, location) for joint, location in closing_joints(scene)]
+    joints = [(joint.name, location) for joint, location in loop_joints(scene)]
     check_names([*joints, *((c.name, f"constraints[{i}]") for i, c in enumerate(others))])
     return (*loops, *others), joined([*found, of_others])
 

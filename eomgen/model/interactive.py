@@ -118,7 +118,7 @@ def interactive(model: Model) -> Model:
         outputs=(*OUTPUTS, *(OF_RATTLE if model.constraints else ())),
         form="velocity",
         route=model.route if model.route != "closed" else "auto",
-        closing="projected",
+        loops_kept="projected",
     )
 
 

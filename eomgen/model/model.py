@@ -20,7 +20,7 @@ from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import ExtraState, Input
 from eomgen.scene.joints import Joint
 from eomgen.scene.joints.base import Coordinate
-from eomgen.scene.schema import Closing, Form, LeftOut, Route
+from eomgen.scene.schema import Form, LeftOut, LoopsKept, Route
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class Model(Displayed):
     pivots      for each row of the constraints, in the order of elimination, its index and that of
                 the velocity that is solved for by it
     blocks      of these, the indices of those that are eliminated together with the next
-    closing     how loops are closed: "closed", in closed form; "projected"; or "auto"
+    loops_kept  how loops are kept: "closed", solved in closed form; "projected"; or "auto"
     groups      what determines the coordinates that follow from the others in closed form, in the
                 order in which they are solved; () if they are states too
     """
@@ -210,7 +210,7 @@ class Model(Displayed):
     dropped: tuple[str, ...] = ()
     pivots: tuple[tuple[int, int], ...] = ()
     blocks: tuple[int, ...] = ()
-    closing: Closing = "auto"
+    loops_kept: LoopsKept = "auto"
     groups: tuple[Group, ...] = ()
 
     @cached_property

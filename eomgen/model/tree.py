@@ -37,7 +37,7 @@ def links_of(scene: Scene) -> tuple[Link, ...]:
     check_names([(body.name, location) for body, location in bodies])
     check_names([(joint.name, location) for joint, location in joints])
     locations = {body.name: location for body, location in bodies}
-    parent_joint = _parent_joints(locations, [pair for pair in joints if not closes(pair[0])])
+    parent_joint = _parent_joints(locations, [pair for pair in joints if not pair[0].loop])
     order = _parents_first(locations, parent_joint)
     index = {name: k for k, name in enumerate(order, start=-1)}
     tables = {body.name: body for body, _ in bodies}
@@ -49,12 +49,7 @@ def links_of(scene: Scene) -> tuple[Link, ...]:
     )
 
 
-def closes(joint: Joint) -> bool:
-    """Whether a joint closes a loop instead of carrying its child."""
-    return joint.loop
-
-
-def closing_joints(scene: Scene) -> list[tuple[Joint, str]]:
+def loop_joints(scene: Scene) -> list[tuple[Joint, str]]:
     """The joints that close loops, each with its location.
 
     Raises `SceneError` for an unknown body, or a body held to itself.

@@ -99,7 +99,7 @@ class _Plan:
                 max_steps=asked.max_steps,
                 resume=asked.resume,
             )
-        held = problem.projection or problem.closed_form
+        held = problem.projection or problem.solved_loops
         if held:
             advances = watched(held, advances, t_start, problem.initial, self.passage)
         return monitored(monitor, advances, t_start, problem.initial) if monitor else advances
@@ -139,8 +139,8 @@ def _counted(
     if problem.projection:
         violations = Violations(len(problem.projection.names))
         functions["projection"] = replace(problem.projection, violations=violations, seen=Seen())
-    if problem.closed_form:
-        functions["closed_form"] = replace(problem.closed_form, seen=Seen())
+    if problem.solved_loops:
+        functions["solved_loops"] = replace(problem.solved_loops, seen=Seen())
     counted = problem.having(**functions)
     if asked.tally:
         counted = asked.tally.counting(counted)

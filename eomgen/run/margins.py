@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 SINGULAR, NEAR = 1e-9, 0.05
 """A margin that counts as 0; and one below which the least margin is searched between steps."""
-IN_CLOSED_FORM = 1e-7
+NEAR_SOLVED = 1e-7
 """A margin that counts as 0 in closed form, which turns back on the same branch at a dead point."""
 
 

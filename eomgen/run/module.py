@@ -10,13 +10,13 @@ import numpy as np
 
 from eomgen.base.errors import RunError
 from eomgen.base.loading import load_source
-from eomgen.run.closed_form import closed_form_of
 from eomgen.run.intervals import BY_INTERVALS, Interval
 from eomgen.run.noise import step_noise
 from eomgen.run.origin import Origin
 from eomgen.run.problem import Contacts, Explain, FloatArray, Problem, Switching, unexplained
 from eomgen.run.projection import projection_of
 from eomgen.run.sizes import mechanism_size, row_sizes, state_sizes
+from eomgen.run.solved_loops import solved_loops_of
 from eomgen.run.works import Powers
 
 Rate = Callable[[float, FloatArray], FloatArray]
@@ -107,8 +107,8 @@ def as_problem(
     initial state.
     """
     exactly, jacobian = _rates(module, parameters, inputs)
-    closed_form = closed_form_of(module, parameters, inputs)
-    derivative = _rejecting(exactly, closed_form is not None)
+    solved_loops = solved_loops_of(module, parameters, inputs)
+    derivative = _rejecting(exactly, solved_loops is not None)
     try:
         initial = module.initial_state(parameters)
         initial = start(initial) if start else initial
@@ -143,7 +143,7 @@ def as_problem(
         columns=hasattr(module, "_along"),
         timed=_depends_on_time(module),
         projection=projection,
-        closed_form=closed_form,
+        solved_loops=solved_loops,
     )
 
 

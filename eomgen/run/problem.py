@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from eomgen.base.errors import RunError
 from eomgen.engine import quaternions
-from eomgen.run.closed_form import ClosedForm
 from eomgen.run.compiled import Compiled, Series
 from eomgen.run.intervals import Interval
 from eomgen.run.localised import Scrutiny
 from eomgen.run.origin import Origin
 from eomgen.run.projection import Projection
 from eomgen.run.rows import all_finite
+from eomgen.run.solved_loops import SolvedLoops
 
 FloatArray = NDArray[np.float64]
 """An array of 64-bit floats, such as a state."""
@@ -122,7 +122,7 @@ class Problem:
     series      makes the Taylor series of the solutions, by the name of the method that takes them;
                 raises `RunError` where that is not possible
     projection  onto the constraints; None if there are none
-    closed_form the constraints that are kept in closed form; None if there are none
+    solved_loops the constraints that are kept in closed form; None if there are none
     scrutiny    what is checked beside that; None for an ordinary run
 
     Raises `RunError` if `initial` does not have one finite number for each state, or if a
@@ -149,7 +149,7 @@ class Problem:
     compiled: Compiled | None = None
     series: Mapping[str, Callable[[], Series]] = field(default_factory=dict)
     projection: Projection | None = None
-    closed_form: ClosedForm | None = None
+    solved_loops: SolvedLoops | None = None
     scrutiny: Scrutiny | None = None
 
     def __post_init__(self) -> None:

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.closed_form import ClosedForm
 from eomgen.run.failure import EndedRunError, StepFailure
 from eomgen.run.integrators.interface import Advance
-from eomgen.run.margins import IN_CLOSED_FORM, NEAR, SINGULAR, Seen, rank_margin, stays_away
+from eomgen.run.margins import NEAR, NEAR_SOLVED, SINGULAR, Seen, rank_margin, stays_away
 from eomgen.run.passage import Passage
 from eomgen.run.projection import Projection, without
+from eomgen.run.solved_loops import SolvedLoops
 
 FloatArray = NDArray[np.float64]
 
@@ -30,10 +30,10 @@ class SingularPositionError(StepFailure):
     """The mechanism, or what was taken as independent, is singular at a time."""
 
     def __init__(
-        self, held: Projection | ClosedForm, t: float, y: FloatArray, margins: FloatArray
+        self, held: Projection | SolvedLoops, t: float, y: FloatArray, margins: FloatArray
     ) -> None:
         least, dead, remedy = int(np.argmin(margins)), True, OTHERS
-        if isinstance(held, ClosedForm) and least >= len(held.names):
+        if isinstance(held, SolvedLoops) and least >= len(held.names):
             angle = held.angles[least - len(held.names)]
             reason = (
                 f"at t = {t:.6g} s {angle}, which follows from the state in closed form, leaves "
@@ -48,7 +48,7 @@ class SingularPositionError(StepFailure):
                 reason += ", or this has no direction, as where a disc lies flat"
                 remedy = f"{ELSEWHERE}, or {OTHERS}"
         else:
-            dead = isinstance(held, ClosedForm)
+            dead = isinstance(held, SolvedLoops)
             remedy = OTHERS if dead else ELSEWHERE
             reason = (
                 f"the mechanism is singular at t = {t:.6g} s: constraint {held.names[least]} "
@@ -63,7 +63,7 @@ class SingularPositionError(StepFailure):
 
 
 def watched(
-    projection: Projection | ClosedForm,
+    projection: Projection | SolvedLoops,
     advances: Iterator[Advance],
     t: float,
     y: FloatArray,
@@ -108,7 +108,7 @@ def watched(
 class _Watch:
     """The margins of a run, as its steps are taken."""
 
-    def __init__(self, projection: Projection | ClosedForm, seen: Seen) -> None:
+    def __init__(self, projection: Projection | SolvedLoops, seen: Seen) -> None:
         self._projection, self._seen = projection, seen
         self._last: Advance | None = None
 
@@ -122,7 +122,7 @@ class _Watch:
         singular.
         """
         projection, seen = self._projection, self._seen
-        if isinstance(projection, ClosedForm) and not np.isfinite(advance.y).all():
+        if isinstance(projection, SolvedLoops) and not np.isfinite(advance.y).all():
             raise StepFailure("the loops cannot be closed", OTHERS)
         if advance.margins:
             seen.begin(advance.margins.start, advance.margins.before)
@@ -139,7 +139,7 @@ class _Watch:
 
     def explained(self, failure: StepFailure) -> StepFailure:
         """The failure of a step, which the margins may explain."""
-        bound = BEFORE_END if isinstance(self._projection, ClosedForm) else NEAR
+        bound = BEFORE_END if isinstance(self._projection, SolvedLoops) else NEAR
         if self._seen.here >= bound:
             return failure
         reason = f"the mechanism is nearly singular there, and the step fails: {failure.reason}"
@@ -149,7 +149,7 @@ class _Watch:
 
 
 def _search(
-    projection: Projection | ClosedForm, start: float, last: Advance, advance: Advance
+    projection: Projection | SolvedLoops, start: float, last: Advance, advance: Advance
 ) -> None:
     """Look for a singular position in two steps, of which the first begins at `start`, by golden
     section. It ends where none can be.
@@ -179,7 +179,7 @@ def _search(
     _checked(projection, best, (last if best < last.t else advance).within(best))
 
 
-def _checked(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:
+def _checked(projection: Projection | SolvedLoops, t: float, y: FloatArray) -> float:
     """The least margin. Raises `SingularPositionError` if it counts as 0."""
     margins = projection.margins(t, y)
     least = float(margins.min())
@@ -188,9 +188,9 @@ def _checked(projection: Projection | ClosedForm, t: float, y: FloatArray) -> fl
     return least
 
 
-def _least(projection: Projection | ClosedForm, t: float, y: FloatArray) -> float:
+def _least(projection: Projection | SolvedLoops, t: float, y: FloatArray) -> float:
     return float(projection.margins(t, y).min())
 
 
-def _limit(projection: Projection | ClosedForm) -> float:
-    return IN_CLOSED_FORM if isinstance(projection, ClosedForm) else SINGULAR
+def _limit(projection: Projection | SolvedLoops) -> float:
+    return NEAR_SOLVED if isinstance(projection, SolvedLoops) else SINGULAR

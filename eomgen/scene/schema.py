@@ -58,7 +58,7 @@ ModuleName = Annotated[Identifier, AfterValidator(_no_module)]
 
 
 Form = Literal["velocity", "momentum", "redundant"]
-Closing = Literal["auto", "closed", "projected"]
+LoopsKept = Literal["auto", "closed", "projected"]
 """How the loops of a mechanism are closed."""
 LeftOut = Literal["velocity_forces"]
 """Terms of the equations that a scene may leave out."""
@@ -269,7 +269,7 @@ class Scene(Table, Displayed):
     )
     dimensions: Literal[2, 3] = Field(default=2, description="2 in the plane, 3 in space")
     route: Route = Field(default="auto", description="route to the equations")
-    loops: Closing = Field(
+    loops: LoopsKept = Field(
         default="auto",
         description="closed: dependent coordinates follow in closed form and are no states; "
         "projected: all coordinates are states; auto: closed where that is possible",

@@ -33,8 +33,8 @@ def setup_of(
 ) -> Setup:
     """What outputs of a run of a scene are computed from; form and route are those of `model`."""
     tables = {**tables_of(scene), "form": model.form, "route": model.route}
-    if model.closing != "auto":
-        tables["loops"] = model.closing
+    if model.loops_kept != "auto":
+        tables["loops"] = model.loops_kept
     text = json.dumps(tables, ensure_ascii=False, separators=(",", ":"))
     return Setup(text, dict(parameters), dict(inputs), varying)
 

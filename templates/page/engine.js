@@ -48,7 +48,7 @@ const makeEngine = (mechanism, data) => {
   };
   const given = () => [engine.p, engine.u];
   const ofStates = { positions, others, kinds, quaternions };
-  const held = mechanism.projectPosition && makeClosure(mechanism, steps, data.size ?? 1, { ...ofStates, unit, given, derivative });
+  const held = mechanism.projectPosition && makeLoops(mechanism, steps, data.size ?? 1, { ...ofStates, unit, given, derivative });
   const projected = held?.placed ?? ((t, y) => unit(y));
   const free = {
     ny,

@@ -5,7 +5,7 @@
 //   suits(free)  whether it can make steps of the mechanism, if not every method can
 //
 // problem: {ny, positions, others, steps, held, f(t, y), sample(k)}; f returns an array that its next call may
-// reuse; `steps` are the functions of the engine, `held` the constraints of loops, or null; see `closure`.
+// reuse; `steps` are the functions of the engine, `held` the constraints of loops, or null; see `loops`.
 
 const methods = (() => {
   // After more iterations than SLOW the next step takes other factors; after more than MOST their end says

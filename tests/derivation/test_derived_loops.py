@@ -189,5 +189,5 @@ def test_large_mechanisms_with_loops_are_derived_by_algorithms() -> None:
     titles = [step.title for step in found.steps]
     assert found.matrices is None and "One equation for each freedom" in titles
     assert "Inwards: the mass matrix M" in titles
-    found = exposition_of(replace(model_of("peaucellier"), closing="projected", route="aba"))
+    found = exposition_of(replace(model_of("peaucellier"), loops_kept="projected", route="aba"))
     assert "The accelerations that meet the constraints" in [step.title for step in found.steps]

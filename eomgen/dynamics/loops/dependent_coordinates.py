@@ -71,11 +71,11 @@ def solved(d: MechanismState, group: Group) -> list[Turn | Scalar]:
     its coordinates the direction of its frame, or its value.
     """
     constraint = next(c for c in d.model.constraints if c.name == group.constraint)
-    closing = constraint.closed_by()
-    if isinstance(closing, Given):
-        return [d.value(closing.equals)]
-    assert closing is not None
-    return _Polygon(d, group).solved(closing)
+    part = constraint.loop_part()
+    if isinstance(part, Given):
+        return [d.value(part.equals)]
+    assert part is not None
+    return _Polygon(d, group).solved(part)
 
 
 def angle_of(d: MechanismState, turn: Turn, cut: tuple[int, int]) -> Scalar:
@@ -115,12 +115,12 @@ class _Polygon:
             k for i in group.coordinates for k, f in enumerate(self._frames) if i in f.q
         ]
 
-    def solved(self, closing: Bar | Pair) -> list[Turn | Scalar]:
+    def solved(self, part: Bar | Pair) -> list[Turn | Scalar]:
         """What the group determines, in the order of its coordinates."""
-        if isinstance(closing, Bar):
-            found = self._rod(closing)
+        if isinstance(part, Bar):
+            found = self._rod(part)
         else:
-            found = (self._slider if closing.slides else self._pin)(closing.joint)
+            found = (self._slider if part.slides else self._pin)(part.joint)
         return [found[k] for k in self._unknown]
 
     # Polygons.

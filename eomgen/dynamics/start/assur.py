@@ -28,7 +28,7 @@ from eomgen.model.model import Model
 from eomgen.scalars import exact
 from eomgen.scalars.protocol import Scalar
 from eomgen.scene.constraints import Constraint
-from eomgen.scene.constraints.base import Bar, Closing, Given, Pair
+from eomgen.scene.constraints.base import Bar, Given, LoopPart, Pair
 from eomgen.scene.joints.base import WORLD
 
 SAME = 1e-4
@@ -46,12 +46,12 @@ def with_closed_form(model: Model) -> Model:
 
     Raises `SceneError` if the model asks for that and they do not.
     """
-    if model.closing == "projected" or not model.constraints:
+    if model.loops_kept == "projected" or not model.constraints:
         return replace(model, groups=())
-    if len(model.rows) > MOST and model.closing == "auto":
+    if len(model.rows) > MOST and model.loops_kept == "auto":
         return replace(model, groups=())
     made, why = _found(_Alike(model))
-    if why and model.closing == "closed":
+    if why and model.loops_kept == "closed":
         raise SceneError(f"loops: 'closed' cannot be: {why}; leave it out")
     if why:
         return replace(model, groups=())
@@ -64,7 +64,9 @@ class _Alike:
     """
 
     def __init__(self, model: Model) -> None:
-        self.model = replace(model, outputs=(), notices=(), groups=(), route="auto", closing="auto")
+        self.model = replace(
+            model, outputs=(), notices=(), groups=(), route="auto", loops_kept="auto"
+        )
         self._key = pickle.dumps(self.model)
 
     def __hash__(self) -> int:
@@ -119,7 +121,7 @@ def _choices(model: Model, d: Dynamics) -> Iterator[frozenset[int]]:
     outer = set[int]()
     seen = set[int]()
     for constraint in model.constraints:
-        if (found := _loop(d, constraint.closed_by())) is not None:
+        if (found := _loop(d, constraint.loop_part())) is not None:
             new = [i for i in found[0] if i not in seen]
             outer |= set(new[-found[1] :])
             seen |= set(found[0])
@@ -217,35 +219,35 @@ def _group(d: Dynamics, constraint: Constraint, unknown: set[int]) -> Group | No
     if any(name in d.model.dropped for name in rows):
         return None
     names = [c.name for c in d.model.coordinates]
-    closing = constraint.closed_by()
-    if isinstance(closing, Given):
-        own = names.index(closing.coordinate) if closing.coordinate in names else -1
-        used = {names.index(name) for name in names_in(closing.equals) if name in names}
+    part = constraint.loop_part()
+    if isinstance(part, Given):
+        own = names.index(part.coordinate) if part.coordinate in names else -1
+        used = {names.index(name) for name in names_in(part.equals) if name in names}
         if own in unknown and not used & unknown:
             return Group(constraint.name, (own,), cuts=(None,))
         return None
-    loop = _loop(d, closing)
+    loop = _loop(d, part)
     if loop is None:
         return None
     within, count, before = loop
     moving = [i for i in within if i in unknown]
     kinds = [frame.kind for frame in d.linkage.frames if {*frame.q} & {*moving}]
-    slider = isinstance(closing, Pair) and closing.slides
+    slider = isinstance(part, Pair) and part.slides
     if before & unknown or len(moving) != count or (slider and "revolute" not in kinds):
         return None
     return Group(constraint.name, tuple(moving), 1, (None,) * count)
 
 
-def _loop(d: Dynamics, closing: Closing | None) -> tuple[list[int], int, set[int]] | None:
+def _loop(d: Dynamics, part: LoopPart | None) -> tuple[list[int], int, set[int]] | None:
     """The coordinates in a planar loop, in the order of its frames, how many it determines, and
     those that carry it; None if it is none.
     """
-    if d.dimensions == 3 or closing is None or isinstance(closing, Given):
+    if d.dimensions == 3 or part is None or isinstance(part, Given):
         return None
-    if isinstance(closing, Bar):
-        bodies, count = [body for body, _ in closing.ends], 1
+    if isinstance(part, Bar):
+        bodies, count = [body for body, _ in part.ends], 1
     else:
-        bodies, count = [closing.joint.parent, closing.joint.child], 2
+        bodies, count = [part.joint.parent, part.joint.child], 2
     first, second = (set(_path(d, body)) for body in bodies)
     of = {k: frame.q[0] for k, frame in enumerate(d.linkage.frames) if frame.q}
     within = [of[k] for k in sorted(first ^ second) if k in of]

@@ -70,7 +70,7 @@ def _walks(model: Model) -> tuple[tuple[Place, ...], ...]:
     ask for them one after another.
     """
     alike = replace(model, pivots=(), blocks=(), groups=(), outputs=(), notices=())
-    return _walked(replace(alike, route="auto", closing="auto"))
+    return _walked(replace(alike, route="auto", loops_kept="auto"))
 
 
 @lru_cache(maxsize=2)

@@ -146,8 +146,8 @@ def advances(
         if touched and met:
             touched.now.slack[:] = met.slack
         margins = np.concatenate(([held.margins[1][1]], kept.margins[:n])) if held else None
-        if n and problem.closed_form:
-            margins = problem.closed_form.passed(t, y, kept.ends[:n], kept.states[:n])
+        if n and problem.solved_loops:
+            margins = problem.solved_loops.passed(t, y, kept.ends[:n], kept.states[:n])
             near = margins is None  # perhaps to a singular position, for which each is looked at
             n = 0 if not size.fits(not near) and place else n
         usual = n > 0 and (not place or why == MADE)

@@ -29,7 +29,11 @@ class Strides:
         touched: Touched | None,
     ) -> None:
         problem = stepper.problem
-        switching, contacts, self._looked = problem.switching, problem.contacts, problem.closed_form
+        switching, contacts, self._looked = (
+            problem.switching,
+            problem.contacts,
+            problem.solved_loops,
+        )
         self._stepper, self._steps = stepper, steps
         self._dense = stepper.settings.dense or self._looked is not None
         self._atol = np.zeros(problem.initial.shape) + stepper.bounds.atol

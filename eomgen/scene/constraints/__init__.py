@@ -11,7 +11,7 @@ from eomgen.scene.constraints.base import Constraint, ConstraintTable, Row
 from eomgen.scene.constraints.distance import Distance
 from eomgen.scene.constraints.formula import Coupling, Equation
 from eomgen.scene.constraints.knife_edge import KnifeEdge
-from eomgen.scene.constraints.loop import LoopJoint, closing
+from eomgen.scene.constraints.loop import LoopJoint, loop_joint
 from eomgen.scene.constraints.point_on import PointOn
 from eomgen.scene.constraints.rolling import Rolling
 
@@ -32,5 +32,5 @@ __all__ = [
     "PointOn",
     "Rolling",
     "Row",
-    "closing",
+    "loop_joint",
 ]

@@ -81,7 +81,7 @@ class Pair:
     slides: bool
 
 
-Closing = Given | Bar | Pair
+LoopPart = Given | Bar | Pair
 
 
 class Constraint(Protocol):
@@ -101,7 +101,7 @@ class Constraint(Protocol):
     def internal(self) -> bool:
         """Whether its forces change neither the momentum nor the moment of momentum of all."""
 
-    def closed_by(self) -> Closing | None:
+    def loop_part(self) -> LoopPart | None:
         """What determines the coordinates of a planar loop in closed form; None for nothing."""
 
     def rows(self, mechanism: Linkage) -> Iterable[Row]:
@@ -129,7 +129,7 @@ class ConstraintTable(EffectTable):
         """Whether its forces change neither the momentum nor the moment of momentum of all."""
         return False
 
-    def closed_by(self) -> Closing | None:
+    def loop_part(self) -> LoopPart | None:
         """What determines the coordinates of a planar loop in closed form; None for nothing."""
         return None
 

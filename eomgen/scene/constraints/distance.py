@@ -58,7 +58,7 @@ length = 0.5
         """True between two bodies."""
         return WORLD not in (self.body_1, self.body_2)
 
-    def closed_by(self) -> Bar:
+    def loop_part(self) -> Bar:
         """Itself."""
         return Bar(((self.body_1, self.at_1), (self.body_2, self.at_2)), self.length)
 

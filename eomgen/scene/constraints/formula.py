@@ -34,7 +34,7 @@ equals = "-2*shoulder_angle + 0.1"
     coordinate: Identifier = Field(description="coordinate that follows")
     equals: Quantity = quantity("", "its value", sees=("motion",))
 
-    def closed_by(self) -> Given:
+    def loop_part(self) -> Given:
         """Its formula."""
         return Given(self.coordinate, self.equals)
 

@@ -22,7 +22,7 @@ from eomgen.scene.joints import (
 )
 from eomgen.scene.joints.base import WORLD, Orientation, spatial
 
-Closing = Ball | Cylindrical | Particle | Planar | Prismatic | Revolute | Universal | Weld
+LoopClosing = Ball | Cylindrical | Particle | Planar | Prismatic | Revolute | Universal | Weld
 Direction = tuple[exact.Real, ...]
 X, Y, Z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -39,7 +39,7 @@ class LoopJoint:
     constant. Such a row is 0 also where the child is turned by half a turn; assembly excludes that.
     """
 
-    joint: Closing
+    joint: LoopClosing
 
     @property
     def name(self) -> str:
@@ -76,7 +76,7 @@ class LoopJoint:
         """True between two bodies."""
         return WORLD not in (self.joint.parent, self.joint.child)
 
-    def closed_by(self) -> Pair | None:
+    def loop_part(self) -> Pair | None:
         """A pin or a slider."""
         slides = isinstance(self.joint, Prismatic)
         return Pair(self.joint, slides) if slides or isinstance(self.joint, Revolute) else None
@@ -235,7 +235,7 @@ def _about(mechanism: Linkage, angle: Scalar, x: Scalar, y: Scalar) -> tuple[Sca
     return c * x - s * y, s * x + c * y
 
 
-def closing(joint: Joint, location: str, dimensions: int) -> LoopJoint:
+def loop_joint(joint: Joint, location: str, dimensions: int) -> LoopJoint:
     """The constraint of a joint that closes a loop.
 
     Raises `SceneError` for a joint that constrains nothing.

@@ -131,7 +131,7 @@ def arithmetic(
     Raises `SceneError` or `RunError` if no route gives an acceleration at the initial state, or if
     60 digits are not enough for a reference.
     """
-    model = replace(model, form="velocity", outputs=(), closing="projected")
+    model = replace(model, form="velocity", outputs=(), loops_kept="projected")
     check_nonsingular(model)
     taken = compile_program(model, jacobian=False).system
     others, missing = compiled(model, but=taken.route)

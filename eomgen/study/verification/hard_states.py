@@ -83,7 +83,7 @@ def closed_states(
     along its motion, without those near singular positions.
     """
     problem, found, nq = as_problem(module), [], len(model.coordinates)
-    seen, held = viewed(module, model), problem.projection or problem.closed_form
+    seen, held = viewed(module, model), problem.projection or problem.solved_loops
     positions = walked_positions(model) or (np.array(model.initial_q),)
     for index, kind in enumerate(CLOSED):
         for number in range(count):

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.run.margins import IN_CLOSED_FORM, NEAR, Seen
+from eomgen.run.margins import NEAR, NEAR_SOLVED, Seen
 from eomgen.run.projection import without
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedForm:
+class SolvedLoops:
     """The constraints of a module that keeps them in closed form: nothing is projected.
 
     names    of the rows
@@ -45,17 +45,17 @@ class ClosedForm:
         assert self.seen
         seen = replace(self.seen)
         for end, margin in zip(ends.tolist(), found[1:].tolist(), strict=True):
-            if not margin >= IN_CLOSED_FORM or seen.turns(end, margin):
+            if not margin >= NEAR_SOLVED or seen.turns(end, margin):
                 return None
             seen.add(end, margin)
         return np.asarray(found)
 
 
-def closed_form_of(module: Any, parameters: Any, inputs: Any) -> ClosedForm | None:
+def solved_loops_of(module: Any, parameters: Any, inputs: Any) -> SolvedLoops | None:
     """The constraints of a module that keeps them in closed form; None if it does not."""
     if not getattr(module, "FOLLOWING", None):
         return None
-    return ClosedForm(
+    return SolvedLoops(
         tuple(module.CONSTRAINTS),
         tuple(getattr(module, "RANGED", ())),
         lambda t, y: module.constraint_margins(t, y, parameters, inputs),

@@ -1,10 +1,10 @@
-// `makeClosure`: the constraints of a mechanism's loops, as the engine is given them. It needs no document.
+// `makeLoops`: the constraints of a mechanism's loops, as the engine is given them. It needs no document.
 //
 // unit(y) gives quaternions the length 1; given() returns [p, u]; derivative(t, y). What is returned has
 // `placed(t, y)`, which returns the state, changed in place, on the constraints; it throws a sentence where the
 // loops cannot be closed, and where the mechanism is singular.
 
-const makeClosure = (mechanism, steps, size, { positions, others, kinds, quaternions, unit, given, derivative }) => {
+const makeLoops = (mechanism, steps, size, { positions, others, kinds, quaternions, unit, given, derivative }) => {
   const sizes = Float64Array.from(mechanism.constraints, (force) => (force === "N" ? size : 1));
   const [n, nv, rows, ny] = [positions.length, kinds.filter((kind) => kind === "velocity").length, sizes.length, kinds.length];
   const off = steps.records.Residuals({ rows, sizes });
