@@ -36,9 +36,10 @@ from eomgen.store import generated_code
 from eomgen.study.accuracy.choosing import meet
 from eomgen.study.accuracy.localised import under_scrutiny
 from eomgen.study.accuracy.measure import error
+from eomgen.study.accuracy.methods import method_of
 from eomgen.study.accuracy.moved import moved_problem
 from eomgen.study.accuracy.reference import reference
-from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
+from eomgen.study.accuracy.trial import Case, Setting, Tried
 from eomgen.study.diagnosis import problem_of
 
 TARGETS = (1e-3, 1e-6, 1e-9)

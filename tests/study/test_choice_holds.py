@@ -28,7 +28,7 @@ from eomgen.store import generated_code, program_of
 from eomgen.study.accuracy import search, trial
 from eomgen.study.accuracy.budgeting import within
 from eomgen.study.accuracy.choosing import meet
-from eomgen.study.accuracy.estimate import looser
+from eomgen.study.accuracy.estimate import second_of
 from eomgen.study.accuracy.ladder import Ladder, Rung, Work, next_rung
 from eomgen.study.accuracy.localised import under_scrutiny
 from eomgen.study.accuracy.measure import error
@@ -264,11 +264,11 @@ def test_steps_as_long_as_any_may_be() -> None:
     run = case.run(Setting("RK45", 1e-6, 1e-6))
     counts = {**run.trajectory.counts, "capped": run.trajectory.counts["steps"]}
     capped = replace(run, trajectory=replace(run.trajectory, counts=counts))
-    setting, other = looser(case, run)
+    setting, other = second_of(case, run)
     assert setting.rtol == 1e-5 and other is case
-    setting, other = looser(case, capped)
+    setting, other = second_of(case, capped)
     assert setting == run.setting and other.kept["max_step"] < case.t_end / 1000
-    _, other = looser(replace(case, kept={**case.kept, "max_step": 0.01}), capped)
+    _, other = second_of(replace(case, kept={**case.kept, "max_step": 0.01}), capped)
     assert other.kept["max_step"] == 0.02
 
 

@@ -1,91 +1,43 @@
-"""The error of a run, estimated from other runs of the same scene.
+"""The error of a run, estimated from a second run of the same scene.
 
 A method's error is about C τ^a at tolerance τ, with a near 1; with equal steps h of a method of
 order p it is C h^p. Two runs that differ only in τ differ by the error of the looser one, less that
-of the tighter one; three runs give the exponent. Runs of two methods differ by about the larger of
-their errors. Differences are taken over the last part of a run. The last moment alone would not do:
-in an oscillation the difference may pass through 0 just then. Nor would the greatest difference: a
-spike or an impact makes it large for a moment.
+of the tighter one. The second run's constants are also perturbed by rounding errors, and its steps
+rounded at random, so the difference shows what rounding does.
+
+Differences are taken over the last part of a run. The last moment alone would not do: in an
+oscillation the difference may pass through 0 just then. Nor would the greatest difference: a spike
+or an impact makes it large for a moment.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from eomgen.run.checks import longest_steps
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
-from eomgen.study.accuracy.measure import WRONG
-from eomgen.study.accuracy.trial import Case, Setting, Tried, method_of
+from eomgen.study.accuracy.methods import method_of
+from eomgen.study.accuracy.trial import Case, Setting, Tried, plain
 
 LAST = 0.1
 """Part of a run's time, at its end, over which differences are taken."""
-NEAREST = 2
-"""This many of the looser runs of a method are used to estimate the tightest run's error: errors of
-much looser ones may fall faster than theory says."""
-CAUTION = 0.8
-"""If only one difference is known, the theoretical exponent is reduced by this factor."""
-MORE = 1.5
-"""Two runs count as different in their steps if one has this many times the steps of the other."""
-ROUNDING, FEW = 2.0**-52, 8.0
-"""An error is never stated below machine epsilon, nor, from a second run, below a few times
-it."""
+ROUNDING = 8 * 2.0**-52
+"""No error is stated below a few times machine epsilon."""
 STRIKES = 1e-13
 """Impacts are located to 1e-14 of a step; with rigid contacts no error is stated below some times
 that."""
-SMALL = 1e-3
-"""With equal steps, the error follows theory once differences are less than this."""
-APART = 30.0
-"""Errors scatter: their observed decay counts only if theory predicts a decrease by this factor."""
-SCATTER = 3.0
-"""The errors of multistep methods, whose orders vary, scatter more; the estimate of their remaining
-error is multiplied by this."""
-ALIKE = 2.0
-"""The error of a run is taken as this many times its difference from a run of another method: both
-may be off in the same direction, and the closest of several others is used."""
-WIDER = 10.0
-"""Factor between a run's tolerances and those of the run that estimates its error."""
+WIDER, SHORTER = 10.0, 16
+"""Factor between the tolerances of two runs, and how many times shorter equal steps are where
+something may lie between them."""
 MOSTLY = 0.3
 """If more than this share of a run's steps is at the greatest length allowed, the tolerance does
 not determine its steps."""
-CHANCE = 1.5
+CHANCE = 2.0
 """The error is taken to be at least this many times the difference between a run and one with other
 rounding errors."""
-SLOPES = (0.6, 1.2)
-"""Bounds of a fitted exponent, relative to the theoretical one."""
-
-
-@dataclass(frozen=True)
-class Law:
-    """A power law: quantity = factor · τ^exponent."""
-
-    factor: float
-    exponent: float
-
-    def at(self, tolerance: float) -> float:
-        """The quantity at the given tolerance."""
-        return self.factor * math.pow(tolerance, self.exponent)
-
-    def tolerance(self, quantity: float) -> float:
-        """The tolerance at which the law gives the quantity."""
-        return math.exp(math.log(quantity / self.factor) / self.exponent)
-
-
-def fit(tolerances: Sequence[float], quantities: Sequence[float], expected: float) -> Law:
-    """The power law through the last of a series of points. Its exponent is fitted to the others by
-    least squares of the logarithms and kept within `SLOPES` times the `expected` one. A single
-    point takes the expected exponent.
-    """
-    tau, e = np.log(np.asarray(tolerances)), np.log(np.asarray(quantities))
-    slope = expected
-    if len(tau) > 1:
-        away, rise = tau[:-1] - tau[-1], e[:-1] - e[-1]
-        bounds = sorted(bound * expected for bound in SLOPES)
-        slope = min(max(float(away @ rise) / float(away @ away), bounds[0]), bounds[1])
-    return Law(math.exp(e[-1] - slope * tau[-1]), slope)
 
 
 def difference(one: Trajectory, other: Trajectory, scale: FloatArray) -> float:
@@ -104,77 +56,6 @@ def _rows(run: Trajectory, since: float) -> tuple[FloatArray, FloatArray]:
     """Rows from a time on, in reverse. Of two rows at an impact, the later one comes first."""
     late = run.t >= since
     return run.t[late][::-1], run.y[late][::-1]
-
-
-def remaining(
-    gaps: Sequence[float], tolerances: Sequence[float], expected: float, caution: float = CAUTION
-) -> float:
-    """The error of the tightest of k >= 2 runs of one method, estimated from the differences
-    `gaps` (k - 1,) between successive runs, whose `tolerances` (k,) decrease.
-
-    With one difference, the theoretical exponent times `caution` is used. With more, the decay of
-    the differences gives the exponent, if the tolerances are far enough apart: near rounding the
-    error stops falling. The difference of a wrong run says nothing of the next run's error and is
-    returned unchanged.
-    """
-    last = gaps[-1]
-    if last >= WRONG or last == 0:
-        return last
-    slope = caution * expected
-    for gap, tolerance in zip(gaps[-2::-1], tolerances[-3::-1], strict=True):
-        ratio = tolerance / tolerances[-2]
-        if ratio**expected >= APART and 0 < gap < WRONG:
-            slope = min(max(math.log(gap / last) / math.log(ratio), 0.0), expected)
-            break
-    return last * math.pow(tolerances[-1] / tolerances[-2], slope)
-
-
-def errors(runs: Sequence[Tried], scale: FloatArray, case: Case) -> list[float]:
-    """Estimated error of each run, relative to the scale; infinite if nothing is known.
-
-    The error of a method's looser run is its difference from the tightest one; that of the tightest
-    run is what remains by its power law. A smaller difference from a run of another method is used
-    instead. If steps are bounded otherwise, two runs may share most of their steps: they are
-    compared only if one took `MORE` times as many. Impacts at rigid contacts have a fixed tolerance
-    of their own; there the tightest run's error is its full difference from the next one.
-    """
-    found = []
-    for run in runs:
-        name = run.setting.integrator
-        others = [r for r in runs if r.setting.integrator != name]
-        apart = [ALIKE * difference(run.trajectory, r.trajectory, scale) for r in others]
-        own = _reporting(
-            sorted((r for r in runs if r.setting.integrator == name), key=lambda r: r.tolerance),
-            case,
-        )
-        if run is not own[-1] and (run in own or not case.bounded or _more(own[-1], run)):
-            apart.append(difference(run.trajectory, own[-1].trajectory, scale))
-        elif run is own[-1] and len(own) > 1:
-            gaps = [difference(a.trajectory, b.trajectory, scale) for a, b in pairwise(own)]
-            tolerances = [r.tolerance for r in own]
-            method = method_of(name)
-            scatter = SCATTER if method.multistep else 1.0
-            struck = case.problem.contacts is not None
-            caution = 1.0 if method.equal_steps and gaps[-1] < SMALL else CAUTION
-            caution = 0.0 if case.bounded else caution
-            left = remaining(gaps, tolerances, method.exponent, caution)
-            apart.append(scatter * (gaps[-1] if struck else left))
-        found.append(max(min(apart, default=math.inf), ROUNDING))
-    return found
-
-
-def _reporting(own: Sequence[Tried], case: Case) -> list[Tried]:
-    """Of a method's runs, given tightest first, those that can be compared, tightest last."""
-    ladder = [own[0]]
-    for run in own[1:]:
-        if not case.bounded or _more(ladder[-1], run):
-            ladder.append(run)
-    return ladder[::-1]
-
-
-def _more(one: Tried, other: Tried) -> bool:
-    """Whether `other` took clearly fewer steps than `one`."""
-    return one.trajectory.counts["steps"] >= MORE * other.trajectory.counts["steps"]
 
 
 @dataclass(frozen=True)
@@ -201,68 +82,56 @@ def representable(run: Tried, scale: FloatArray) -> tuple[float, int]:
     return float(floors[worst]), worst
 
 
-def looser(case: Case, run: Tried) -> tuple[Setting, Case]:
-    """The setting and case of a run that estimates another's error: ten times its tolerances, or
-    twice its step.
+def second_of(case: Case, run: Tried, factor: float = WIDER) -> tuple[Setting, Case]:
+    """The setting and case of a run that estimates another's error: `factor` times its tolerances,
+    or half its step.
 
-    If other bounds determine most steps, the tolerance would not change them. Then the bound that
-    the user gave is doubled; without one, steps are bounded to half their greatest length.
+    Methods with equal steps cannot repeat a step over which they passed something, so the second
+    one has much shorter steps where something may lie between them. If other bounds determine most
+    steps, the tolerance would not change them. Then the bound that the user gave is doubled;
+    without one, steps are bounded to half their greatest length.
     """
-    given = run.setting
+    given, problem = run.setting, case.problem
     if given.dt is not None:
-        return replace(given, dt=2 * given.dt), case
+        unseen = problem.corners or (problem.scrutiny and problem.scrutiny.localised)
+        within = SHORTER if problem.scrutiny and unseen else 2
+        return replace(given, dt=given.dt / within), case
     assert given.rtol is not None
-    atol = None if given.atol is None else _plain(given.atol * WIDER)
-    setting = replace(given, rtol=_plain(given.rtol * WIDER), atol=atol)
+    atol = None if given.atol is None else plain(given.atol * factor)
+    setting = replace(given, rtol=plain(given.rtol * factor), atol=atol)
     counts, bound = run.trajectory.counts, case.kept.get("max_step")
     if bound is not None:
         return setting, replace(case, kept={**case.kept, "max_step": 2 * bound})
     if counts["capped"] > MOSTLY * counts["steps"]:
-        _, unseen = longest_steps(None, case.t_end)
-        return given, replace(case, kept={**case.kept, "max_step": unseen / 2})
+        _, unchecked = longest_steps(None, case.t_end)
+        return given, replace(case, kept={**case.kept, "max_step": unchecked / 2})
     return setting, case
 
 
-def by_looser_run(
-    case: Case,
-    run: Tried,
-    second: Tried,
-    others: Sequence[Tried],
-    samples: Sequence[Tried],
-    scale: FloatArray,
+def estimated(
+    case: Case, run: Tried, second: Tried, scale: FloatArray, samples: Sequence[Tried] = ()
 ) -> Estimate:
-    """A run's error from a second one (`looser`), whose constants were perturbed by rounding.
+    """A run's error from a second one (`second_of`), whose constants were perturbed by rounding.
 
-    others   looser runs of the same method
     samples  runs with the same setting and other perturbations of the constants
 
-    The difference is mostly the error of the second run and so an upper bound of the run's own. It
-    is not much larger if errors do not fall with the tolerance, as with LSODA near rounding, or if
-    rounding causes them. Errors of equal steps fall as theory predicts, except for rounding, which
-    the samples show. As two runs may agree by accident, the estimate is at least what the
-    differences of the `NEAREST` other runs give when extrapolated by theory, and at least what the
-    samples differ by.
+    The difference from a looser run is mostly the error of that one, and so an upper bound of the
+    run's own. It is not much larger if errors do not fall with the tolerance, as near rounding. The
+    difference from a tighter run is the run's own error less that one's.
     """
-    if not all(other.trajectory.finished for other in (second, *samples)):
+    if not all(other.trajectory.finished for other in (run, second, *samples)):
         return Estimate(math.inf, math.inf, math.nan, second)
-    method, one = method_of(run.setting.integrator), run.trajectory
-    floor = max(representable(run, scale)[0], FEW * ROUNDING)
+    one, two = run.trajectory, second.trajectory
+    exponent = method_of(run.setting.integrator).exponent
+    share = min(abs(1 - math.pow(second.tolerance / run.tolerance, exponent)), 1.0) or 1.0
+    floor = max(representable(run, scale)[0], ROUNDING)
     floor = floor if case.problem.contacts is None else max(floor, STRIKES)
-    last = difference(one, second.trajectory, scale)
-    if samples and method.equal_steps and last < SMALL:
-        last /= math.pow(second.tolerance / run.tolerance, CAUTION * method.exponent)
-    last = max(last, floor)
-    for other in sorted(others, key=lambda other: other.tolerance)[:NEAREST]:
-        gap = difference(one, other.trajectory, scale)
-        theory = math.pow(other.tolerance / run.tolerance, CAUTION * method.exponent)
-        if gap < WRONG:
-            last = max(last, gap / theory)
-    for sample in samples:
-        last = max(last, CHANCE * difference(one, sample.trajectory, scale))
+    noise = max((difference(one, each.trajectory, scale) for each in samples), default=0.0)
+    last = max(difference(one, two, scale) / share, CHANCE * noise, floor)
     if case.problem.contacts is not None:
         return Estimate(last, last, float(one.t[-1]), second)
-    most, at = _greatest(one, second.trajectory, scale)
-    return Estimate(last, max(last, most), at, second)
+    most, at = _greatest(one, two, scale)
+    return Estimate(last, max(last, most / share), at, second)
 
 
 def _greatest(one: Trajectory, two: Trajectory, scale: FloatArray) -> tuple[float, float]:
@@ -273,36 +142,14 @@ def _greatest(one: Trajectory, two: Trajectory, scale: FloatArray) -> tuple[floa
     return float(apart[worst]), float(t[worst])
 
 
-def by_second_run(case: Case, first: Tried) -> Estimate:
-    """A run's error from a second run with perturbed constants, which is made here.
-
-    The second run has a tenth of the tolerances, or half the step; near the tightest tolerance it
-    has ten times the tolerances.
+def by_second_run(case: Case, run: Tried) -> Estimate:
+    """A run's error from a second run with perturbed constants, which is made here: a tighter one
+    or, near the tightest tolerance, a looser one.
     """
-    given = first.setting
-    if given.dt is not None:
-        other = replace(given, dt=given.dt / 2)
-    else:
-        assert given.rtol is not None
-        factor = 0.1 if given.rtol >= 10 * method_of(given.integrator).tightest else 10.0
-        atol = None if given.atol is None else _plain(given.atol * factor)
-        other = replace(given, rtol=_plain(given.rtol * factor), atol=atol)
-    second = case.run(other, moved=0)
+    tightest = method_of(run.setting.integrator).tightest
+    tighter = run.setting.dt is None and run.tolerance >= WIDER * tightest
+    setting, case = second_of(case, run, 1 / WIDER if tighter else WIDER)
+    second = case.run(setting, moved=0)
     if second.interrupted:
         raise KeyboardInterrupt
-    one, two = first.trajectory, second.trajectory
-    if not (one.finished and two.finished):
-        return Estimate(math.inf, math.inf, math.nan, second)
-    exponent = method_of(given.integrator).exponent * (CAUTION if given.dt is None else 1)
-    # The difference of the two is one error less the other.
-    share = min(abs(1 - math.pow(second.tolerance / first.tolerance, exponent)), 1.0)
-    scale = case.scale(second.extent)
-    last = difference(one, two, scale) / share
-    if case.problem.contacts is not None:
-        return Estimate(last, last, float(one.t[-1]), second)
-    most, at = _greatest(one, two, scale)
-    return Estimate(last, max(last, most / share), at, second)
-
-
-def _plain(value: float) -> float:
-    return float(f"{value:.6g}")
+    return estimated(case, run, second, case.scale(second.extent))

@@ -63,7 +63,7 @@ class Work:
     quaternion_defect  greatest difference of a quaternion's length from 1 before normalisation
     seconds            least wall time of `repeats` runs; of a stopped run, the time until then
     spread             median wall time less the least, s
-    units              counted work (see `study.accuracy.cost`): the same on every machine
+    units              counted work (see `study.accuracy.methods`): the same on every machine
     steps, derivatives, jacobians   counts of one run
     reason             why it is not "ok", and what to change; or an integrator's remark
     stopped_at         the time at which a failed run stopped, s

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.run.integrate import integrate
-from eomgen.run.integrators import EndedRunError, FixedStep, find_integrator
+from eomgen.run.integrators import EndedRunError
 from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.progress import Progress
@@ -18,35 +18,16 @@ from eomgen.run.stepping import ADAPTIVE_SAMPLES
 from eomgen.run.tally import Follow, Tally
 from eomgen.run.trajectory import Trajectory
 from eomgen.run.works import Powers
-from eomgen.study.accuracy.cost import meter
 from eomgen.study.accuracy.measure import scales
+from eomgen.study.accuracy.methods import Method, meter
 
-TIGHTEST = {"LSODA": 1e-12, "DOP853": 1e-16, "taylor": 1e-16, "Rodas5P": 3e-15}
-"""Relative tolerances below which a method fails for many scenes, or gains nothing. The sums of
-DOP853, Rodas5P and Taylor series are compensated: their errors go on to fall with the tolerance."""
-TIGHTEST_OF_ALL = 1e-13
-ORDERS = {
-    "RK45": 5,
-    "DOP853": 8,
-    "LSODA": 10,
-    "Rodas5P": 5,
-    "Radau": 5,
-    "BDF": 4,
-    "taylor": 20,
-}
-"""Orders of adaptive methods: the time for an error e grows like e^(-1/order). LSODA has orders up
-to 12; Taylor series choose their own."""
 LEAST = 1e-9
 """Shortest time that is measured, s."""
 OVER = "no time for more"
-SOON = 0.2
-"""Part of the work allowed after which a run's speed is judged."""
 HARDLY = 0.3
 """Equal steps may exceed the requested length by 2 to this power: halving them doubles the time."""
 MARKS = 500
-"""About how many times a run's progress is recorded."""
-SLOW = 2.5
-"""A run is stopped early if its speed so far predicts this many times the work allowed."""
+"""About how many parts of a run's time have their longest step recorded."""
 
 ShowProgress = Callable[[str], AbstractContextManager[Progress]]
 """Shows which run is being made, and its progress."""
@@ -55,35 +36,6 @@ ShowProgress = Callable[[str], AbstractContextManager[Progress]]
 def unseen(label: str) -> AbstractContextManager[Progress]:
     """Show nothing."""
     return nullcontext(lambda fraction: None)
-
-
-@dataclass(frozen=True)
-class Method:
-    """A method in theory: error ∝ τ^exponent, time ∝ τ^-growth (with equal steps, τ = h).
-
-    tightest   its least relative tolerance; 0 for equal steps
-    multistep  whether a step uses several previous states
-    """
-
-    name: str
-    exponent: float
-    growth: float
-    tightest: float
-    multistep: bool = False
-
-    @property
-    def equal_steps(self) -> bool:
-        """Whether τ is a step, s."""
-        return not self.tightest
-
-
-def method_of(name: str) -> Method:
-    """The properties of a method, by its name. Raises `RunError` for an unknown name."""
-    found = find_integrator(name)
-    if isinstance(found, FixedStep):
-        return Method(name, float(found.order), 1.0, 0.0)
-    growth, tightest = 1 / ORDERS.get(name, 5), TIGHTEST.get(name, TIGHTEST_OF_ALL)
-    return Method(name, 1.0, growth, tightest, not found.one_step)
 
 
 @dataclass(frozen=True)
@@ -114,10 +66,9 @@ class Tried:
     """A run, and what it took.
 
     seconds  wall time
-    work     counted, in units of `cost`, by which methods are compared
+    work     counted, in units of `methods`, by which methods are compared
     extent   (2, ny), the least and the greatest value of each state at the ends of steps
-    pace     (3, n): times, s, the work done up to then, and the longest step since the time
-             before, s
+    steps    (2, n): of each part of its time, the longest step, s, and when it began, s
     """
 
     setting: Setting
@@ -125,7 +76,7 @@ class Tried:
     seconds: float
     work: float
     extent: FloatArray
-    pace: FloatArray
+    steps: FloatArray
 
     @property
     def tolerance(self) -> float:
@@ -192,7 +143,7 @@ class Case:
             while dt > tolerance * 2**HARDLY:
                 dt /= 2
             return Setting(method.name, dt=dt)
-        rtol = max(_plain(tolerance), method.tightest)
+        rtol = max(plain(tolerance), method.tightest)
         size = 10.0 ** math.floor(math.log10(float(np.min(self.scale(extent)))))
         atol = max(rtol * size, least_tolerance(method.name, rtol) * noise)
         return Setting(method.name, rtol=rtol, atol=float(f"{atol:.0e}"))
@@ -203,15 +154,13 @@ class Case:
         *,
         most: float = math.inf,
         due: float = math.inf,
-        like: Tried | None = None,
         powers: Powers | None = None,
         moved: int | None = None,
         follow: Follow | None = None,
     ) -> Tried:
-        """Make a run. It stops early if it takes `most` units of work or clearly will, and when
+        """Make a run. It stops early if it takes `most` units of work, and when
         `time.perf_counter` reaches `due`.
 
-        like    a run whose progress predicts this one's; without it, work is proportional to time
         powers  given to record the works of effects
         moved   number of the perturbation of constants, if those are possible
         follow  called with time and state after each step; may end the run
@@ -220,8 +169,8 @@ class Case:
         if moved is not None and self.problem.scrutiny:
             problem = replace(problem, scrutiny=replace(self.problem.scrutiny, seed=moved))
         spent = meter(problem, setting.integrator)
-        pace = _Pace(spent, most, due, self.t_end, like)
-        tally = Tally(pace.check, follow)
+        limits = _Limits(spent, most, due, self.t_end)
+        tally = Tally(limits.check, follow)
         with self.show_progress(f"simulating {problem.name}") as progress:
             started = time.perf_counter()
             trajectory = integrate(
@@ -238,60 +187,45 @@ class Case:
             seconds = time.perf_counter() - started
         extent = np.array([tally.low, tally.high])
         work = max(spent(tally), 1.0)
-        return Tried(setting, trajectory, max(seconds, LEAST), work, extent, pace.made(work))
+        steps = np.array(limits.longest).T
+        return Tried(setting, trajectory, max(seconds, LEAST), work, extent, steps)
 
 
 @dataclass
-class _Pace:
-    """The progress of a run, which is stopped when its work or time is used up or clearly will be.
+class _Limits:
+    """The work and time that a run may take, and the longest step in each part of its time.
 
-    spent  gives its work so far
-    like   a run whose progress is expected of this one
-    marks  times, s, the work done up to then, and the longest step since the one before, s
+    spent    gives its work so far
+    longest  lengths, s, and when they began, s
     """
 
     spent: Callable[[Tally], float]
     most: float
     due: float
     t_end: float
-    like: Tried | None
-    marks: list[tuple[float, float, float]] = field(default_factory=lambda: [(0.0, 0.0, 0.0)])
-    last: float = 0.0
-    longest: float = 0.0
+    longest: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
+    _t: float = 0.0
+    _steps: int = 0
+    _part: int = 0
 
     def check(self, tally: Tally, t: float) -> None:
-        """Record a step that ends at t. Raises `EndedRunError` to stop the run."""
-        self.last, self.longest = t, max(self.longest, t - self.last)
-        marked = t >= self.marks[-1][0] + self.t_end / MARKS
-        bounded = t < self.t_end and math.isfinite(self.most)
-        if marked or bounded:
-            work = self.spent(tally)
-            if marked:
-                self.marks.append((t, work, self.longest))
-                self.longest = 0.0
-            if bounded:
-                hopeless = work > SOON * self.most and work > SLOW * self.most * self._share(t)
-                if work > self.most or hopeless:
-                    raise EndedRunError(OVER)
-        if t < self.t_end and math.isfinite(self.due) and time.perf_counter() > self.due:
+        """Record one step or several that end at t. Raises `EndedRunError` to stop the run."""
+        length = (t - self._t) / max(tally.steps - self._steps, 1)
+        part = int(MARKS * t / self.t_end)
+        if part > self._part:
+            self.longest.append((length, self._t))
+        elif length > self.longest[-1][0]:
+            self.longest[-1] = (length, self._t)
+        self._t, self._steps, self._part = t, tally.steps, part
+        if t >= self.t_end:
+            return
+        if math.isfinite(self.most) and self.spent(tally) > self.most:
+            raise EndedRunError(OVER)
+        if math.isfinite(self.due) and time.perf_counter() > self.due:
             raise EndedRunError(OVER)
 
-    def made(self, work: float) -> FloatArray:
-        """The progress of the whole run, which took the given `work`; see `Tried.pace`."""
-        return np.array([*self.marks, (self.t_end, work, self.longest)]).T
 
-    def _share(self, t: float) -> float:
-        return done(self.like, t, self.t_end)
-
-
-def done(run: Tried | None, t: float, t_end: float) -> float:
-    """The share of a run's work done up to a time, s; without a run, the share of the time."""
-    if run is None:
-        return t / t_end
-    return float(np.interp(t, run.pace[0], run.pace[1])) / run.work
-
-
-def _plain(value: float) -> float:
+def plain(value: float) -> float:
     """The greatest of …, 1, 2, 5, 10, … at or below a positive value."""
     power = math.floor(math.log10(value) + 1e-9)
     first = next(digit for digit in (5, 2, 1) if value * (1 + 1e-9) >= digit * 10.0**power)

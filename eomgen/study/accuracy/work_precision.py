@@ -20,9 +20,9 @@ from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Trajectory
 from eomgen.run.works import Powers
-from eomgen.study.accuracy.cost import meter
 from eomgen.study.accuracy.ladder import Ladder, Rung, Work, next_rung
 from eomgen.study.accuracy.measure import WRONG, error
+from eomgen.study.accuracy.methods import meter
 from eomgen.study.accuracy.reference import Reference
 from eomgen.study.timing import least_seconds
 

@@ -1,9 +1,9 @@
-"""The cost of a run by counting operations: the same on every machine at all times.
+"""The integration methods as a search knows them, and the cost of a run by counting operations.
 
-Methods are ranked by this cost and not by measured time. It adds up derivatives, Jacobians, LU
-factorisations, steps, rows, and checks of contacts and branches, each times a known cost. One unit
-is about a microsecond on one core at 2 GHz. Only a search with a time budget measures how long a
-unit takes on the given machine.
+The cost is the same on every machine at all times. Methods are ranked by it and not by measured
+time. It adds up derivatives, Jacobians, LU factorisations, steps, rows, and checks of contacts and
+branches, each times a known cost. One unit is about a microsecond on one core at 2 GHz. Only a
+search with a time budget measures how long a unit takes on the given machine.
 
 `METHODS` was fitted to runs of six built-in scenes with 2 to 90 states (mean deviation 20 %). That
 of Rodas5P was not: in Python its steps take as long as those of Radau, or longer, but a long run
@@ -15,6 +15,7 @@ their steps in C are faster than those of DOP853 in C.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from eomgen.run.integrators import FixedStep, find_integrator
 from eomgen.run.problem import Problem
 from eomgen.run.tally import Tally
 
@@ -48,6 +49,7 @@ class Overhead:
     stages      of implicit methods with equal steps: stages solved for together, each with a
                 Jacobian
     compiled    whether Jacobians are counted as in compiled code
+    order       of a method with error control; see `Method`
     """
 
     step: float
@@ -56,6 +58,7 @@ class Overhead:
     row: float = 0.0
     stages: int = 0
     compiled: bool = False
+    order: int = 5
 
 
 METHODS: Mapping[str, Overhead] = {
@@ -69,17 +72,43 @@ METHODS: Mapping[str, Overhead] = {
     "gauss_4": Overhead(60.0, 17.0, 1.8, stages=2),
     "gauss_6": Overhead(64.0, 12.0, 2.0, stages=3),
     "RK45": Overhead(25.0, 9.0, 0.3, 8.0),
-    "DOP853": Overhead(20.0, 7.5, 0.1, 12.0),
-    "taylor": Overhead(10.0, 1.0, 0.1, 2.0),
+    "DOP853": Overhead(20.0, 7.5, 0.1, 12.0, order=8),
+    "taylor": Overhead(10.0, 1.0, 0.1, 2.0, order=20),
     "Rodas5P": Overhead(10.0, 2.0, 0.2, 1.0, compiled=True),
     "Radau": Overhead(150.0, 30.0, 1.0, 12.0),
     "Radau_differences": Overhead(150.0, 30.0, 1.0, 12.0),
-    "BDF": Overhead(90.0, 50.0, 1.2, 18.0),
-    "BDF_differences": Overhead(90.0, 50.0, 1.2, 18.0),
-    "LSODA": Overhead(28.0, 1.0, 0.5, 17.0),
+    "BDF": Overhead(90.0, 50.0, 1.2, 18.0, order=4),
+    "BDF_differences": Overhead(90.0, 50.0, 1.2, 18.0, order=4),
+    "LSODA": Overhead(28.0, 1.0, 0.5, 17.0, order=10),
 }
 OTHER = Overhead(50.0, 10.0, 0.5, 15.0)
 """Of a method that is not in the table."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method in theory: error ∝ τ^exponent, work ∝ τ^-growth (with equal steps, τ = h).
+
+    tightest  its least relative tolerance; 0 for equal steps
+    """
+
+    name: str
+    exponent: float
+    growth: float
+    tightest: float
+
+    @property
+    def equal_steps(self) -> bool:
+        """Whether τ is a step, s."""
+        return not self.tightest
+
+
+def method_of(name: str) -> Method:
+    """The properties of a method, by its name. Raises `RunError` for an unknown name."""
+    found = find_integrator(name)
+    if isinstance(found, FixedStep):
+        return Method(name, float(found.order), 1.0, 0.0)
+    return Method(name, 1.0, 1 / METHODS.get(name, OTHER).order, found.smallest_rtol)
 
 
 def function(problem: Problem, name: str, compiled: bool = False) -> float:
