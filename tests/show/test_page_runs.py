@@ -130,9 +130,9 @@ def both_runs(name: str, method: str, dt: float, seconds: float) -> tuple[Any, T
         "seconds": seconds,
         "y": problem.initial.tolist(),
     }
-    found = run_in_node(other_functions.in_javascript() + code.source, RUN, given)
     if method in ADAPTIVE:  # how long steps may be where their branches are not seen
         given["data"] |= {"span": 1.5 * seconds}
+    found = run_in_node(other_functions.in_javascript() + code.source, RUN, given)
     try:
         if method in ADAPTIVE:  # the end of a run shortens its last steps
             options = {"rtol": 1e-9, "atol": 1e-12, "samples": round(1.5 * seconds / dt) + 1}
