@@ -33,13 +33,11 @@ NO_STEP = 6
 """A step whose state is not finite."""
 
 
-class Way(Protocol):
-    """Steps between events."""
+class Way(Within, Protocol):
+    """Steps between events, of which the last one's states are known."""
 
     def go(self, t: float, y: Annotated[Vector, "STATES"], length: float, end: float, /) -> bool:
-        """Make a step of a length from t and y to `end`; the states in it are those of `Within`.
-        False if there is none.
-        """
+        """Make a step of a length from t and y to `end`. False if there is none."""
         ...
 
     def part(self) -> None:
@@ -48,14 +46,7 @@ class Way(Protocol):
 
 
 def through(
-    law: ContactLaw,
-    way: Way,
-    within: Within,
-    now: Touching,
-    search: Search,
-    at: Place,
-    length: float,
-    end: float,
+    law: ContactLaw, way: Way, now: Touching, search: Search, at: Place, length: float, end: float
 ) -> int:
     """Go to `end`, about a length from here. WHOLE, or why that is not possible."""
     now.alpha = ALPHA * nothing_held(law, now, at.t, at.y)
@@ -66,16 +57,12 @@ def through(
     while why <= OPENED and at.t < end:
         if not way.go(at.t, at.y, h, end):
             return NO_STEP
-        why = ended(law, way, within, now, search, at, end, 1.0)
+        why = ended(law, way, now, search, at, end, 1.0)
         h = end - at.t
     return why if why > OPENED else WHOLE
 
 
-def met(
-    law: ContactLaw,
-    now: Touching,
-    at: Place,
-) -> int:
+def met(law: ContactLaw, now: Touching, at: Place) -> int:
     """Let contacts that touch at the start strike, or hold them. WHOLE, or why that is not
     possible.
     """
@@ -92,29 +79,18 @@ def met(
 
 
 def ended(
-    law: ContactLaw,
-    way: Way,
-    within: Within,
-    now: Touching,
-    search: Search,
-    at: Place,
-    end: float,
-    share: float,
+    law: ContactLaw, way: Way, now: Touching, search: Search, at: Place, end: float, share: float
 ) -> int:
     """Go to the end of a step that was made, or to the first event in it, see `taken`, and let
     contacts strike that close. WHOLE or OPENED, or why that is not possible.
     """
-    why = taken(law, within, now, search, at, end, share)
+    why = taken(law, way, now, search, at, end, share)
     if why != WHOLE:
         way.part()
     return struck(law, now, at) if why == CLOSED else why
 
 
-def struck(
-    law: ContactLaw,
-    now: Touching,
-    at: Place,
-) -> int:
+def struck(law: ContactLaw, now: Touching, at: Place) -> int:
     """Let contacts strike that have closed. WHOLE, or why that is not possible."""
     answer = strike(law, now, at)
     if answer == STRUCK:

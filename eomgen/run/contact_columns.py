@@ -65,7 +65,7 @@ class Lane:
         closed, opened = np.zeros((2, len(contacts.names)), np.int64)
         at = Place(t, y.copy(), closed, opened, length, t, 0)
         try:
-            why = through(law, self, self, now, Search(), at, length, end)
+            why = through(law, self, now, Search(), at, length, end)
         except (ArithmeticError, ValueError, StepFailure):
             return None
         return (at.y, self._lost) if why == WHOLE else None

@@ -218,7 +218,7 @@ def random_case(name: str) -> list[object]:
         "release": [STACK, known(holds), t, y, np.array([*holds[:1], 0])],
         "settle": [STACK, known(holds), t, y],
         "deepest": [STACK, t, y - 1e-9],
-        "through": [STACK, STACK, STACK, known(holds), Search(), at, end - t, end],
+        "through": [STACK, STACK, known(holds), Search(), at, end - t, end],
         "taken": [STACK, STACK, known(holds), Search(), at, end, share],
     }[name]
 
