@@ -8,6 +8,7 @@ from eomgen.model.model import Model
 from eomgen.program.tape import TIME
 
 if TYPE_CHECKING:
+    from eomgen.derivation.exercise import Exercise
     from eomgen.derivation.exposition import Exposition
     from eomgen.derivation.matrices import Matrices
     from eomgen.derivation.steps import Step
@@ -141,6 +142,12 @@ class Derivation:
         from eomgen.show.derivation import as_html
 
         return as_html(self.model, self.steps, self.exposition.effects)
+
+    def exercise(self, seed: int = 0) -> "Exercise":
+        """Questions on results of the derivation; the seed chooses them and their numbers."""
+        from eomgen.derivation.exercise import exercise_of
+
+        return exercise_of(self.model, self.exposition, seed)
 
     def _repr_html_(self) -> str:
         from eomgen.show.notebook import framed

@@ -2,11 +2,15 @@
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from eomgen.api.deriving import derivation_of
 from eomgen.base.errors import RunError
 from eomgen.base.files import check_writable, write_whole
 from eomgen.commands.shared import Arguments, read_model, reporter_of
+
+if TYPE_CHECKING:
+    from eomgen.derivation.exercise import Exercise
 
 
 def derive(given: Arguments) -> int:
@@ -19,7 +23,9 @@ def derive(given: Arguments) -> int:
     found = derivation_of(
         model, reporter, form=given.state_form, detail=given.detail, method=given.method
     )
-    if kind == "text":
+    if given.exercise:
+        text = _exercise(found.exercise(given.seed), kind, solved=given.solutions)
+    elif kind == "text":
         text = found.text(encoding="utf-8" if given.output else sys.stdout.encoding)
     else:
         text = found.latex() if kind == "latex" else found.html()
@@ -29,6 +35,19 @@ def derive(given: Arguments) -> int:
         write_whole(given.output, text, force=given.force)
         print(f"wrote {given.output}")
     return 0
+
+
+def _exercise(exercise: "Exercise", kind: str, *, solved: bool) -> str:
+    """A sheet with blanks or answers; the page with blanks checks what is typed."""
+    from eomgen.show.derivation import as_html, as_latex, as_text
+    from eomgen.show.exercise import as_page
+
+    model, steps = exercise.model, exercise.steps(solved=solved)
+    if kind == "text":
+        return as_text(model, steps)
+    if kind == "latex":
+        return as_latex(model, steps, exercise.exposition.effects)
+    return as_html(model, steps, exercise.exposition.effects) if solved else as_page(exercise)
 
 
 def _kind(output: Path | None) -> str:

@@ -224,6 +224,11 @@ class Derivation(Forced):
         "velocities (by what suits the mechanism)",
         choices=METHODS,
     )
+    exercise: bool = option(
+        False, "questions on the results, in HTML with fields that check answers"
+    )
+    solutions: bool = option(False, "with --exercise: the answers")
+    seed: int = option(0, "with --exercise: chooses the questions and their numbers", value="N")
     output: Path | None = _file("write it to a file")
 
 

@@ -236,8 +236,17 @@ def _broken(e: Any, indent: float) -> Iterator[str]:
 
 def as_html(model: Model, steps: tuple[Step, ...], effects: Sequence[DerivedEffect]) -> str:
     """All steps as one HTML page with MathML and SVG, which browsers draw themselves."""
+    found = sections(model, steps, effects)
+    context = {"name": model.name, "title": model.title, "steps": found}
+    return render("derivation", "derivation.html.jinja", context, html=True)
+
+
+def sections(
+    model: Model, steps: Sequence[Step], effects: Sequence[DerivedEffect]
+) -> list[dict[str, Any]]:
+    """What a template writes of each step."""
     drawn = _figures(model, effects)
-    sections = [
+    return [
         {
             "number": signs(step.number),
             "title": Markup(joined(pieces(step.title), escape, _code, _math_name, _html_power)),
@@ -258,8 +267,6 @@ def as_html(model: Model, steps: tuple[Step, ...], effects: Sequence[DerivedEffe
         }
         for i, step in enumerate(steps, 1)
     ]
-    context = {"name": model.name, "title": model.title, "steps": sections}
-    return render("derivation", "derivation.html.jinja", context, html=True)
 
 
 def _code(text: str) -> str:

@@ -1,0 +1,131 @@
+"""Exercises from a derivation: results with a blank in place of their right side."""
+
+import random
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from eomgen.base.errors import SceneError
+from eomgen.derivation.exposition import Exposition
+from eomgen.derivation.matrices import Matrices, written_out
+from eomgen.derivation.reading import read, reading_names
+from eomgen.derivation.simplified import simplified, size
+from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.symbols import Expr
+from eomgen.model.model import Model
+
+MOST_QUESTIONS = 5
+LONGEST = 60
+"""The size of a result up to which it is asked for."""
+BLANK = sp.Symbol("…")
+ASKED = (
+    "Write each result as a formula of the symbols in the equations above it. M, V and G are those "
+    "of M dv/dt + V + G = F, with the symmetric M of kinetic energy."
+)
+NUMBERS = "With these numbers, in SI units and radians:"
+FUNCTIONS = (sp.sin, sp.cos, sp.tan, sp.exp, sp.log, sp.Abs)
+
+
+@dataclass(frozen=True)
+class Question:
+    """A result that is asked for: its symbol, and over names of the scene what it is. With values
+    `at` which it is wanted, by name, a number is asked for.
+    """
+
+    left: Expr
+    right: Expr
+    at: Mapping[str, float]
+
+    @property
+    def value(self) -> Expr:
+        """The answer."""
+        if not self.at:
+            return self.right
+        number = self.right.subs({s: self.at[s.name] for s in self.right.free_symbols})
+        return sp.Float(f"{float(number):.4g}")
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """Questions on a mechanism. `known` are the names that answers may use."""
+
+    model: Model
+    questions: tuple[Question, ...]
+    known: tuple[str, ...]
+    hints: tuple[Step, ...]
+    exposition: Exposition
+
+    def steps(self, *, solved: bool) -> tuple[Step, ...]:
+        """The sheet: what is given, and the questions with blanks or with their answers."""
+        names = reading_names(self.model)
+        given = [s for s in self.exposition.steps if s.kind in ("state", "bodies")]
+        found = [*given]
+        for title, words, numeric in (("Questions", ASKED, False), ("Numbers", NUMBERS, True)):
+            asked = [q for q in self.questions if bool(q.at) == numeric]
+            lines = [
+                Equation(sp.Symbol(name), sp.Float(str(x)))
+                for q in asked
+                for name, x in q.at.items()
+            ]
+            lines += [Equation(q.left, q.value if solved else BLANK) for q in asked]
+            if asked:
+                said = tuple(Equation(read(x.left, names), read(x.right, names)) for x in lines)
+                found.append(Step("equations", title, words, said))
+        return tuple(found)
+
+
+def exercise_of(model: Model, exposition: Exposition, seed: int = 0) -> Exercise:
+    """An exercise; the seed chooses what is asked for, and the numbers of the last question.
+
+    Raises `SceneError` where no equation is written out, or none is short enough.
+    """
+    if exposition.matrices is None:
+        raise SceneError(
+            f"exercise: the equations of {model.name} are an algorithm, with nothing to fill in"
+        )
+    found, chance = exposition.matrices, random.Random(seed)
+    known = {c.name for c in (*model.coordinates, *model.velocities)} | {*model.defaults}
+    asked = [q for q in _results(found) if {s.name for s in q.right.free_symbols} <= known]
+    if not asked:
+        raise SceneError(f"exercise: the equations of {model.name} are too long to ask for")
+    chosen = sorted(chance.sample(range(len(asked)), min(MOST_QUESTIONS, len(asked))))
+    questions = [asked[i] for i in chosen]
+    questions += _numeric(model, [asked[i] for i in chosen], chance)
+    hints = tuple(
+        s for s in exposition.steps if s.kind in ("joint", "motion", "constraint", "balance")
+    )
+    return Exercise(model, tuple(questions), tuple(sorted(known)), hints, exposition)
+
+
+def _results(found: Matrices) -> Iterator[Question]:
+    """Entries of M on and above its diagonal, of V and G, and accelerations, that are not 0."""
+    several = len(found.a) > 1
+    for letter in "MVG":
+        whole = getattr(found, letter)
+        for i in range(whole.rows):
+            for j in range(i, whole.cols) if letter == "M" else (0,):
+                index = f"_{i + 1},{j + 1}" if letter == "M" else f"_{i + 1}"
+                symbol = sp.Symbol(letter + (index if several else ""))
+                yield from _asked(symbol, simplified(written_out(whole[i, j], found.definitions)))
+    for a in found.a:
+        right = dict(found.definitions).get(a, a)
+        if size(right) <= LONGEST:
+            yield from _asked(a, simplified(written_out(right, found.definitions)))
+
+
+def _asked(left: Expr, right: Expr) -> Iterator[Question]:
+    plain = all(isinstance(f, FUNCTIONS) for f in right.atoms(sp.Function))
+    if right.free_symbols and plain and size(right) <= LONGEST:
+        yield Question(left, right, {})
+
+
+def _numeric(model: Model, asked: list[Question], chance: random.Random) -> Iterator[Question]:
+    """The longest of the results with numbers near the scene's and a random state."""
+    question = max(asked, key=lambda q: size(q.right))
+    at = {}
+    for name in sorted(s.name for s in question.right.free_symbols):
+        base = model.defaults.get(name)
+        number = chance.uniform(0.2, 1.4) if base is None else base * chance.uniform(0.6, 1.8)
+        at[name] = float(f"{number:.2g}")
+    yield Question(question.left, question.right, at)

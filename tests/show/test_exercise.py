@@ -1,0 +1,88 @@
+"""Exercises: sheets with blanks and answers, and pages that check what is typed."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser import chromium, missing
+
+import eomgen
+from eomgen.commands.main import main
+from eomgen.show.exercise import as_page
+
+RIGHT = (
+    "I_pole + m_pole*l^2",
+    "m_pole*l**2 + I_pole",
+    "I_pole + l m_pole l",
+    "l^2*(m_pole + I_pole/l^2)",
+    "I_pole*(sin(theta)^2 + cos(theta)^2) - -m_pole*(l*l)",
+    "((I_pole + m_pole*l)^2 - I_pole^2 - (m_pole*l)^2)/(2*m_pole*l) + m_pole*l^2",
+)
+WRONG = ("I_pole - m_pole*l^2", "I_pole + m_pole*l", "I_pole + 1.000001*m_pole*l^2", "I_pole + "
+         "m_pole*l^2 + 1e-6*theta", "0/0", "I_pole + m_cart*l^2")  # fmt: skip
+NONSENSE = {
+    "": "ends too early",
+    "I_pole +": "ends too early",
+    "mass*l": "no symbol",
+    "(l": "missing",
+    "l ; l": "not understood",
+    "constructor(l)": "no symbol",
+    "(" * 2000: "too many",
+}
+
+
+def test_sheets_of_one_seed_are_the_same_and_others_differ(tmp_path: Path) -> None:
+    """Blanks on the one, answers on the other; numbers and questions go by the seed."""
+    found = eomgen.derive("furuta_pendulum")
+    sheets = [found.exercise(seed) for seed in (1, 1, 2)]
+    first, again, other = ([(q.left, q.at) for q in sheet.questions] for sheet in sheets)
+    assert first == again != other
+    given, solved = (sheets[0].steps(solved=x) for x in (False, True))
+    asked = [(a, b) for a, b in zip(given[-2].equations, solved[-2].equations, strict=True)]
+    assert all(a.left == b.left and a.right.name == "…" != str(b.right) for a, b in asked)
+    target = tmp_path / "sheet.tex"
+    assert main(["derive", "cart_pole", "--exercise", "--solutions", "-o", str(target)]) == 0
+    assert "m_{\\mathrm{pole}}" in target.read_text("utf-8")
+    with pytest.raises(eomgen.SceneError, match="exercise: the equations of chain"):
+        eomgen.derive("chain").exercise()
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """The page of an exercise on the cart-pole, opened."""
+    path = tmp_path_factory.mktemp("exercise") / "exercise.html"
+    path.write_text(as_page(eomgen.derive("cart_pole").exercise(3)), "utf-8")
+    with chromium() as browser:
+        opened = browser.new_page()
+        opened.goto(path.as_uri())
+        yield opened
+
+
+@pytest.mark.apart
+@pytest.mark.skipif(bool(missing()), reason=missing())
+def test_answers_in_any_form(page: Any) -> None:
+    """Equal formulas are right, near misses are not, and nonsense is told so; hints open one after
+    another.
+    """
+    questions = eomgen.derive("cart_pole").exercise(3).questions
+    place = [str(q.left) for q in questions].index("M_2,2")
+
+    def said(answer: str, i: int = place) -> str:
+        form = page.locator("form").nth(i)
+        form.locator("input").fill(answer)
+        form.locator("button").click()
+        return str(form.locator("output").text_content())
+
+    assert [said(text) for text in RIGHT] == ["Right."] * len(RIGHT)
+    assert [said(text) for text in WRONG] == ["Not the same."] * len(WRONG)
+    for text, complaint in NONSENSE.items():
+        assert complaint in said(text)
+    assert [said(str(q.right), i) for i, q in enumerate(questions)] == ["Right."] * len(questions)
+    last = len(questions) - 1
+    assert said(str(questions[last].value)) != "Right."
+    assert said(str(questions[last].value), last) == "Right."
+    hints = page.locator("details.hint")
+    assert [hints.nth(i).is_visible() for i in (0, 1)] == [True, False]
+    page.locator("details.hint > summary").nth(0).click()
+    assert [hints.nth(i).is_visible() for i in (0, 1, 2)] == [True, True, False]
