@@ -37,7 +37,7 @@ FLOORS = (
     "results",
     "study.precision",
     "study.linear",
-    "study.closing",
+    "study.constrained_start",
     "study.whole",
     "study.diagnosis",
     "study.timing",

@@ -12,7 +12,7 @@ from eomgen.base.errors import RunError
 from eomgen.model.model import Model
 from eomgen.run.origin import START, Origin
 from eomgen.run.problem import FloatArray
-from eomgen.study.closing import closed
+from eomgen.study.constrained_start import on_constraints
 
 UNIT_TOLERANCE = 1e-9
 """Deviation of a quaternion's length from 1 that is not reported."""
@@ -77,7 +77,7 @@ def initial_with(
                 "scaled to 1"
             )
         y[indices] /= length
-    found, notices = closed(model, parameters, y, [names[index] for index in given], option)
+    found, notices = on_constraints(model, parameters, y, [names[index] for index in given], option)
     for notice in notices:
         reporter.note_scene(notice)
     changed = [

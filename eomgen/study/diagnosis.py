@@ -21,7 +21,7 @@ from eomgen.run.origin import START, UNITS, Origin
 from eomgen.run.problem import Explain, Explanation, FloatArray, Problem, unexplained
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.joints.base import Geared
-from eomgen.study.closing import closed
+from eomgen.study.constrained_start import on_constraints
 from eomgen.study.whole import has_all, initial_of, names_of, on_branch, whole_of
 
 GROWN = 1e9
@@ -57,7 +57,7 @@ def problem_of(
 
     def started(_: FloatArray) -> FloatArray:
         y = initial_of(module, model, parameters)
-        whole, notices = closed(model, given[0], start(y) if start else y)
+        whole, notices = on_constraints(model, given[0], start(y) if start else y)
         for notice in notices:
             note(notice)
         return on_branch(module, model, whole, *given)

@@ -22,7 +22,7 @@ from eomgen.run.module import as_problem, given_values, load_module
 from eomgen.run.problem import FloatArray, Problem
 from eomgen.run.trajectory import Trajectory
 from eomgen.store import key_of, this_program
-from eomgen.study.closing import closed
+from eomgen.study.constrained_start import on_constraints
 from eomgen.study.diagnosis import explained
 from eomgen.study.whole import initial_of, names_of, on_branch
 from eomgen.sweep.counter import Counter
@@ -209,7 +209,7 @@ class _Prepared:
             y = start(initial_of(module, model, values[0]), names_of(model))
             for indices in map(list, model.quaternions):
                 y[indices] /= np.linalg.norm(y[indices]) or 1.0
-            whole, notices = closed(model, values[0], y, states, "vary")
+            whole, notices = on_constraints(model, values[0], y, states, "vary")
             for notice in notices:
                 note(notice)
             return on_branch(module, model, whole, *values)

@@ -39,7 +39,7 @@ from eomgen.store import generated_code, interfaced_program_of
 from eomgen.study.precision.extended import doubles, extended, extended_digits
 from eomgen.study.verification import judging, laws
 from eomgen.study.verification import verify as verifying
-from eomgen.study.verification.hard_states import closed_states, hard_states
+from eomgen.study.verification.hard_states import constrained_states, hard_states
 from eomgen.study.verification.roundings import NOTHING, ULP, Roundings, spread
 from eomgen.study.verification.truth import Truth
 from eomgen.study.verification.virtual_work import FreeBodies
@@ -152,7 +152,7 @@ def expected(scene: str) -> list[tuple[str, list[Any], Any, FloatArray]]:
     )
     for seed in (0, 1):
         if model.constraints:
-            states += closed_states(model, module, count, seed, wanted.t_end)
+            states += constrained_states(model, module, count, seed, wanted.t_end)
         else:
             states += hard_states(module, nv, count, seed, wanted.t_end)
     for state in states:

@@ -26,6 +26,7 @@ from eomgen.study.cost.single import in_single, kernel_in_single
 from eomgen.study.timing import least_seconds
 from eomgen.study.verification.routes import Made, compiled, loaded, velocities
 from eomgen.study.verification.samples import Sample, agreement, condition_numbers, judging_states
+from eomgen.study.verification.states import number_of_states
 from eomgen.study.verification.truth import Exact, Truth
 from eomgen.study.verification.ulps import BITS, component_errors, vector_errors
 from eomgen.tables.routes import ROUTES
@@ -33,8 +34,7 @@ from eomgen.tables.routes import ROUTES
 BASELINE = "linalg.solve"
 TERMS = ("mass_matrix", "bias_force", "applied_force")
 STATES, FEW_STATES = 100, 20
-"""Default number of states of each kind; the smaller one for more than `LARGE` velocities."""
-LARGE = 12
+"""Default number of states of each kind; the smaller one for large models."""
 AGREED = 40
 """Digits to which the two solutions in 60 digits must agree."""
 BATCH = 1000
@@ -142,7 +142,7 @@ def arithmetic(
     )
     progress(0.2)
     truth = Truth(model)
-    count = states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
+    count = number_of_states(model, states, STATES, FEW_STATES)
     samples, truths = judging_states(
         truth,
         wanted,
@@ -162,9 +162,7 @@ def arithmetic(
     found += [_judged(name, made, "float64", pairs) for name, made in every.items()]
     if single:
         progress(0.8)
-        rounded = [replace(s, t=_rounded(s.t), y=_rounded(s.y)) for s in samples]
-        pairs = [(s, truth(s.t, s.y)) for s in rounded]
-        found += [_judged(name, made, "float32", pairs) for name, made in every.items()]
+        found += _in_single(every, truth, samples)
     progress(0.9)
     return Arithmetic(
         model.name,
@@ -174,6 +172,13 @@ def arithmetic(
         tuple(_timed(found, every, samples[0].y)),
         agreed,
     )
+
+
+def _in_single(every: Mapping[str, Made], truth: Truth, samples: Sequence[Sample]) -> list[Solver]:
+    """The solvers in float32, at the samples rounded to float32."""
+    rounded = [replace(s, t=_rounded(s.t), y=_rounded(s.y)) for s in samples]
+    pairs = [(s, truth(s.t, s.y)) for s in rounded]
+    return [_judged(name, made, "float32", pairs) for name, made in every.items()]
 
 
 def _agreed(truth: Truth, samples: Sequence[Sample], truths: Sequence[Exact]) -> float:

@@ -53,7 +53,7 @@ FAR = 0.01
 """The least margin of states with constraints: nearer to a singular position digits are lost by any
 elimination.
 """
-CLOSED = ("fast", "still", "random")
+CONSTRAINED = ("fast", "still", "random")
 """Kinds for mechanisms with constraints, at positions that meet these."""
 
 
@@ -76,16 +76,16 @@ def hard_states(
     return found
 
 
-def closed_states(
+def constrained_states(
     model: Model, module: GeneratedModule, count: int, seed: int, t_end: float
 ) -> list[State]:
-    """`count` states of each kind of `CLOSED` that meet the constraints of a model, at positions
-    along its motion, without those near singular positions.
+    """`count` states of each kind of `CONSTRAINED` that meet the constraints of a model, at
+    positions along its motion, without those near singular positions.
     """
     problem, found, nq = as_problem(module), [], len(model.coordinates)
     seen, held = viewed(module, model), problem.projection or problem.solved_loops
     positions = walked_positions(model) or (np.array(model.initial_q),)
-    for index, kind in enumerate(CLOSED):
+    for index, kind in enumerate(CONSTRAINED):
         for number in range(count):
             rng = np.random.default_rng([seed, index, number])
             y, t = random_state(seen, rng), float(rng.uniform(0.0, t_end))

@@ -2,11 +2,19 @@
 
 import numpy as np
 
+from eomgen.model.model import Model
 from eomgen.run.module import GeneratedModule
 from eomgen.run.problem import FloatArray
 
 REACH = {"rad": 2 * np.pi, "m": 0.6, "rad/s": 3.0, "m/s": 1.0}
 """Greatest absolute value of a state of each unit; 1 for other units."""
+LARGE = 12
+"""Velocities above which a model is large."""
+
+
+def number_of_states(model: Model, asked: int | None, many: int, few: int) -> int:
+    """How many states are made: as many as asked for, or by default fewer for a large model."""
+    return asked or (many if len(model.velocities) <= LARGE else few)
 
 
 def random_state(module: GeneratedModule, rng: np.random.Generator) -> FloatArray:

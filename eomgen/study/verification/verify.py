@@ -3,8 +3,9 @@
 The bounds are in `study.verification.bounds`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -32,13 +33,14 @@ from eomgen.study.verification.bounds import (
     slope_checks,
 )
 from eomgen.study.verification.drift import Drift, drift
-from eomgen.study.verification.hard_states import State, closed_states, hard_states
+from eomgen.study.verification.hard_states import State, constrained_states, hard_states
 from eomgen.study.verification.judging import Judged, judged
 from eomgen.study.verification.laws import broken, why_no_energy_law, why_no_momentum_law
 from eomgen.study.verification.roundings import Roundings
 from eomgen.study.verification.routes import compiled
 from eomgen.study.verification.sampled import SampledRun, sampled
 from eomgen.study.verification.slopes import worst_slope
+from eomgen.study.verification.states import number_of_states
 from eomgen.study.verification.truth import Truth
 from eomgen.study.whole import viewed, whole_of
 from eomgen.tables.routes import ROUTES
@@ -55,8 +57,8 @@ OUTPUTS = (
     "body_poses",
 )
 """What is generated and verified besides derivative and Jacobian."""
-STATES, FEW_STATES, LARGE = 8, 2, 12
-"""Default number of states of each kind; the smaller one for more than `LARGE` velocities."""
+STATES, FEW_STATES = 8, 2
+"""Default number of states of each kind; the smaller one for large models."""
 
 
 @dataclass(frozen=True)
@@ -120,43 +122,27 @@ def verify(
     Raises `SceneError` or `RunError` if there is no module, or no state has an acceleration.
     """
     form, model = model.form, replace(model, form="velocity")
-    check_nonsingular(model)
     taken, modules, full, missing, roundings = _modules(model, module, progress)
     module, given = modules[taken], full
     modules = {route: viewed(each, model) for route, each in modules.items()}
     full, seen = viewed(full, model), modules[taken]
     bare = replace(model, outputs=())
-    truth, count = Truth(bare), states or (STATES if len(model.velocities) <= LARGE else FEW_STATES)
-    asked = _asked(model, module, count, seed, wanted.t_end)
-    run = sampled(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
-    asked += _states(run, module, model)
-    found: list[Judged | None] = []
-    stopped = ""
-    try:
-        for k, state in enumerate(asked):
-            found.append(judged(bare, truth, taken, modules, full, roundings, state))
-            progress(0.3 + 0.5 * (k + 1) / len(asked))
-    except KeyboardInterrupt:
-        if all(one is None for one in found):
-            raise
-        stopped = f"interrupted after {len(found)} of {len(asked)} states; no laws, no run"
-    there = [one for one in found if one is not None]
-    if not there:
-        raise RunError("no finite acceleration in 60 digits at any state; change the scene")
+    truth, count = Truth(bare), number_of_states(model, states, STATES, FEW_STATES)
+    asked, run = _asked(model, module, wanted, count, seed, progress)
+    judge = partial(judged, bare, truth, taken, modules, full, roundings)
+    there, tried, stopped = _until_interrupted(
+        judge, asked, lambda part: progress(0.3 + 0.5 * part)
+    )
     lawful, ran = list[Check](), None
     if not stopped:
         lawful = _laws(there, taken, truth, seen, roundings)
         progress(0.85)
         shown = _of_conservation(there)
         ran = drift(model, wanted, module, given, shown, lambda x: progress(0.88 + 0.12 * x))
-        lawful += drift_checks(ran)
     ulps = {route: forward_ulps(there, route, bare) for route in modules}
     data = in_ulps(np.array([one.data for one in there]), there, bare)
     accurate = forward_checks(there, ulps, data, taken, len(bare.velocities), bound)
     others = (*matrix_checks(there), *loss_checks(there, taken), *part_checks(there))
-    notes = [f"route {route} is not available: {why}" for route, why in missing.items()]
-    if form != "velocity":
-        notes.append(f"form '{form}' is verified as 'velocity'")
     return Verified(
         name=model.name,
         taken=taken,
@@ -164,9 +150,9 @@ def verify(
         states=seen.STATES,
         units=tuple(module.UNITS[state] for state in seen.STATES),
         judged=tuple(there),
-        checks=(*accurate, *others, *lawful),
-        notes=(*notes, *(_notes(ran, bare) if ran else (stopped,))),
-        left_out=len(found) - len(there),
+        checks=(*accurate, *others, *lawful, *(drift_checks(ran) if ran else ())),
+        notes=(*_remarks(missing, form), *(_notes(ran, bare) if ran else (stopped,))),
+        left_out=tried - len(there),
         until=run.until,
         ulps=ulps,
         data=data,
@@ -174,13 +160,53 @@ def verify(
     )
 
 
+def _until_interrupted(
+    judge: Callable[[State], Judged | None], asked: Sequence[State], progress: Progress
+) -> tuple[list[Judged], int, str]:
+    """What `judge` finds at the states, how many were judged, and a note if the user stopped it
+    before the last of them.
+
+    Raises `RunError` if no state has an acceleration.
+    """
+    found: list[Judged | None] = []
+    stopped = ""
+    try:
+        for k, state in enumerate(asked):
+            found.append(judge(state))
+            progress((k + 1) / len(asked))
+    except KeyboardInterrupt:
+        if all(one is None for one in found):
+            raise
+        stopped = f"interrupted after {len(found)} of {len(asked)} states; no laws, no run"
+    there = [one for one in found if one is not None]
+    if not there:
+        raise RunError("no finite acceleration in 60 digits at any state; change the scene")
+    return there, len(found), stopped
+
+
 def _asked(
-    model: Model, module: GeneratedModule, count: int, seed: int, t_end: float
-) -> list[State]:
-    """The seeded states, `count` of each kind."""
+    model: Model,
+    module: GeneratedModule,
+    wanted: Simulation,
+    count: int,
+    seed: int,
+    progress: Progress,
+) -> tuple[list[State], SampledRun]:
+    """The seeded states, `count` of each kind, with those of the scene's own run; and that run."""
     if model.constraints:
-        return closed_states(model, module, count, seed, t_end)
-    return hard_states(module, len(model.velocities), count, seed, t_end)
+        asked = constrained_states(model, module, count, seed, wanted.t_end)
+    else:
+        asked = hard_states(module, len(model.velocities), count, seed, wanted.t_end)
+    run = sampled(model, wanted, module, count + 2, lambda part: progress(0.2 + 0.1 * part))
+    return asked + _states(run, module, model), run
+
+
+def _remarks(missing: Mapping[str, str], form: str) -> list[str]:
+    """What a user should know of how a model was verified."""
+    notes = [f"route {route} is not available: {why}" for route, why in missing.items()]
+    if form != "velocity":
+        notes.append(f"form '{form}' is verified as 'velocity'")
+    return notes
 
 
 def _laws(
@@ -211,8 +237,9 @@ def _modules(
 ) -> tuple[str, dict[str, GeneratedModule], GeneratedModule, dict[str, str], Roundings]:
     """The route taken; the modules by route, with `module` for the route taken if given; a module
     of that route with all of `OUTPUTS`; why routes are missing; and the roundings of the programs
-    of the route taken.
+    of the route taken. Raises `SceneError` if the mass matrix is singular.
     """
+    check_nonsingular(model)
     code = generated_code(model)
     taken = next(line.split()[0] for line in code.explanation if "<- taken" in line)
     module = module or load_module(code.module, model.name)

@@ -9,7 +9,7 @@ from eomgen.model.model import Model
 from eomgen.run.problem import FloatArray
 
 
-def closed(
+def on_constraints(
     model: Model,
     parameters: Mapping[str, float] | None,
     y: FloatArray,
