@@ -20,7 +20,7 @@ from eomgen.run.trajectory import save_csv, save_npz
 from eomgen.scene.appearance import appearance_of
 from eomgen.scene.reader import parse_scene
 from eomgen.show.picture import picture_of
-from eomgen.show.symbols import Sight, strokes
+from eomgen.show.strokes import Sight, strokes
 
 ROD = """
 name = "rod"
