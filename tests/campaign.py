@@ -6,6 +6,8 @@ from typing import TypeVar
 
 T = TypeVar("T")
 FULL = "FULL" in os.environ
+BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")
+"""The built-in scenes whose route is `closed`: SymPy's equations are there to be looked into."""
 
 
 def is_kept(index: int, every: int) -> bool:

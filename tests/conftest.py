@@ -3,17 +3,20 @@
 import gc
 import os
 import signal
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
-from campaign import FULL, is_kept
-from matplotlib.figure import Figure
-from mechanisms import BUILT_IN, Compiled, compiled
+from campaign import BUILT_IN, FULL, is_kept
 from xdist.scheduler import LoadScopeScheduling
 
-from eomgen.native.compiler import Compiler
+if TYPE_CHECKING:  # not imported here: the process that deals out tests runs none
+    from matplotlib.figure import Figure
+    from mechanisms import Compiled
+
+    from eomgen.native.compiler import Compiler
 
 TOGETHER = {
     "closed": "generated handout identities pivots program routes".split(),
@@ -85,9 +88,17 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByGroup:
 
 
 @pytest.fixture(scope="session", params=BUILT_IN)
-def built_in(request: pytest.FixtureRequest) -> Compiled:
+def built_in(request: pytest.FixtureRequest) -> "Compiled":
     """Each built-in scene, compiled once."""
+    from mechanisms import compiled
+
     return compiled(request.param)
+
+
+def _blank(*_: Any) -> "Figure":
+    from matplotlib.figure import Figure
+
+    return Figure((1, 1))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -97,15 +108,15 @@ def _blank_motions(request: pytest.FixtureRequest) -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         if request.path.parent.name != "show":
-            patch.setattr("eomgen.show.figure.draw_motion", lambda motion: Figure((1, 1)))
+            patch.setattr("eomgen.show.figure.draw_motion", _blank)
         yield
 
 
 @pytest.fixture
 def blank_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same of studies, and in `show`."""
-    monkeypatch.setattr("eomgen.show.figure.draw_motion", lambda motion: Figure((1, 1)))
-    monkeypatch.setattr("eomgen.show.work_precision.draw", lambda about, works: Figure((1, 1)))
+    monkeypatch.setattr("eomgen.show.figure.draw_motion", _blank)
+    monkeypatch.setattr("eomgen.show.work_precision.draw", _blank)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -115,26 +126,33 @@ def _in_short() -> Iterator[None]:
     the fixture `optimised` show that.
     """
 
-    def plainly(self: Compiler, sources: Mapping[str, str], main: str, *flags: str) -> bytes:
+    compile_c = _compile_c()
+
+    def plainly(self: "Compiler", sources: Mapping[str, str], main: str, *flags: str) -> bytes:
         texts = {
             name: text.replace('optimize("O3", ', "optimize(") for name, text in sources.items()
         }
-        return COMPILE(self, texts, main, *("-O0" if x[:2] == "-O" else x for x in flags))
+        return compile_c(self, texts, main, *("-O0" if x[:2] == "-O" else x for x in flags))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Compiler, "shared_library", plainly)
+        patch.setattr("eomgen.native.compiler.Compiler.shared_library", plainly)
         patch.setattr("eomgen.study.timing.TIMING", 0.0)
         patch.setattr("eomgen.study.accuracy.work_precision.REPEATS", 0.0)
         yield
 
 
-COMPILE = Compiler.shared_library
+@cache
+def _compile_c() -> Callable[..., bytes]:
+    """The compiler's own way, which is asked for before it is replaced."""
+    from eomgen.native.compiler import Compiler
+
+    return Compiler.shared_library
 
 
 @pytest.fixture
 def optimised(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """C is compiled as for users."""
-    monkeypatch.setattr(Compiler, "shared_library", COMPILE)
+    monkeypatch.setattr("eomgen.native.compiler.Compiler.shared_library", _compile_c())
     monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path / "optimised"))
 
 

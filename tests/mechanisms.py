@@ -19,8 +19,6 @@ from eomgen.model.elaborate import elaborate
 from eomgen.pipeline import python_module
 from eomgen.scene.reader import parse_scene, read_scene
 
-BUILT_IN = ("double_pendulum", "pendulum", "two_body", "two_body_forced")
-"""The built-in scenes whose route is `closed`: SymPy's equations are there to be looked into."""
 SEEDS = some((4, 9, 15, 18, 27, 36), (4, 9, 15, 18, 20, 22, 27, 34, 36, 37, 38, 39))
 """Random trees that are quick to compile and of every kind; see `random_tree`."""
 

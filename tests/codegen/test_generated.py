@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign import some
-from mechanisms import BUILT_IN, SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
+from campaign import BUILT_IN, some
+from mechanisms import SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
 from newton_euler import Mechanism, Motion
 
 from eomgen.base.errors import SceneError

@@ -14,6 +14,8 @@ from eomgen.base.errors import RunError
 from eomgen.study.verification.states import random_state
 from eomgen.sweep import processes
 
+pytestmark = pytest.mark.apart
+
 jnp = jax.numpy
 SCENES = ("two_body_forced", "tumbling_body", "human_figure")
 """Of the last one the kernel is long."""

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 import sympy as sp
-from campaign import some
-from mechanisms import BUILT_IN, REPORTED, SEEDS, Scene, compiled, random_tree
+from campaign import BUILT_IN, some
+from mechanisms import REPORTED, SEEDS, Scene, compiled, random_tree
 from newton_euler import Mechanism, solve
 
 from eomgen.derivation.handout.closed import Equations, derive

@@ -64,7 +64,7 @@ def deep() -> Iterator[None]:
     sys.setrecursionlimit(limit)
 
 
-@pytest.mark.every(2)
+@pytest.mark.every(3)
 @pytest.mark.usefixtures("deep")
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_last_step_by_the_printed_equations(scene: str) -> None:
@@ -72,6 +72,7 @@ def test_the_last_step_by_the_printed_equations(scene: str) -> None:
     _follow(scene, eomgen.derive(scene))
 
 
+@pytest.mark.every(2)
 @pytest.mark.usefixtures("deep")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("scene", BY_METHOD)

@@ -7,9 +7,9 @@ returns is compared in double precision.
 import numpy as np
 import pytest
 import sympy as sp
-from campaign import some
+from campaign import BUILT_IN, some
 from engine import along, exact, varied
-from mechanisms import BUILT_IN, Compiled, compiled, random_tree
+from mechanisms import Compiled, compiled, random_tree
 
 TREES = some((9, 22, 37), (9, 22, 38))
 ROUNDING = 1e-12

@@ -11,6 +11,8 @@ import pytest
 import eomgen
 from eomgen.commands.main import main
 
+pytestmark = pytest.mark.apart
+
 CORNERS: dict[str, Any] = {
     "name": "corners",
     "bodies": [{"name": "block", "mass": 2.0, "inertia_com": 0.1}],

@@ -9,6 +9,8 @@ from gymnasium.utils.env_checker import check_env
 import eomgen
 from eomgen.scene.built_in import BUILT_IN
 
+pytestmark = pytest.mark.apart
+
 GIVEN: dict[str, Any] = {
     "actions": {"push": (-1.0, 1.0)},
     "start": {"theta": ("uniform", 3.0, 3.3)},

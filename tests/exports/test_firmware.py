@@ -17,6 +17,8 @@ from eomgen.exports import Number
 from eomgen.exports.firmware import ERRORS, FARTHEST
 from eomgen.run.columns import FUNCTIONS
 
+pytestmark = pytest.mark.apart
+
 LIMITS: dict[Number, float] = {"double": 1e-13, "float": 3e-5}
 
 

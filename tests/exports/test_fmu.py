@@ -23,6 +23,8 @@ from eomgen.exports.units import exponents, rate_of
 from eomgen.native import compiler
 from eomgen.run.integrators import Adaptive, find_integrator
 
+pytestmark = pytest.mark.apart
+
 BALL = """
 name = "thrown_ball"
 title = "Ball & <floor>, \\"--> é"

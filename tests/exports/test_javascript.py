@@ -13,7 +13,7 @@ from live import NODE
 
 import eomgen
 
-pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
+pytestmark = [pytest.mark.apart, pytest.mark.skipif(NODE is None, reason="needs node")]
 
 
 def stepped(scene: str, method: str, y: list[float], count: int, folder: Path) -> list[float]:

@@ -14,6 +14,8 @@ from eomgen.base.errors import RunError
 from eomgen.commands.main import main
 from eomgen.scalars.functions import BY_MATH
 
+pytestmark = pytest.mark.apart
+
 SCENES = ("cart_pole", "tumbling_body", "bouncing_two_body", "four_bar", CORNERS)
 _LINE = re.compile(r"^(\w+) = (.*);$")
 _ELEMENT = re.compile(r"\b([ypu])\((\d+)\)")

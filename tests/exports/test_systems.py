@@ -8,6 +8,8 @@ import pytest
 
 import eomgen
 
+pytestmark = pytest.mark.apart
+
 
 def test_the_state_space_of_a_cart_and_pole() -> None:
     """A and B are those of `linearise`; C and D those of the tip and of the force at the rail.

@@ -18,6 +18,8 @@ import eomgen
 from eomgen.api.given import model_of, read
 from eomgen.base.errors import RunError, SceneError
 
+pytestmark = pytest.mark.apart
+
 STEPS = """
 const module = new WebAssembly.Module(Buffer.from(given.module, "base64"));
 const of = new WebAssembly.Instance(module).exports, call = (name) => of[`${given.name}_${name}`];

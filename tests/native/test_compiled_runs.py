@@ -262,7 +262,7 @@ def test_each_step_is_followed(method: str) -> None:
     assert_same(*runs)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(4)
 @pytest.mark.parametrize("method", [*EXPLICIT, *GAUSS, "leapfrog", "DOP853", "Rodas5P"])
 def test_what_fails_fails_alike(method: str) -> None:
     """In the fall into a centre, and where Newton's iteration does not converge."""

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from campaign import some
+from campaign import BUILT_IN, some
 from engine import MP
-from mechanisms import BUILT_IN, compiled, load, random_tree
+from mechanisms import compiled, load, random_tree
 from newton_euler import Mechanism, solve
 
 from eomgen.codegen.from_equations import from_equations
