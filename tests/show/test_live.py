@@ -21,7 +21,10 @@ from eomgen.scene.reader import parse_scene
 from eomgen.show.live import live_table, velocity_rows
 from eomgen.store import LiveCode, live_code
 
-pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
+pytestmark = [
+    pytest.mark.apart,
+    pytest.mark.skipif(NODE is None, reason="node is not installed"),
+]
 
 STATES = 1000
 SCENES = some(("two_body_forced", "spinning_top", "bouncing_two_body"), built_in_names())

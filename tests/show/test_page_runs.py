@@ -37,7 +37,10 @@ from eomgen.show.live import live_table
 from eomgen.store import live_code
 from eomgen.tables.integrators import INTEGRATORS
 
-pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
+pytestmark = [
+    pytest.mark.apart,
+    pytest.mark.skipif(NODE is None, reason="node is not installed"),
+]
 
 EXPLICIT = {
     **dict.fromkeys(("euler", "semi_implicit_euler"), 0.001),
