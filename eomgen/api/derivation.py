@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from eomgen.api.options import check_seed
 from eomgen.base.errors import SceneError
 from eomgen.model.model import Model
 from eomgen.program.tape import TIME
@@ -144,9 +145,12 @@ class Derivation:
         return as_html(self.model, self.steps, self.exposition.effects)
 
     def exercise(self, seed: int = 0) -> "Exercise":
-        """Questions on results of the derivation; the seed chooses them and their numbers."""
+        """Questions on results of the derivation; the seed, from 0 on, chooses them and their
+        numbers. Raises `SceneError` if the equations are too long to be asked for.
+        """
         from eomgen.derivation.exercise import exercise_of
 
+        check_seed(seed, "seed")
         return exercise_of(self.model, self.exposition, seed)
 
     def _repr_html_(self) -> str:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 def derive(given: Arguments) -> int:
     """Print or write the derivation as text, LaTeX or HTML."""
     kind = given.format or _kind(given.output)
+    if (given.solutions or given.seed) and not given.exercise:
+        name = "--solutions" if given.solutions else "--seed"
+        raise RunError(f"{name}: is for an exercise; give --exercise too")
     model, _ = read_model(given.scene, given)
     if given.output is not None:
         check_writable(given.output, force=given.force)

@@ -32,7 +32,9 @@ NONSENSE = {
 }
 
 
-def test_sheets_of_one_seed_are_the_same_and_others_differ(tmp_path: Path) -> None:
+def test_sheets_of_one_seed_are_the_same_and_others_differ(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Blanks on the one, answers on the other; numbers and questions go by the seed."""
     found = eomgen.derive("furuta_pendulum")
     sheets = [found.exercise(seed) for seed in (1, 1, 2)]
@@ -46,6 +48,13 @@ def test_sheets_of_one_seed_are_the_same_and_others_differ(tmp_path: Path) -> No
     assert "m_{\\mathrm{pole}}" in target.read_text("utf-8")
     with pytest.raises(eomgen.SceneError, match="exercise: the equations of chain"):
         eomgen.derive("chain").exercise()
+    with pytest.raises(eomgen.RunError, match=r"^seed: "):
+        found.exercise(-1)
+    capsys.readouterr()
+    for option in ("--solutions", "--seed 3"):
+        assert main(["derive", "cart_pole", *option.split()]) == 1
+        said = f"eomgen: {option.split()[0]}: is for an exercise; give --exercise too\n"
+        assert capsys.readouterr().err == said
 
 
 @pytest.fixture(scope="module")
