@@ -55,14 +55,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     that stand apart; see the markers in pyproject.toml.
     """
     if not FULL:
-        beside = set() if _is_of_all(config) else {"apart"}
+        marks = ("full", "apart") if _is_of_all(config) else ("full",)
         seen: dict[str, int] = {}
         left = []
         for item in items:
             name = item.nodeid.partition("[")[0]
             seen[name] = seen.get(name, -1) + 1
             every = item.get_closest_marker("every")
-            if any(map(item.get_closest_marker, {"full", "apart"} - beside)) or (
+            if any(map(item.get_closest_marker, marks)) or (
                 every and not is_kept(seen[name], *every.args)
             ):
                 left.append(item)
