@@ -1,7 +1,8 @@
 """The outputs that a generated module can have besides `derivative` and `jacobian`.
 
-The table gives the schema the names, elaboration the conditions, recording the shapes and backends
-the docstrings. To add an output, add its entry here and its function in `codegen.from_recursion`.
+The table gives the schema the names, elaboration the conditions, recording the shapes and what
+computes them, backends the docstrings. To add an output, add its entry here and the function of
+`codegen` that the entry names.
 """
 
 from collections.abc import Mapping
@@ -19,11 +20,13 @@ class OutputSpec:
 
     shape     shape of the array, () for a number
     about     its docstring: what it is, with units and frames
+    builder   "module:function" in `codegen`: what computes it; "" for a matrix of derivatives
     space     shape and docstring in space, if they differ from those in the plane
     needs     what a model must have for the output to exist; "" for nothing
     forms     whether all state forms have it, or the form [q, v] alone
     contacts  whether forces of held rigid contacts, which it leaves out, would change it
     by        the variables by which it is the Jacobian of `derivative`; "" if it is not one
+    beside    the prefix of inputs that it takes beside the state, one for each velocity; "": none
     units     the unit of its numbers, or those of linear and of angular components; () if they
               differ, or if it has none
     titles    what it is called in a figure, and its angular components; () for its name
@@ -34,11 +37,13 @@ class OutputSpec:
 
     shape: tuple[Size, ...]
     about: str
+    builder: str = ""
     space: tuple[tuple[Size, ...], str] | None = None
     needs: str = ""
     forms: bool = True
     contacts: bool = False
     by: str = ""
+    beside: str = ""
     units: tuple[str, ...] = ()
     titles: tuple[str, ...] = ()
     parts: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
@@ -65,69 +70,95 @@ def _of_kind(words: tuple[str, ...], part: str) -> str:
     return words[-1 if part in ANGULAR else 0] if words else ""
 
 
-def _force(about: str, *, contacts: bool = False) -> OutputSpec:
+def _force(about: str, builder: str, beside: str = "", *, contacts: bool = False) -> OutputSpec:
     """An output of generalised forces or accelerations, one for each velocity."""
-    return OutputSpec(("nv",), about, forms=False, contacts=contacts)
+    return OutputSpec(("nv",), about, builder, forms=False, contacts=contacts, beside=beside)
 
 
 OUTPUTS: Mapping[str, OutputSpec] = {
     "forward_dynamics": _force(
         "Accelerations (nv,) under generalised forces `tau` in addition to the effects.",
+        "observed:forward_dynamics",
+        "tau",
         contacts=True,
     ),
     "inverse_dynamics": _force(
         "Generalised forces (nv,) that, in addition to the effects, give accelerations `vd`.",
+        "observed:inverse_dynamics",
+        "vd",
         contacts=True,
     ),
     "mass_matrix": OutputSpec(
         ("nv", "nv"),
         "Mass matrix M(q), (nv, nv): symmetric, kinetic energy ½ vᵀ M v; handout (26) is not, see "
         "`derive`.",
+        "observed:mass_matrix",
         forms=False,
     ),
-    "velocity_force": _force("V(q, v) of M v̇ + V + G = F, (nv,)."),
-    "gravity_force": _force("G(q) of M v̇ + V + G = F, (nv,)."),
-    "bias_force": _force("h = V + G of M v̇ + h = F, (nv,)."),
+    "velocity_force": _force("V(q, v) of M v̇ + V + G = F, (nv,).", "observed:velocity_force"),
+    "gravity_force": _force("G(q) of M v̇ + V + G = F, (nv,).", "observed:gravity_force"),
+    "bias_force": _force("h = V + G of M v̇ + h = F, (nv,).", "observed:bias_force"),
     "applied_force": _force(
-        "F of M v̇ + V + G = F, (nv,): applied forces and torques.", contacts=True
+        "F of M v̇ + V + G = F, (nv,): applied forces and torques.",
+        "observed:applied_force",
+        contacts=True,
     ),
-    "kinetic_energy": OutputSpec((), "Kinetic energy, J.", units=("J",), group="energy"),
-    "potential_energy": OutputSpec((), "Potential energy, J.", units=("J",), group="energy"),
+    "kinetic_energy": OutputSpec(
+        (), "Kinetic energy, J.", "observed:kinetic_energy", units=("J",), group="energy"
+    ),
+    "potential_energy": OutputSpec(
+        (), "Potential energy, J.", "observed:potential_energy", units=("J",), group="energy"
+    ),
     "kinetic_slopes": OutputSpec(
         ("nq",),
         "Derivatives of the kinetic energy by the coordinates, at fixed velocities, (nq,).",
+        "observed:kinetic_slopes",
         needs="constraints",
     ),
     "effect_powers": OutputSpec(
         ("effects",),
         "Power of each of `EFFECT_NAMES` on the motion, W.",
+        "observed:effect_powers",
         units=("W",),
         titles=("power",),
     ),
     "coordinates": OutputSpec(
         ("nq",),
         "Coordinates of all joints, (nq,): those too that follow from others and are no states.",
+        "observed:coordinates",
         needs="constraints",
         forms=False,
     ),
-    "velocities": OutputSpec(("nv",), "Their velocities, (nv,).", needs="constraints", forms=False),
+    "velocities": OutputSpec(
+        ("nv",), "Their velocities, (nv,).", "observed:velocities", needs="constraints", forms=False
+    ),
     "accelerations": OutputSpec(
-        ("nv",), "Their accelerations, (nv,).", needs="constraints", forms=False, contacts=True
+        ("nv",),
+        "Their accelerations, (nv,).",
+        "observed:accelerations",
+        needs="constraints",
+        forms=False,
+        contacts=True,
     ),
     "momentum": OutputSpec(
         (3,),
         "Linear momentum x, y (kg m/s), angular momentum about the world's origin (kg m^2/s).",
+        "observed:momentum",
         ((6,), "Momentum x, y, z (kg m/s), angular momentum about the world's origin (kg m^2/s)."),
         units=("kg m/s", "kg m²/s"),
         titles=("momentum", "angular momentum"),
         parts={3: ("px", "py", "lz"), 6: ("px", "py", "pz", "lx", "ly", "lz")},
     ),
     "centre_of_mass": OutputSpec(
-        ("dimensions",), "World position of the centre of mass of all bodies, m.", units=("m",)
+        ("dimensions",),
+        "World position of the centre of mass of all bodies, m.",
+        "observed:centre_of_mass",
+        units=("m",),
     ),
     "joint_forces": OutputSpec(
         ("joints", 3),
         "Force (world x, y; N) and moment (N m) of each of `JOINTS` on its parent.",
+        "observed:joint_forces",
         (
             ("joints", 6),
             "Force (N) and moment (N m) of each of `JOINTS` on its parent, world axes.",
@@ -140,12 +171,14 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "constraint_forces": OutputSpec(
         ("constraints",),
         "Multiplier of each of `CONSTRAINTS`, N or N m: its force in the direction of the row.",
+        "constraints:constraint_forces",
         needs="constraints",
         contacts=True,
     ),
     "driving_forces": OutputSpec(
         ("driven",),
         "Driving force or torque of each of `DRIVEN` on the child, N or N m.",
+        "observed:driving_forces",
         needs="driven joints",
         contacts=True,
         titles=("driving force",),
@@ -153,6 +186,7 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "body_poses": OutputSpec(
         ("bodies", 3),
         "World x, y (m) of each centre of mass and angle (rad), one row a body.",
+        "observed:body_poses",
         (("bodies", 3, 4), "[world_R_body | centre of mass (m)] of each body, 3 x 4."),
         units=("m", "rad"),
         titles=("position", "angle"),
@@ -163,6 +197,7 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "body_velocities": OutputSpec(
         ("bodies", 3),
         "World velocity x, y (m/s) of each centre of mass, angular velocity (rad/s).",
+        "observed:body_velocities",
         (
             ("bodies", 6),
             "Velocity of each centre of mass (m/s) and angular velocity (rad/s), world.",
@@ -174,6 +209,7 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "point_positions": OutputSpec(
         ("points", "dimensions"),
         "World position of each of `POINTS`, m.",
+        "observed:point_positions",
         needs="points",
         units=("m",),
         titles=("position",),
@@ -182,6 +218,7 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "point_velocities": OutputSpec(
         ("points", "dimensions"),
         "World velocity of each of `POINTS`, m/s.",
+        "observed:point_velocities",
         needs="points",
         units=("m/s",),
         titles=("velocity",),
@@ -190,6 +227,7 @@ OUTPUTS: Mapping[str, OutputSpec] = {
     "point_jacobians": OutputSpec(
         ("points", "dimensions", "nv"),
         "Jacobian J of each of `POINTS`, whose world velocity is J v.",
+        "observed:point_jacobians",
         needs="points",
         forms=False,
     ),
@@ -247,7 +285,7 @@ JACOBIAN = OutputSpec(
 """The Jacobian, which every module has."""
 DERIVATIVES = ("jacobian", *(name for name, spec in OUTPUTS.items() if spec.by))
 """Names of the matrices of derivatives."""
-DYNAMICS = ("forward_dynamics", "inverse_dynamics")
+DYNAMICS = tuple(name for name, spec in OUTPUTS.items() if spec.beside)
 """Outputs that take more than a time, a state, parameters and inputs."""
 SAVED = tuple(name for name in OUTPUTS if name not in (*DYNAMICS, *DERIVATIVES))
 """The outputs that a state determines, and that are no derivatives."""

@@ -40,7 +40,7 @@ LOOP = (
     )
 )
 SCENE = "eomgen/scene/"
-AGAIN = 'OutputSpec((), "Kinetic energy again, J.", units=("J",))'
+AGAIN = 'OutputSpec((), "Kinetic energy again, J.", "observed:energy_again", units=("J",))'
 EDITS = {
     "a joint": {
         f"{SCENE}joints/telescope.py": OURS / "joints.py",
@@ -68,8 +68,8 @@ EDITS = {
     },
     "an output": {
         "eomgen/tables/outputs.py": [('    "kinetic_slopes": ', f'    "energy_again": {AGAIN},')],
-        "eomgen/codegen/from_recursion.py": [
-            ('    "coordinates": ', '    "energy_again": lambda r: [r.dynamics.kinetic_energy],')
+        "eomgen/codegen/observed.py": [
+            ("def coordinates(", "energy_again = lambda r: [r.dynamics.kinetic_energy]")
         ],
     },
     "a route": {
