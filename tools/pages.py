@@ -9,6 +9,7 @@ import inspect
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from types import MethodType
 from typing import Any
 
 import eomgen
@@ -83,7 +84,9 @@ def functions_page() -> str:
                 if isinstance(value, property):
                     lines += _entry("attribute", f"eomgen.{name}.{part}", None, value.__doc__)
                 elif inspect.isfunction(value):
-                    lines += _entry("method", f"eomgen.{name}.{part}", value, value.__doc__)
+                    lines += _entry(
+                        "method", f"eomgen.{name}.{part}", MethodType(value, each), value.__doc__
+                    )
     return "\n".join(lines)
 
 
@@ -99,8 +102,7 @@ def _entry(
 def _call(function: Callable[..., Any]) -> str:
     """All arguments with their defaults."""
     signature = inspect.signature(function)
-    given = [each for each in signature.parameters.values() if each.name != "self"]
-    bare = [each.replace(annotation=each.empty) for each in given]
+    bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
     return str(signature.replace(parameters=bare, return_annotation=signature.empty))
 
 

@@ -1,19 +1,21 @@
 """The result of a simulation, which can be pickled, plotted, and displayed in a notebook."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from eomgen.base.options import about, taking
 from eomgen.language.base import identifier
 from eomgen.results.labelled import dataframe, dataset, units_of
 from eomgen.results.simulated import Simulated
 from eomgen.run.limits import Excursion, excursions
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import save_csv, save_npz
+from eomgen.show.filming import FilmOptions
 from eomgen.study.diagnosis import joint_limits, locks
 from eomgen.study.recording import FOLLOWING
 
@@ -30,6 +32,31 @@ if TYPE_CHECKING:
     from eomgen.study.accuracy.estimate import Estimate
     from eomgen.study.accuracy.search import Choice
     from eomgen.study.between import Direction
+
+
+@dataclass(frozen=True)
+class Filming(FilmOptions):
+    """What `Run.film` takes."""
+
+    run: "Run"
+    path: str | Path
+    _: KW_ONLY
+    progress: "Progress | None" = field(
+        default=None, metadata=about("called with the fraction done")
+    )
+
+
+@taking(Filming)
+def film(options: Filming) -> Path:
+    """Write a film, .gif or, where the program ffmpeg is, .mp4; return its path.
+
+    Raises `RunError` for another suffix, without ffmpeg, or if the file exists and this program
+    did not write it.
+    """
+    from eomgen.show.plotting import filmed
+
+    run, path = options.run, Path(options.path)
+    return filmed(run.trajectory, run.motion, path, options, options.progress).path
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -170,34 +197,7 @@ class Run(Simulated):
         )
         return plotted(self.trajectory, self.motion, wanted).figure
 
-    def film(
-        self,
-        path: str | Path,
-        *,
-        fps: float = 25.0,
-        speed: float = 1.0,
-        start: float | None = None,
-        end: float | None = None,
-        size: str = "",
-        force: bool = False,
-        progress: "Progress | None" = None,
-    ) -> Path:
-        """Write a film, .gif or, where the program ffmpeg is, .mp4; return its path.
-
-        fps         frames of a second
-        speed       of the film relative to the motion: 0.5 shows it half as fast
-        start, end  times of the run between which it is shown, s; None: all
-        size        in pixels, as "640x480"; "": as the motion needs it
-        progress    called with the fraction done
-
-        Raises `RunError` for another suffix, without ffmpeg, or if the file exists and this program
-        did not write it.
-        """
-        from eomgen.show.filming import FilmOptions
-        from eomgen.show.plotting import filmed
-
-        options = FilmOptions(fps=fps, speed=speed, start=start, end=end, size=size, force=force)
-        return filmed(self.trajectory, self.motion, Path(path), options, progress).path
+    film = film
 
     def save(
         self,

@@ -11,7 +11,11 @@ class FilmOptions:
 
     fps: float = option(25.0, "frames of a second", value="N")
     speed: float = option(1.0, "0.5 shows the motion half as fast")
-    start: float | None = option(None, "time of the first frame, s", flag="--from", value="T")
-    end: float | None = option(None, "time of the last, s", flag="--to", value="T")
+    start: float | None = option(
+        None, "time of the first frame, s", none="the run's first", flag="--from", value="T"
+    )
+    end: float | None = option(
+        None, "time of the last, s", none="the run's last", flag="--to", value="T"
+    )
     size: str = option("", "pixels, 640x480 for example (as it needs them)", value="WxH")
     force: bool = option(False, "also overwrite files that eomgen did not write")

@@ -48,6 +48,7 @@ where a heavy tip is in line with all joints, to less than the rounding of sines
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from eomgen.dynamics.orthogonal.aligned_axes import align_axes
 from eomgen.dynamics.orthogonal.back_substitution import outwards
@@ -98,6 +99,13 @@ from eomgen.scalars.protocol import Scalar, Scalars
 
 SLIGHT = 1e-16
 """A pivot of an inertia matrix is at least this part of its diagonal entry."""
+
+
+class _Others(NamedTuple):
+    """The rows beside a pivot row: those `kept` in a triangle, by column, and the `free` ones."""
+
+    kept: dict[Column, Row]
+    free: list[Row]
 
 
 class Elimination:
@@ -260,7 +268,8 @@ class Elimination:
             axes.sort(key=lambda axis: -order.index(column_of(axis[0])[1]))
             kept = {(False, j): linear[j] for j in translations if j in linear}
             kept |= {(True, j): angular[j] for j in order if j in angular}
-            one, kept, loose = self._eliminate_aligned_rotation(link, axes.pop(0), kept, loose, at)
+            every = _Others(kept, loose)
+            one, (kept, loose) = self._eliminate_aligned_rotation(link, axes.pop(0), every, at)
             taken.append(one)
             linear = {j: row for (spins, j), row in kept.items() if not spins}
             angular = {j: row for (spins, j), row in kept.items() if spins}
@@ -277,17 +286,18 @@ class Elimination:
         free = [self._rows.of(columns, shifted(row, at)) for row in free]
         # Rows of angular accelerations alone come first, and stay free of linear ones.
         free.sort(key=lambda row: not all(s.is_zero(x) for x in row.linear))
+        others = _Others(kept, free)
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
-            first, sources, kept, free, gathered = self._pivot_row(axis[0], held, kept, free)
+            first, sources, others, gathered = self._pivot_row(axis[0], held, others)
             # The rows of rotors of several axes contain all of these.
             early = len(link.free) > 1 and not s.is_zero(link.armature)
-            one, kept, free, term = self._eliminate_axis(
-                link, axis, first, kept, free, term, tau[axis[1]], early=early
+            one, others, term = self._eliminate_axis(
+                link, axis, first, others, term, tau[axis[1]], early=early
             )
             taken.append(replace(one, rows=sources, gathered=gathered, before=tuple(rotations)))
             rotations.clear()
-        rest = [*kept.values(), *free]
+        rest = [*others.kept.values(), *others.free]
         empty = tuple(row for row in (*loose, *rest) if self._rows.is_empty(row))
         holding = tuple(row for row in rest if not self._rows.is_empty(row))
         return EliminatedLink(tuple(taken), tuple(rotations), holding, empty), term
@@ -345,21 +355,20 @@ class Elimination:
         self,
         link: Link,
         axis: tuple[MotionAxis, int],
-        kept: dict[Column, Row],
-        loose: list[Row],
+        every: _Others,
         at: Vec,
-    ) -> tuple[EliminatedAxis, dict[Column, Row], list[Row]]:
+    ) -> tuple[EliminatedAxis, _Others]:
         """Eliminate the rotation about the arm from the rows about the arm's end `at`.
 
         The heaviest rows do not contain it. Rows with other arms, rotated against them first, would
         bring it in, and rounding would not remove it.
         """
-        first, nothing = kept.pop(column_of(axis[0])), no_wrench(self._scalars)
+        first, nothing = every.kept.pop(column_of(axis[0])), no_wrench(self._scalars)
         # The forces along this axis are all on its own row.
-        one, kept, loose, _ = self._eliminate_axis(
-            link, axis, first, kept, loose, nothing, self._rows.zero, early=True
+        one, others, _ = self._eliminate_axis(
+            link, axis, first, every, nothing, self._rows.zero, early=True
         )
-        return replace(one, rows=(shifted(first, at),)), kept, loose
+        return replace(one, rows=(shifted(first, at),)), others
 
     def _arm(self, k: int, at: Vec) -> Vec:
         """The arm of link k from the point `at`, the joint of the heaviest child."""
@@ -367,26 +376,24 @@ class Elimination:
         return sub(self._links[k].arm, at) if between is None else between
 
     def _pivot_row(
-        self, motion: MotionAxis, held: bool, kept: dict[Column, Row], free: list[Row]
-    ) -> tuple[
-        Row, tuple[Row, ...], dict[Column, Row], list[Row], tuple[GivensRotation | Sum, ...]
-    ]:
+        self, motion: MotionAxis, held: bool, every: _Others
+    ) -> tuple[Row, tuple[Row, ...], _Others, tuple[GivensRotation | Sum, ...]]:
         """The pivot row of a motion axis, and the rows from which its acceleration is found.
 
         If the link has inertia along the axis (`held`), the pivot is the triangle's own row; else a
         row that contains the axis alone, or one gathered from all rows that contain it.
         """
         column = column_of(motion)
-        kept, rotations = dict(kept), Steps()
+        kept, free, rotations = dict(every.kept), list(every.free), Steps()
         if held:
             first = kept.pop(column)
-            return first, (first,), kept, free, ()
+            return first, (first,), _Others(kept, free), ()
         single = self._rows.empty(column)
         for n, row in enumerate(free):
             parts = zip((*row.angular, *row.linear), (*single.angular, *single.linear), strict=True)
             if all(self._scalars.is_zero(a - b) for a, b in parts):
-                return row, (row,), kept, [*free[:n], *free[n + 1 :]], ()
-        free, angular = list(free), column[0]
+                return row, (row,), _Others(kept, [*free[:n], *free[n + 1 :]]), ()
+        angular = column[0]
         sources = tuple(
             row
             for row in (*free, *reversed(kept.values()))
@@ -396,20 +403,19 @@ class Elimination:
             single, free[n] = self._rows.rotated(single, row, column, rotations)
         for key in reversed(kept):
             single, kept[key] = self._rows.rotated(single, kept[key], column, rotations)
-        return single, sources or (single,), kept, free, tuple(rotations)
+        return single, sources or (single,), _Others(kept, free), tuple(rotations)
 
     def _eliminate_axis(
         self,
         link: Link,
         axis: tuple[MotionAxis, int],
         first: Row,
-        kept: dict[Column, Row],
-        free: Sequence[Row],
+        others: _Others,
         term: Wrench,
         tau: Scalar,
         *,
         early: bool = False,
-    ) -> tuple[EliminatedAxis, dict[Column, Row], list[Row], Wrench]:
+    ) -> tuple[EliminatedAxis, _Others, Wrench]:
         """Rotate the pivot row `first` against all others until it alone contains a motion axis.
 
         It is rotated against the free rows first, or if `early` against the kept ones, which then
@@ -417,7 +423,7 @@ class Elimination:
         """
         s, (motion, i) = self._scalars, axis
         column = column_of(motion)
-        kept, free, rotations = dict(kept), list(free), Steps()
+        kept, free, rotations = dict(others.kept), list(others.free), Steps()
 
         def with_free(pivot: Row) -> Row:
             for n, row in enumerate(free):
@@ -446,4 +452,4 @@ class Elimination:
         share = pivot.force / pivot.weight
         left = Wrench(*with_component(motion, moment, push, back))
         one = EliminatedAxis(motion, i, (first,), first.index, share, tuple(rotations), rotor)
-        return one, kept, free, left
+        return one, _Others(kept, free), left
