@@ -65,11 +65,13 @@ def closing(
             low = gap_b[c] + slack[c] < 0.0
             dips = rate_a[c] < 0.0 and rate_b[c] > 0.0
             if now.holds[c] == 0 and (low or dips):
-                before = gap_a[c] + slack[c]
-                after = gap_b[c] + slack[c]
-                times[c] = first_zero(
-                    law, within, now, search, at.t, c, slack[c], a, b, before, after
-                )
+                at.contact = c
+                at.slack = slack[c]
+                search.before = a
+                search.here = b
+                search.at_before = gap_a[c] + slack[c]
+                search.at_here = gap_b[c] + slack[c]
+                times[c] = first_zero(law, within, now, search, at)
                 if times[c] < 0.0:
                     return times[c]
                 first = min(first, times[c])
@@ -88,43 +90,35 @@ def closing(
     return inf
 
 
-def first_zero(
-    law: ContactLaw,
-    within: Within,
-    now: Touching,
-    search: Search,
-    t: float,
-    c: int,
-    slack: float,
-    a: float,
-    b: float,
-    at_a: float,
-    at_b: float,
-) -> float:
+def first_zero(law: ContactLaw, within: Within, now: Touching, search: Search, at: Place) -> float:
     """The first time at which a gap falls to 0, infinity if it does not; its rate changes sign at
-    most once between a and b, where the gap has these values.
+    most once between the points `before` and `here` of the search, which has the gap there.
     """
-    before = value(law, within, now, t, RATE, c, slack, a)
-    after = value(law, within, now, t, RATE, c, slack, b)
+    a = search.before
+    b = search.here
+    at_a = search.at_before
+    at_b = search.at_here
+    before = value(law, within, now, at, RATE, a)
+    after = value(law, within, now, at, RATE, b)
     # A gap that rises first reaches 0 only after its maximum: at a it may be 0 but for rounding.
     if at_a > 0.0 and at_b < 0.0 and not (before > 0.0 and after < 0.0):
-        return zero(law, within, now, search, t, GAP, c, slack, a, b)
+        return zero(law, within, now, search, at, GAP, a, b)
     turns = before * after < 0.0
     middle = b
     if turns:
-        middle = zero(law, within, now, search, t, RATE, c, slack, a, b)
+        middle = zero(law, within, now, search, at, RATE, a, b)
         if middle < 0.0:
             return middle
     if before < 0.0:  # it falls first
         if at_a <= 0.0:
             return a
-        if turns and value(law, within, now, t, GAP, c, slack, middle) < 0.0:
-            return zero(law, within, now, search, t, GAP, c, slack, a, middle)
+        if turns and value(law, within, now, at, GAP, middle) < 0.0:
+            return zero(law, within, now, search, at, GAP, a, middle)
         return inf
     if at_b >= 0.0 or not turns:  # it rises still
         return a if before == 0.0 and at_b < at_a and at_a <= 0.0 else inf
-    if value(law, within, now, t, GAP, c, slack, middle) > 0.0:
-        return zero(law, within, now, search, t, GAP, c, slack, middle, b)
+    if value(law, within, now, at, GAP, middle) > 0.0:
+        return zero(law, within, now, search, at, GAP, middle, b)
     return middle
 
 
@@ -147,9 +141,10 @@ def opening(
     for c in range(n):
         times[c] = inf
         if now.holds[c] == 1 and now.pushes[c] == 0.0 and now.parts[c] > 0.0:
+            at.contact = c
             times[c] = 0.0
-            if value(law, within, now, at.t, PUSH, c, 0.0, 0.0) > 0.0:
-                times[c] = zero(law, within, now, search, at.t, PUSH, c, 0.0, 0.0, length)
+            if value(law, within, now, at, PUSH, 0.0) > 0.0:
+                times[c] = zero(law, within, now, search, at, PUSH, 0.0, length)
                 if times[c] < 0.0:
                     return times[c]
             first = min(first, times[c])
@@ -164,10 +159,8 @@ def zero(
     within: Within,
     now: Touching,
     search: Search,
-    t: float,
+    at: Place,
     what: int,
-    c: int,
-    slack: float,
     a: float,
     b: float,
 ) -> float:
@@ -176,34 +169,26 @@ def zero(
     """
     search.xtol = max(1e-14 * (b - a), 1e-300)
     search.rtol = 1e-15
-    at_a = value(law, within, now, t, what, c, slack, a)
-    at_b = value(law, within, now, t, what, c, slack, b)
+    at_a = value(law, within, now, at, what, a)
+    at_b = value(law, within, now, at, what, b)
     answer = begun(search, a, b, at_a, at_b)
     while answer == WANTED:
-        answer = gone_on(search, value(law, within, now, t, what, c, slack, search.here))
+        answer = gone_on(search, value(law, within, now, at, what, search.here))
     if answer == FOUND:
         return search.here
     return UNHELD if what == PUSH else NO_ZERO
 
 
-def value(
-    law: ContactLaw,
-    within: Within,
-    now: Touching,
-    t: float,
-    what: int,
-    c: int,
-    slack: float,
-    s: float,
-) -> float:
+def value(law: ContactLaw, within: Within, now: Touching, at: Place, what: int, s: float) -> float:
     """What is searched for its zero, at a time; not a number if there are no forces."""
+    c = at.contact
     y = within.state(s)
     if what == GAP:
-        gap = law.gaps(t + s, y)
-        return gap[c] + slack
+        gap = law.gaps(at.t + s, y)
+        return gap[c] + at.slack
     if what == RATE:
-        rate = law.rates(t + s, y)
+        rate = law.rates(at.t + s, y)
         return rate[c]
-    if not press(law, now, t + s, y):
+    if not press(law, now, at.t + s, y):
         return nan
     return now.pushes[c] - now.parts[c]

@@ -93,7 +93,8 @@ class Touching:
 @dataclass(slots=True)
 class Place:
     """Where a run is: time and state, and flags of the contacts that have just closed or opened.
-    There were `events` within `least` s `since` a time.
+    There were `events` within `least` s `since` a time. Last the contact of which a zero is sought,
+    and what is added to its gap.
     """
 
     t: float
@@ -103,6 +104,8 @@ class Place:
     least: float
     since: float
     events: int
+    contact: int = 0
+    slack: float = 0.0
 
 
 def largest(n: int, x: Annotated[Vector, "n"]) -> float:
