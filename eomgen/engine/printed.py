@@ -52,7 +52,7 @@ ON_PAGES: tuple[Root, ...] = (
     *[(name, {}) for name in "add_compensated normalised moved_onto convolved".split()],
     *[(name, {"method": DOP853}) for name in ("made", "interpolate")],
     *[(name, {}) for name in "first_length within round_off passed_over end_at".split()],
-    *CONTACTS,
+    *[(name, {}) for name in "begin deepest press met ended release".split()],
 )
 """What a page that goes on live calls."""
 RECORDS: tuple[type, ...] = (
@@ -65,15 +65,10 @@ RECORDS: tuple[type, ...] = (
 SIZES = ("STATES", "POSITIONS", "OTHERS", "CONTACTS", "PRESSED", "FIRST", "PRODUCTS", "ORDERS")
 """Sizes that are known for a mechanism."""
 CODES = {
-    "TOLERANCE": contacts.TOLERANCE,
-    "ENDLESS": contacts.ENDLESS,
-    "NO_FORCES": contacts.NO_FORCES,
-    "WHOLE": contact_runs.WHOLE,
-    "CLOSED": contact_runs.CLOSED,
     "OPENED": contact_runs.OPENED,
     "NOT_FOUND": contact_runs.NOT_FOUND,
     "NOT_KEPT": contact_runs.NOT_KEPT,
-    "ENDLESSLY": contact_runs.ENDLESSLY,
+    "MOST_EVENTS": contact_runs.MOST_EVENTS,
     "PROJECTED": projection.PROJECTED,
     "UNUSUAL": adaptive.UNUSUAL,
     "MOST_PARTS": crossings.MOST_PARTS,

@@ -34,9 +34,8 @@ const makeEngine = (mechanism, data) => {
     grip: null, // what is pulled: {body, at, target, point, force}
     onSample: null,
   };
-  let lost = new Float64Array(ny); // rounding errors of the last sums
   let [start, goal, cost] = [0, 0, NaN];
-  let [regular, closed] = [true, []];
+  let regular = true;
   let [law, change] = [null, null];
   let safe = null; // the last state from which the mechanism moves on by itself
 
@@ -101,21 +100,28 @@ const makeEngine = (mechanism, data) => {
     return contacts.make({
       names: table.map((c) => c.name),
       sizes,
-      ny,
+      states: ny,
       active: (k) => switches[k] === null || engine.p[switches[k]] !== 0,
       many: mechanism.held(...at(engine.t, engine.y), table.map(() => 0)).length,
       gaps: (t, y) => mechanism.gaps(...at(t, y)),
       rates: (t, y) => mechanism.gapRates(...at(t, y)),
-      impact: (t, y, k, bounce) =>
-        mechanism.impact(...at(t, y), [...table.map((_, i) => (i === k ? 1 : 0)), bounce]),
+      impact: (t, y, chosen) => mechanism.impact(...at(t, y), chosen),
       held: (t, y, forces) => {
         if (engine.grip) pullAt(t, y);
         return mechanism.held(...at(t, y), forces);
       },
       restSpeed: data.restSpeed ?? null,
       span: data.span ?? 10,
-    });
+    }, engine.y);
   }
+
+  const way = contactWay({
+    states: ny,
+    change: (t, y, h) => change(problem, t, y, h),
+    dense: (t, y, end) => (change.free ? change(problem, t, y, end) : null),
+    placed: projected,
+    added: steps.add_compensated,
+  });
 
   // ---- Steps ----
 
@@ -124,7 +130,7 @@ const makeEngine = (mechanism, data) => {
 
   // Go on from the present state: steps end at the same marks, sums begin anew.
   function renew() {
-    lost.fill(0);
+    way.part();
     regular = engine.t === start;
     problem = law?.held().length ? { ...free, f: law.derivative, series: null } : free;
   }
@@ -132,7 +138,7 @@ const makeEngine = (mechanism, data) => {
   function restart() {
     start = engine.t;
     goal = engine.t;
-    closed = law ? law.begin(engine.t, engine.y) : [];
+    if (law) note(law.begin(engine.t));
     renew();
   }
 
@@ -163,53 +169,28 @@ const makeEngine = (mechanism, data) => {
   // One step to the next mark, or to the contact that comes first.
   function makeStep() {
     const { t, y } = engine;
-    const off = law ? law.held().filter((k) => !law.active(k)) : [];
+    const off = law ? law.release(t) : [];
     if (off.length) {
-      note(law.release(t, y, off));
-      renew();
-    }
-    if (closed.length) {
-      const after = law.strike(t, y, closed);
-      closed = [];
-      y.set(after.y);
-      note(after.events);
+      note(off);
       renew();
     }
     const end = mark();
-    const length = regular ? engine.dt : end - t;
-    const found = change(problem, t, y, change.free ? end : length);
-    const next = change.free ? found.slice() : y.slice();
-    const rest = change.free ? new Float64Array(ny) : lost.slice();
-    if (!change.free) {
-      steps.add_compensated({ value: next, lost: rest }, found);
-      projected(end, next);
+    if (!way.go(t, y, regular ? engine.dt : end - t, end)) {
+      throw new Error("the state overflows or is not a number: take a smaller step");
     }
-    if (!next.every(Number.isFinite)) throw new Error("the state overflows or is not a number: take a smaller step");
-    if (law && cutAtContact(t, y, next, end)) return;
-    engine.t = end;
-    engine.y.set(next);
-    lost = rest;
+    if (law) {
+      const events = law.ended(way, t, end, (there) => (engine.t = there));
+      if (events) {
+        note(events);
+        renew();
+        return;
+      }
+    } else {
+      engine.t = end;
+      y.set(way.last);
+    }
     regular = true;
     if (engine.onSample) engine.onSample(engine.t, engine.y);
-  }
-
-  // End a step where a contact closes or opens; whether one does.
-  function cutAtContact(t, y, next, end) {
-    const state = (s) => {
-      if (s <= 0) return y;
-      if (s >= end - t) return next;
-      if (change.free) return change(problem, t, y, t + s).slice();
-      const within = change(problem, t, y, t + s - t); // to the time that is said, as in Python
-      return projected(t + s, y.map((x, k) => x + within[k]));
-    };
-    const there = law.taken(t, y, end, state);
-    if (there.whole) return false;
-    engine.t = there.t;
-    engine.y.set(there.y);
-    closed = there.closed;
-    note(there.opened);
-    renew();
-    return true;
   }
 
   const note = (events) => engine.events.push(...events);
