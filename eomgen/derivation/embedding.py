@@ -79,6 +79,12 @@ class Embedding:
         return tuple(pair for polygon in self.polygons for pair in polygon.definitions)
 
     @property
+    def same(self) -> dict[Expr, Expr]:
+        """Dependent coordinates and velocities that are others, or their negatives."""
+        pairs = (x for p in self.polygons for x in (*p.positions, *p.velocities))
+        return {symbol: e for symbol, e in pairs if e.is_Symbol or (-e).is_Symbol}
+
+    @property
     def rates(self) -> tuple[Definition, ...]:
         """The dependent accelerations over the independent ones."""
         return tuple(pair for polygon in self.polygons for pair in polygon.rates)
@@ -280,12 +286,12 @@ def _shortened(
 
 
 def projected(
-    found: Embedding, M: Expr, forces: Mapping[str, Expr]
+    K: Expr, kappa: Expr, M: Expr, forces: Mapping[str, Expr]
 ) -> tuple[Expr, dict[str, Expr]]:
     """M̂, and V̂, Ĝ, F̂ by their letters, from those of the tree."""
-    turned = found.K.T
-    reduced = simplified(turned * M * found.K)
-    moved = {**forces, "V": forces["V"] + M * found.kappa}
+    turned = K.T
+    reduced = simplified(turned * M * K)
+    moved = {**forces, "V": forces["V"] + M * kappa}
     return reduced, {letter: simplified(turned * e) for letter, e in moved.items()}
 
 

@@ -33,8 +33,14 @@ from eomgen.derivation.loops import (
     polygon_steps,
 )
 from eomgen.derivation.matrices import Matrices, of_pins, of_projected, projected_definitions
-from eomgen.derivation.mechanism import NamingMechanism, Notes
 from eomgen.derivation.poses import poses
+from eomgen.derivation.prescribed import (
+    PRESCRIBED,
+    free_step,
+    freed,
+    left_free,
+    prescribed_motion,
+)
 from eomgen.derivation.projected.derive import balanced
 from eomgen.derivation.projected.derive import solved as solved_projected
 from eomgen.derivation.projected.steps import projected_steps, state_words
@@ -49,11 +55,8 @@ from eomgen.derivation.supported import (
     why_not_momenta,
     why_not_pins,
 )
-from eomgen.derivation.symbolic_scalars import SymbolicScalars
 from eomgen.derivation.symbols import Expr, real
 from eomgen.dynamics.start.assur import with_closed_form
-from eomgen.language.formula import names_in
-from eomgen.language.rates import with_rates
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import Load
 from eomgen.scene.joints.base import WORLD
@@ -89,11 +92,6 @@ SOLVED = "The equations solved for the accelerations."
 ELIMINATED = (
     "From the last velocity to the first each is eliminated: d is a pivot, and b what is left of "
     "F - V - G."
-)
-PRESCRIBED = (
-    "Driven coordinates follow the formulas above, and their rates are the derivatives of these; "
-    "locked coordinates are constant. Neither is a state; the forces on them are whatever this "
-    "requires."
 )
 SYMMETRIC_TITLE = "The symmetric mass matrix, that of kinetic energy"
 
@@ -134,6 +132,8 @@ def exposition_of(
     if form != "velocity" and constraints:
         raise SceneError(f"form: no derivation in the form '{form}': {why_not_momenta(model)}")
     bare = replace(tree_of(with_symbols(model, effects)), form=form)
+    if not constraints:
+        bare = freed(bare)
     parts = Parts(effects, constraints)
     small = len(model.bodies) <= MOST_REPORTED
     long = f"it is written out for up to {MOST_REPORTED} bodies, and there are {len(model.bodies)}"
@@ -220,10 +220,12 @@ def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Expositi
     equations = replace(equations, balance=_each(equations.balance, simplified))
     tree, direct = of_projected(equations), None
     if method == "lagrange":
-        tree, energies = lagrangian(model, tree, equations.loads.uniform)
+        tree, energies = lagrangian(bare, tree, equations.loads.uniform)
+    by_pivots = method == "lagrange" or bool(model.prescribed)
     if not parts.constraints:
+        tree = left_free(model, tree) if model.prescribed else tree
         direct = solved_directly(tree.M, tree.F - tree.V - tree.G)
-        if direct is None and method == "kane":
+        if direct is None and not by_pivots:
             equations = solved_projected(equations)
             tree = replace(tree, definitions=projected_definitions(equations))
     names = reading_names(model)
@@ -233,8 +235,10 @@ def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Expositi
     words = (
         "Each body by itself, with its weight, the forces of the effects, and those of its joints."
     )
+    if model.prescribed:
+        words += f" {PRESCRIBED}"
     start = [
-        found[0],
+        _renamed(_state(model), names) if model.prescribed else found[0],
         Step("bodies", "Free bodies", words, ()),
         *found[1:joints],
     ]
@@ -245,7 +249,7 @@ def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Expositi
     if parts.constraints:
         return _of_tied(model, parts, start, found[joints:place], tree)
     whole = _whole(tree, model, parts)
-    if direct is None and method == "lagrange":
+    if direct is None and by_pivots:
         solution = tuple(solved_for([x.name for x in tree.a], tree.M, tree.F - tree.V - tree.G))
         lines = dict(solution)
         words = f"{SOLVED} {ELIMINATED}"
@@ -257,12 +261,14 @@ def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Expositi
         whole = _with(whole, direct)
     solved = {line.left.name: line.right for line in found[place].equations}
     rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
+    left = [_renamed(free_step(tree), said)] if model.prescribed else []
     form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
     ends = [*impact_steps(model, parts.effects), form_step(model, "velocity", form, parts.effects)]
     steps = [
         *start,
         *found[joints:place],
         *(_renamed(step, names) for step in _effect_steps(model, parts)),
+        *left,
         *found[place:],
         *(_renamed(step, names) for step in ends),
     ]
@@ -294,15 +300,7 @@ def _of_tied(
 
 def _recursive(model: Model, parts: Parts, method: Method | None) -> Exposition:
     frames = frames_of(model)
-    state = [
-        Equation(sp.Symbol(letter), sp.Matrix([[real(c.name) for c in group]]))
-        for letter, group in (("q", model.coordinates), ("v", model.velocities))
-    ]
-    state += prescribed_motion(model)
-    steps = [
-        Step("state", "State", state_words(model), tuple(state)),
-        Step("bodies", "Free bodies", _free_words(model), ()),
-    ]
+    steps = [_state(model), Step("bodies", "Free bodies", _free_words(model), ())]
     effects = _effect_steps(model, parts, every=True)
     if not parts.constraints and method == "newton-euler":
         steps += [*effects, *composite_steps(model, frames, parts.effects)]
@@ -321,6 +319,16 @@ def _recursive(model: Model, parts: Parts, method: Method | None) -> Exposition:
     steps += [*impact_steps(model, parts.effects), _last(model, parts)]
     names = reading_names(model)
     return _told(RECURSIVE, [_renamed(step, names) for step in steps], None, parts)
+
+
+def _state(model: Model) -> Step:
+    """Coordinates and velocities, and those that are prescribed."""
+    state = [
+        Equation(sp.Symbol(letter), sp.Matrix([[real(c.name) for c in group]]))
+        for letter, group in (("q", model.coordinates), ("v", model.velocities))
+    ]
+    state += [Equation(*pair) for pair in prescribed_motion(model)]
+    return Step("state", "State", state_words(model), tuple(state))
 
 
 def _last(model: Model, parts: Parts) -> Step:
@@ -399,20 +407,6 @@ def _loads_as_they_are(derived: DerivedEffect) -> list[Equation]:
     return lines
 
 
-def prescribed_motion(model: Model) -> list[Equation]:
-    """Driven coordinates with their rates and accelerations, and locked ones."""
-    names = NamingMechanism(model, Notes()).names
-    found = []
-    for c in model.prescribed:
-        used = {name: names[name] for name in names_in(c.value) if name != "t"}
-        x, v, a = with_rates(c.value, used, names["t"], SymbolicScalars())
-        found.append(Equation(real(c.position.name), x))
-        if not c.locked:
-            found.append(Equation(real(c.velocity.name), v))
-            found.append(Equation(real(c.velocity.acceleration), a))
-    return found
-
-
 def _free_words(model: Model) -> str:
     words = (
         "Each body by itself, with its weight, the forces of the effects and those of its joints. "
@@ -456,7 +450,8 @@ def _numbered_within(steps: Iterator[Step], number: str) -> list[Step]:
 def _whole(found: Matrices, model: Model, parts: Parts, following: int = 0) -> Matrices:
     """The matrices with the forces of effects written out, after `following` definitions."""
     needed = dict.fromkeys(body for derived in parts.effects for body in used_bodies(derived))
-    more, _ = poses(model, frames_of(model), needed)
+    placed, _ = poses(model, frames_of(model), needed)
+    more = [*prescribed_motion(model), *placed]
     more += [pair for derived in parts.effects for pair in derived.definitions]
     if not more:
         return found

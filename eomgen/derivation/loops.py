@@ -135,7 +135,8 @@ def freedom_steps(
     matrices, without the definitions of effects.
     """
     model, K = found.model, found.K
-    M, vectors = projected(found, tree.M, {"V": tree.V, "G": tree.G, "F": tree.F})
+    whole = [e.xreplace(found.same) for e in (tree.M, tree.V, tree.G, tree.F)]
+    M, vectors = projected(K, found.kappa, whole[0], dict(zip("VGF", whole[1:], strict=True)))
     k = K.cols
     letters = [
         Equation(sp.Symbol("M_r"), M),

@@ -21,8 +21,9 @@ from eomgen.commands.main import main
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import derived_effects
 from eomgen.derivation.evaluate import array, define, number
-from eomgen.derivation.exposition import exposition_of, prescribed_motion
+from eomgen.derivation.exposition import exposition_of
 from eomgen.derivation.impacts import impact_steps
+from eomgen.derivation.prescribed import prescribed_motion
 from eomgen.derivation.steps import at_detail
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
@@ -138,8 +139,8 @@ def test_driven_and_locked_joints(seed: int) -> None:
     for still in ((), ("velocity_forces",)):
         left = replace(model, leave_out=still)
         at = instant(left, seed)
-        for line in prescribed_motion(left):
-            assert_close(number(line.right, at.known), at.known[line.left.name])
+        for symbol, value in prescribed_motion(left):
+            assert_close(number(value, at.known), at.known[symbol.name])
         rates, _ = follow_recursion(left, at.known)
         assert_close(rates, at.solver.articulated_forward())
 

@@ -42,10 +42,38 @@ constraints = [
 ]
 effects = [{ type = "gravity", g = "g" }]
 """  # noqa: E501
+SHAKEN = """
+name = "shaken"
+dimensions = 2
+parameters = { m = 1.3, l = 0.4, A = 0.05, nu = 9.0, g = 9.81 }
+bodies = [
+    { name = "slide", mass = 0.5, inertia_com = 0 },
+    { name = "bent", mass = "m", inertia_com = 0.02 },
+    { name = "arm", mass = "m", inertia_com = 0.01 },
+    { name = "tip", mass = "m", inertia_com = 0.03 },
+]
+joints = [
+    { name = "shaker", type = "prismatic", parent = "world", child = "slide", axis = [0, 1], coordinate = "y" },
+    { name = "pin", type = "revolute", parent = "slide", child = "arm", r_child = [0, "l"], coordinate = "theta" },
+    { name = "bend", type = "revolute", parent = "arm", child = "bent", r_child = [0, "l"], coordinate = "beta" },
+    { name = "end", type = "revolute", parent = "bent", child = "tip", r_child = [0, "l"], coordinate = "phi" },
+]
+effects = [
+    { type = "gravity", g = "g" },
+    { type = "driven", name = "shake", joint = "shaker", coordinate = "A*cos(nu*t)" },
+    { type = "joint_spring", name = "spring", joint = "end", stiffness = 3.0, damping = 0.1 },
+]
+locked = { beta = 0.3 }
+"""  # noqa: E501
 LOOPS = ("four_bar", "slider_crank", "differential", "peaucellier", "rattleback", "bicycle",
          "car_suspension", "stewart_platform")  # fmt: skip
-SCENES = some((ATWOOD, *LOOPS, "two_body_forced", "furuta_pendulum"), (ATWOOD, *built_in_names()))
-BY_METHOD = some(("two_body_forced", "spinning_top", "four_bar"), (ATWOOD, *built_in_names()))
+SCENES = some(
+    (ATWOOD, SHAKEN, *LOOPS, "two_body_forced", "furuta_pendulum"),
+    (ATWOOD, SHAKEN, *built_in_names()),
+)
+BY_METHOD = some(
+    (SHAKEN, "two_body_forced", "spinning_top", "four_bar"), (ATWOOD, SHAKEN, *built_in_names())
+)
 
 
 @cache
