@@ -17,9 +17,12 @@ FALL = 'effects = [{ type = "gravity", g = "g" }%s]'
 
 
 def scene(parameters: str, bodies: str, joints: str, more: str = "", effects: str = "") -> str:
-    """A scene with gravity; parameters are numbers of no importance."""
+    """A scene with gravity; parameters without a value are numbers of no importance."""
     space = "inertia_com = [" in bodies or "[0, 0, 1]" in joints
-    values = ", ".join(f"{name} = {1 + i / 7:.3f}" for i, name in enumerate(parameters.split()))
+    given = [name.split("=") for name in parameters.split()]
+    values = ", ".join(
+        f"{name} = {''.join(value) or f'{1 + i / 7:.3f}'}" for i, (name, *value) in enumerate(given)
+    )
     return "\n".join(
         [
             'name = "one"',
@@ -48,6 +51,12 @@ def joint(kind: str, parent: str, child: str, coordinate: str, **keys: str) -> s
 
 
 PUSH = ', { type = "motor", name = "f", joint = "j_x", torque = "input" }'
+LOOP = (
+    '{ name = "pin", type = "revolute", loop = true, parent = "%s", child = "%s", '
+    "r_parent = %s, r_child = %s }\n"
+)
+TURN = ', { type = "motor", name = "tau", joint = "j_%s", torque = "input" }'
+BALL = '[0, 0, "a"]'
 DOWN, OUT = '[0, "l"]', '[0, 0, "l"]'
 SCENES = {
     "pendulum": scene(
@@ -219,16 +228,65 @@ SCENES = {
         + joint("prismatic", "arm", "a", "r", axis="[1, 0]"),
     ),
 }
+# Mechanisms with loops, and with a motion that is given.
+SCENES |= {
+    "kapitza": scene(
+        "m l A nu g",
+        body("pivot", "0") + body("a", "m"),
+        joint("prismatic", "world", "pivot", "y", axis="[0, 1]")
+        + joint("revolute", "pivot", "a", "theta", r_child=DOWN),
+        effects=', { type = "driven", name = "shaker", joint = "j_y", coordinate = "A*cos(nu*t)" }',
+    ),
+    "governor": scene(
+        "J M m a g",
+        body("spindle", "1", '["J", "J", "J"]')
+        + body("left", "m", "[0, 0, 0]")
+        + body("right", "m", "[0, 0, 0]")
+        + body("sleeve", "M", "[0, 0, 0]"),
+        joint("revolute", "world", "spindle", "phi", axis="[0, 0, 1]")
+        + joint("revolute", "spindle", "left", "theta", axis="[1, 0, 0]", r_child=BALL)
+        + joint("revolute", "spindle", "right", "psi", axis="[1, 0, 0]", r_child=BALL)
+        + joint("prismatic", "spindle", "sleeve", "y", axis="[0, 0, -1]"),
+        'constraints = [{ type = "coupling", name = "arms", coordinate = "psi", '
+        'equals = "-theta" }, { type = "coupling", name = "rods", coordinate = "y", '
+        'equals = "2*a*cos(theta)" }]',
+    ),
+    "slider-crank": scene(
+        "J m J_r m_r r=0.1 l=0.3 g",
+        body("crank", "1", '"J"') + body("piston", "m") + body("rod", "m_r", '"J_r"'),
+        joint("revolute", "world", "crank", "theta")
+        + joint("prismatic", "world", "piston", "x", axis="[1, 0]")
+        + joint("revolute", "piston", "rod", "beta")
+        + LOOP % ("crank", "rod", '["r", 0]', '["l", 0]'),
+        "initial = { q = { theta = 0.6 }, guess = { x = 0.4, beta = 3 } }",
+        TURN % "theta",
+    ),
+    "four-bar": scene(
+        "J_2 J_3 J_4 m a=0.1 b=0.3 c=0.25 d=0.3 g",
+        body("crank", "1", '"J_2"') + body("rocker", "1", '"J_4"') + body("coupler", "m", '"J_3"'),
+        joint("revolute", "world", "crank", "theta")
+        + joint("revolute", "world", "rocker", "psi", r_parent='["d", 0]')
+        + joint("revolute", "crank", "coupler", "phi", r_parent='["a", 0]')
+        + LOOP % ("coupler", "rocker", '["b", 0]', '["c", 0]'),
+        "initial = { q = { theta = 0.6 }, guess = { psi = 1.5 } }",
+        TURN % "theta",
+    ),
+}
 S = {
     name: sp.Symbol(name)
-    for name in "m M J A C l r k g f x R l_1 l_2 m_1 m_2 alpha c J_1 J_2".split()
+    for name in "m M J A C l r k g f x R l_1 l_2 m_1 m_2 alpha c J_1 J_2 nu a b d "
+    "J_3 J_4 J_r m_r tau K_x kappa_x kappa_beta K_psi K_phi kappa_psi kappa_phi".split()
 }
-Q = {name: sp.Symbol(name) for name in ("theta", "phi", "psi", "x", "y", "r")}
+Q = {name: sp.Symbol(name) for name in ("theta", "phi", "psi", "beta", "x", "y", "r")}
 D = {name: sp.Symbol(f"{name}_dot") for name in Q}
 m, M, J, A, C, l, r, k, g, f, x, R = (S[n] for n in "m M J A C l r k g f x R".split())  # noqa: E741
 l_1, l_2, m_1, m_2, alpha = (S[n] for n in ("l_1", "l_2", "m_1", "m_2", "alpha"))
 c, J_1, J_2 = (S[n] for n in ("c", "J_1", "J_2"))
-theta, phi = Q["theta"], Q["phi"]
+a, b, d, tau, J_3, J_4, J_r, m_r = (S[n] for n in "a b d tau J_3 J_4 J_r m_r".split())
+K_x, K_psi, K_phi = (S[n] for n in ("K_x", "K_psi", "K_phi"))
+kappa_x, kappa_beta = S["kappa_x"], S["kappa_beta"]
+kappa_psi, kappa_phi = S["kappa_psi"], S["kappa_phi"]
+theta, phi, psi, beta = (Q[n] for n in ("theta", "phi", "psi", "beta"))
 w, u, v = D["theta"], D["phi"], D["x"]
 sin, cos = sp.sin, sp.cos
 FORMS: dict[tuple[str, str], Any] = {
@@ -319,6 +377,36 @@ FORMS: dict[tuple[str, str], Any] = {
     ("cylindrical", "M"): [[J + m * r**2, 0, 0], [0, m, 0], [0, 0, m]],
     ("cylindrical", "V"): [2 * m * r * D["r"] * w, 0, -m * r * w**2],
     ("cylindrical", "G"): [0, m * g, 0],
+    # Landau and Lifshitz, Mechanics, section 30: a pendulum whose point of support oscillates.
+    ("kapitza", "theta_ddot"): -((g + sp.Symbol("y_ddot")) * sin(theta) / l),
+    ("kapitza", "V"): [m * l * sp.Symbol("y_ddot") * sin(theta)],
+    # Landau and Lifshitz, Mechanics, section 5, problem 4: two balls m and a sleeve M on arms and
+    # rods a; the spindle J is left free.
+    ("governor", "M"): [
+        [J + 2 * m * a**2 * sin(theta) ** 2, 0],
+        [0, 2 * a**2 * (m + 2 * M * sin(theta) ** 2)],
+    ],
+    ("governor", "V"): [
+        2 * m * a**2 * u * w * sin(2 * theta),
+        a**2 * (2 * M * w**2 - m * u**2) * sin(2 * theta),
+    ],
+    ("governor", "G"): [0, 2 * g * a * sin(theta) * (m + M)],
+    # Norton, Design of Machinery, sections 6.7 and 11.4 (velocity ratios; the kinetic energy of
+    # the links by that of the crank): β is the angle of the rod from the piston.
+    ("slider-crank", "K_x"): r * sin(beta - theta) / cos(beta),
+    ("slider-crank", "beta_dot"): r * w * cos(theta) / (l * cos(beta)),
+    ("slider-crank", "M"): [
+        [J + (m + m_r) * K_x**2 + J_r * r**2 * cos(theta) ** 2 / (l**2 * cos(beta) ** 2)]
+    ],
+    ("slider-crank", "V"): [
+        (m + m_r) * K_x * kappa_x + J_r * kappa_beta * r * cos(theta) / (l * cos(beta))
+    ],
+    # The same; θ₃ = θ + φ and θ₄ = ψ in Norton's letters, (6.18).
+    ("four-bar", "K_psi"): a * sin(phi) / (c * sin(theta + phi - psi)),
+    ("four-bar", "K_phi"): a * sin(psi - theta) / (b * sin(theta + phi - psi)) - 1,
+    ("four-bar", "M"): [[J_2 + m * a**2 + J_3 * (1 + K_phi) ** 2 + J_4 * K_psi**2]],
+    ("four-bar", "V"): [J_3 * (1 + K_phi) * kappa_phi + J_4 * K_psi * kappa_psi],
+    ("four-bar", "F_r"): tau,
     ("free body", "M"): [[m, 0, 0], [0, m, 0], [0, 0, J]],
     ("free body", "G"): [0, m * g, 0],
 }
@@ -336,7 +424,7 @@ def plain(e: Any) -> Any:
 
 
 @pytest.mark.parametrize(
-    "name", some(("pendulum", "cart-pole", "two-link", "atwood"), tuple(SCENES))
+    "name", some(("pendulum", "two-link", "atwood", "kapitza", "slider-crank"), tuple(SCENES))
 )
 def test_textbook_forms(name: str) -> None:
     """M, V, G and accelerations have the factors, sums and brackets of the textbook."""
@@ -349,9 +437,10 @@ def test_textbook_forms(name: str) -> None:
             ours = plain(getattr(found, what))
             assert ours == sp.Matrix(want), (what, ours)
             continue
-        word = what.replace("_ddot", "`ddot")
-        lines = [x.right for x in steps if x.left.is_Symbol and x.left.name == word]
+        word = what.replace("_ddot", "`ddot").replace("_dot", "`dot")
+        lines = [x.right for x in steps if getattr(x.left, "name", "") == word]
         read = {sp.Symbol(f"{n}`dot"): s for n, s in D.items()}
+        read |= {sp.Symbol(f"{n}`ddot"): sp.Symbol(f"{n}_ddot") for n in D}
         shown = [plain(e).xreplace(read) for e in lines]
         assert want in shown, (what, shown)
 
@@ -361,3 +450,18 @@ def test_forms_that_are_short_already_stay() -> None:
     a, b, c = sp.symbols("a b c")
     for e in (a + b, a * (b + c), sin(a + b), a / (b + c), a**2 + b**2 - 2 * a * b * cos(c)):
         assert simplified(e) == e
+
+
+@pytest.mark.parametrize("name", some(("slider-crank",), ("slider-crank", "four-bar")))
+def test_velocity_forces_are_half_the_rate_of_the_inertia(name: str) -> None:
+    """J(θ) θ̈ + ½ J'(θ) θ̇² = τ (Eksergian): V of one freedom from its M alone."""
+    found = derived(name)
+    (inertia,), (force,) = (plain(found.written_out(e)) for e in (found.M, found.V))
+    rates = {theta: w, w: sp.S.Zero}
+    speed = sp.Symbol("theta_dot")
+    inertia, force = inertia.xreplace({speed: w}), force.xreplace({speed: w})
+    numbers = {sp.Symbol(p.name): p.default for p in found.model.parameters}
+    for angle in (0.4, 1.1):
+        at = {**numbers, theta: angle, w: 2.0}
+        want = sum(sp.diff(inertia, x) * rates[x] for x in rates) * w / 2
+        assert abs((force - want).subs(at).evalf()) < 1e-12

@@ -120,6 +120,16 @@ def closed_model(text: str) -> Model:
     return with_closed_form(assembled(elaborate(parse_scene(text))))
 
 
+def test_two_freedoms_with_couplings() -> None:
+    """The angles that follow are those that couplings give, whichever the assembly solved for."""
+    turns = (turn(name, "world", name, (0, 0), (0, 0)) for name in ("alpha", "beta", "gamma"))
+    bodies = (planar_linkages.body(name, 1.0, 0.1) for name in ("alpha", "beta", "gamma"))
+    gear = '[[constraints]]\ntype = "coupling"\nname = "gear"\ncoordinate = "gamma"\n'
+    text = "\n".join((planar_linkages.head("gears"), *bodies, *turns, gear))
+    model = closed_model(f"loops = 'closed'\n{text}equals = 'sin(alpha) - 0.3*beta'\n")
+    assert model.states == ("alpha", "beta", "alpha_dot", "beta_dot")
+
+
 def at_digits(model: Model, q: Any) -> Dynamics:
     values = {name: mpfr(x) for name, x in model.defaults.items()}
     still = [mpfr(0)] * len(model.velocities)

@@ -12,7 +12,7 @@ import pickle
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from itertools import permutations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -37,6 +37,8 @@ MOST = 60
 """Rows of constraints from which on closed forms are not tried unless a scene asks for them: to
 find them takes a time that grows faster than the mechanism.
 """
+MOST_SETS = 100
+"""The most sets of dependent coordinates that are tried."""
 FROM_JUMP = 0.1
 """How near, rad, an angle may come to where its values jump."""
 
@@ -110,7 +112,7 @@ def _why_not_tried(model: Model) -> str:
 
 def _choices(model: Model, d: Dynamics) -> Iterator[frozenset[int]]:
     """Sets of coordinates that may be the dependent ones: those of the assembly; the outer ones of
-    each loop; and with one degree of freedom all but each one in turn.
+    each loop; and unless they are many all others, those first that leave early ones free.
     """
     of = {j: i for index in model.joint_indices for i, j in index.plain}
     columns = [column for _, column in model.pivots]
@@ -127,8 +129,9 @@ def _choices(model: Model, d: Dynamics) -> Iterator[frozenset[int]]:
             seen |= set(found[0])
     tried.append(frozenset(outer))
     every = {of[j] for j in range(len(model.velocities)) if j in of}
-    if len(every) == len(columns) + 1:
-        tried += [frozenset(every - {i}) for i in sorted(every)]
+    free = len(every) - len(columns)
+    if math.comb(len(every), free) <= MOST_SETS:
+        tried += [frozenset(every.difference(kept)) for kept in combinations(sorted(every), free)]
     for choice in dict.fromkeys(tried):
         if len(choice) == len(columns):
             yield choice
