@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from eomgen.codegen.interface import Function, Interface
-from eomgen.program.printing import Block, Dialect, Names, print_block
+from eomgen.program.printing import Block, Dialect, Names, given_in, print_block
 from eomgen.program.program import Check, Program, cost, live_steps
-from eomgen.program.tape import COUNTED, TIME, Stage
+from eomgen.program.tape import COUNTED, TIME
 
 LARGE = 500
 """Least number of operations that an output shares with `derivative` for it to call that kernel."""
@@ -123,11 +123,7 @@ def shares(program: Program, name: str, base: Block) -> bool:
 
 def _operations(program: Program, name: str, known: frozenset[int] = frozenset()) -> set[int]:
     """The steps of an output that are operations at every call, if the nodes `known` are given."""
-    steps = program.steps
-
-    def is_given(i: int) -> bool:
-        return i in known or steps[i].stage <= Stage.PARAMETERS
-
+    is_given, steps = given_in(program, known), program.steps
     live = live_steps(program, program.outputs[name].nodes, is_given)
     return {i for i in live if not is_given(i) and steps[i].operation in COUNTED}
 

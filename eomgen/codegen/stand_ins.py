@@ -42,7 +42,7 @@ class StandIn(EffectTable):
         """The loads, over the symbols."""
 
         def given(name: str) -> Any:
-            return mechanism.input(name) if name else mechanism.value(ZERO)
+            return mechanism.input(name) if name else mechanism.zero
 
         for load in self.components:
             if isinstance(load, JointLoad):
@@ -62,9 +62,9 @@ class Fall(EffectTable):
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The weight of each body, at its centre of mass."""
-        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
+        zeros = (mechanism.zero,) * mechanism.dimensions
         for body in mechanism.bodies:
-            m = mechanism.mass(body)
+            m = mechanism.value(mechanism.masses[body])
             force = tuple(m * part for part in _fixed(self.components, mechanism))
             yield Load(body, force, zeros, "gravity")
 

@@ -102,7 +102,7 @@ def _add(
         offset = vector(joint.r_parent, symbols)
         centre = -vector(joint.r_child, symbols)
         if isinstance(joint, WithRotor):
-            armature = joint.reflected_inertia(symbols.value)
+            armature = symbols.value(joint.reflected_inertia)
     if parent >= 0:
         offset = offset + found[parent].centre
     primitives = joint.primitives(model.dimensions)

@@ -74,12 +74,10 @@ class SymbolicMechanism:
         self.dimensions = model.dimensions
         self.magnitude = model.magnitude
         self.bodies = tuple(body.name for body in model.bodies)
+        self.masses = {body.name: body.mass for body in model.bodies}
+        self.zero = scalars.number(0.0)
         self.joints = dofs_of(model.bodies, model.dimensions)
         self._by_joint = {body.joint.name: body for body in model.bodies}
-
-    def mass(self, body: str) -> Expr:
-        """Mass of a body."""
-        return self.value(self.model.bodies[self.bodies.index(body)].mass)
 
     def height(self, body: str) -> Expr:
         """World y or z of a body's centre of mass."""

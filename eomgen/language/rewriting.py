@@ -5,6 +5,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from eomgen.language.base import Table
+from eomgen.language.conditions import value_of
 from eomgen.language.formula import ZERO, Apply, Constant, Formula, Name
 
 Value = TypeVar("Value")
@@ -27,9 +28,9 @@ def changed(value: Value, change: Callable[[Formula], Any]) -> Value:
     return found  # type: ignore[no-any-return]
 
 
-def valued(value: Value, evaluate: Callable[[Formula], float]) -> Value:
-    """The same with each formula replaced by its value."""
-    return changed(value, lambda formula: Constant(evaluate(formula)))
+def valued(value: Value, known: Mapping[str, float]) -> Value:
+    """The same with each formula replaced by its value for these names; nan if it is undefined."""
+    return changed(value, lambda formula: Constant(value_of(formula, known)))
 
 
 def plain_data(value: Any, change: Callable[[Formula], Any]) -> Any:

@@ -39,15 +39,13 @@ class _Tracing:
     def __init__(self, model: Model) -> None:
         self.dimensions, self.magnitude = model.dimensions, model.magnitude
         self.bodies = tuple(body.name for body in model.bodies)
+        self.masses, self.zero = {body.name: body.mass for body in model.bodies}, Traced()
         self.joints = dofs_of(model.bodies, model.dimensions)
         self._positions = {body.joint.name: body.positions for body in model.bodies}
         self._points = {point.name: point.body for point in model.points}
         moving = ("t", *(c.name for c in (*model.coordinates, *model.velocities)))
         self._names = dict.fromkeys(moving, Traced("joint"))
         self._names |= {state.name: Traced("state") for state in model.extra}
-
-    def mass(self, body: str) -> Traced:
-        return Traced()
 
     def height(self, body: str) -> Traced:
         return Traced("height")

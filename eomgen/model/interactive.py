@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, cast
 
-from eomgen.language.formula import ZERO, Name
+from eomgen.language.formula import Name
 from eomgen.language.quantity import Parameter
 from eomgen.model.model import Model
 from eomgen.scene.effects import Effect
@@ -92,7 +92,7 @@ class Pull(EffectTable):
         """The force and the torque."""
         given = [mechanism.input(i.name) for i in self.inputs(mechanism.dimensions)]
         n = mechanism.dimensions
-        at = (mechanism.value(ZERO),) * n
+        at = (mechanism.zero,) * n
         yield Load(self.body, tuple(given[:n]), at, "applied", tuple(given[n:]))
 
 

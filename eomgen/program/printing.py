@@ -1,7 +1,7 @@
 """Printing of programs as source code: variable names, inlining, parentheses."""
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 
@@ -124,6 +124,23 @@ class Names:
         return None
 
 
+def given_in(
+    program: Program, known: Collection[int] = (), *, fixed: bool = False
+) -> Callable[[int], bool]:
+    """Whether the value of a step is read by name: an input, one of `known`, and unless `fixed`
+    also what depends on parameters alone. Constants are written out.
+    """
+    steps = program.steps
+
+    def is_given(i: int) -> bool:
+        operation, _, stage, _ = steps[i]
+        if operation == "constant":
+            return False
+        return i in known or operation == "input" or (not fixed and stage <= Stage.PARAMETERS)
+
+    return is_given
+
+
 def print_block(
     program: Program,
     nodes: Sequence[int],
@@ -141,13 +158,7 @@ def print_block(
     known  nodes that another block computes and this one reads by name
     """
     steps = program.steps
-
-    def is_given(i: int) -> bool:
-        operation, _, stage, _ = steps[i]
-        if operation == "constant":
-            return False
-        return i in known or operation == "input" or (not fixed and stage <= Stage.PARAMETERS)
-
+    is_given = given_in(program, known, fixed=fixed)
     live = live_steps(program, nodes, is_given)
     given = {i for i in live if is_given(i)}
     uses = Counter(nodes)

@@ -38,33 +38,32 @@ def slope(
 
     `value` is the function's value. At a corner or a jump it is the derivative of the branch taken.
     """
-    one, two = scalars.number(1.0), scalars.number(2.0)
-    x, d = arguments, slopes
+    x, d, number = arguments, slopes, scalars.number
     match function:
         case "sin":
             return scalars.call("cos", x[0]) * d[0]
         case "cos":
             return -(scalars.call("sin", x[0]) * d[0])
         case "tan":
-            return (one + value * value) * d[0]
+            return (number(1.0) + value * value) * d[0]
         case "sqrt":
-            return d[0] / (two * value)
+            return d[0] / (number(2.0) * value)
         case "asin":
-            return d[0] / scalars.call("sqrt", one - x[0] * x[0])
+            return d[0] / scalars.call("sqrt", number(1.0) - x[0] * x[0])
         case "acos":
-            return -(d[0] / scalars.call("sqrt", one - x[0] * x[0]))
+            return -(d[0] / scalars.call("sqrt", number(1.0) - x[0] * x[0]))
         case "atan":
-            return d[0] / (one + x[0] * x[0])
+            return d[0] / (number(1.0) + x[0] * x[0])
         case "exp":
             return value * d[0]
         case "log":
             return d[0] / x[0]
         case "tanh":
-            return (one - value * value) * d[0]
+            return (number(1.0) - value * value) * d[0]
         case "abs":
             return scalars.call("select", x[0], d[0], -d[0])
         case "step":
-            return scalars.number(0.0)
+            return number(0.0)
         case "atan2":
             return (x[1] * d[0] - x[0] * d[1]) / (x[1] * x[1] + x[0] * x[0])
         case "min":

@@ -33,7 +33,7 @@ def hidden_rods(
     these bounds, so that no bob hangs on nothing.
     """
     n = model.dimensions
-    corners = extent_points([valued(shape, model.value) for shape in shapes], n)
+    corners = extent_points([valued(shape, model.defaults) for shape in shapes], n)
     low, high = corners.min(axis=0), corners.max(axis=0)
     held = [body.joint for body in model.bodies if body.joint.holds]
     pins = {r for joint in held if joint.type in PINS for r in (joint.r_parent, joint.r_child)}

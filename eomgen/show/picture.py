@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eomgen.language.conditions import value_of
 from eomgen.language.formula import ZERO, Constant
 from eomgen.language.rewriting import constant, valued
 from eomgen.model.frames import from_centre
@@ -96,7 +95,7 @@ class Picture:
         """
         known = {**values, "t": t}
         elements = tuple(without_formula(element) for element in self.elements)
-        found = valued(replace(self, elements=elements), lambda part: value_of(part, known))
+        found = valued(replace(self, elements=elements), known)
         drawn = (replace(b, shapes=tuple(filter(is_drawable, b.shapes))) for b in found.bodies)
         return replace(found, bodies=tuple(drawn))
 

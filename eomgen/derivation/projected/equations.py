@@ -344,7 +344,7 @@ def armatures(model: Model, symbols: Symbols) -> dict[int, Expr]:
     found: dict[int, Expr] = {}
     for body, first in zip(model.bodies, model.first_velocity, strict=True):
         if isinstance(body.joint, WithRotor):
-            inertia = body.joint.reflected_inertia(symbols.value)
+            inertia = symbols.value(body.joint.reflected_inertia)
             if inertia != 0:
                 found |= {first + i: inertia for i in range(len(body.velocities))}
     return found

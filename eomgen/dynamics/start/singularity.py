@@ -126,7 +126,7 @@ def _evened_body(body: Body, model: Model) -> Body:
     entries = [abs(model.value(entry)) for entry in body.inertia_com]
     joint = body.joint
     if isinstance(joint, WithRotor):
-        rotor = Constant(float(joint.reflected_inertia(model.value) > 0))
+        rotor = Constant(float(model.value(joint.reflected_inertia) > 0))
         joint = joint.replaced(motor_inertia=rotor)
         if isinstance(joint, Geared):
             joint = joint.replaced(gear_ratio=None)

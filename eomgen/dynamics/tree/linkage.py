@@ -92,7 +92,7 @@ def _drafted(
             place = _at_joint(place, joint, vector(joint.r_parent), model.dimensions, scalars)
             point = vector(joint.r_child)
             if isinstance(joint, WithRotor):
-                armature = joint.reflected_inertia(value)
+                armature = value(joint.reflected_inertia)
             if joint.orientation is not None:
                 drafts.append(_held(place, body, rows_of(joint.orientation), value, scalars))
                 place = _origin(len(drafts) - 1, scalars)

@@ -64,6 +64,8 @@ class MechanismState:
         self.axes: Axes = axes or ("world" if model.dimensions == 2 else "own")
         self.dimensions = model.dimensions
         self.bodies = tuple(body.name for body in model.bodies)
+        self.masses = {body.name: body.mass for body in model.bodies}
+        self.zero = scalars.number(0.0)
         self.nv = len(model.velocities)
         self.moved = self.nv + len(model.driven)
         self._linkage = linkage
@@ -74,10 +76,6 @@ class MechanismState:
     def joints(self) -> dict[str, tuple[str, ...]]:
         """The joints that move but the free ones, each with the kinds of its primitives."""
         return dofs_of(self.model.bodies, self.dimensions)
-
-    def mass(self, body: str) -> Scalar:
-        """Mass of a body, kg."""
-        return self.linkage.mounts[self.index[body]].mass
 
     def height(self, body: str) -> Scalar:
         """World y of a body's centre of mass in the plane, z in space, m."""

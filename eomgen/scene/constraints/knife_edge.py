@@ -46,5 +46,5 @@ across = [0, 1]
     def rows(self, mechanism: Linkage) -> Iterator[Row]:
         """The velocity across the edge."""
         e = unit(mechanism, self.body, self.across)
-        touch = self.touch(mechanism, e, mechanism.number(0.0))
+        touch = self.touch(mechanism, e, mechanism.zero)
         yield Row(None, normal_loads(touch, mechanism.number(1.0)))

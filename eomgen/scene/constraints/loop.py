@@ -139,7 +139,7 @@ class LoopJoint:
                 residual, torque = cross(a, b)[0], (dot(a, b),)
             else:
                 residual, torque = dot(a, b) - cosine, cross(b, a)
-            still = tuple(mechanism.number(0.0) for _ in a)
+            still = tuple(mechanism.zero for _ in a)
             loads = (
                 Load(self.joint.child, still, still, "applied", torque),
                 Load(self.joint.parent, still, still, "applied", negative(torque)),
@@ -150,7 +150,7 @@ class LoopJoint:
         """Pairs of directions, of the parent and of the child, that keep an angle, and its cosine;
         in the plane, that stay parallel, and 0.
         """
-        joint, nothing = self.joint, mechanism.number(0.0)
+        joint, nothing = self.joint, mechanism.zero
         if mechanism.dimensions == 2:
             return [(a, b, nothing) for a, b in self._alike(mechanism)]
         if isinstance(joint, Ball):

@@ -6,7 +6,6 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from eomgen.language.base import Identifier
-from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, quantity
 from eomgen.language.quantity import Vector as VectorField
 from eomgen.scene.effects.base import EffectTable, Load, Mechanism, Scalar, Vector
@@ -43,19 +42,20 @@ at = [5, 0]
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The attraction of each body, at its centre of mass."""
-        zeros, mu = (mechanism.value(ZERO),) * mechanism.dimensions, mechanism.value(self.mu)
+        zeros, mu = (mechanism.zero,) * mechanism.dimensions, mechanism.value(self.mu)
         for body in self._attracted(mechanism):
             arm, squared = self._from_point(mechanism, body)
             cubed = squared * mechanism.call("sqrt", squared)
-            pull = mu * mechanism.mass(body) / cubed
+            pull = mu * mechanism.value(mechanism.masses[body]) / cubed
             yield Load(body, negative(scale(pull, arm)), zeros, "applied")
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """-Σ μ m/|r|, J; zero at infinity."""
-        total, mu = mechanism.value(ZERO), mechanism.value(self.mu)
+        total, mu = mechanism.zero, mechanism.value(self.mu)
         for body in self._attracted(mechanism):
             _, squared = self._from_point(mechanism, body)
-            total = total - mu * mechanism.mass(body) / mechanism.call("sqrt", squared)
+            mass = mechanism.value(mechanism.masses[body])
+            total = total - mu * mass / mechanism.call("sqrt", squared)
         return total
 
     def elements(self, layout: Layout) -> Iterator[Attraction]:
@@ -75,7 +75,7 @@ at = [5, 0]
 
     def _from_point(self, mechanism: Mechanism, body: str) -> tuple[Vector, Scalar]:
         """The vector r, m, and r·r."""
-        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
+        zeros = (mechanism.zero,) * mechanism.dimensions
         centre = tuple(mechanism.value(part) for part in self.at)
         arm = sub(mechanism.position(body, zeros), centre)
         arm = mechanism.called("r", *arm)

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal, Protocol, Self
 
 from eomgen.language.base import Identifier, Table
 from eomgen.language.conditions import Condition
-from eomgen.language.formula import ZERO, Formula
+from eomgen.language.formula import Formula
 from eomgen.language.rewriting import constant
 from eomgen.scalars.exact import Real
 from eomgen.scene.effects.elements import WORLD_INDEX, AtJoint, Element, Layout, Pull, Touching
@@ -116,13 +116,18 @@ class Mechanism(Protocol):
         """Names of all bodies."""
 
     @property
+    def masses(self) -> Mapping[str, Formula]:
+        """Mass of each body, kg."""
+
+    @property
+    def zero(self) -> Scalar:
+        """The number 0."""
+
+    @property
     def joints(self) -> Mapping[str, tuple[str, ...]]:
         """The primitives, in order, of each joint that is neither free nor a weld: "revolute" or
         "prismatic" for a coordinate, "spherical" for a quaternion.
         """
-
-    def mass(self, body: str) -> Scalar:
-        """Mass of a body, kg."""
 
     def height(self, body: str) -> Scalar:
         """World y of a body's centre of mass in the plane, z in space, m."""
@@ -263,11 +268,11 @@ class EffectTable(Table):
 
     def overlap(self, mechanism: Mechanism) -> Scalar:
         """The greatest depth of its soft contacts or stops, m or rad; 0 if none overlaps."""
-        return mechanism.number(0.0)
+        return mechanism.zero
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """Potential energy, J; 0 for an effect without one."""
-        return mechanism.value(ZERO)
+        return mechanism.zero
 
     def elements(self, layout: Layout) -> Iterable[Element]:
         """What pictures show of it: by default its points of bodies and the joints it names."""

@@ -81,6 +81,6 @@ def local_names(
     for prefix, motion in (("", "position"), ("v", "velocity")):
         names = [f"{prefix}{axis}" for axis in "xyz"]
         if used.intersection(names):
-            values = (*getattr(mechanism, motion)(body, at), mechanism.number(0.0))
+            values = (*getattr(mechanism, motion)(body, at), mechanism.zero)
             found |= dict(zip(names, values, strict=False))
     return found

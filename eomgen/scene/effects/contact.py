@@ -239,13 +239,13 @@ dissipation = 0.2
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k d² or 2/5 k d^2.5, summed over contacts, J."""
-        total = mechanism.number(0.0)
+        total = mechanism.zero
         if self.law == "impact":
             return total
         power = mechanism.number(2.0 if self.law == "spring_damper" else 2.5)
         for touch in self._touches(mechanism):
             force = self._elastic(mechanism, touch)
-            d = mechanism.call("max", -touch.gap, mechanism.number(0.0))
+            d = mechanism.call("max", -touch.gap, mechanism.zero)
             part = force * d / power
             if touch.energy_term is not None:
                 part = part + force * touch.energy_term
@@ -313,7 +313,7 @@ dissipation = 0.2
 
     def overlap(self, mechanism: Mechanism) -> Scalar:
         """The greatest depth d of a soft law, m."""
-        deepest = mechanism.number(0.0)
+        deepest = mechanism.zero
         if self.law == "impact":
             return deepest
         for touch in self._touches(mechanism):
@@ -356,7 +356,7 @@ dissipation = 0.2
 
     def _elastic(self, mechanism: Mechanism, touch: Touch) -> Scalar:
         """k d or k d^1.5, N. As in `vectors.length`, max keeps the derivative finite at d = 0."""
-        d = mechanism.call("max", -touch.gap, mechanism.number(0.0))
+        d = mechanism.call("max", -touch.gap, mechanism.zero)
         force = mechanism.value(self.stiffness) * d
         if self.law == "spring_damper":
             return force
@@ -365,7 +365,7 @@ dissipation = 0.2
 
     def _force(self, mechanism: Mechanism, touch: Touch, gap_rate: Scalar) -> Scalar:
         """The normal force, N, at a rate of the gap, m/s."""
-        force, nothing = self._elastic(mechanism, touch), mechanism.number(0.0)
+        force, nothing = self._elastic(mechanism, touch), mechanism.zero
         if self.law == "spring_damper" and self.damping != ZERO:
             force = force - mechanism.value(self.damping) * gap_rate
             force = mechanism.call("max", force, nothing)
@@ -406,7 +406,7 @@ dissipation = 0.2
             ball = Ball(self.other, centre, mechanism.value(self.other_radius))
             yield from (on_ball(mechanism, first, ball) for first in balls)
             return
-        zeros = (mechanism.number(0.0),) * mechanism.dimensions
+        zeros = (mechanism.zero,) * mechanism.dimensions
         normal = tuple(mechanism.number(x) for x in direction(self.normal))
         plane = Plane(self.other, zeros, normal, mechanism.value(self.offset))
         corners: Components | None = None

@@ -69,7 +69,7 @@ def joint_dof(mechanism: Mechanism, joint: str, kind: str, index: int) -> Dof:
 
 def spring_energy(mechanism: Mechanism, stiffness: Formula, stretches: Iterable[Scalar]) -> Scalar:
     """Σ ½ k s², J."""
-    total = mechanism.number(0.0)
+    total = mechanism.zero
     for stretch in stretches:
         half = mechanism.number(0.5) * mechanism.value(stiffness)
         total = total + half * (stretch * stretch)

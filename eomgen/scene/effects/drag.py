@@ -90,7 +90,7 @@ wind = ["3*sin(t)", 0]
         has_force = self.linear != ZERO or quadratic is not None
         has_torque = self.turning_linear != ZERO or self.turning_quadratic != ZERO
         for body, at in self.loaded_points(mechanism):
-            force: Vector = (mechanism.number(0.0),) * mechanism.dimensions
+            force: Vector = (mechanism.zero,) * mechanism.dimensions
             if has_force:
                 speed = mechanism.velocity(body, at)
                 if has_wind:

@@ -7,7 +7,6 @@ from pydantic import Field
 
 from eomgen.base.errors import SceneError
 from eomgen.language.base import Identifier
-from eomgen.language.formula import ZERO
 from eomgen.language.quantity import Quantity, Vector, quantity
 from eomgen.language.rewriting import constant
 from eomgen.scene.effects.base import EffectTable, Input, Load, Mechanism
@@ -68,7 +67,7 @@ torque = "input"
             torque = tuple(mechanism.value(part) for part in self.torque)
         else:
             torque = (mechanism.value(self.torque),)
-        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
+        zeros = (mechanism.zero,) * mechanism.dimensions
         if self.axes == "body" and mechanism.dimensions == 3:
             outside = mechanism.outward(self.body, torque)
             yield Load(self.body, zeros, zeros, "applied", outside, in_body=(zeros, torque))

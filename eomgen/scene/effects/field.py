@@ -131,7 +131,7 @@ force = ["-2*(vx - 1)", "-2*vy"]
         """That of "attract" and "repel", J: 0 at infinity if power > 1, at s = 1 m if power = 1, at
         s = 0 if power < 1.
         """
-        total = mechanism.number(0.0)
+        total = mechanism.zero
         if self.kind not in ("attract", "repel"):
             return total
         for body, at in self.loaded_points(mechanism):
@@ -165,7 +165,7 @@ force = ["-2*(vx - 1)", "-2*vy"]
         return mechanism.value(given)
 
     def _central(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
-        r, zero = self._from_center(mechanism, body, at), mechanism.number(0.0)
+        r, zero = self._from_center(mechanism, body, at), mechanism.zero
         if self.kind == "vortex":
             r = r[:2]
         r = mechanism.called("r", *r)
@@ -179,7 +179,7 @@ force = ["-2*(vx - 1)", "-2*vy"]
         return scale(factor, r)
 
     def _sideways(self, mechanism: Mechanism, body: str, at: Vector) -> Vector:
-        call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
+        call, zero, one = mechanism.call, mechanism.zero, mechanism.number(1.0)
         ahead = mechanism.called("d", *negative(self._from_center(mechanism, body, at)))
         v = mechanism.velocity(body, at)
         distance, speed = length(mechanism, ahead), length(mechanism, v)
@@ -202,7 +202,7 @@ force = ["-2*(vx - 1)", "-2*vy"]
         self, mechanism: Mechanism, v: Vector, ahead: Vector, scale: Scalar
     ) -> Vector:
         """The unit vector n along v × d in space; ẑ if they are parallel."""
-        call, zero, one = mechanism.call, mechanism.number(0.0), mechanism.number(1.0)
+        call, zero, one = mechanism.call, mechanism.zero, mechanism.number(1.0)
         about = cross(v, ahead)
         beside = dot(about, about) - mechanism.number(HEAD_ON) * scale
         upright = (zero, zero, one)

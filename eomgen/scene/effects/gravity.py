@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, field_validator
 
 from eomgen.language.base import Identifier
-from eomgen.language.formula import ZERO, Apply, Formula, evaluate
+from eomgen.language.formula import Apply, Formula, evaluate
 from eomgen.language.quantity import Numbers, Quantity, quantity
 from eomgen.language.rewriting import constant
 from eomgen.scalars.exact import direction
@@ -60,34 +60,35 @@ g = 9.81
         """Acceleration of free fall, world axes, m/s²."""
         g = mechanism.value(self.g)
         if self.direction is None:
-            return (*(mechanism.value(ZERO),) * (mechanism.dimensions - 1), -g)
+            return (*(mechanism.zero,) * (mechanism.dimensions - 1), -g)
         return tuple(mechanism.number(part) * g for part in direction(self.direction))
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """The weight of each body, at its centre of mass."""
-        zeros = (mechanism.value(ZERO),) * mechanism.dimensions
+        zeros = (mechanism.zero,) * mechanism.dimensions
         if self.direction is None and not self.except_bodies:
             g = mechanism.value(self.g)
             for body in mechanism.bodies:
-                yield Load(body, (*zeros[1:], -mechanism.mass(body) * g), zeros, "gravity")
+                mass = mechanism.value(mechanism.masses[body])
+                yield Load(body, (*zeros[1:], -mass * g), zeros, "gravity")
             return
         fall = self.acceleration(mechanism)
         for body in self._falling(mechanism):
-            force = tuple(mechanism.mass(body) * part for part in fall)
+            force = tuple(mechanism.value(mechanism.masses[body]) * part for part in fall)
             yield Load(body, force, zeros, "applied" if self.except_bodies else "gravity")
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """Σ m g times height, J; zero at the world's origin."""
-        total = mechanism.value(ZERO)
+        total = mechanism.zero
         if self.direction is None and not self.except_bodies:
             g = mechanism.value(self.g)
             for body in mechanism.bodies:
-                total = total + mechanism.mass(body) * g * mechanism.height(body)
+                total = total + mechanism.value(mechanism.masses[body]) * g * mechanism.height(body)
             return total
         fall, zeros = self.acceleration(mechanism), (total,) * mechanism.dimensions
         for body in self._falling(mechanism):
             for part, x in zip(fall, mechanism.position(body, zeros), strict=True):
-                total = total - mechanism.mass(body) * part * x
+                total = total - mechanism.value(mechanism.masses[body]) * part * x
         return total
 
     @property

@@ -97,7 +97,7 @@ rest = 0.5
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k s², J; 0 with a law."""
         if self.law is not None:
-            return mechanism.number(0.0)
+            return mechanism.zero
         stretches = (self._stretch(mechanism, dof) for dof in self.dofs(mechanism))
         return spring_energy(mechanism, self.stiffness, stretches)
 

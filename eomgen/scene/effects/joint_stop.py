@@ -107,7 +107,7 @@ damping = 1.0
 
     def _back(self, mechanism: Mechanism, dof: Dof) -> Scalar:
         """k x + c dq/dt, N m or N, if it pushes back from the limit, else 0."""
-        beyond, nothing = self._beyond(mechanism, dof), mechanism.number(0.0)
+        beyond, nothing = self._beyond(mechanism, dof), mechanism.zero
         back = mechanism.value(self.stiffness) * beyond
         if self.damping == ZERO:
             return back
@@ -124,7 +124,7 @@ damping = 1.0
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k x², J; 0 for a rigid stop."""
         if self.restitution is not None:
-            return mechanism.number(0.0)
+            return mechanism.zero
         excesses = (self._beyond(mechanism, dof) for dof in self.dofs(mechanism))
         return spring_energy(mechanism, self.stiffness, excesses)
 
@@ -144,7 +144,7 @@ damping = 1.0
 
     def overlap(self, mechanism: Mechanism) -> Scalar:
         """How far the farthest coordinate is beyond a soft stop, rad or m."""
-        farthest = mechanism.number(0.0)
+        farthest = mechanism.zero
         if self.restitution is not None:
             return farthest
         for dof in self.dofs(mechanism):
@@ -168,7 +168,7 @@ damping = 1.0
             ends.append((dof.value - mechanism.value(self.low), one))
         if self.high is not None:
             ends.append((mechanism.value(self.high) - dof.value, -one))
-        restitution, none = mechanism.value(self.restitution), mechanism.number(0.0)
+        restitution, none = mechanism.value(self.restitution), mechanism.zero
         return tuple(
             Contact(
                 name,

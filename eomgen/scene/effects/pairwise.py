@@ -81,7 +81,7 @@ gravitation = 6.7e-11
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
         """Equal and opposite forces on every two bodies: one load on each."""
-        zeros = (mechanism.number(0.0),) * mechanism.dimensions
+        zeros = (mechanism.zero,) * mechanism.dimensions
         totals: dict[str, Vector] = {}
         for first, second in self.pairs(mechanism.bodies):
             pull = self._pull(mechanism, first, second)
@@ -97,7 +97,7 @@ gravitation = 6.7e-11
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """The sum over all pairs, J; 0 for a law."""
-        total = mechanism.number(0.0)
+        total = mechanism.zero
         for first, second in self.pairs(mechanism.bodies):
             if self.gravitation is not None:
                 _, softened = self._apart(mechanism, first, second)
@@ -142,12 +142,12 @@ gravitation = 6.7e-11
     def _strength(self, mechanism: Mechanism, first: str, second: str) -> Scalar:
         """G m_1 m_2."""
         assert self.gravitation is not None
-        masses = mechanism.mass(first) * mechanism.mass(second)
-        return mechanism.value(self.gravitation) * masses
+        one, other = (mechanism.value(mechanism.masses[body]) for body in (first, second))
+        return mechanism.value(self.gravitation) * (one * other)
 
     def _apart(self, mechanism: Mechanism, first: str, second: str) -> tuple[Vector, Scalar]:
         """The vector from the first centre of mass to the second, and r² + ε²."""
-        zeros = (mechanism.number(0.0),) * mechanism.dimensions
+        zeros = (mechanism.zero,) * mechanism.dimensions
         d = sub(mechanism.position(second, zeros), mechanism.position(first, zeros))
         softening = mechanism.value(self.softening)
         return d, dot(d, d) + softening * softening

@@ -109,7 +109,7 @@ rest_length = 0.5
         if not self.tension_only:
             return pull
         taut = mechanism.call("min", stretch, tension + damping * rate)
-        nothing = mechanism.number(0.0)
+        nothing = mechanism.zero
         return tuple(mechanism.call("select", taut, part, nothing) for part in pull)
 
     def elements(self, layout: Layout) -> Iterator[Link]:
@@ -138,7 +138,7 @@ rest_length = 0.5
 
     def potential_energy(self, mechanism: Mechanism) -> Scalar:
         """½ k s², J; 0 while a rope is slack."""
-        half, nothing = mechanism.number(0.5), mechanism.number(0.0)
+        half, nothing = mechanism.number(0.5), mechanism.zero
         if self.law is not None:
             return nothing
         line = line_of(self, mechanism)

@@ -76,7 +76,7 @@ def on_plane(
     normal = mechanism.called("n", *normal)
     height = dot(normal, centre) - (plane.offset + ball.radius)
     arms: list[Vector] = [()]
-    lifts = [mechanism.number(0.0)]
+    lifts = [mechanism.zero]
     if corners is not None:
         edges = [_edge(mechanism, ball.body, size, i) for i, size in enumerate(corners)]
         sums = _signed_sums([(*edge, dot(normal, edge)) for edge in edges])
@@ -203,7 +203,7 @@ def _relative(speeds: Sequence[Vector]) -> Vector:
 
 def _edge(mechanism: Mechanism, body: str, size: Scalar, axis: int) -> Vector:
     """Half an edge of a box along an axis of its body, in world axes, m."""
-    zero = mechanism.number(0.0)
+    zero = mechanism.zero
     parts = [size if i == axis else zero for i in range(mechanism.dimensions)]
     return mechanism.outward(body, tuple(parts))
 

@@ -7,14 +7,13 @@ revolute primitive, a linear one for a prismatic, three angular ones for a spher
 own axes every column is constant; `dynamics.kinematics.MotionAxis` is one column.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from eomgen.language.base import AngleOrNumber, Identifier, Number, Table
-from eomgen.language.formula import ZERO, Formula
+from eomgen.language.formula import ZERO, Apply, Formula
 from eomgen.language.quantity import Quantity, Vector, quantity
 
 WORLD = "world"
@@ -128,9 +127,10 @@ class WithRotor(JointTable):
         validate_default=False,
     )
 
-    def reflected_inertia(self, value: Callable[[Formula], Any]) -> Any:
-        """The inertia that is added to each velocity, kg m² or kg, over `value` of quantities."""
-        return value(self.motor_inertia)
+    @property
+    def reflected_inertia(self) -> Formula:
+        """The inertia that is added to each velocity, kg m² or kg."""
+        return self.motor_inertia
 
 
 class Geared(WithRotor):
@@ -144,12 +144,12 @@ class Geared(WithRotor):
         default=None, description="range of the coordinate; leaving it is reported, not prevented"
     )
 
-    def reflected_inertia(self, value: Callable[[Formula], Any]) -> Any:
-        """gear_ratio² motor_inertia, kg m² or kg, over `value` of quantities."""
-        inertia = value(self.motor_inertia)
+    @property
+    def reflected_inertia(self) -> Formula:
+        """gear_ratio² motor_inertia, kg m² or kg."""
         if self.gear_ratio is None:
-            return inertia
-        return value(self.gear_ratio) * value(self.gear_ratio) * inertia
+            return self.motor_inertia
+        return Apply("*", (Apply("*", (self.gear_ratio, self.gear_ratio)), self.motor_inertia))
 
 
 def kinds_of(joint: Any, dimensions: int) -> list[str]:

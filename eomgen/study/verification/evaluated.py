@@ -61,6 +61,8 @@ class EvaluatedModel:
         self.dimensions = model.dimensions
         self.scalars = Bits()
         self.bodies = tuple(body.name for body in model.bodies)
+        self.masses = {body.name: body.mass for body in model.bodies}
+        self.zero = self.scalars.number(0.0)
         self.nv = len(model.velocities)
         self.moved = self.nv + len(model.driven)
         self._parameters = _all_extended({**model.defaults, **(parameters or {})})
