@@ -44,7 +44,7 @@ def derivation_of(
 ) -> Derivation:
     """The derivation of a model. Raises `SceneError` as `derive` does."""
     from eomgen.derivation.exposition import exposition_of  # imports SymPy
-    from eomgen.derivation.steps import at_detail
+    from eomgen.derivation.reading import at_detail
 
     with reporter.located(), reporter.waiting(f"deriving {model.name} …"):
         checked(model)

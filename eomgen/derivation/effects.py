@@ -13,7 +13,9 @@ from eomgen.derivation.mechanism import AXES, NamingMechanism, Notes
 from eomgen.derivation.steps import Definition, Equation
 from eomgen.derivation.symbols import Expr, real
 from eomgen.language.formula import Name
+from eomgen.language.quantity import of_joint
 from eomgen.model.dependence import is_plain
+from eomgen.model.effects import sliding_in
 from eomgen.model.model import Model
 from eomgen.scene.effects import Effect
 from eomgen.scene.effects.base import (
@@ -41,6 +43,7 @@ class DerivedEffect:
     rates        its extra states' symbols, and their time derivatives
     contacts     its rigid contacts
     bodies       the bodies whose pose or motion it uses
+    slides       whether the joints on which it acts are prismatic; None for some of them, or none
     """
 
     effect: Effect
@@ -50,6 +53,7 @@ class DerivedEffect:
     rates: tuple[Definition, ...]
     contacts: tuple[Contact, ...]
     bodies: tuple[str, ...]
+    slides: bool | None = None
 
     @property
     def falls(self) -> bool:
@@ -60,7 +64,9 @@ class DerivedEffect:
     def words(self) -> str:
         """What the effect is, in a sentence or two, without the keys of its table."""
         kind = type(self.effect)
-        return kind.told or inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
+        if kind.told and (" | " not in kind.told or self.slides is not None):
+            return of_joint(kind.told, bool(self.slides))
+        return inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]
 
 
 def derived_effects(model: Model) -> tuple[DerivedEffect, ...]:
@@ -82,8 +88,12 @@ def _derived(model: Model, effect: Effect) -> DerivedEffect:
         (real(dotted(state.name)), rate)
         for state, rate in zip(effect.states(model.dimensions), states, strict=True)
     )
+    sliding = sliding_in(model.bodies, model.dimensions)
+    slide = {_subject(model, load) in sliding for load in loads if isinstance(load, JointLoad)}
+    slides = next(iter(slide)) if len(slide) == 1 else None
+    bodies = tuple(notes.bodies)
     return DerivedEffect(
-        effect, tuple(definitions), tuple(loads), kept, rates, contacts, tuple(notes.bodies)
+        effect, tuple(definitions), tuple(loads), kept, rates, contacts, bodies, slides
     )
 
 

@@ -44,7 +44,14 @@ from eomgen.derivation.prescribed import (
 from eomgen.derivation.projected.derive import balanced
 from eomgen.derivation.projected.derive import solved as solved_projected
 from eomgen.derivation.projected.steps import projected_steps, state_words
-from eomgen.derivation.reading import is_of_handout, numbered, read_all, reading_names, renumbered
+from eomgen.derivation.reading import (
+    brief,
+    is_of_handout,
+    numbered,
+    read_all,
+    reading_names,
+    renumbered,
+)
 from eomgen.derivation.recursion import recursive_steps
 from eomgen.derivation.simplified import simplified, solved_directly, tidied
 from eomgen.derivation.state_forms import form_step, momentum_form, plain_form, velocity_form
@@ -175,7 +182,7 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
         read = {x.xreplace(shown): e.xreplace(shown) for x, e in zip(s.a, direct, strict=True)}
         steps[place] = _renamed(_directly(steps[place], read), names)
         whole = _with(whole, direct)
-        written = plain_form(model, direct)
+        written = plain_form(model, [real(c.acceleration) for c in model.velocities])
     else:
         written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
     last = form_step(model, form, written, parts.effects)
@@ -259,11 +266,8 @@ def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Expositi
         lines = dict(zip(tree.a, direct, strict=True))
         found[place] = _renamed(_directly(found[place], lines), said)
         whole = _with(whole, direct)
-    solved = {line.left.name: line.right for line in found[place].equations}
-    rates = [(names[c.acceleration], real(c.acceleration)) for c in model.velocities]
     left = [_renamed(free_step(tree), said)] if model.prescribed else []
-    form = plain_form(model, [solved.get(name, symbol) for name, symbol in rates])
-    ends = [*impact_steps(model, parts.effects), form_step(model, "velocity", form, parts.effects)]
+    ends = [*impact_steps(model, parts.effects), _last(model, parts)]
     steps = [
         *start,
         *found[joints:place],
@@ -339,7 +343,7 @@ def _last(model: Model, parts: Parts) -> Step:
 
 def _told(intro: str, steps: list[Step], matrices: Matrices | None, parts: Parts) -> Exposition:
     """Steps numbered from one, after an introduction if there is one."""
-    whole = numbered(steps)
+    whole = numbered(brief(steps))
     first = (Step("introduction", "An algorithm", intro, ()),) if intro else ()
     return Exposition((*first, *whole), matrices, parts.loads)
 
@@ -368,7 +372,7 @@ def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterato
             "x, y, z the position of its centre of mass."
         )
         _, equations = poses(model, frames_of(model), needed)
-        yield Step("motion", "Where the bodies are, and how they move", words, tuple(equations))
+        yield Step("pose", "Where the bodies are, and how they move", words, tuple(equations))
     for derived in parts.effects:
         lines = equations_of(derived.definitions)
         if derived.kept:
@@ -377,9 +381,17 @@ def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterato
         yield Step(
             "force" if derived.falls else "effect",
             f"Effect `{derived.effect.name}` ({derived.effect.type.replace('_', ' ')})",
-            derived.words,
+            f"{derived.words}{_inputs_of(model, derived)}",
             tuple(lines),
         )
+
+
+def _inputs_of(model: Model, derived: DerivedEffect) -> str:
+    """Which names of an effect are inputs."""
+    names = [f"`{x.name}`" for x in derived.effect.inputs(model.dimensions)]
+    if not names:
+        return ""
+    return f" {' and '.join(names)} {'is an input' if len(names) == 1 else 'are inputs'}."
 
 
 def used_bodies(derived: DerivedEffect) -> Iterator[str]:

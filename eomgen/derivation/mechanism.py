@@ -215,6 +215,8 @@ class NamingMechanism(SymbolicMechanism):
         """Values by symbols of their own; what is a symbol already stays."""
         if all(x.is_Atom or (-x).is_Atom for x in values):
             return tuple(values)
+        if letter.endswith("dot"):
+            letter = dotted(letter.removesuffix("dot"))
         key = (letter, values)
         if (found := self.notes.known.get(key)) is None:
             found = self._defined(letter, self.notes.subscript(letter), values)

@@ -6,6 +6,7 @@ of sines and cosines as functions of sums of angles, and each with what its term
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache, reduce
+from typing import Any
 
 import sympy as sp
 
@@ -46,18 +47,26 @@ def _minus(e: Expr) -> int:
 
 def _with_signs(e: Expr) -> Expr:
     """Minus signs in front of products instead of in all terms of a factor, and the reverse."""
-    return e.replace(lambda x: x.is_Mul and any(f.is_Add for f in x.args), _signed)
+    return e.replace(lambda x: x.is_Mul and any(_sum_of(f) for f in x.args), _signed)
+
+
+def _sum_of(factor: Expr) -> Any:
+    """The sum that is a factor of a product or of its denominator, None for any other."""
+    whole = factor.is_Add or (factor.is_Pow and factor.exp == -1 and factor.base.is_Add)
+    return factor.as_base_exp()[0] if whole else None
 
 
 def _signed(product: Expr) -> Expr:
     factors = []
     minus = product.could_extract_minus_sign() and -1 in product.args
     for x in product.args:
-        negative = sum(t.could_extract_minus_sign() for t in x.args) if x.is_Add else 0
-        turned = x.is_Add and (negative == len(x.args) or (minus and 2 * negative >= len(x.args)))
+        inner = _sum_of(x)
+        terms = inner.args if inner is not None else ()
+        negative = sum(t.could_extract_minus_sign() for t in terms)
+        turned = bool(terms) and (negative == len(terms) or (minus and 2 * negative >= len(terms)))
         if turned:
             minus = not minus
-        factors.append(-x if turned else x)
+        factors.append(sp.Pow(-inner, x.as_base_exp()[1]) if turned else x)
     plain = [x for x in factors if x != -1]
     return sp.Mul(-1 if minus else 1, *plain)
 
@@ -137,7 +146,11 @@ def _forms(e: Expr) -> Iterator[Expr]:
     yield e
     top, bottom = sp.fraction(sp.together(e))
     over, under = (min(_whole(x), key=size) for x in (top, bottom))
-    yield sp.cancel(over / under) if size(over) + size(under) < LONGEST // 4 else over / under
+    if size(over) + size(under) < LONGEST // 4:
+        short = sp.cancel(over / under)
+        yield short
+        (n, first), (m, second) = (x.primitive() for x in sp.fraction(short))
+        yield n / m * first / second
     yield over / under
     for whole in dict.fromkeys((over, sp.expand(top))):
         yield sp.Add(*(min(_whole(x), key=size) / under for x in sp.Add.make_args(whole)))

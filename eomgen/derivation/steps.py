@@ -1,17 +1,16 @@
 """What a derivation that is to be read consists of."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from eomgen.derivation.symbols import Expr
-from eomgen.tables.details import DETAILS, Detail
+from eomgen.tables.details import Detail
 
 Definition = tuple[Expr, Expr]
 """A symbol and what it stands for."""
 Pairs = list[tuple[Expr, Expr]]
 """Left and right sides of equations."""
-Kind = Literal["introduction", "state", "bodies", "balance", "joint", "motion", "effect",
+Kind = Literal["introduction", "state", "bodies", "balance", "joint", "motion", "pose", "effect",
                "constraint", "algorithm", "equations", "solution", "form", "impact", "force",
                "variant"]  # fmt: skip
 
@@ -20,8 +19,9 @@ LEVELS: dict[Kind, Detail] = {
     "state": "summary",
     "bodies": "steps",  # each by itself, with its forces
     "balance": "steps",  # Newton and Euler for each
-    "joint": "steps",  # a joint, and its derivatives
-    "motion": "steps",  # where bodies are, and how they move
+    "joint": "steps",
+    "motion": "steps",  # the derivatives of a joint
+    "pose": "steps",  # where bodies are in the world, and how they move
     "effect": "steps",
     "constraint": "steps",
     "algorithm": "steps",
@@ -62,9 +62,3 @@ class Step:
     def figure(self) -> str:
         """The sketch that belongs beside the words: "mechanism", "bodies", or none."""
         return FIGURES.get(self.kind, "")
-
-
-def at_detail(steps: Sequence[Step], detail: Detail) -> tuple[Step, ...]:
-    """The steps of a level; their numbers stay."""
-    last = DETAILS.index(detail)
-    return tuple(step for step in steps if DETAILS.index(LEVELS[step.kind]) <= last)

@@ -17,7 +17,8 @@ from eomgen.model.model import Model
 from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.drawing import Drawing, svg, tikz, tikz_colours
 from eomgen.show.layout import entries, in_parts, is_wide, row_lines, size_of
-from eomgen.show.mathml import mathml, negative, symbol, terms_of, written
+from eomgen.show.mathml import mathml, symbol, terms_of, written
+from eomgen.show.order import negative
 from eomgen.show.plain import PlainPrinter, minus_signs, printer
 from eomgen.show.prose import blocks, joined, pieces, signs
 from eomgen.show.sketches import mechanism_sketch

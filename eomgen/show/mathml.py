@@ -12,7 +12,7 @@ from sympy.simplify.radsimp import fraction
 
 from eomgen.derivation.spatial import ForceCross, MotionCross
 from eomgen.show.notation import parsed
-from eomgen.show.order import ordered_factors, ordered_terms
+from eomgen.show.order import negative, ordered_factors, ordered_terms
 
 Expr = Any
 SUM, PRODUCT, POWER, ATOM = range(4)
@@ -115,13 +115,6 @@ def _sum(terms: Sequence[Expr]) -> str:
         sign = f"<mo{form}>−</mo>" if minus else "<mo>+</mo>" if i else ""
         parts.append(sign + text)
     return "".join(parts)
-
-
-def negative(term: Expr) -> bool:
-    """Whether a term of a sum is written with a minus."""
-    if isinstance(term, sp.MatMul):
-        return bool(term.args[0].is_number and term.args[0] < 0)
-    return bool(not term.is_Matrix and term.as_coeff_Mul()[0].is_negative)
 
 
 def _product(e: Expr) -> tuple[str, int]:

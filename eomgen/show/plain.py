@@ -43,7 +43,12 @@ class PlainPrinter(PrettyPrinter):  # type: ignore[misc]
         top, bottom = fraction(e, exact=True)
         if bottom != 1:
             return self._print(top) / self._print(bottom)
-        return super()._print_Mul(sp.Mul(*ordered_factors(e), evaluate=False))
+        factors = ordered_factors(e)
+        number = sp.Mul(*(x for x in factors if x.is_Number))
+        rest = [x for x in factors if not x.is_Number]
+        return super()._print_Mul(
+            sp.Mul(*((number,) if number != 1 else ()), *rest, evaluate=False)
+        )
 
     def _as_ordered_terms(self, e: Expr, order: Any = None) -> list[Expr]:
         return ordered_terms(e)

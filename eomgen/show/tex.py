@@ -7,9 +7,9 @@ from typing import Any
 from sympy.printing.latex import LatexPrinter
 from sympy.simplify.radsimp import fraction
 
-from eomgen.show.mathml import decimal, negative
+from eomgen.show.mathml import decimal
 from eomgen.show.notation import GREEK, parsed
-from eomgen.show.order import ordered_factors, ordered_terms
+from eomgen.show.order import negative, ordered_factors, ordered_terms
 
 Expr = Any
 ACCENTS = {1: r"\dot", 2: r"\ddot"}

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import sympy as sp
 from campaign import some
 from driven_trees import given
 from effect_cases import CASES, TRIED, Case
@@ -24,7 +25,9 @@ from eomgen.derivation.evaluate import array, define, number
 from eomgen.derivation.exposition import exposition_of
 from eomgen.derivation.impacts import impact_steps
 from eomgen.derivation.prescribed import prescribed_motion
-from eomgen.derivation.steps import at_detail
+from eomgen.derivation.reading import at_detail
+from eomgen.derivation.simplified import simplified
+from eomgen.derivation.symbols import real
 from eomgen.dynamics import impulses
 from eomgen.dynamics.dynamics import Dynamics
 from eomgen.model.elaborate import elaborate
@@ -33,6 +36,7 @@ from eomgen.scene.reader import BUILT_IN, built_in_names, parse_scene, read_scen
 from eomgen.show.body_diagrams import body_diagrams
 from eomgen.show.derivation import as_html, as_latex, as_text
 from eomgen.show.drawing import Label, Line
+from eomgen.show.plain import printer
 from eomgen.show.prose import blocks, pieces
 from eomgen.show.terms import explained
 from eomgen.tables.details import DETAILS
@@ -533,3 +537,53 @@ def kernels(source: str) -> str:
     """The kernels of a generated module, without what checks its arguments."""
     fixed, rest = source[source.index("def _fixed") :].split("def _constants(")
     return fixed + rest[rest.index("def _initial_state") : rest.index("def _numbers")]
+
+
+SLIDING = """
+name = "sliding"
+dimensions = 2
+parameters = { m = 1.0, k = 100.0, c = 0.5, l = 0.4 }
+bodies = [
+    { name = "first", mass = "m", inertia_com = 0 },
+    { name = "second", mass = "2*m", inertia_com = 0 },
+    { name = "bob", mass = "m", inertia_com = 0 },
+]
+joints = [
+    { name = "a", type = "prismatic", parent = "world", child = "first", axis = [1, 0] },
+    { name = "b", type = "prismatic", parent = "world", child = "second", axis = [1, 0] },
+    { name = "pin", type = "revolute", parent = "second", child = "bob", r_child = [0, "l"] },
+]
+effects = [
+    { type = "spring", name = "s", body_1 = "first", body_2 = "second", stiffness = "k", damping = "c" },
+    { type = "motor", name = "drive", joint = "a", torque = "input" },
+]
+initial = { q = { b_slide = 1.0 } }
+"""  # noqa: E501
+
+
+def test_what_is_plain_is_put_in() -> None:
+    """Poses that are a number or a coordinate are not lines of their own, and names by default are
+    letters; a spring along a rail has one component. Each step has the next number.
+    """
+    found = eomgen.derive(SLIDING)
+    text = found.text()
+    assert [s.number for s in found.steps] == [f"({i})" for i in range(1, len(found.steps) + 1)]
+    assert "ψ_" not in text and "s_b − s_a" in text and "θ_pin" in text
+    assert "s_a is the coordinate a_slide" in text and "ḋ_s,x" in text
+    assert "A force on the joint's child" in text and "drive is an input" in text
+    assert text.count("s̈_a =") == 1
+
+
+def test_signs_and_factors_as_a_person_writes_them() -> None:
+    """Lengths before angles and rates, a positive term first, one number in front."""
+    R, r, g, theta, omega = (real(x) for x in ("R", "r", "g", "theta", "omega"))
+    pretty = printer(use_unicode=True)
+    written = {
+        "R⋅θ": theta * R,
+        "r - R": r - R,
+        "3⋅(r - R)": sp.Mul(3, r - R, evaluate=False),
+        "r⋅ω": omega * r,
+        "-2⋅g⋅r": sp.Mul(-1, 2, g, r, evaluate=False),
+    }
+    assert {text: pretty.doprint(e) for text, e in written.items()} == {x: x for x in written}
+    assert simplified(2 * g / (-3 * R + 3 * r)) == sp.Rational(2, 3) * g / (r - R)

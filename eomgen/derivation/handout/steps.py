@@ -7,6 +7,7 @@ import sympy as sp
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.handout.closed import Equations
 from eomgen.derivation.handout.elimination import rows_without_forces, trees
+from eomgen.derivation.reading import words_on_names
 from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
@@ -52,7 +53,8 @@ def _mechanism(equations: Equations) -> Iterator[Titled]:
         "state",
         "State",
         "Each body has the position x, y of its centre of mass, its momentum P = m v, its "
-        "orientation and its angular momentum L = I ω. The joints leave the coordinates free.",
+        "orientation and its angular momentum L = I ω. The joints leave the coordinates free."
+        + words_on_names(model),
         [
             (sp.Symbol("Y"), _redundant_state(equations)),
             *zip(s.angle, kin.angle, strict=True),

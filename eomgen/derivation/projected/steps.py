@@ -8,6 +8,7 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.projected.simplify import gathered
+from eomgen.derivation.reading import words_on_names
 from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
@@ -88,11 +89,11 @@ def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
 
 def state_words(model: Model) -> str:
     """What q and v are."""
-    if not model.quaternions:
-        return "Coordinates q and velocities v."
+    spins = "; those of a quaternion are the angular velocity in the axes of the body to which it "
+    spins += "belongs"
     return (
-        "Coordinates q and velocities v; those of a quaternion are the angular velocity in the "
-        "axes of the body to which it belongs."
+        f"Coordinates q and velocities v{spins if model.quaternions else ''}."
+        f"{words_on_names(model)}"
     )
 
 

@@ -200,7 +200,9 @@ class EffectTable(Table):
     direction_fields: ClassVar[tuple[str, ...]] = ()
     """Fields with a fixed direction in the world, or None."""
     told: ClassVar[str] = ""
-    """What it is, as a derivation says it; "" for the first paragraph of its description."""
+    """What it is, as a derivation says it; "" for the first paragraph of its description. It may
+    have alternatives by joint: see `language.quantity.of_joint`.
+    """
     single: ClassVar[bool] = False
     """Whether a scene has at most one of it."""
     input_field: ClassVar[str] = ""

@@ -26,6 +26,10 @@ class JointSpring(OnJoints):
     n, and the torque is -k s n - c ω; its `rest` is 0, and the torque reverses at s = π.
     """
 
+    told = (
+        "A torque -(k s + c ds/dt) on a joint's angle q, with s = q - rest. | "
+        "A force -(k s + c ds/dt) on a joint's slide q, with s = q - rest."
+    )
     example: ClassVar[str] = """
 [[effects]]
 type = "joint_spring"

@@ -15,8 +15,8 @@ class Motor(OnCoordinate):
     """
 
     told = (
-        "A torque, at a prismatic joint a force, on the joint's child, with its reaction "
-        "on the parent."
+        "A torque on the joint's child, with its reaction on the parent. | "
+        "A force on the joint's child, with its reaction on the parent."
     )
     example: ClassVar[str] = """
 [[effects]]
