@@ -11,38 +11,68 @@ from typing import Annotated
 
 import numpy as np
 
-from eomgen.subset.words import Matrix, Vector, Whole, copy, transposed, with_arrays, with_lists
+from eomgen.subset.words import Matrix, Vector, Whole, numbers, transposed, with_arrays, with_lists
 
 
-def _largest(n: int, x: Vector) -> int:
-    return int(np.argmax(np.abs(x)))
+def _largest(first: int, end: int, x: Vector) -> int:
+    return first + int(np.argmax(np.abs(x[first:end])))
 
 
 @with_arrays(_largest)
-def place_of_largest(n: int, x: Annotated[Vector, "n"]) -> int:
-    """The number of the first of the entries of greatest size."""
-    found = 0
-    for i in range(1, n):
+def place_of_largest(first: int, end: int, x: Annotated[Vector, "end"]) -> int:
+    """The number of the first of some entries that has the greatest size."""
+    found = first
+    for i in range(first + 1, end):
         if abs(x[i]) > abs(x[found]):
             found = i
     return found
 
 
-def _nonzero(n: int, x: Vector, found: Whole) -> int:
-    numbers = np.flatnonzero(x)
-    found[: len(numbers)] = numbers
-    return len(numbers)
+def _nonzero(first: int, end: int, x: Vector, found: Whole) -> int:
+    places = first + np.flatnonzero(x[first:end])
+    found[: len(places)] = places
+    return len(places)
 
 
 @with_arrays(_nonzero)
-def nonzero(n: int, x: Annotated[Vector, "n"], found: Annotated[Whole, "n"]) -> int:
+def nonzero(
+    first: int, end: int, x: Annotated[Vector, "end"], found: Annotated[Whole, "end"]
+) -> int:
     """Write down the numbers of the entries that are not 0; returns how many there are."""
     many = 0
-    for i in range(n):
+    for i in range(first, end):
         if x[i] != 0.0:
             found[many] = i
             many += 1
     return many
+
+
+def _divide_part(first: int, end: int, divisor: float, x: Vector) -> None:
+    x[first:end] /= divisor
+
+
+@with_arrays(_divide_part)
+def divide_part(first: int, end: int, divisor: float, x: Annotated[Vector, "end"]) -> None:
+    """Divide some entries."""
+    for i in range(first, end):
+        x[i] /= divisor
+
+
+def _subtract_part(first: int, end: int, factor: float, y: Vector, x: Vector) -> None:
+    x[first:end] -= factor * y[first:end]
+
+
+@with_arrays(_subtract_part)
+def subtract_part(
+    first: int,
+    end: int,
+    factor: float,
+    y: Annotated[Vector, "end"],
+    x: Annotated[Vector, "end"],
+) -> None:
+    """Subtract from some entries of x those of y, times a factor."""
+    for i in range(first, end):
+        x[i] -= factor * y[i]
 
 
 def _subtract_products(n: int, p: int, columns: Matrix) -> None:
@@ -52,11 +82,10 @@ def _subtract_products(n: int, p: int, columns: Matrix) -> None:
 @with_arrays(_subtract_products)
 def subtract_products(n: int, p: int, columns: Annotated[Matrix, "n", "n"]) -> None:
     """Subtract row p from all that are below it, each times its factor, which is in column p."""
-    factors = copy(columns[p])
     for j in range(p + 1, n):
-        above = columns[j, p]
+        above = columns[j][p]
         if above != 0.0:
-            columns[j, p + 1 :] -= above * factors[p + 1 :]
+            subtract_part(p + 1, n, above, columns[p], columns[j])
 
 
 def _subtract_columns(n: int, m: int, columns: Matrix, x: Vector) -> None:
@@ -71,7 +100,36 @@ def subtract_columns(
     """Subtract the first m columns, each times its unknown, from the rest of x, one by one."""
     for p in range(m):
         value = x[p]
-        x[m:] -= value * columns[p, m:]
+        subtract_part(m, n, value, columns[p], x)
+
+
+def _exchange_rows(m: int, n: int, p: int, q: int, columns: Matrix) -> None:
+    row = columns[m:, p].copy()
+    columns[m:, p] = columns[m:, q]
+    columns[m:, q] = row
+
+
+@with_arrays(_exchange_rows)
+def exchange_rows(m: int, n: int, p: int, q: int, columns: Annotated[Matrix, "n", "n"]) -> None:
+    """Exchange two rows, from column m on."""
+    for j in range(m, n):
+        value = columns[j][p]
+        columns[j][p] = columns[j][q]
+        columns[j][q] = value
+
+
+def _put_in_order(m: int, n: int, order: Whole, x: Vector) -> None:
+    x[m:] = x[order[m:]]
+
+
+@with_arrays(_put_in_order)
+def put_in_order(m: int, n: int, order: Annotated[Whole, "n"], x: Annotated[Vector, "n"]) -> None:
+    """Put entries in an order, from m on."""
+    rest = numbers(n)
+    for i in range(m, n):
+        rest[i] = x[i]
+    for i in range(m, n):
+        x[i] = rest[order[i]]
 
 
 @dataclass(slots=True)
@@ -80,7 +138,7 @@ class Factors:
     diagonal, and nothing else in the first `first` columns.
 
     right    these rows: right[i, j] is entry (i, j) of the matrix, j >= first
-    entries  for each of them, up to ends[i], the columns - first where it is not 0
+    entries  for each of them the ends[i] columns where it is not 0
     columns  the other rows: columns[j, i] is entry (i, j), i >= first
     order    the other row i was row order[i]
     """
@@ -88,7 +146,7 @@ class Factors:
     n: int
     right: Annotated[Matrix, "n", "n"]
     columns: Annotated[Matrix, "n", "n"]
-    entries: Annotated[Whole, "n * n"]
+    entries: Annotated[Whole, "n", "n"]
     ends: Annotated[Whole, "n"]
     order: Annotated[Whole, "n"]
     first: int = 0
@@ -141,33 +199,25 @@ def eliminated(factors: Factors) -> bool:
     """Factorise the matrix whose rows are in `right` and `columns`; False if it is singular."""
     n = factors.n
     m = factors.first
-    diagonal = factors.diagonal
-    used = 0
     for p in range(m):
-        factors.columns[p, m:] /= diagonal
-        below = copy(factors.columns[p])
-        end = used + nonzero(n - m, factors.right[p, m:], factors.entries[used:])
-        for e in range(used, end):
-            k = factors.entries[e]
-            factor = factors.right[p, m + k]
-            factors.columns[m + k, m:] -= factor * below[m:]
-        factors.ends[p] = end
-        used = end
+        divide_part(m, n, factors.diagonal, factors.columns[p])
+        factors.ends[p] = nonzero(m, n, factors.right[p], factors.entries[p])
+        for e in range(factors.ends[p]):
+            k = factors.entries[p][e]
+            subtract_part(m, n, factors.right[p][k], factors.columns[p], factors.columns[k])
     for i in range(m, n):
         factors.order[i] = i
     for p in range(m, n):
-        pivot = p + place_of_largest(n - p, factors.columns[p, p:])
+        pivot = place_of_largest(p, n, factors.columns[p])
         if pivot != p:
-            row = copy(factors.columns[:, p])
-            factors.columns[m:, p] = factors.columns[m:, pivot]
-            factors.columns[m:, pivot] = row[m:]
+            exchange_rows(m, n, p, pivot, factors.columns)
             number = factors.order[p]
             factors.order[p] = factors.order[pivot]
             factors.order[pivot] = number
-        value = factors.columns[p, p]
+        value = factors.columns[p][p]
         if value == 0.0:
             return False
-        factors.columns[p, p + 1 :] /= value
+        divide_part(p + 1, n, value, factors.columns[p])
         subtract_products(n, p, factors.columns)
     return True
 
@@ -178,23 +228,19 @@ def solve_by(factors: Factors, x: Annotated[Vector, "factors.n"]) -> None:
     n = factors.n
     m = factors.first
     subtract_columns(n, m, factors.columns, x)
-    rest = copy(x)
-    for i in range(m, n):
-        x[i] = rest[factors.order[i]]
+    put_in_order(m, n, factors.order, x)
     for p in range(m, n):
         value = x[p]
-        x[p + 1 :] -= value * factors.columns[p, p + 1 :]
+        subtract_part(p + 1, n, value, factors.columns[p], x)
     for p in range(n - 1, m - 1, -1):
-        value = x[p] / factors.columns[p, p]
+        value = x[p] / factors.columns[p][p]
         x[p] = value
-        x[m:p] -= value * factors.columns[p, m:p]
-    e = 0
+        subtract_part(m, p, value, factors.columns[p], x)
     for i in range(m):
         value = x[i]
-        while e < factors.ends[i]:
-            k = m + factors.entries[e]
-            value -= factors.right[i, k] * x[k]
-            e += 1
+        for e in range(factors.ends[i]):
+            k = factors.entries[i][e]
+            value -= factors.right[i][k] * x[k]
         x[i] = value / factors.diagonal
 
 

@@ -29,6 +29,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from math import exp, inf, isfinite, log, nan, sqrt
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -36,9 +37,9 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Known", "Matrix", "Row", "Vector", "Whole", "added", "all_within", "combined", "copy",
-    "counts", "exp", "inf", "isfinite", "larger", "log", "matrix", "nan", "next_after", "numbers",
-    "ordered", "product", "rows", "sqrt", "table", "transposed", "unrolled", "whole",
-    "with_arrays", "with_lists", "zeros",
+    "counts", "exp", "in_loops", "inf", "isfinite", "larger", "log", "matrix", "nan",
+    "next_after", "numbers", "ordered", "product", "rows", "sqrt", "table", "transposed",
+    "unrolled", "whole", "with_arrays", "with_lists", "zeros",
 ]  # fmt: skip
 
 Vector = NDArray[np.float64]
@@ -49,6 +50,8 @@ T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+_LOOPS: dict[Callable[..., Any], Any] = {}
+"""The functions of the text in the place of which others run."""
 _sum, _sums = np.add.reduce, np.add.accumulate
 
 
@@ -166,7 +169,24 @@ def with_arrays(other: F) -> Callable[[F], F]:
     """Decorates a function in the place of which Python runs another one, which has the same bits
     and is quicker there because it has no loops.
     """
-    return lambda _: other
+
+    def decorated(function: F) -> F:
+        _LOOPS[other] = function
+        return other
+
+    return decorated
+
+
+def in_loops(function: F) -> F:
+    """A function that is run as it stands, with all that it calls of its module: for few numbers in
+    lists that is quicker.
+    """
+    text: Any = _LOOPS.get(function, function)
+    own = dict(text.__globals__)
+    for name, x in text.__globals__.items():
+        if callable(x) and (loops := _LOOPS.get(x)):
+            own[name] = FunctionType(loops.__code__, own)
+    return cast(F, own[text.__name__])
 
 
 def with_lists(method: str) -> Callable[[F], F]:
@@ -179,6 +199,7 @@ def with_lists(method: str) -> Callable[[F], F]:
             own = getattr(first, method, None)
             return own(*others) if own else function(first, *others)
 
+        _LOOPS[called] = function
         return cast(F, called)
 
     return decorated
