@@ -130,7 +130,7 @@ class Derivation:
         """All steps as plain text, in ASCII if the encoding lacks Greek letters."""
         from eomgen.show.derivation import as_text
 
-        return as_text(self.model, self.steps, encoding=encoding)
+        return as_text(self.model, self.steps, self.exposition.effects, encoding=encoding)
 
     def latex(self) -> str:
         """All steps as one LaTeX document."""

@@ -47,7 +47,7 @@ def _exercise(exercise: "Exercise", kind: str, *, solved: bool) -> str:
 
     model, steps = exercise.model, exercise.steps(solved=solved)
     if kind == "text":
-        return as_text(model, steps)
+        return as_text(model, steps, exercise.exposition.effects)
     if kind == "latex":
         return as_latex(model, steps, exercise.exposition.effects)
     return as_html(model, steps, exercise.exposition.effects) if solved else as_page(exercise)

@@ -13,6 +13,8 @@ from eomgen.model.model import Model
 from eomgen.tables.details import DETAILS, Detail
 
 AXES = "xyz"
+MOST_GIVEN = 16
+"""Parameters up to which each of them is told."""
 LETTERS = {"angle": "theta", "slide": "s"}
 """Letters of coordinates that have no name in the scene."""
 
@@ -87,13 +89,21 @@ def brief_coordinates(model: Model) -> dict[str, str]:
 
 
 def words_on_names(model: Model) -> str:
-    """A sentence on the coordinates that are written in brief, "" without any."""
-    found = brief_coordinates(model)
-    if not found:
-        return ""
-    name, written = next(iter(found.items()))
-    likewise = ", the others likewise" if len(found) > 1 else ""
-    return f" {written.replace('theta', 'θ')} is the coordinate `{name}`{likewise}."
+    """What coordinates that are written in brief are, and what is given; "" without any."""
+    words = ""
+    if found := brief_coordinates(model):
+        name, written = next(iter(found.items()))
+        likewise = ", the others likewise" if len(found) > 1 else ""
+        words = f" {written.replace('theta', 'θ')} is the coordinate `{name}`{likewise}."
+    if not 0 < len(model.parameters) <= MOST_GIVEN:
+        return words
+    names = reading_names(model)
+    given = []
+    for p in model.parameters:
+        size = f"{p.default:.6g} {p.unit if p.unit != '1' else ''}".rstrip()
+        about = f"{p.about}, " if p.about else ""
+        given.append(f"{names.get(p.name, p.name)} ({about}{size})")
+    return f"{words}\n\nGiven: {'; '.join(given)}."
 
 
 def read(expression: Expr, names: Mapping[str, str]) -> Expr:

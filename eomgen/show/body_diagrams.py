@@ -30,6 +30,15 @@ def body_diagrams(model: Model, effects: Sequence[DerivedEffect]) -> tuple[Drawi
     return tuple(_diagram(pose, shape, effects) for shape in pose.shapes(effects))
 
 
+def named_loads(
+    model: Model, effects: Sequence[DerivedEffect]
+) -> Iterator[tuple[str, tuple[Expr, ...]]]:
+    """Each body, and the names of the forces and torques in its diagram."""
+    for body, drawing in zip(model.bodies, body_diagrams(model, effects), strict=True):
+        labels = (x.text for x in drawing.items if isinstance(x, Label) and x.style == "force")
+        yield body.name, tuple(dict.fromkeys(x for x in labels if isinstance(x, sp.Expr)))
+
+
 def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Drawing:
     model, body = pose.model, shape.body
     names = reading_names(model)

@@ -14,7 +14,7 @@ from eomgen.base.templating import render
 from eomgen.derivation.effects import DerivedEffect
 from eomgen.derivation.steps import Equation, Step
 from eomgen.model.model import Model
-from eomgen.show.body_diagrams import body_diagrams
+from eomgen.show.body_diagrams import body_diagrams, named_loads
 from eomgen.show.drawing import Drawing, svg, tikz, tikz_colours
 from eomgen.show.layout import entries, in_parts, is_wide, row_lines, size_of
 from eomgen.show.mathml import mathml, symbol, terms_of, written
@@ -32,9 +32,15 @@ MOST_LINES = 6
 Figures = dict[str, tuple[Drawing, ...]]
 
 
-def as_text(model: Model, steps: tuple[Step, ...], *, encoding: str = "utf-8") -> str:
+def as_text(
+    model: Model,
+    steps: tuple[Step, ...],
+    effects: Sequence[DerivedEffect],
+    *,
+    encoding: str = "utf-8",
+) -> str:
     """All steps as plain text, with formulas in SymPy's two-dimensional notation. It is drawn in
-    ASCII if the encoding lacks Greek letters.
+    ASCII if the encoding lacks Greek letters. In place of free-body diagrams there are lists.
     """
     letters = _has(encoding, "θ\u0308⋅√⎛─−")
     pretty = printer(use_unicode=letters)
@@ -57,11 +63,25 @@ def as_text(model: Model, steps: tuple[Step, ...], *, encoding: str = "utf-8") -
                     text, WIDTH, initial_indent=lead, subsequent_indent=" " * len(lead)
                 )
             parts.append("")
+        if step.figure == "bodies":
+            parts += [*_loads(model, effects, pretty, signed), ""]
         for equation in step.equations:
             lines = _lines(equation, pretty)
             parts += [textwrap.indent(signed(text), "    ") + "\n" for text in lines]
     text = "\n".join(line.rstrip() for line in "\n".join(parts).split("\n"))
     return unicodedata.normalize("NFC", text)
+
+
+def _loads(
+    model: Model,
+    effects: Sequence[DerivedEffect],
+    pretty: PlainPrinter,
+    signed: Callable[[str], str],
+) -> Iterator[str]:
+    """The forces on each body, by their names in its diagram."""
+    for name, labels in named_loads(model, effects):
+        loads = signed(", ".join(map(pretty.doprint, labels))) or "none"
+        yield from textwrap.wrap(f"- {name}: {loads}", WIDTH, subsequent_indent="  ")
 
 
 def _raised(power: str) -> str:

@@ -10,11 +10,19 @@ from eomgen.show.notation import parsed
 
 
 def entries(equation: Equation) -> Iterator[Equation]:
-    """A matrix equation as one equation for each entry, of a matrix for those that are not 0."""
+    """A matrix equation as one equation for each entry, of a matrix for those that are not 0; of a
+    symmetric mass matrix without those below the diagonal.
+    """
     left, matrix = equation.left, equation.right
+    mass = (
+        getattr(left, "name", "").startswith("M")
+        and matrix.rows > 1
+        and matrix.is_symmetric(simplify=False)
+    )
     for i in range(matrix.rows):
         for j in range(matrix.cols):
-            if matrix.cols > 1 and matrix.rows > 1 and matrix[i, j] == 0:
+            vanishes = matrix.cols > 1 and matrix.rows > 1 and matrix[i, j] == 0
+            if vanishes or (mass and j < i):
                 continue
             if isinstance(left, sp.MatrixBase):
                 yield Equation(left[i, j], matrix[i, j])

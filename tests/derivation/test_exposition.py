@@ -297,8 +297,9 @@ def test_dots_are_over_whole_names() -> None:
     for found in (eomgen.derive(parse_scene(ENDING_IN_D)), eomgen.derive("two_body")):
         model, steps = found.model, found.steps
         named = "bend" if model.name == "names" else "θ"
-        text, paper = as_text(model, steps), as_latex(model, steps, found.exposition.effects)
-        page = as_html(model, steps, found.exposition.effects)
+        text, paper, page = (
+            write(model, steps, found.exposition.effects) for write in (as_text, as_latex, as_html)
+        )
         one, two = ("˙", "¨") if named == "bend" else ("\u0307", "\u0308")
         assert named + one in text and named + two in text
         over = r"\mathrm{bend}" if named == "bend" else r"\theta"
@@ -317,10 +318,10 @@ def test_three_formats(scene: str) -> None:
     found = derived(scene)
     long = len(found.steps) > 40
     steps = tuple(s for i, s in enumerate(found.steps) if s.figure or not long or i % 5 == 1)
-    page, paper = (
-        write(found.model, steps, found.exposition.effects) for write in (as_html, as_latex)
+    page, paper, text = (
+        write(found.model, steps, found.exposition.effects)
+        for write in (as_html, as_latex, as_text)
     )
-    text = as_text(found.model, steps)
     assert paper.isascii()
     formulas = [line for line in text.splitlines() if line.startswith("    ")]
     assert formulas and not any("-" in line for line in formulas)
@@ -572,6 +573,7 @@ def test_what_is_plain_is_put_in() -> None:
     assert "s_a is the coordinate a_slide" in text and "ḋ_s,x" in text
     assert "A force on the joint's child" in text and "drive is an input" in text
     assert text.count("s̈_a =") == 1
+    assert "- second: " in text and "Given: m (1); k (100)" in text
 
 
 def test_signs_and_factors_as_a_person_writes_them() -> None:

@@ -1,6 +1,6 @@
 """The projected-constraints derivation, step by step, like the handout's by `derivation.steps`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import sympy as sp
 
@@ -33,16 +33,30 @@ def projected_steps(equations: ProjectedEquations) -> tuple[Step, ...]:
     given = equations.symbols.numbers.items()
     numbers = {symbol: sp.Float(float(x), DIGITS) for x, symbol in given}
 
-    def read(expression: Expr) -> Expr:
-        return expression.xreplace(numbers).xreplace(shown)
+    def read(expression: Expr, names: dict[Expr, Expr]) -> Expr:
+        return expression.xreplace(numbers).xreplace(names)
 
     steps = []
-    parts = (*_joints(equations), *_balance(equations), *_solution(equations))
+    joints = tuple(_joints(equations))
+    still = {**shown, **_without_rates(equations, shown)}
+    parts = (*joints, *_balance(equations, joints), *_solution(equations))
     for kind, title, words, pairs in parts:
-        lines = [Equation(read(left), read(right)) for left, right in pairs]
+        names = shown if kind in ("state", "joint", "motion") else still
+        lines = [Equation(read(left, names), read(right, names)) for left, right in pairs]
         kept = tuple(line for line in lines if line.left != line.right)
         steps.append(Step(kind, title, words, kept))
     return tuple(steps)
+
+
+def _without_rates(equations: ProjectedEquations, shown: dict[Expr, Expr]) -> dict[Expr, Expr]:
+    """Accelerations where the derivatives of velocities are 0, as α^0 and a^0."""
+    found = {}
+    for symbol in equations.solution.definitions:
+        kind, _, _ = symbol.name.partition("__")
+        if kind in ("alpha", "a") and symbol in shown:
+            letter, _, rest = shown[symbol].name.partition("_")
+            found[symbol] = sp.Symbol(f"{letter}^0_{rest}")
+    return found
 
 
 def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
@@ -74,7 +88,7 @@ def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
         yield (
             "joint",
             f"Joint `{body.joint.name}`: {body.joint.type}, `{parent}` to `{body.name}`",
-            _joint_words(body.name, parent),
+            _joint_words(body.name, parent, turns=whole != sp.eye(3)),
             pairs,
         )
         yield (
@@ -97,14 +111,16 @@ def state_words(model: Model) -> str:
     )
 
 
-def _joint_words(name: str, parent: str) -> str:
+def _joint_words(name: str, parent: str, *, turns: bool) -> str:
     """What the rotation R and the vector r of a joint are."""
-    turns = f"R_{name} rotates axes of `{name}` into"
+    of_parent = "the world's" if parent == WORLD else f"those of `{parent}`"
+    axes = f"R_{name} rotates axes of `{name}` into {of_parent}, and"
+    if not turns:
+        axes = f"Axes of `{name}` are parallel to {of_parent}, and"
     if parent == WORLD:
-        place = f"r_{name} is the position of the centre of mass of `{name}` in the world"
-        return f"{turns} the world's, and {place}."
+        return f"{axes} r_{name} is the position of the centre of mass of `{name}` in the world."
     runs = f"r_{name} runs from the centre of mass of `{parent}` to that of `{name}`"
-    return f"{turns} those of `{parent}`, and {runs}, axes of `{parent}`."
+    return f"{axes} {runs}, axes of `{parent}`."
 
 
 def _differentiated(c: Constraint, still: dict[Expr, Expr]) -> Pairs:
@@ -154,15 +170,17 @@ def _short(expression: Expr) -> Expr:
     return gathered(expression, frozenset())
 
 
-def _balance(equations: ProjectedEquations) -> Iterator[Titled]:
-    """M, V, G, F."""
+def _balance(equations: ProjectedEquations, before: Sequence[Titled]) -> Iterator[Titled]:
+    """M, V, G, F; what is said `before` of angular velocities is not said again."""
+    said = {symbol for *_, pairs in before for symbol, _ in pairs}
+    said = {symbol for symbol in said if symbol.name.startswith("omega__")}
     terms, model = equations.balance, equations.model
     definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
     needed = _needed(equations, [*terms.M, *terms.V, *terms.G, *terms.F])
     named = [
         (symbol, e)
         for symbol, e in definitions
-        if symbol in needed and not symbol.name.startswith(ROTATIONS)
+        if symbol in needed and symbol not in said and not symbol.name.startswith(ROTATIONS)
     ]
     if named:
         yield (
@@ -170,8 +188,9 @@ def _balance(equations: ProjectedEquations) -> Iterator[Titled]:
             "Parts of the motion",
             "These parts have names, to keep what follows short. ω, u with a velocity as index are "
             "the partial velocities: the motion of a body while this velocity is 1 and all others "
-            "are 0. α, a are the accelerations that remain while all derivatives of velocities are "
-            "0. g is the acceleration of gravity, and W rotates axes of a body into the world's.",
+            "are 0. α^0, a^0 are the accelerations that remain while all derivatives of velocities "
+            "are 0. g is the acceleration of gravity, and W rotates axes of a body into the "
+            "world's.",
             named,
         )
     weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
@@ -180,7 +199,8 @@ def _balance(equations: ProjectedEquations) -> Iterator[Titled]:
         "Virtual power",
         "For every velocity that the joints leave free, the forces of inertia do the work of "
         f"the loads: m a for each body's force{weights}. Forces in the joints do none. This is "
-        "M dv/dt + V + G = F; first the mass matrix (entries that are not written are 0),",
+        "M dv/dt + V + G = F; first the mass matrix, which is symmetric (entries that are not "
+        "written are 0, or stand on the other side of the diagonal),",
         [(sp.Symbol("M"), terms.M)],
     )
     yield "equations", "Velocity forces", "", [(sp.Symbol("V"), terms.V)]
