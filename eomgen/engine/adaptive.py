@@ -8,7 +8,7 @@ Slopes k (16, STATES) and terms (7, STATES) have the sizes of DOP853.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Protocol
+from typing import Annotated
 
 from eomgen.engine.sums import round_off
 from eomgen.engine.system import System
@@ -16,12 +16,9 @@ from eomgen.subset.words import (
     Known,
     Matrix,
     Vector,
-    Whole,
     combined,
-    copy,
     inf,
     larger,
-    matrix,
     next_after,
     ordered,
     sqrt,
@@ -29,8 +26,9 @@ from eomgen.subset.words import (
     zeros,
 )
 
-MADE, AT_END, UNUSUAL = 0, 1, 2
-"""Why steps ended: all were made; the next one reaches the end; it is not for these steps."""
+MADE, AT_END, UNUSUAL, EVENT = 0, 1, 2, 3
+"""Why steps ended: all were made; the next one reaches the end; it is not for these steps; the last
+one ends where rigid contacts close or open."""
 
 
 @dataclass(slots=True)
@@ -60,100 +58,6 @@ class Progress:
     length: float = 0.0
     derivatives: int = 0
     is_dense: bool = False
-
-
-@dataclass(slots=True)
-class Records:
-    """Of each step its end, the greatest length of the next one, its own length and error, the
-    least margin of constraints, what it has counted and how many rows there are so far, the state,
-    slope and lost part at its end, and its terms if wanted. The rows at given times. The four
-    states of each quaternion. How many rows are passed, and steps made. A method leaves out what it
-    does not need.
-    """
-
-    ends: Annotated[Vector, "most"]
-    lengths: Annotated[Vector, "most"]
-    last_lengths: Annotated[Vector, "most"]
-    errors: Annotated[Vector, "most"]
-    margins: Annotated[Vector, "most"]
-    derivatives: Annotated[Whole, "most"]
-    jacobians: Annotated[Whole, "most"]
-    factorisations: Annotated[Whole, "most"]
-    sampled: Annotated[Whole, "most"]
-    states: Annotated[Matrix, "most", "STATES"]
-    slopes: Annotated[Matrix, "most", "STATES"]
-    losses: Annotated[Matrix, "most", "STATES"]
-    terms: Annotated[Matrix, "7 * most", "STATES"]
-    times: Annotated[Vector, "count"]
-    rows: Annotated[Matrix, "count", "STATES"]
-    quaternions: Annotated[Whole, "4 * many"]
-    many: int
-    count: int
-    most: int
-    passed: int = 0
-    made: int = 0
-
-
-def keep(
-    kept: Records,
-    end: float,
-    length: float,
-    y: Annotated[Vector, "STATES"],
-    lost: Annotated[Vector, "STATES"],
-) -> None:
-    """Keep a step, whose last state is also that of rows at its end."""
-    while kept.passed < kept.count and kept.times[kept.passed] <= end:
-        kept.rows[kept.passed] = y
-        kept.passed += 1
-    i = kept.made
-    kept.ends[i] = end
-    kept.lengths[i] = length
-    kept.sampled[i] = kept.passed
-    kept.states[i] = y
-    kept.losses[i] = lost
-    kept.made += 1
-
-
-@dataclass(slots=True)
-class Start:
-    """The state from which steps begin, its slope if that is known, and what rounding took."""
-
-    state: Annotated[Vector, "STATES"]
-    slope: Annotated[Vector, "STATES"]
-    lost: Annotated[Vector, "STATES"]
-
-
-class Checks(Protocol):
-    """What the place where steps are made says of them; false for what it cannot do."""
-
-    def begins(self) -> None:
-        """A step begins: forget what one that was not made has left."""
-
-    def are_usual(self, k: Annotated[Matrix, "16", "STATES"], first: int, past: int) -> bool:
-        """Whether these slopes are finite, and no flag was raised in this step."""
-        ...
-
-    def placed(self, t: float, y: Annotated[Vector, "STATES"]) -> bool:
-        """Put a state on the constraints, and normalise its quaternions."""
-        ...
-
-    def seen(
-        self,
-        at: Progress,
-        y: Annotated[Vector, "STATES"],
-        raw: Annotated[Vector, "STATES"],
-        last: Annotated[Vector, "STATES"],
-        k: Annotated[Matrix, "16", "STATES"],
-        terms: Annotated[Matrix, "7", "STATES"],
-    ) -> int:
-        """MADE if a step from y to `last` passes over nothing. `raw` is `last` before projection.
-        The terms may be computed.
-        """
-        ...
-
-    def keeps(self, i: int, at: Progress, last: Annotated[Vector, "STATES"]) -> bool:
-        """Step i, to this state, is kept, or is not."""
-        ...
 
 
 def eighth_root(x: float) -> float:
@@ -264,6 +168,27 @@ def made(
     return True
 
 
+def explicit_step(
+    method: Known,
+    system: System,
+    run: Bounds,
+    at: Progress,
+    y: Annotated[Vector, "STATES"],
+    lost: Annotated[Vector, "STATES"],
+    k: Annotated[Matrix, "16", "STATES"],
+    change: Annotated[Vector, "STATES"],
+    raw: Annotated[Vector, "STATES"],
+) -> bool:
+    """The same with the slope at the end of the step, and what rounding takes from it, `lost`."""
+    if not made(method, system, run, at, y, lost, k, change, raw):
+        return False
+    k[method.last] = system.derivative(at.end, raw)
+    at.derivatives += 1
+    round_off(y, raw, change, lost)
+    wrong = ordered(k[method.last] * 0.0)
+    return wrong == 0.0
+
+
 def interpolate(
     method: Known,
     system: System,
@@ -305,69 +230,3 @@ def within(
     for i in unrolled(range(6, -1, -1)):
         found = (found + terms[i]) * (rest if i % 2 else x)
     place[:] = found + y
-
-
-def made_many(
-    method: Known,
-    system: System,
-    checks: Checks,
-    run: Bounds,
-    at: Progress,
-    start: Start,
-    kept: Records,
-) -> int:
-    """Up to `kept.most` steps from `at.t` on. They end at the end, or before one that reaches it if
-    none may, or that anything is unusual in. Returns why.
-    """
-    y = copy(start.state)
-    lost = copy(start.lost)
-    change = zeros(len(y))
-    raw = zeros(len(y))
-    place = zeros(len(y))
-    k = matrix(16, len(y))
-    terms = matrix(7, len(y))
-    k[0] = start.slope
-    while kept.made < kept.most and at.t < run.until:
-        length = min(at.length, run.longest)
-        if not length >= 10.0 * abs(next_after(at.t) - at.t):
-            return UNUSUAL
-        if not run.reaches and not at.t + length < run.until:
-            return AT_END
-        checks.begins()
-        if not made(method, system, run, at, y, lost, k, change, raw):
-            return UNUSUAL
-        k[method.last] = system.derivative(at.end, raw)
-        at.derivatives += 1
-        last = copy(raw)
-        if not checks.are_usual(k, 0, method.last + 1) or not checks.placed(at.end, last):
-            return UNUSUAL
-        why = checks.seen(at, y, raw, last, k, terms)
-        if why != MADE:
-            return why
-        has_rows = kept.passed < kept.count and kept.times[kept.passed] < at.end
-        if has_rows or run.dense:
-            interpolate(method, system, at, y, raw, k, terms)
-        while kept.passed < kept.count and kept.times[kept.passed] < at.end:
-            now = kept.times[kept.passed]
-            within(at, y, terms, now, place)
-            if not checks.placed(now, place):
-                return UNUSUAL
-            kept.rows[kept.passed] = place
-            kept.passed += 1
-        past = method.last + 1
-        if at.is_dense:
-            past = len(method.nodes)
-        if not checks.are_usual(k, method.last + 1, past) or not checks.keeps(kept.made, at, last):
-            return UNUSUAL
-        round_off(y, raw, change, lost)
-        y = copy(last)
-        k[0] = k[method.last]
-        at.t = at.end
-        i = kept.made
-        keep(kept, at.t, at.length, y, lost)
-        kept.derivatives[i] = at.derivatives
-        kept.slopes[i] = k[0]
-        if run.dense:
-            for term in range(7):
-                kept.terms[7 * i + term] = terms[term]
-    return MADE

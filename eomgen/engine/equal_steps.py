@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
-from eomgen.engine.adaptive import MADE, UNUSUAL
+from eomgen.engine.adaptive import EVENT, MADE, UNUSUAL
 from eomgen.engine.explicit import Method, Step
 from eomgen.engine.quaternions import normalised
 from eomgen.engine.sums import Sum, add_compensated
@@ -75,10 +75,6 @@ class Constrained(Protocol):
     ) -> bool:
         """The least margin of the constraints there; False if it is near 0."""
         ...
-
-
-EVENT = 3
-"""The last step ends where rigid contacts close or open."""
 
 
 class Events(Protocol):

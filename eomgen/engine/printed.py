@@ -8,6 +8,7 @@ from functools import cache
 
 from eomgen.engine import (
     adaptive,
+    adaptive_steps,
     branches,
     complementarity,
     contact_runs,
@@ -80,11 +81,11 @@ CODES = {
 @cache
 def text() -> Text:
     """The text of the whole engine."""
-    steps = (adaptive, differences, equal_steps, explicit, implicit, rosenbrock, quaternions, sums)
+    steps = (adaptive, adaptive_steps, equal_steps, explicit, implicit, rosenbrock, taylor)
     solved = (elimination, least_squares, complementarity, roots)
     held = (projection, rattle, separable, symmetric)
     checks = (branches, contacts, contact_times, contact_runs, contact_steps, crossings)
-    return Text.of(*steps, *solved, *checks, *held, taylor, system)
+    return Text.of(*steps, *solved, *checks, *held, differences, quaternions, sums, system)
 
 
 def c_source(functions: Roots, language: Language = C) -> str:

@@ -11,10 +11,8 @@ from typing import Annotated
 
 import numpy as np
 
-from eomgen.engine.adaptive import AT_END, MADE, UNUSUAL, Records, keep
+from eomgen.engine.adaptive import Bounds, Progress
 from eomgen.engine.elimination import Factors, factored, solve_by
-from eomgen.engine.equal_steps import Constrained
-from eomgen.engine.quaternions import normalised
 from eomgen.engine.rodas_5p_coefficients import (
     COUPLINGS,
     DENSE,
@@ -273,55 +271,24 @@ def rodas_within(
     state[:] = back * y + x * (run.last + back * (run.dense[0] + bend))
 
 
-def rodas_many(
+def rosenbrock_step(
     system: StiffSystem,
-    held: Constrained,
-    run: Rodas,
+    stiff: Rodas,
     factors: Factors,
-    begun: float,
-    smooth: float,
-    state: Annotated[Vector, "STATES"],
-    kept: Records,
-) -> int:
-    """Up to `kept.most` steps from a state at the time `begun` to the end, or before one that
-    anything is unusual in, or that ends after `smooth`: up to there no branch of the derivative
-    begins or ends. Returns why.
-    """
-    t = begun
-    y = copy(state)
-    place = zeros(len(y))
-    while kept.made < kept.most and t < run.t_bound:
-        length = min(run.h_abs, run.longest)
-        if not length >= 10.0 * abs(next_after(t) - t):
-            return UNUSUAL
-        held.clear()
-        if not rodas_step(system, run, factors, t, y) or held.is_raised():
-            return UNUSUAL
-        if not run.end <= smooth:
-            return AT_END
-        while kept.passed < kept.count and kept.times[kept.passed] < run.end:
-            now = kept.times[kept.passed]
-            rodas_within(run, y, (now - t) / run.h_last, place)
-            if not normalised(kept.many, kept.quaternions, place):
-                return UNUSUAL
-            if not held.projected(now, place):
-                return UNUSUAL
-            kept.rows[kept.passed] = place
-            kept.passed += 1
-        place[:] = run.last
-        if not normalised(kept.many, kept.quaternions, place):
-            return UNUSUAL
-        if not held.projected(run.end, place):
-            return UNUSUAL
-        i = kept.made
-        if held.is_raised() or not held.keep_step(run.end, place, kept.margins[i:]):
-            return UNUSUAL
-        t = run.end
-        y[:] = place
-        keep(kept, t, run.h_abs, y, run.lost)
-        kept.last_lengths[i] = run.h_last
-        kept.errors[i] = run.error
-        kept.derivatives[i] = run.derivatives
-        kept.jacobians[i] = i + 1
-        kept.factorisations[i] = run.factorisations
-    return MADE
+    run: Bounds,
+    at: Progress,
+    y: Annotated[Vector, "STATES"],
+    raw: Annotated[Vector, "STATES"],
+) -> bool:
+    """Make a step within bounds from y at `at.t` to `raw` at `at.end`. False if there is none."""
+    stiff.h_abs = at.length
+    stiff.derivatives = 0
+    stiff.t_bound = run.until
+    if not rodas_step(system, stiff, factors, at.t, y):
+        return False
+    at.h = stiff.h_last
+    at.end = stiff.end
+    at.length = stiff.h_abs
+    at.derivatives += stiff.derivatives
+    raw[:] = stiff.last
+    return True

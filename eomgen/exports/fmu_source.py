@@ -12,12 +12,12 @@ from eomgen.engine.crossings import MOST_PARTS
 from eomgen.engine.embedded import DOP853
 from eomgen.engine.methods import Root
 from eomgen.engine.printed import CONTACTS, text
+from eomgen.engine.taylor import HIGHEST
 from eomgen.exports.fmu_unit import Observed, Unit
 from eomgen.exports.steps import Method, contacts_of, step_of
 from eomgen.native.functions import restricted
 from eomgen.program.ordering import ordered
 from eomgen.program.tape import TIME
-from eomgen.run.integrators.taylor import HIGHEST
 from eomgen.subset.languages import C
 
 HEADERS = ("fmi3PlatformTypes.h", "fmi3FunctionTypes.h", "fmi3Functions.h")

@@ -21,14 +21,13 @@ from eomgen.engine.methods import METHODS, Root, Roots
 from eomgen.engine.rattle import Linked
 from eomgen.engine.rosenbrock import Rodas
 from eomgen.engine.symmetric import Projected
-from eomgen.engine.taylor import Terms
+from eomgen.engine.taylor import HIGHEST, Terms
 from eomgen.model.model import Model
 from eomgen.program.program import Program, interpret
 from eomgen.program.tape import TIME
 from eomgen.program.taylor_text import SeriesText
 from eomgen.run.integrators import INTEGRATORS, Adaptive, rattle
 from eomgen.run.integrators.leapfrog import split_of
-from eomgen.run.integrators.taylor import HIGHEST
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
 from eomgen.run.sizes import mechanism_size, state_sizes

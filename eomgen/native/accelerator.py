@@ -173,17 +173,17 @@ class Accelerator:
             found: Steps | None = None
             if name == "DOP853":
                 found = once(name, ("derivative", *needed), partial(partial, runs.dop853))
-            elif not set(needed) - set(projects):
+            else:
+                met = problem if set(contacts) & set(needed) else replace(problem, contacts=None)
+                own = implicit.needed(name, met)
+                further = tuple(x for x in needed if x not in own)
                 make = partial(partial, implicit.rodas_5p, problem)
-                found = once(name, implicit.needed(name, problem), make)
+                found = once(name, (*further, *own), make)
             return found
 
         def equal(name: str) -> EqualSteps | None:
-            solves = name in implicit.GAUSS
-            if contacts and (solves or (projects and name in equal_steps.LEAPFROGS)):
-                return None
             needed, make = ("derivative", *projects, *contacts), equal_steps.steps
-            if solves or (projects and name in equal_steps.LEAPFROGS):
+            if name in implicit.GAUSS or (projects and name in equal_steps.LEAPFROGS):
                 needed, make = implicit.needed(name, problem), implicit.equal
             found: EqualSteps | None = once(name, needed, partial(make, name, problem))
             return found

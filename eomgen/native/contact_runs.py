@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from eomgen.codegen.interface import Interface
-from eomgen.engine import contact_runs, equal_steps
+from eomgen.engine import contact_runs
 from eomgen.engine.contact_times import SHARE
 from eomgen.run.compiled import Touched
 from eomgen.subset.structures import filled, take
@@ -35,10 +35,10 @@ def sizes(interface: Interface) -> dict[str, int]:
     return {"contacts": many, "pressed": shapes["held"][0] if many else 0}
 
 
-def context(interface: Interface) -> dict[str, Any]:
-    """The values of the template."""
+def values(contacts: int, pressed: int) -> dict[str, Any]:
+    """The values of the template, for so many contacts and results of `held`."""
     codes = {"whole": contact_runs.WHOLE, "opened": contact_runs.OPENED}
-    return {**sizes(interface), **codes, "event": equal_steps.EVENT, "share": repr(SHARE)}
+    return {"contacts": contacts, "pressed": pressed, **codes, "share": repr(SHARE)}
 
 
 def events(of: ctypes.Structure, touched: Touched) -> Events:

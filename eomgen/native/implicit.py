@@ -5,26 +5,24 @@ Jacobian of the scene, which are libraries of their own.
 """
 
 import ctypes
-import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
-from eomgen.engine.adaptive import UNUSUAL, Bounds
+from eomgen.engine.adaptive import Bounds
 from eomgen.engine.elimination import Factors
 from eomgen.engine.methods import EQUAL, Root
 from eomgen.engine.rattle import Linked
-from eomgen.native import equal_steps
-from eomgen.native.mechanism import KERNELS, Mechanism, made_margins
+from eomgen.native import contact_runs, equal_steps, strides
+from eomgen.native.mechanism import KERNELS, Mechanism
 from eomgen.native.mechanism import context as of_mechanism
-from eomgen.native.strides import records_of, stride
 from eomgen.run.compiled import EqualSteps, Stretch, Stride
 from eomgen.run.integrators import rattle
 from eomgen.run.integrators.implicit_stages import projected_of, stages_of
-from eomgen.run.integrators.rodas_5p import rodas
+from eomgen.run.integrators.rodas_5p import between, rodas
 from eomgen.run.problem import Problem
 from eomgen.run.projection import PROJECTS
 from eomgen.subset.structures import filled, with_room
@@ -49,12 +47,31 @@ many states."""
 MANY = 16
 """From so many states on loops over them gain from vectors."""
 _NO_QUATERNIONS = np.empty(0, np.int64)
-_POINTER, _REAL = ctypes.c_void_p, ctypes.c_double
+COUNTS = ("jacobians", "factorisations")
+"""What Rodas5P counts beside derivatives."""
 
 
-def library_of(name: str, constrained: bool) -> str:
-    """The name of a method's library."""
-    return f"{LIBRARY} {name}{' constrained' * constrained}"
+class Library(NamedTuple):
+    """A method's library: its name, whether constraints are kept, the number of rigid contacts, and
+    that of the results of `held`.
+    """
+
+    method: str
+    constrained: bool = False
+    contacts: int = 0
+    pressed: int = 0
+
+    @property
+    def name(self) -> str:
+        """Its name among other libraries."""
+        parts = self.method, *map(int, self[1:])
+        return f"{LIBRARY} {' '.join(map(str, parts))}"
+
+    @classmethod
+    def named(cls, name: str) -> "Library":
+        """That of a name."""
+        _, method, constrained, *sizes = name.split()
+        return cls(method, constrained == "1", *map(int, sizes))
 
 
 def sources(library: str, states: int) -> Mapping[str, str]:
@@ -63,18 +80,25 @@ def sources(library: str, states: int) -> Mapping[str, str]:
     from eomgen.engine.printed import c_source
     from eomgen.subset.languages import C
 
-    _, name, *constrained = library.split()
-    roots: list[Root] = [("rodas_many", {})]
+    of = Library.named(library)
+    name = of.method
+    roots: list[Root] = [(each, {}) for each in ("rosenbrock_step", "rodas_within")]
     if name in EQUAL:
         roots = [EQUAL[name], *[("rattle", {})] * (name in equal_steps.LEAPFROGS), EQUAL_STEPS]
-        if constrained and name in GAUSS:
+        if of.constrained and name in GAUSS:
             roots[0] = ("projected_change", EQUAL[name][1])
         elif name == "leapfrog":
             del roots[0]
+    else:
+        roots += strides.ROOTS
+    roots += [*contact_runs.ROOTS, ("differences", {})] if of.contacts else []
     context = {
         **of_mechanism(),
+        **contact_runs.values(of.contacts, of.pressed),
         "engine": C.prelude + c_source(roots),
         "name": name,
+        "equal": name in EQUAL,
+        "adaptive": name not in EQUAL,
         "root": roots[0][0],
         "states": states,
         "many": states >= MANY,
@@ -86,60 +110,49 @@ def needed(name: str, problem: Problem) -> tuple[str, ...]:
     """The names of the libraries of functions that a method needs, and last that of its own."""
     projects = PROJECTS if problem.projection else ()
     if name in equal_steps.LEAPFROGS:
-        return (*RATTLE, *projects, library_of(name, True))
+        return (*RATTLE, *projects, Library(name, constrained=True).name)
     held = bool(projects) and name in GAUSS
-    return (*KERNELS, *projects, *(SYMMETRIC if held else ()), library_of(name, held))
+    further = (*projects, *(SYMMETRIC if held else ()))
+    if contacts := problem.contacts:
+        many, states = len(contacts.names), len(problem.states)
+        own = Library(name, held, many, states + 2 * many + len(contacts.drives))
+        return (*KERNELS, *further, *contact_runs.FUNCTIONS, own.name)
+    return (*KERNELS, *further, Library(name, held).name)
 
 
 def equal(name: str, problem: Problem, of: Mechanism, library: ctypes.CDLL) -> EqualSteps:
     """The steps of a Gauss method, or of leapfrog with constraints."""
     if leaps := equal_steps.LEAPFROGS.get(name):
         n, rows = rattle.sizes_of(problem)
-        room = _with(of, room=with_room(Linked, n=n, rows=rows))
+        room = _with(of, problem, room=with_room(Linked, n=n, rows=rows))
         call = equal_steps.Call(library.steps, room, _NO_QUATERNIONS)
         return EqualSteps(call.made, DERIVATIVES * leaps)
     many = len(GAUSS[name].b)
-    room = _with(of, stages=stages_of(many, problem))
+    room = _with(of, problem, stages=stages_of(many, problem))
     if problem.projection:
-        room = _with(room, room=projected_of(many, problem))
+        room = _with(room, problem, room=projected_of(many, problem))
     quaternions = np.array(sum(problem.quaternions, ()), np.int64)
     call = equal_steps.Call(library.steps, room, quaternions)
     return EqualSteps(call.made, many, iterates=True)
 
 
-def _with(of: Mechanism, **room: Any) -> Mechanism:
-    """A mechanism with records to work in."""
+def _with(of: Mechanism, problem: Problem, **room: Any) -> Mechanism:
+    """A mechanism with records to work in, and the sizes of its states."""
     made = {name: filled(record) for name, record in room.items()}
     pointers = {name: ctypes.addressof(record) for name, record in made.items()}
-    return of.having(room, made, **pointers)
+    sizes = np.array(problem.sizes or np.ones(len(problem.states)))
+    return of.having(room, made, sizes, nominal=sizes.ctypes.data, **pointers)
 
 
 def rodas_5p(problem: Problem, of: Mechanism, library: ctypes.CDLL, stretch: Stretch) -> Stride:
-    """Steps of Rodas5P, which may be watched with switching functions of time alone only, and have
-    no rigid contacts; none if they are to be `dense`.
-    """
-    watched, solver, held = stretch.watched, stretch.solver, stretch.constrained
-    assert stretch.touched is None and not (watched and watched.ends)
-    ny, most = len(problem.states), 0 if stretch.dense else stretch.most
+    """Steps of Rodas5P."""
+    solver, touched, ny = stretch.solver, stretch.touched, len(problem.states)
+    is_held = touched is not None and bool(touched.now.holds.any())
     bounds = Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until)
-    run = rodas(ny, bounds, problem.leading_positions, problem.timed)
-    run.h_abs, run.h_last, run.error = solver.h_abs, solver.h_last, solver.error
-    run.lost[:] = solver.lost
-    margins = made_margins(held, most)
-    quaternions = np.array(sum(problem.quaternions, ()), np.int64)
-    given = {"quaternions": quaternions, "many": len(problem.quaternions)}
-    kept, records = records_of(stretch, most, margins=margins[1:], **given)
-    system = _with(of, room=with_room(Factors, n=ny)).holding(ny, held, None)
-    start, clear = np.ascontiguousarray(solver.y), watched.clear if watched else math.inf
-    call = library.steps
-    call.restype = ctypes.c_int64
-    call.argtypes = [*[_POINTER] * 2, _REAL, _REAL, *[_POINTER] * 2]
-    why = call(
-        *map(ctypes.byref, (system, filled(run))),
-        *(solver.t, clear, start.ctypes.data),
-        ctypes.byref(records),
+    run = rodas(ny, bounds, problem.leading_positions, problem.timed or is_held)
+    run.h_last, run.error = solver.h_last, solver.error
+    method = strides.Method(
+        library.adaptive, ("h_abs", "h_last", "error", "lost"), COUNTS, 4, between
     )
-    counts = {"jacobians": kept.jacobians, "factorisations": kept.factorisations}
-    least = margins[: records.made + 1] if held else None
-    memory = "h_abs", "h_last", "error", "lost"
-    return stride(kept, records, memory, why != UNUSUAL, counts, margins=least)
+    own = _with(of, problem, stages=run, room=with_room(Factors, n=ny))
+    return strides.steps(method, own, stretch)

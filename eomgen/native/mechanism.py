@@ -4,7 +4,7 @@ constraints, and rigid contacts.
 
 import ctypes
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ FUNCTIONS = (
     *contact_runs.FUNCTIONS,
 )
 """The functions that steps call."""
-ROOM = ("rates", "stages", "room")
+ROOM = ("rates", "nominal", "stages", "room")
 """What steps of some methods work with."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
@@ -44,7 +44,9 @@ class Mechanism(ctypes.Structure):
 
     _fields_ = (
         *((name, Function) for name in FUNCTIONS),
-        *((name, _POINTER) for name in ("inputs", "onto", "events", *ROOM)),
+        *((name, _POINTER) for name in ("inputs", "onto", "events")),
+        ("many", _WHOLE),
+        *((name, _POINTER) for name in ("quaternions", *ROOM)),
     )
     kept: tuple[Any, ...]
 
@@ -87,7 +89,9 @@ def mechanism(given: Given) -> Mechanism | None:
     constants are those that the module computes, also where it is a perturbed one.
     """
     module, libraries, (p, u), origin = given
-    made, kept = Mechanism(), list[Any]([given])
+    quaternions = np.array(sum(module.QUATERNIONS, ()), np.int64)
+    made, kept = Mechanism(), list[Any]([given, quaternions])
+    made.many, made.quaternions = len(quaternions) // 4, quaternions.ctypes.data
     for name in filter(FUNCTIONS.__contains__, libraries):
         library = libraries[name]
         kernels = Kernels(module, library)
@@ -103,12 +107,20 @@ def mechanism(given: Given) -> Mechanism | None:
     return made
 
 
+def unconstrained(quaternions: Sequence[tuple[int, ...]], stages: Array) -> Mechanism:
+    """What steps are given that call no function of a mechanism, but take the numbers `stages`."""
+    each = np.array(sum(quaternions, ()), np.int64)
+    made = Mechanism(many=len(quaternions), quaternions=each.ctypes.data, stages=stages.ctypes.data)
+    made.kept = each, stages
+    return made
+
+
 class Constraints(ctypes.Structure):
     """`constraints` of `templates/c/projection.c.jinja`."""
 
     _fields_ = (
-        *((name, _POINTER) for name in ("of", "sizes", "quaternions")),
-        *((name, _WHOLE) for name in ("count", "states", "rows")),
+        *((name, _POINTER) for name in ("of", "sizes")),
+        *((name, _WHOLE) for name in ("states", "rows")),
         *((name, _REAL) for name in ("start", "earlier", "t", "here")),
         *((name, _POINTER) for name in ("before", "after", "in_step", "room")),
     )
@@ -117,17 +129,15 @@ class Constraints(ctypes.Structure):
 
 def _constraints(of: Mechanism, states: int, given: Constrained) -> Constraints:
     rows = of.constraint_residuals.count
-    quaternions = np.array(given.quaternions, np.int64)
     sizes = np.ascontiguousarray(given.sizes)
     in_step, room = np.zeros(2 * rows), np.empty(3 * rows + states)
     made = Constraints(
         ctypes.addressof(of),
-        *(sizes.ctypes.data, quaternions.ctypes.data),
-        *(len(given.quaternions), states, rows),
+        *(sizes.ctypes.data, states, rows),
         *(x for pair in given.margins for x in pair),
         *(array.ctypes.data for array in (given.before, given.after, in_step, room)),
     )
-    made.kept = given, sizes, quaternions, in_step, room
+    made.kept = given, sizes, in_step, room
     return made
 
 

@@ -196,7 +196,7 @@ class CompiledSteps(Lanes):
             return None
         of, rows = self._projection, len(self._projection.names)
         none = (np.zeros(rows), np.zeros(rows), ((0.0, 0.0), (0.0, 0.0)))
-        given = Constrained(of.sizes, of.quaternions, *none)
+        given = Constrained(of.sizes, *none)
         return found.holding(self.states, given, None)
 
 

@@ -1,17 +1,30 @@
-"""Steps of adaptive methods in compiled code: what they leave, as runs take it."""
+"""Steps of adaptive methods in compiled code, with the bits of the same steps made in Python."""
 
 import ctypes
-from collections.abc import Mapping, Sequence
-from typing import Any
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from eomgen.engine.adaptive import Records
+from eomgen.engine.adaptive import EVENT, UNUSUAL, Bounds, Progress
+from eomgen.engine.adaptive_steps import Records, Start
+from eomgen.engine.branches import Switches
+from eomgen.engine.crossings import Watch
+from eomgen.engine.methods import Root
+from eomgen.native import contact_runs
+from eomgen.native.mechanism import Mechanism, made_margins
 from eomgen.native.memory import room
-from eomgen.run.compiled import Stretch, Stride
-from eomgen.subset.structures import take
+from eomgen.run import branches
+from eomgen.run.compiled import Array, Stretch, Stride, Watched
+from eomgen.subset.structures import address, filled, take
 
+ROOTS: list[Root] = [
+    (name, {}) for name in ("adaptive_steps", "passed_over", "end_at", "normalised")
+]
+"""What steps call of the engine, beside the method."""
 MEMORY = {
     "h_abs": "lengths",
     "f": "slopes",
@@ -20,34 +33,138 @@ MEMORY = {
     "error": "errors",
 }
 """The records of what determines a solver's next step."""
+_POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+
+Between = Callable[[float, float, Array, Array, float], Array]
+"""The state at a time in a step from `start` of length h from a state, by its terms."""
 
 
-def records_of(stretch: Stretch, most: int, **given: Any) -> tuple[Records, ctypes.Structure]:
-    """Room for the records of up to `most` steps and their rows, and what C is given of it."""
-    ny, count = len(stretch.solver.y), len(stretch.times)
-    sizes = {"most": most, "STATES": ny, "count": count, "many": 0, "times": stretch.times}
-    return room(Records, **{**sizes, "rows": np.empty((count, ny)), **given})
+@dataclass(frozen=True, eq=False)
+class Method:
+    """The compiled steps of a method.
+
+    call     the function that makes them
+    memory   what determines its next step
+    counts   what it counts beside derivatives, by the names of records
+    wide     the number of terms of a step
+    between  the states in it
+    """
+
+    call: Any
+    memory: tuple[str, ...]
+    counts: tuple[str, ...]
+    wide: int
+    between: Between
 
 
-def stride(
-    kept: Records,
-    records: ctypes.Structure,
-    memory: Sequence[str],
-    usual: bool,
-    counts: Mapping[str, NDArray[np.int64]],
-    **more: Any,
-) -> Stride:
-    """The steps in records that C has made."""
+class _Checks(ctypes.Structure):
+    """`Checks` of `templates/c/checks.c.jinja`, without what C begins with."""
+
+    _fields_ = (
+        *((name, _POINTER) for name in ("system", "run", "watch", "found")),
+        *(("clear", _REAL), ("only_whole", _WHOLE)),
+        *((name, _POINTER) for name in ("margins", "switched", "values", "switches")),
+        ("switching_calls", _WHOLE),
+        *((name, _POINTER) for name in ("by", "at", "y", "raw")),
+        *((name, _WHOLE) for name in ("sound", "is_event")),
+    )
+
+
+def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
+    """Steps of a method for a mechanism."""
+    solver, most, touched = stretch.solver, stretch.most, stretch.touched
+    watched, held, ny = stretch.watched, stretch.constrained, len(solver.y)
+    seen = _Checked.of(watched, ny)
+    is_held = touched is not None and touched.now.holds.any()
+    kept, records = _records(method, stretch)
+    switched, values = np.empty(most), np.empty((most, seen.watch.many))
+    switches, margins = np.zeros(most, np.int64), made_margins(held, most)
+    system = of.holding(ny, held, touched)
+    bounds = stretch.atol, stretch.rtol, stretch.longest, stretch.until
+    run = filled(Bounds(*bounds, stretch.dense, stretch.reaches))
+    at = filled(Progress(solver.t, length=float(solver.h_abs)))
+    checks = _Checks(
+        *map(ctypes.addressof, (system, run, *seen[2:])),
+        *(watched.clear if watched else math.inf, stretch.only_whole),
+        *map(address, (margins[1:], switched, values, switches)),
+    )
+    slope = getattr(solver, "f", solver.y)
+    begun = Start(*map(np.ascontiguousarray, (solver.y, slope, solver.lost)))
+    start = filled(begun)
+    method.call.restype, method.call.argtypes = _WHOLE, [_POINTER] * 4
+    why = method.call(*map(ctypes.addressof, (checks, at, start, records)))
     take(kept, records)
     n = kept.made
+    counts = {name: getattr(kept, name) for name in ("derivatives", *method.counts)}
+    counts["switches"] = switches
+    if touched:
+        contact_runs.taken(touched, system.kept[-1])
+        counts |= touched.called_by(most)
+        if is_held:  # then Jacobians are differences of derivatives
+            counts["jacobians"] = np.zeros(most, np.int64)
     passed = int(kept.sampled[n - 1]) if n else 0  # not those of a step that was not made
     return Stride(
         kept.ends[:n],
         kept.states[:n],
-        {name: getattr(kept, MEMORY[name])[:n] for name in memory},
-        {name: values[:n] for name, values in {"derivatives": kept.derivatives, **counts}.items()},
+        {name: getattr(kept, MEMORY[name])[:n] for name in method.memory},
+        {name: so_far[:n] for name, so_far in counts.items()},
         kept.sampled[:n],
         kept.rows[:passed].copy(),  # the array for all rows to come is not kept with them
-        usual,
-        **more,
+        why != UNUSUAL,
+        why == EVENT,
+        switched[:n],
+        values[:n],
+        partial(_within, method.between, (solver.t, begun.state), kept) if stretch.dense else None,
+        margins[: n + 1] if held else None,
     )
+
+
+def _records(method: Method, stretch: Stretch) -> tuple[Records, ctypes.Structure]:
+    """Room for the records of steps and their rows, and what C is given of it."""
+    ny, count, most = len(stretch.solver.y), len(stretch.times), stretch.most
+    terms = {} if stretch.dense else {"terms": np.empty((0, ny))}
+    return room(
+        Records,
+        most=most,
+        STATES=ny,
+        count=count,
+        wide=method.wide,
+        **{"times": stretch.times, "rows": np.empty((count, ny)), **terms},
+    )
+
+
+class _Checked(NamedTuple):
+    """Room for the switching functions along steps and for the switches found, and both as C has
+    them.
+    """
+
+    watch: Watch
+    found: Switches
+    of_watch: ctypes.Structure
+    of_found: ctypes.Structure
+
+    @staticmethod
+    def of(watched: Watched | None, states: int) -> "_Checked":
+        """The room, with what is known of the functions."""
+        watch = _watch(watched, states)
+        found = branches.switches(states, last=watched.switched if watched else -math.inf)
+        return _Checked(watch, found, filled(watch), filled(found))
+
+
+def _watch(watched: Watched | None, states: int) -> Watch:
+    """Room for the switching functions along steps, and what is known of them."""
+    if not (watched and watched.ends):
+        return branches.watch(0, states)
+    (earlier, before), (here, first) = watched.ends
+    made = branches.watch(len(first), states, watched.angles, watched.timed)
+    made.earlier, made.before[:], made.here, made.first[:] = earlier, before, here, first
+    return made
+
+
+def _within(
+    between: Between, begun: tuple[float, Array], kept: Records, i: int, time: float
+) -> Array:
+    """The state at a time in step number i of those that begin at a time and a state."""
+    start, first = (float(kept.ends[i - 1]), kept.states[i - 1]) if i else begun
+    terms = kept.terms[kept.wide * i : kept.wide * (i + 1)]
+    return between(start, float(kept.last_lengths[i]), first, terms, time)

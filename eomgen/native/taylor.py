@@ -12,20 +12,22 @@ from eomgen.base.templating import render
 from eomgen.codegen.backends import c
 from eomgen.codegen.interface import Interface
 from eomgen.codegen.series import recurrences_of, series_functions
-from eomgen.engine.adaptive import UNUSUAL, Bounds, Progress, Start
-from eomgen.engine.taylor import Terms, convolved, expanded
-from eomgen.native.strides import records_of, stride
+from eomgen.engine.taylor import HIGHEST, Terms, convolved, expanded, order_of
+from eomgen.native import contact_runs, strides
+from eomgen.native.mechanism import context as of_mechanism
+from eomgen.native.mechanism import unconstrained
 from eomgen.program.program import Program, live_steps
 from eomgen.program.tape import ARITHMETIC, FUNCTIONS, Stage
 from eomgen.program.taylor import Recurrences
 from eomgen.program.taylor_text import SeriesText, series_text
 from eomgen.run.compiled import Array, Series, Stretch, Stride
-from eomgen.run.integrators.taylor import HIGHEST, order_of
+from eomgen.run.integrators.taylor import between
 from eomgen.run.module import given_values
 from eomgen.scalars.floats import FloatScalars
-from eomgen.subset.structures import filled
 
 MAIN = "taylor.c"
+ENGINE = ("series_step", "expanded", "reach", "change_after", "order_of")
+"""What steps call of the engine, beside what those of all methods do."""
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
@@ -41,11 +43,13 @@ def sources(program: Program, interface: Interface) -> Mapping[str, str]:
         "states": len(interface.states),
         "series": text,
         "orders": HIGHEST + 1,
-        "prelude": C.prelude,
-        "engine": c_source([("taylor_steps", {}), ("normalised", {})]),
+        "engine": C.prelude + c_source([*((name, {}) for name in ENGINE), *strides.ROOTS]),
+        **of_mechanism(),
+        **contact_runs.values(0, 0),
+        "equal": False,
+        "adaptive": True,
         "convolved": c_source([("convolved", {})], VECTORS),
-        "functions": series_functions(text, by_four),
-        "quaternions": interface.quaternions,
+        "of_series": series_functions(text, by_four),
     }
     return {MAIN: render(c.TEMPLATES, "taylor.c.jinja", context)}
 
@@ -126,10 +130,9 @@ class CompiledTaylor:
         values = fixed_values(recurrences_of(program, interface), module, *given)
         self._fixed, self._states = np.array([*values.values(), 0.0]), len(interface.states)
         self._at = self._fixed.ctypes.data
-        self._series, self._steps = library.series, library.steps
+        self._series, self._steps = library.series, library.adaptive
         self._series.argtypes = [_POINTER, _REAL, _POINTER, _WHOLE, _POINTER]
-        self._steps.argtypes = [*[_POINTER] * 2, _WHOLE, *[_POINTER] * 3]
-        self._steps.restype = _WHOLE
+        self._mechanism = unconstrained(interface.quaternions, self._fixed)
 
     def series(self, t: float, y: Array, order: int) -> Array:
         """The Taylor coefficients (order + 1, ny) from the state y at t on."""
@@ -138,20 +141,9 @@ class CompiledTaylor:
         return rows
 
     def steps(self, stretch: Stretch) -> Stride:
-        """Steps. None are made if they must be checked or keep constraints, or if states within
-        them are wanted.
-        """
-        checked = stretch.watched or stretch.constrained or stretch.touched
-        most = 0 if stretch.dense or checked else stretch.most
-        ny, solver = self._states, stretch.solver
-        none = np.empty((0, ny))
-        kept, records = records_of(stretch, most, slopes=none, terms=none)
-        run = filled(Bounds(stretch.atol, stretch.rtol, stretch.longest, stretch.until))
-        at = filled(Progress(solver.t))
-        begun = Start(*map(np.ascontiguousarray, (solver.y, none, solver.lost)))
-        start = filled(begun)
-        why = self._steps(
-            *(self._at, ctypes.addressof(run), order_of(stretch.rtol)),
-            *map(ctypes.addressof, (at, start, records)),
-        )
-        return stride(kept, records, ("h_abs", "lost"), why != UNUSUAL, {})
+        """Steps. None are made if they must be checked or keep constraints."""
+        if stretch.watched or stretch.constrained or stretch.touched:
+            stretch = replace(stretch, most=0)
+        wide = order_of(stretch.rtol) + 1
+        method = strides.Method(self._steps, ("h_abs", "lost"), (), wide, between)
+        return strides.steps(method, self._mechanism, stretch)

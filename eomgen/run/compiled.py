@@ -25,14 +25,12 @@ class Constrained:
     """What steps that keep constraints are given of these; see `run.projection`.
 
     sizes          (nc,), size of each residual
-    quaternions    indices of the components of each unit quaternion among the states
     before, after  (nc,), the largest residuals so far before and after projection, which the steps
                    update
     margins        the ends of the last two steps, s, and the least margins there
     """
 
     sizes: Array
-    quaternions: Sequence[tuple[int, int, int, int]]
     before: Array
     after: Array
     margins: tuple[tuple[float, float], tuple[float, float]]
@@ -60,6 +58,7 @@ class Stride:
     sampled      (m,), number of rows passed so far
     rows         (r, ny), the states at the times of these rows
     usual        whether the next step may be made so, too
+    event        whether rigid contacts close or open at the end of the last one, which is a part
     switched     (m,), the time of the last switch so far, s, and
     values       (m, ns), the switching functions at their ends, if there are some of the state
     within       gives the state at a time in the step of a number; None if that was not asked for
@@ -74,6 +73,7 @@ class Stride:
     sampled: NDArray[np.int64]
     rows: Array
     usual: bool
+    event: bool = False
     switched: Array = field(default_factory=partial(np.empty, 0))
     values: Array = field(default_factory=partial(np.empty, 0))
     within: Callable[[int, float], Array] | None = None
@@ -112,7 +112,8 @@ class Stretch:
     dense       whether states within the steps are wanted
     times       ascending times of the rows wanted, after t
     watched     given to make no step that may pass over a branch of the derivative
-    touched     given to make no step in which a rigid contact closes or opens
+    touched     given for steps that end where rigid contacts close or open
+    only_whole  whether no step may end so, but before that
     constrained the constraints to keep, if there are any
     """
 
@@ -127,6 +128,7 @@ class Stretch:
     times: Array
     watched: Watched | None
     touched: "Touched | None"
+    only_whole: bool
     constrained: Constrained | None
 
 
@@ -171,8 +173,8 @@ class Touched:
         return dict(zip(CALLS, (self.calls[n + 1] - self.calls[n]).tolist(), strict=True))
 
     def called_by(self, n: int) -> dict[str, Whole]:
-        """The calls of what contacts are checked with, up to the ends of n steps."""
-        return dict(zip(CALLS[1:], self.calls[1 : n + 1, 1:].T, strict=True))
+        """The calls up to the ends of n steps."""
+        return dict(zip(CALLS, self.calls[1 : n + 1].T, strict=True))
 
     def take(self, made: "Touched") -> None:
         """Take what is known of the contacts after an event."""

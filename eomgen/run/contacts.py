@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eomgen.engine.contact_runs import NOT_FOUND, NOT_KEPT
+from eomgen.engine.contact_runs import CLOSED, NOT_FOUND, NOT_KEPT, OPENED, WHOLE, taken
 from eomgen.engine.contacts import Place, Touching, deepest, press
 from eomgen.engine.differences import differences
+from eomgen.engine.roots import Search
+from eomgen.run.compiled import Touched
 from eomgen.run.failure import StepFailure
 from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.subset.structures import with_room
@@ -109,6 +111,18 @@ class Within:
         if s <= 0:
             return self.y
         return self.last if s >= self.end - self.t else self.between(self.t + s)
+
+
+def meets(met: Touched, step: Within, share: float) -> bool:
+    """Go to the end of a step that has been made, or to the first event in it, see
+    `engine.contact_runs.taken`. Answers whether there is one; then `met` says which.
+
+    Raises `StepFailure` if that is not found.
+    """
+    why = taken(met.law, step, met.now, Search(), met.at, step.end, share)
+    if why not in (WHOLE, CLOSED, OPENED):
+        raise not_taken(met.names, met.now, why, (step.t, step.end), met.at)
+    return why != WHOLE
 
 
 def not_taken(

@@ -19,8 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eomgen.engine.contact_runs import CLOSED, OPENED, WHOLE, taken
-from eomgen.engine.contact_times import SHARE
 from eomgen.engine.contacts import (
     ENDLESS,
     NO_FORCES,
@@ -31,16 +29,13 @@ from eomgen.engine.contacts import (
     strike,
     weigh,
 )
-from eomgen.engine.roots import Search
 from eomgen.run.compiled import Strikes, Touched
 from eomgen.run.contacts import (
     Holding,
     Rate,
-    Within,
     check_depth,
     in_sizes,
     no_forces,
-    not_taken,
     nothing_held,
     restrained,
     sizes_of,
@@ -110,29 +105,23 @@ def advances(
         smooth = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
         steps = stepper.begin(smooth, now.t, made, resume, touched)
-        resume = None
+        resume, start = None, now.t
         for advance in steps:
             made += advance.steps
             if made > max_steps:
                 raise StepFailure(f"{max_steps} steps did not suffice", "take a shorter --t-end")
             step = advance._replace(contact_powers=powers)
-            start, why = now.t, WHOLE
-            if advance.checked:
-                now.t, now.y = step.t, step.y
-                why = CLOSED if now.closed.any() else OPENED if now.opened.any() else WHOLE
-            else:
-                within = Within(now.t, now.y, step.y, step.t, step.within)
-                why = taken(contacts, within, held, Search(), now, step.t, SHARE)
-            if why not in (WHOLE, CLOSED, OPENED):
-                raise not_taken(contacts.names, held, why, (start, step.t), now)
-            if why == WHOLE:
+            now.t, now.y = step.t, step.y
+            closes, opens = now.closed.any(), now.opened.any()
+            if not (closes or opens):
                 yield step._replace(resume=_resume(step, held, begun))
+                start = now.t
                 continue
             if now.t > start:
-                yield _part(step, now, keep=why == CLOSED)
-            elif step.checked:  # for what it counts
-                yield step._replace(samples=[], steps=0, resume=None)
-            if why == OPENED:
+                yield _part(step, keep=bool(closes))
+            else:  # for what it counts
+                yield step._replace(samples=[], steps=0)
+            if opens:
                 yield _opened(contacts, smooth, now)
             break
 
@@ -228,9 +217,9 @@ def _opened(contacts: Contacts, problem: Problem, now: Place) -> Advance:
     return Advance(now.t, y, [], problem, lambda _: y, steps=0, events=events)
 
 
-def _part(step: Advance, now: Place, keep: bool) -> Advance:
+def _part(step: Advance, keep: bool) -> Advance:
     """The part of a step up to an event; with `keep` the state there is a sample."""
-    t, y = now.t, now.y
-    samples = [sample for sample in step.samples if sample[0] < t or (sample[0] == t and not keep)]
-    rows = [*samples, (t, y)] if keep else samples
-    return step._replace(t=t, y=y, samples=rows, resume=None)
+    if not keep:
+        return step
+    samples = [sample for sample in step.samples if sample[0] < step.t]
+    return step._replace(samples=[*samples, (step.t, step.y)])

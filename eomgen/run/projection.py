@@ -171,8 +171,7 @@ def constrained_by(projection: Projection | None) -> Constrained | None:
     largest, seen = projection.violations, projection.seen
     assert largest and seen
     margins = (seen.start, seen.before), (seen.t, seen.here)
-    given = projection.sizes, projection.quaternions
-    return Constrained(*given, largest.before, largest.after, margins)
+    return Constrained(projection.sizes, largest.before, largest.after, margins)
 
 
 def jacobian_of(module: Any) -> Callable[..., FloatArray]:

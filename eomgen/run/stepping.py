@@ -175,7 +175,7 @@ def _adaptive_steps(asked: Asked, method: Adaptive, problem: Problem, remark: Re
 
     kept = {**_settings(asked, None), **numbers(longest=longest, unseen=unseen)}
     begin = partial(adaptive.advances, settings)
-    if compiled and not asked.powers and method.compiled == "DOP853":
+    if compiled and not asked.powers and method.compiled:
         return Steps(begin, rows, kept, compiled.strikes)
     return Steps(begin, rows, kept)
 

@@ -17,31 +17,11 @@ from eomgen.subset.unrolled import unrolled_functions
 
 
 class Waves:
-    """A system of states that drive one another, and checks that let all pass."""
+    """A system of states that drive one another."""
 
     def derivative(self, t: float, y: Any) -> Any:
         """The rates."""
         return 0.7 * np.roll(y, -1) - 0.1 * y * y * y + 0.3 * t
-
-    def begins(self) -> None:
-        """Nothing is to be done."""
-
-    def are_usual(self, k: Any, first: int, past: int) -> bool:
-        """They are."""
-        return True
-
-    def placed(self, t: float, y: Any) -> bool:
-        """A place that differs a little."""
-        y[0] *= 1.0 - 1e-9
-        return True
-
-    def seen(self, at: Progress, y: Any, raw: Any, last: Any, k: Any, terms: Any) -> int:
-        """Far states are not for these steps."""
-        return 2 if last[0] > 3.0 else 0
-
-    def keeps(self, at: Progress, last: Any) -> bool:
-        """It is kept."""
-        return True
 
 
 @pytest.mark.parametrize("n", [1, 2, 12])

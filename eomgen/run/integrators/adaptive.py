@@ -42,30 +42,30 @@ def advances(
     repeated up to there: see `eomgen.run.branches`.
 
     made     number of earlier steps, which count towards the most that are allowed
-    touched  what is known of rigid contacts; gaps below 0 end compiled steps
+    touched  what is known of rigid contacts; the steps end with the part of one up to an event, of
+             which `touched` says when the part is yielded
 
     Raises `StepFailure` if the method fails, or after the most steps allowed.
     """
     method, bounds = settings.method, settings.bounds
-    stepper = Stepper(settings, problem)
+    stepper = Stepper(settings, problem, touched)
     stepper.begin(t_start, resume)
     compiled = None
     if settings.steps and method.compiled:
-        compiled = Strides(stepper, settings.steps, touched)
+        compiled = Strides(stepper, settings.steps)
     left, here = bounds.most - made, 0
     while here < left:
         _check_pace(problem, stepper, t_start, here, left)
         most = min(m for m in (left, _CHECK_STIFFNESS, _CHECK_PACE) if m > here) - here
         most = min(most, stepper.shaken.left) if stepper.shaken else most
-        use = None if touched and touched.now.slack.any() else compiled
-        portion = (use.made(most) if use else None) or stepper.made()
+        portion = (compiled.made(most) if compiled else None) or stepper.made()
         if portion is None:  # the step must be repeated
             here += 1
             continue
         yield from portion.advances(settings.each)
         n = len(portion.ends)
         here += n
-        if stepper.ended:
+        if stepper.ended or portion.met:
             return
         stepper.prepare_next(float(portion.ends[-1]), portion.states[-1], n)
     raise StepFailure(f"{bounds.most} steps did not suffice", method.remedy)

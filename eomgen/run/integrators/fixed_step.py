@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from eomgen.engine.adaptive import MADE, UNUSUAL
-from eomgen.engine.contact_runs import CLOSED, OPENED, WHOLE, taken
-from eomgen.engine.equal_steps import EVENT, Course, Kept, equal_steps
+from eomgen.engine.adaptive import EVENT, MADE, UNUSUAL
+from eomgen.engine.equal_steps import Course, Kept, equal_steps
 from eomgen.engine.explicit import Step
-from eomgen.engine.roots import Search
 from eomgen.engine.sums import Sum
 from eomgen.run.calls import Calls, Count
-from eomgen.run.compiled import CALLS, EqualSteps, Touched
-from eomgen.run.contacts import Within, not_taken
+from eomgen.run.compiled import EqualSteps, Touched
+from eomgen.run.contacts import Within, meets
 from eomgen.run.failure import NOT_FINITE, StepFailure
 from eomgen.run.integrators.interface import Advance, Change, FixedStep, Resume
 from eomgen.run.integrators.portions import Portion, Size
@@ -142,37 +140,35 @@ def advances(
         given = t, Sum(y, lost), course, kept
         own.touched = met = touched and touched.copy(t, y, most)
         why = place.make(*given, held, met) if place else own.make(*given, i + 1 == steps)
-        n = kept.made - (why == EVENT)  # whole steps
+        n, is_part = kept.made, int(why == EVENT)
         if touched and met:
             touched.now.slack[:] = met.slack
         margins = np.concatenate(([held.margins[1][1]], kept.margins[:n])) if held else None
-        if n and problem.solved_loops:
-            margins = problem.solved_loops.passed(t, y, kept.ends[:n], kept.states[:n])
+        if n > is_part and problem.solved_loops:
+            whole = slice(n - is_part)
+            margins = problem.solved_loops.passed(t, y, kept.ends[whole], kept.states[whole])
             near = margins is None  # perhaps to a singular position, for which each is looked at
             n = 0 if not size.fits(not near) and place else n
         usual = n > 0 and (not place or why == MADE)
         if n:
             if place:
                 own.passed(n, place.calls, course)
-            counts = _counts(place, kept, n, met) if place else own.counts_of(n)
+            is_held = touched is not None and bool(touched.now.holds.any())
+            counts = _counts(place, kept, n, met, is_held) if place else own.counts_of(n)
             within = partial(_within, change, problem, (t, y), kept)
             resumes = partial(_continuation, kept, mark) if mark is not None else None
-            rows = _rows(kept, n, i, grid)
-            of = kept.ends[:n], kept.states[:n], *rows, counts, within, resumes, margins
-            yield from Portion(problem, t, *of, touched is not None).advances(each or near)
+            # The end of a part is a row if that of the whole step would be, and is there.
+            is_row = not is_part or grid.is_row(i + n, kept.ends[n - 1])
+            rows = _rows(kept, (n, n - (not is_row)), i, grid)
+            parted = partial(touched.take, met) if touched and met and is_part else None
+            of = kept.ends[:n], kept.states[:n], *rows, counts, within, resumes, margins, parted
+            yield from Portion(problem, t, *of).advances(each or near)
+            if is_part:
+                return
             i, regular, own_most = i + n, True, min(2 * own_most, ahead)
             t, y, lost = float(kept.ends[n - 1]), kept.states[n - 1], kept.losses[n - 1]
             if shaken:
                 lost = lost + shaken.error(t, y, length, n)
-        if touched and met and why == EVENT:
-            touched.take(met)
-            if place:
-                own.passed(1, place.calls, course)
-            else:
-                own.count_after(n)
-            part = _part(change, problem, (t, y), kept, n, grid.is_row(i + 1, kept.ends[n]))
-            yield part._replace(**(met.called(n) if place else {}))
-            return
         if not place and why != MADE:
             own.count_failed()
             raise own.failure or StepFailure(NOT_FINITE, method.remedy)
@@ -185,43 +181,34 @@ def _room(most: int, states: int) -> Kept:
     return Kept(0, most, ends, found, losses, iterations, margins)
 
 
-def _rows(kept: Kept, n: int, made: int, grid: Grid) -> tuple[Any, Any]:
-    """The rows in the first n of these steps, after `made` earlier ones; and the numbers of rows so
-    far.
+def _rows(kept: Kept, many: tuple[int, int], made: int, grid: Grid) -> tuple[Any, Any]:
+    """The rows in these steps, after `made` earlier ones; and the numbers of rows so far. `many`
+    are all of them, and those that may be rows.
     """
-    every = grid.every
+    every, (n, last) = grid.every, many
     if made + n == grid.steps:  # the last one, alone
-        return [(grid.t_end, kept.states[0])], [1]
-    hit = slice(-(made + 1) % every, n, every)
+        return [(grid.t_end, kept.states[0])][:last], [last]
+    hit = slice(-(made + 1) % every, last, every)
     if n <= AHEAD:
         rows = list(zip(kept.ends[hit].tolist(), kept.states[hit].copy(), strict=True))
-        return rows, [(made + k) // every - made // every for k in range(1, n + 1)]
+        until = [min(k, last) for k in range(1, n + 1)]
+        return rows, [(made + k) // every - made // every for k in until]
     # No views, which keep all of the states.
     found = Rows(kept.ends[hit].copy(), kept.states[hit].copy())
-    return found, np.arange(made + 1, made + n + 1) // every - made // every
+    so_far = np.minimum(np.arange(1, n + 1), last)
+    return found, (made + so_far) // every - made // every
 
 
-def _part(
-    change: Change,
-    problem: Problem,
-    start: tuple[float, FloatArray],
-    kept: Kept,
-    n: int,
-    rows: bool,
-) -> Advance:
-    """The part of step n of these, up to an event; its end is a row if the whole step's would be
-    that and is there.
+def _counts(
+    place: EqualSteps, kept: Kept, n: int, met: Touched | None, is_held: bool
+) -> dict[str, Any]:
+    """The derivatives and Jacobians so far in the first n of these steps. While contacts are held
+    Jacobians are differences of derivatives.
     """
-    t, y = float(kept.ends[n]), kept.states[n]
-    part = Kept(1, 1, kept.ends[n:], kept.states[n:], *(kept.losses, kept.iterations, kept.margins))
-    within = partial(_within, change, problem, start, part, 0)
-    return Advance(t, y, [(t, y)] if rows else [], problem, within, checked=True)
-
-
-def _counts(place: EqualSteps, kept: Kept, n: int, met: Touched | None) -> dict[str, Any]:
-    """The derivatives and Jacobians so far in the first n of these steps."""
     if met:
-        return dict(zip(CALLS, met.calls[1 : n + 1].T, strict=True))
+        counts = met.called_by(n)
+        solved = place.iterates and not is_held
+        return {**counts, "jacobians": counts["derivatives"]} if solved else counts
     if not place.iterates:
         return {"derivatives": place.calls * np.arange(1, n + 1)}
     made = place.calls * np.cumsum(kept.iterations[:n])
@@ -309,11 +296,6 @@ class InPython:
         """Those of the first n of the last steps."""
         return {name: calls[:n] for name, calls in self.counts.items()}
 
-    def count_after(self, n: int) -> None:
-        """Count the calls of the last steps after the first n."""
-        for calls, count in self._both:
-            count.calls += calls[-1] - (calls[n - 1] if n else 0)
-
     def passed(self, steps: int, calls: int, course: Course) -> None:
         """Take account of compiled steps, of `calls` derivatives each."""
         if self._checked:
@@ -362,12 +344,9 @@ class InPython:
             return MADE
         start, whole = (t, met.at.y), float(end[0])
         within = Within(*start, y.copy(), whole, partial(self._within, start))
-        why = taken(met.law, within, met.now, Search(), met.at, whole, 1.0)
-        if why == WHOLE:
+        if not meets(met, within, 1.0):
             met.slack[:] = met.now.slack
             return MADE
-        if why not in (CLOSED, OPENED):
-            raise not_taken(met.names, met.now, why, (t, whole), met.at)
         y[:], end[0] = met.at.y, met.at.t
         return EVENT
 

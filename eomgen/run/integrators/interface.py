@@ -130,7 +130,6 @@ class Advance(NamedTuple):
     factorisations  LU factorisations in the step, as far as the method counts them
     capped   number of steps that have the greatest length allowed
     cut      number of longer attempts that passed over a branch of the derivative
-    checked  whether compiled code has checked that no rigid contact closes
     struck   number of the contact of an impact
     events   changes of contacts at its end
     contact_powers  (t, y) -> (nc + nd,), powers of the contacts and of the drives during the step,
@@ -154,7 +153,6 @@ class Advance(NamedTuple):
     held: int = 0
     capped: int = 0
     cut: int = 0
-    checked: bool = False
     resume: Callable[[], Resume] | None = None
     margins: Margins | None = None
     struck: int | None = None

@@ -34,7 +34,8 @@ class Portion(NamedTuple):
     resume    i -> what a later run needs to continue after step i; None if it cannot
     margins   (m + 1,), the least margins of constraints at the start and at their ends; None if
               these are not known
-    checked   as in `Advance`
+    met       called before the last step is given, which is the part of one up to an event of rigid
+              contacts; None if there is none
     totals    what a single step has counted, in the order of `COUNTED`, in place of `counts`
     """
 
@@ -48,24 +49,30 @@ class Portion(NamedTuple):
     within: Callable[[int, float], FloatArray]
     resume: Callable[[int], Resume] | None
     margins: FloatArray | None = None
-    checked: bool = False
+    met: Callable[[], None] | None = None
     totals: Sequence[int] = ()
 
     def advances(self, each: bool) -> Iterator[Advance]:
-        """The steps as one `Advance`, or as one for each."""
+        """The steps as one `Advance`, or as one for each; the part of one is apart."""
         m = len(self.ends)
         if self.totals:
-            yield self._advance(0, self.rows, 1, self.totals)
+            yield self._last(self._advance(0, self.rows, 1, self.totals))
             return
-        counts = [self.counts.get(name) for name in COUNTED]
-        if m == 1 or not each:
-            made = [0 if so_far is None else int(so_far[-1]) for so_far in counts]
-            yield self._advance(m - 1, self.rows, m, made)
-            return
-        row, parts = 0, (_differences(so_far, m) for so_far in (self.sampled, *counts))
-        for i, (rows, *made) in enumerate(zip(*parts, strict=True)):
-            yield self._advance(i, self.rows[row : row + rows], 1, made)
-            row += rows
+        marks = range(m) if each else range(max(0, m - 1 - (self.met is not None)), m)
+        sums = (self.sampled, *(self.counts.get(name) for name in COUNTED))
+        row, before = 0, -1
+        parts = (_differences(so_far, marks) for so_far in sums)
+        for i, (rows, *made) in zip(marks, zip(*parts, strict=True), strict=True):
+            advance = self._advance(i, self.rows[row : row + rows], i - before, made)
+            yield self._last(advance) if i == m - 1 else advance
+            row, before = row + rows, i
+
+    def _last(self, advance: Advance) -> Advance:
+        """The last step, if that is the part of one, as such."""
+        if self.met is None:
+            return advance
+        self.met()
+        return advance._replace(resume=None, margins=None)
 
     def _advance(
         self, i: int, rows: Rows | list[Row], steps: int, counts: Sequence[int]
@@ -74,7 +81,7 @@ class Portion(NamedTuple):
         made_of = float(self.ends[i]), self.states[i], rows, self.problem
         resume = partial(self.resume, i) if self.resume else None
         margins = self._margins(i) if self.margins is not None else None
-        how = partial(self.within, i), steps, *counts, self.checked, resume, margins
+        how = partial(self.within, i), steps, *counts, resume, margins
         # By keywords this takes several times as long.
         return Advance._make((*made_of, *how, None, (), None))
 
@@ -96,9 +103,9 @@ class Size:
         return passes
 
 
-def _differences(sums: Any, m: int) -> list[int]:
-    """What each of m steps adds to these sums, if there are some."""
+def _differences(sums: Any, marks: range) -> list[int]:
+    """What is added to these sums from each mark to the next, if there are some."""
     if sums is None:
-        return [0] * m
-    values = sums if isinstance(sums, list) else sums.tolist()
+        return [0] * len(marks)
+    values = sums[marks.start :] if isinstance(sums, list) else sums[marks.start :].tolist()
     return list(map(sub, values, [0, *values]))

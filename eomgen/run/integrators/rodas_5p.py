@@ -2,6 +2,7 @@
 `eomgen.engine.rosenbrock`.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -53,16 +54,22 @@ class Rodas5P(Solver):
 
     def dense_output(self) -> States:
         """See `Solver`."""
-        (h, y), last, start = self._step, self.y.copy(), self.t_old
-        first, second, third = self._run.dense.copy()
+        (h, y), last = self._step, self.y.copy()
+        terms = np.vstack((self._run.dense, last))
+        return partial(between, self.t_old, h, y, terms)
 
-        def states(times: FloatArray | float) -> FloatArray:
-            x = (np.asarray(times)[..., None] - start) / h
-            back = 1 - x
-            bend = back * (first + x * (second + x * third))
-            return np.asarray(back * y + x * (last + bend)).T
 
-        return states
+def between(
+    start: float, h: float, y: FloatArray, terms: FloatArray, times: FloatArray | float
+) -> FloatArray:
+    """The states at times within a step of length h from `y` at `start`, from the terms (4, ny) of
+    its interpolant, of which the last is the state at its end.
+    """
+    first, second, third, last = terms
+    x = (np.asarray(times)[..., None] - start) / h
+    back = 1 - x
+    bend = back * (first + x * (second + x * third))
+    return np.asarray(back * y + x * (last + bend)).T
 
 
 def rodas(n: int, bounds: Bounds, positions: int, timed: bool) -> Rodas:

@@ -1,14 +1,16 @@
 """The solver of a run by an adaptive method: its steps in Python, and what all steps share."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
+from eomgen.engine.contact_times import SHARE
 from eomgen.run.branches import BranchMonitor, Retry, Step
-from eomgen.run.compiled import Steps
+from eomgen.run.compiled import Steps, Touched
+from eomgen.run.contacts import Within, meets
 from eomgen.run.failure import NOT_FINITE, StepFailure
 from eomgen.run.integrators.interface import Adaptive, Remark, Resume, Tolerances
 from eomgen.run.integrators.portions import Portion
@@ -48,8 +50,9 @@ class Stepper:
     so far.
     """
 
-    def __init__(self, settings: Settings, problem: Problem) -> None:
+    def __init__(self, settings: Settings, problem: Problem, touched: Touched | None) -> None:
         self.settings, self.problem, self.sampled = settings, problem, 0
+        self.touched = touched
         method, bounds = self.method, self.bounds = settings.method, settings.bounds
         self.t_end, self.times = settings.t_end, settings.times
         self.longest, self.branches = bounds.longest, None
@@ -122,6 +125,9 @@ class Stepper:
         if retry:
             self._cut += retry.seen
             return None
+        met, touched = None, self.touched
+        if touched and self._meets(touched, step):
+            met, step = _nothing, replace(step, end=touched.at.t, last=touched.at.y)
         passed = int(np.searchsorted(self.times, step.end, side="right"))
         rows = self._rows(step, self.times[self.sampled : passed])
         expanded = getattr(self.solver, "expanded", 0)
@@ -130,9 +136,16 @@ class Stepper:
         self.sampled = passed
         return Portion(
             *(self.problem, step.start, [step.end], [step.last], rows, (), _NONE),
-            *(partial(_between, self.problem, step), self._resume(step), None, False),
+            *(partial(_between, self.problem, step), self._resume(step), None, met),
             (expanded, 0, factorisations, 0, 0, 0, 0 if capped is None else int(capped[0]), cut),
         )
+
+    def _meets(self, touched: Touched, step: Step) -> bool:
+        """Whether a rigid contact closes or opens in a step."""
+        touched.at.t, touched.at.y = step.start, step.first
+        between = partial(_between, self.problem, step, 0)
+        within = Within(step.start, step.first, step.last, step.end, between)
+        return meets(touched, within, SHARE)
 
     def counted(self) -> tuple[int, int]:
         """The attempts that passed over a branch, and the factorisations, since this was asked."""
@@ -246,6 +259,10 @@ def continuation(t: float, y: FloatArray, memory: Mapping[str, Any]) -> Resume:
     """What a later run needs to continue from the state `y` at t."""
     arrays = {name: np.array(value, dtype=np.float64) for name, value in memory.items()}
     return {"t": np.array(t), "y": y, **arrays}
+
+
+def _nothing() -> None:
+    """What is to be known of an event in a step of Python is known."""
 
 
 def _restored(value: Any, kind: type) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from eomgen.run.branches import BranchMonitor
-from eomgen.run.compiled import Array, Steps, Stretch, Stride, Touched, Watched
+from eomgen.run.compiled import Array, Steps, Stretch, Stride, Watched
 from eomgen.run.integrators.interface import Resume
 from eomgen.run.integrators.portions import Portion, Size
 from eomgen.run.integrators.stepper import Stepper, continuation
@@ -26,7 +26,6 @@ class Strides:
         self,
         stepper: Stepper,
         steps: Callable[[str, tuple[str, ...]], Steps | None],
-        touched: Touched | None,
     ) -> None:
         problem = stepper.problem
         switching, contacts, self._looked = (
@@ -37,7 +36,6 @@ class Strides:
         self._stepper, self._steps = stepper, steps
         self._dense = stepper.settings.dense or self._looked is not None
         self._atol = np.zeros(problem.initial.shape) + stepper.bounds.atol
-        self._touched = touched
         self._needed = (
             *(OF_STATE if switching and switching.of_state else ()),
             *(OF_CONTACTS if contacts else ()),
@@ -66,8 +64,9 @@ class Strides:
         along = solver, *until, bounds.rtol, self._atol, stepper.longest, most, self._dense
         held = constrained_by(stepper.problem.projection)
         times = stepper.times[stepper.sampled :]
-        touched = self._touched and self._touched.copy(solver.t, solver.y, most)
-        stride = steps(Stretch(*along, times, watched, touched, held))
+        met = stepper.touched
+        touched = met and met.copy(solver.t, solver.y, most)
+        stride = steps(Stretch(*along, times, watched, touched, bool(features), held))
         if not len(stride.ends):
             return None
         if branches and features and not self._size.fits(_are_tame(branches, solver, stride)):
@@ -78,9 +77,12 @@ class Strides:
             if not self._size.fits(margins is not None):
                 return None
         self._usual = stride.usual
-        if self._touched and touched:
-            self._touched.now.slack[:] = touched.slack
-        return self._portion(stride, watched, margins)
+        if met and touched:
+            met.now.slack[:] = touched.slack
+        portion = self._portion(stride, watched, margins)
+        if stride.event and met and touched:
+            return portion._replace(met=partial(met.take, touched))
+        return portion
 
     def _portion(self, stride: Stride, watched: Watched | None, margins: Array | None) -> Portion:
         """These steps, at whose end the solver is put."""
@@ -117,7 +119,7 @@ class Strides:
             counts["factorisations"] = factorisations + stride.counts["factorisations"]
         stepper.sampled += int(stride.sampled[-1])
         of = ends, stride.states, rows, stride.sampled, counts
-        return Portion(stepper.problem, start, *of, within, resume, margins, True)
+        return Portion(stepper.problem, start, *of, within, resume, margins)
 
 
 def _are_tame(branches: BranchMonitor, solver: Any, stride: Stride) -> bool:

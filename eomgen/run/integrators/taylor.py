@@ -6,28 +6,20 @@ ours is higher.
 """
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from eomgen.engine.sums import round_off
-from eomgen.engine.taylor import change_after, reach
+from eomgen.engine.taylor import change_after, order_of, reach
 from eomgen.run.compiled import Series
 from eomgen.run.integrators.dormand_prince_8 import DormandPrince8
 from eomgen.run.integrators.interface import Adaptive
 from eomgen.run.integrators.solver import Solver, States
 from eomgen.run.problem import FloatArray
 
-HIGHEST = 24
-"""The highest order."""
 SMALLEST_RTOL = 1e-16
-
-
-def order_of(rtol: float) -> int:
-    """The order for a relative tolerance. Measured on pendulums of 2 and 10 links: the time for an
-    error is within a tenth of the least one.
-    """
-    return min(HIGHEST, max(8, math.ceil(5 - math.log(rtol) / 2)))
 
 
 class TaylorSeries(Solver):
@@ -80,14 +72,19 @@ class TaylorSeries(Solver):
     def dense_output(self) -> States:
         """See `Solver`."""
         start, terms = self._taken
+        return partial(between, start, self.t - start, terms[0], terms)
 
-        def states(times: FloatArray | float) -> FloatArray:
-            lengths: Any = (np.asarray(times) - start)[..., None]
-            change: Any = np.empty((*np.shape(times), terms.shape[1]))
-            change_after(lengths, self.order, terms, change)
-            return np.asarray(terms[0] + change).T
 
-        return states
+def between(
+    start: float, h: float, y: FloatArray, terms: FloatArray, times: FloatArray | float
+) -> FloatArray:
+    """The states at times within a step of length h from `y` at `start`, from the terms of the
+    series there.
+    """
+    lengths: Any = (np.asarray(times) - start)[..., None]
+    change: Any = np.empty((*np.shape(times), len(y)))
+    change_after(lengths, len(terms) - 1, terms, change)
+    return np.asarray(y + change).T
 
 
 class _Held(DormandPrince8):
