@@ -156,11 +156,10 @@ def _mujoco_run(tree: SpatialTree, q: np.ndarray, v: np.ndarray, u: Inputs) -> _
     mujoco.mj_resetData(model, data)
     data.qpos[made.q], data.qvel[made.v] = q, v
     data.qfrc_applied[made.v] = tree.torques(u)
-    if tree.push is not None:
-        k, at = made.bodies[tree.push[0]], tree.push[1]
+    for body, place, force in tree.push_forces(u):
+        k = made.bodies[body]
         mujoco.mj_kinematics(model, data)
-        arm, force = data.xmat[k].reshape(3, 3) @ at, tree.push_force(u)
-        data.xfrc_applied[k] = [*force, *np.cross(arm, force)]
+        data.xfrc_applied[k] = [*force, *np.cross(data.xmat[k].reshape(3, 3) @ place, force)]
     warnings: list[str] = []
     mujoco.set_mju_user_warning(warnings.append)  # in place of MUJOCO_LOG.TXT
     mujoco.mj_forward(model, data)
@@ -335,10 +334,9 @@ def pinocchio_accelerations(
                 v[linear] = rotation.T @ v[linear]
     pin.forwardKinematics(model, data, q)
     forces = [pin.Force.Zero() for _ in range(model.njoints)]
-    if tree.push is not None:
-        k, place = tree.push
-        at, frame = held[k]
-        force = data.oMi[at].rotation.T @ tree.push_force(u)
+    for body, place, push in tree.push_forces(u):
+        at, frame = held[body]
+        force = data.oMi[at].rotation.T @ push
         forces[at] = pin.Force(force, np.cross(frame.act(np.array(place)), force))
     if tree.loops:
         if not _depth_first(tree):

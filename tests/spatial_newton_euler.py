@@ -122,9 +122,8 @@ def solve(
         outside += [*weight, *_cross(moved.place, weight)]
     torques = tree.torques(u)
     power = float(torques @ v)
-    if tree.push is not None:
-        k, at = tree.push
-        arm, force = moving[k].axes @ at, tree.push_force(u)
+    for k, at, force in tree.push_forces(u):
+        arm = moving[k].axes @ at
         right[6 * k : 6 * k + 6] += [*force, *_cross(arm, force)]
         power += float(force @ (moving[k].velocity + _cross(moving[k].spin, arm)))
         outside += [*force, *_cross(moving[k].place + arm, force)]

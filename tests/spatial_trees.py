@@ -4,7 +4,7 @@ Nothing here imports eomgen. The judges (`spatial_newton_euler`, `judges`) read 
 reads the text; both are the same doubles. SI units and radians, but for `orientation_deg`.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
@@ -76,10 +76,10 @@ class SpatialTree:
     """A mechanism in plain numbers, parents before children.
 
     Gravity acts along -y in the plane and along -z in space. `motor` is the body whose joint is
-    driven by the input `drive` (-1: none), `push` the body and the point on it (body axes, from the
-    centre of mass) that the inputs push_x, push_y, push_z act on in world axes (None: none), and
-    `points` are (name, body, place on it). `parameters` are the values that eomgen knows by name.
-    `loops` hold bodies that the joints of the tree carry.
+    driven by the input `drive` (-1: none). `pushes` are the names, the bodies and the points on
+    them (body axes, from the centre of mass) that the inputs NAME_x, NAME_y, NAME_z act on in world
+    axes, and `points` are (name, body, place on it). `parameters` are the values that eomgen knows
+    by name. `loops` hold bodies that the joints of the tree carry.
     """
 
     name: str
@@ -87,10 +87,11 @@ class SpatialTree:
     bodies: tuple[TreeBody, ...]
     gravity: float
     motor: int
-    push: tuple[int, Vector] | None
+    pushes: tuple[tuple[str, int, Vector], ...]
     points: tuple[tuple[str, int, Vector], ...]
     parameters: Mapping[str, float]
     loops: tuple[Loop, ...] = ()
+    drive: str = "drive"
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -111,8 +112,9 @@ class SpatialTree:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs."""
-        push = () if self.push is None else tuple(f"push_{x}" for x in "xyz"[: self.dimensions])
-        return (("drive",) if self.motor >= 0 else ()) + push
+        axes = "xyz"[: self.dimensions]
+        push = tuple(f"{name}_{x}" for name, _, _ in self.pushes for x in axes)
+        return ((self.drive,) if self.motor >= 0 else ()) + push
 
     def q_slices(self) -> list[slice]:
         """Where each body's coordinates lie in q."""
@@ -132,12 +134,15 @@ class SpatialTree:
         """What the motor puts on the velocities, in the order of v."""
         torques = np.zeros(len(self.velocities))
         if self.motor >= 0:
-            torques[self.v_slices()[self.motor]] = (u or {}).get("drive", 0.0)
+            torques[self.v_slices()[self.motor]] = (u or {}).get(self.drive, 0.0)
         return torques
 
-    def push_force(self, u: Mapping[str, float] | None) -> np.ndarray:
-        """The external force in world axes, three components."""
-        return np.array([(u or {}).get(f"push_{x}", 0.0) for x in "xyz"])
+    def push_forces(
+        self, u: Mapping[str, float] | None
+    ) -> Iterator[tuple[int, Vector, np.ndarray]]:
+        """The bodies that are pushed, where, and the force in world axes, three components."""
+        for name, body, place in self.pushes:
+            yield body, place, np.array([(u or {}).get(f"{name}_{x}", 0.0) for x in "xyz"])
 
     def places(self, states: Sequence[str]) -> list[int]:
         """Where a module's STATES hold q and then v: `y[places]` is q, v."""
@@ -186,8 +191,10 @@ LEAST_ARM = 0.15
 class _Writer:
     """Draws quantities, and remembers the parameters that eomgen makes of bare numbers."""
 
-    def __init__(self, rng: np.random.Generator, dimensions: int, given: Mapping) -> None:
-        self.rng, self.dimensions, self.given = rng, dimensions, given
+    def __init__(
+        self, rng: np.random.Generator, dimensions: int, given: Mapping, *, pins: bool = False
+    ) -> None:
+        self.rng, self.dimensions, self.given, self.pins = rng, dimensions, given, pins
         self.shared = {name: given.get(name, value) for name, value in SHARED.items()}
         self.named: dict[str, float] = {}
         self.places: dict[str, np.ndarray] = {}
@@ -265,7 +272,12 @@ class _Writer:
 
 
 def random_spatial_tree(
-    seed: int, dimensions: int = SPACE, most: int = 4, given: Mapping[str, float] | None = None
+    seed: int,
+    dimensions: int = SPACE,
+    most: int = 4,
+    given: Mapping[str, float] | None = None,
+    *,
+    pins: bool = False,
 ) -> tuple[SpatialTree, str]:
     """A mechanism of 1 to `most` bodies from a seed, and its scene as TOML.
 
@@ -275,10 +287,13 @@ def random_spatial_tree(
     on a weld, on a slide, or away from its hinge; a massless body on a weld, or on a hinge or slide
     before another one that moves a solid body differently. The scene lists bodies and joints in any
     order. `given` are other values for some of the tree's `parameters`; nothing else changes.
+
+    With `pins` it has at least two bodies, which are solid or particles, and all are free or held
+    by a revolute joint without rotor and orientation: what the handout derives.
     """
     rng = np.random.default_rng([seed, dimensions, most])
-    writer = _Writer(rng, dimensions, given or {})
-    n = int(rng.integers(1, most + 1))
+    writer = _Writer(rng, dimensions, given or {}, pins=pins)
+    n = int(rng.integers(2 if pins else 1, most + 1))
     straight, parent = float(rng.uniform(0.2, 0.9)), [-1]
     for k in range(1, n):
         near = k - 1 if writer.chance(straight) else int(rng.integers(k))
@@ -286,12 +301,13 @@ def random_spatial_tree(
     hollow: dict[int, int] = {}  # a massless body that moves, and the solid child it moves
     for k in range(n):
         children = [c for c in range(k + 1, n) if parent[c] == k]
-        if children and k not in hollow.values() and writer.chance(0.15):
+        if children and not pins and k not in hollow.values() and writer.chance(0.15):
             hollow[k] = children[0]
     bodies, body_tables, joint_tables = [], [], []
     for k in range(n):
         before = bodies[parent[k]].joint if k in hollow.values() else None
-        kinds = KINDS[dimensions][: -1 if k == 0 else None]  # the first body moves
+        every = ("revolute", "weld") if pins else KINDS[dimensions]
+        kinds = every[: -1 if k == 0 or pins else None]  # the first body moves
         kind = kinds[int(rng.integers(len(kinds)))]
         if k in hollow or before is not None:
             kind = "revolute" if writer.chance(0.6) else "prismatic"
@@ -321,12 +337,12 @@ def random_spatial_tree(
     if motor >= 0:
         head = f'[[effects]]\ntype = "motor"\nname = "drive"\njoint = "j{motor}"\n'
         extra.append(f'{head}torque = "input"\n')
-    push, points = None, []
+    pushes, points = [], []
     if writer.chance(0.6):
         pushed, (text, place) = int(rng.integers(n)), writer.place("push_at")
         head = f'[[effects]]\ntype = "external_force"\nname = "push"\nbody = "b{pushed}"\n'
         extra.append(f'{head}at = {text}\nforce = "input"\n')
-        push = (pushed, place)
+        pushes.append(("push", pushed, place))
     if writer.chance(0.5):
         shown, (text, place) = int(rng.integers(n)), writer.place("tip_at")
         extra.append(f'[[points]]\nname = "tip"\nbody = "b{shown}"\nat = {text}\n')
@@ -337,7 +353,8 @@ def random_spatial_tree(
     head += "".join(f"{key} = {value!r}\n" for key, value in writer.shared.items())
     tables = [head, *rng.permutation(body_tables), *rng.permutation(joint_tables), *extra]
     known = {**writer.shared, **writer.named}
-    tree = SpatialTree(name, dimensions, tuple(bodies), gravity, motor, push, tuple(points), known)
+    pushed_at, shown_at = tuple(pushes), tuple(points)
+    tree = SpatialTree(name, dimensions, tuple(bodies), gravity, motor, pushed_at, shown_at, known)
     return tree, "\n".join(tables)
 
 
@@ -352,7 +369,7 @@ def _joint(
     orientation, axes, places, armature = ORIGIN, (Z,), [ORIGIN, ORIGIN], 0.0
     if not free:
         twin = before if before is not None and before.kind == kind else None
-        orientation, axes = _directions(writer, kind, twin)
+        orientation, axes = (ORIGIN, (Z,)) if writer.pins else _directions(writer, kind, twin)
         if kind == "universal":
             lines.append(f"axes = {[[*axis] for axis in axes]}")
         elif kind == "prismatic" or axes[0] != Z or (kind == "cylindrical" and writer.chance(0.5)):
@@ -369,7 +386,7 @@ def _joint(
             text, places[i] = writer.place(f"{name}_{end}", fit)
             if places[i] != ORIGIN or writer.chance(0.5):
                 lines.append(f"{end} = {text}")
-    if kind in ("revolute", "prismatic") and writer.chance(0.3):
+    if kind in ("revolute", "prismatic") and not writer.pins and writer.chance(0.3):
         text, armature = writer.write(writer.number(0.001, 0.01, 4), f"{name}_motor_inertia")
         lines.append(f"motor_inertia = {text}")
         if writer.chance(0.7):

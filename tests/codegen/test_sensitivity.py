@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from engine import Engine, along, apart, engine, exact, varied
-from mechanisms import random_tree
 from spatial_trees import random_spatial_tree
 
 from eomgen.dynamics.start.assembly import assembled
@@ -68,13 +67,6 @@ force = ["2*m", 0, -3.0] },
 def tree(seed: int, dimensions: int) -> str:
     """A random tree of up to 4 bodies."""
     return random_spatial_tree(seed, dimensions, 4)[1]
-
-
-def flat(seed: int) -> str:
-    """A tree that `closed` is for too."""
-    text = random_tree(seed).text
-    assert text is not None
-    return text
 
 
 ASIDE = tuple(o for o in OUTPUTS if o not in (*DERIVATIVES, "point_jacobians", "point_velocities"))

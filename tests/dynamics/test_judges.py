@@ -107,8 +107,8 @@ def faults(tree: SpatialTree) -> Iterator[tuple[str, SpatialTree]]:
             yield "orientation", changed(tree, k, orientation_deg=(about_y, about_x, about_z))
         if joint.armature:
             yield "armature", changed(tree, k, armature=joint.armature * (1 + 1e-4))
-    if tree.push is not None:
-        yield "push", replace(tree, push=(tree.push[0], (0.123, -0.2, 0.1)))
+    for name, body, _ in tree.pushes:
+        yield "push", replace(tree, pushes=((name, body, (0.123, -0.2, 0.1)),))
     yield "gravity", replace(tree, gravity=tree.gravity + 1e-5)
 
 

@@ -185,7 +185,7 @@ def features(tree: SpatialTree) -> Iterator[str]:
         found |= {"tilted axis"} if any(0 < abs(x) < 1 for x in joint.axes[0]) else set()
     found |= {"several trees"} if parents.count(-1) > 1 else set()
     found |= {"motor"} if tree.motor >= 0 else set()
-    found |= {"push"} if tree.push is not None else set()
+    found |= {"push"} if tree.pushes else set()
     found |= {"no gravity"} if not tree.gravity else set()
     yield from sorted(found)
 
@@ -338,8 +338,8 @@ def test_columns_are_one_by_one(dimensions: int, seed: int, route: str) -> None:
 # In 60 digits.
 
 FEW = range(20, some(23, 25))
-CLOSED = [(seed, 4) for seed in some((4, 37), (4, 9, 15, 22, 27, 36, 37))]
-CLOSED += some([], [(13, 5), (20, 5)])
+CLOSED = [(seed, 4) for seed in some((3, 7), (3, 5, 6, 7, 9, 16, 22))]
+CLOSED += some([], [(4, 5), (8, 5)])
 OUTPUTS = (
     "derivative mass_matrix velocity_force gravity_force bias_force applied_force kinetic_energy "
     "potential_energy momentum centre_of_mass joint_forces body_poses body_velocities "
@@ -365,7 +365,6 @@ def assert_equal_programs(a: Engine, b: Engine, seed: int, digits: int) -> None:
 def test_closed_is_aba(seed: int, most: int) -> None:
     """SymPy's own solution and the recursion, to 50 digits, on planar trees of up to 5 bodies."""
     scene = random_tree(seed, most)
-    assert scene.text is not None
     left = ("input_jacobian", "parameter_jacobian")
     aba, ldl = (engine(scene.text, route, leave_out=left) for route in ("aba", "ldl"))
     closed = engine(scene.text, "closed", leave_out=left) if most == 5 else compiled(scene)

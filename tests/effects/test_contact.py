@@ -304,7 +304,7 @@ def test_random_trees_move_as_under_loads_put_in_by_hand(
     rng, tried, worked = np.random.default_rng(3), 0, 0
     for seed in range(500, 600):
         tree, text = random_spatial_tree(seed, dimensions)
-        if tree.push is not None or len(tree.bodies) not in (2, 3):
+        if tree.pushes or len(tree.bodies) not in (2, 3):
             continue
         tried += 1
         first, last, zs = "b0", f"b{len(tree.bodies) - 1}", dimensions == SPACE
@@ -335,7 +335,7 @@ def test_random_trees_move_as_under_loads_put_in_by_hand(
             worked += sum(bool(np.any(force)) for _, _, force in puts)
             expected = motion.accelerations.copy()
             for k, spot, force in puts:
-                pushed = replace(tree, push=(k, tuple(spot)))
+                pushed = replace(tree, pushes=(("push", k, tuple(spot)),))
                 load = dict(zip(("push_x", "push_y", "push_z"), force, strict=True))
                 expected += solve(pushed, q, v, {**u, **load}).accelerations - motion.accelerations
             y = np.empty(len(places))

@@ -135,7 +135,7 @@ def test_drag_on_any_tree(dimensions: int) -> None:
     wind = ["3*sin(t) - 0.5*y", "0.4*x**2", "0"][:dimensions]
     while tried < some(2, 4):
         tree, text = random_spatial_tree(seed := seed + 1, dimensions)
-        if tree.push is not None or len(tree.bodies) < 2:
+        if tree.pushes or len(tree.bodies) < 2:
             continue
         tried += 1
         k = len(tree.bodies) - 1
@@ -158,7 +158,7 @@ def test_drag_on_any_tree(dimensions: int) -> None:
             place, spin = free.body_poses[k][:, 3] + arm, free.body_velocities[k][3:]
             speed = free.body_velocities[k][:3]
         force = force_by_hand(speed + np.cross(spin, arm), place, t)
-        pushed = replace(tree, push=(k, tuple(at)))
+        pushed = replace(tree, pushes=(("push", k, tuple(at)),))
         u = dict(zip(("push_x", "push_y", "push_z"), force, strict=True))
         expected = solve(pushed, q, v, u).accelerations
         places = tree.places(module.STATES)

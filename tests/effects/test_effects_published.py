@@ -273,9 +273,9 @@ def under(
     tree: SpatialTree, q: np.ndarray, v: np.ndarray, loads: list[tuple[int, np.ndarray, np.ndarray]]
 ) -> np.ndarray:
     """Accelerations under forces (body, point in its axes, force in world axes): linear in them."""
-    total = solve(replace(tree, push=None), q, v).accelerations.copy()
+    total = solve(replace(tree, pushes=()), q, v).accelerations.copy()
     for k, at, force in loads:
-        pushed = replace(tree, push=(k, tuple(at)))
+        pushed = replace(tree, pushes=(("push", k, tuple(at)),))
         u = dict(zip(("push_x", "push_y", "push_z"), force, strict=True))
         total += solve(pushed, q, v, u).accelerations - solve(pushed, q, v).accelerations
     return total
@@ -300,7 +300,7 @@ def test_random_trees_under_fields_forces_and_torques(dimensions: int, route: st
     seen = 0
     for seed in range(700, 900):
         tree, text = random_spatial_tree(seed, dimensions)
-        if tree.push is not None or tree.motor < 0 or len(tree.bodies) < 2:
+        if tree.pushes or tree.motor < 0 or len(tree.bodies) < 2:
             continue
         seen += 1
         last, flat = len(tree.bodies) - 1, dimensions == PLANE
@@ -356,7 +356,7 @@ def test_random_trees_under_fields_forces_and_torques(dimensions: int, route: st
         for _ in range(2):
             q, v = random_state(tree, rng)
             t = float(rng.uniform(0, 5))
-            plain = solve(replace(tree, push=None), q, v)
+            plain = solve(replace(tree, pushes=()), q, v)
             states = {k: carried(plain, dimensions, k) for k in range(last + 1)}
             loads = []
             place, axes, speed, spin = states[0]

@@ -332,7 +332,7 @@ def by_hand(
     tied = 5.0 * (anchor - places[0][0])
     total = plain.accelerations.copy()
     for k, at, force in ((0, a, pull + tied), (last, b, -pull)):
-        pushed = replace(tree, push=(k, tuple(at)))
+        pushed = replace(tree, pushes=(("push", k, tuple(at)),))
         for load, sign in (
             (dict(zip(("push_x", "push_y", "push_z"), force, strict=True)), 1),
             ({}, -1),
