@@ -20,14 +20,11 @@ from eomgen.codegen.interface import Interface, interface_of
 from eomgen.codegen.live import live_system
 from eomgen.codegen.series import with_series
 from eomgen.codegen.system import System, optimised
-from eomgen.dynamics.start.assembly import assembled
 from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.language.formula import Formula
-from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.program.passes import PassReport
 from eomgen.program.program import Program, cost
-from eomgen.scene.schema import Scene
 
 
 @dataclass(frozen=True)
@@ -147,13 +144,3 @@ def live(model: Model, geometry: Sequence[Formula] = (), *, series: bool = False
 def python_module(system: System) -> str:
     """The NumPy module of a system."""
     return python.module(system.program, interface_of(system))
-
-
-def compile_model(model: Model) -> str:
-    """The source of a model's module."""
-    return generate(model).module
-
-
-def compile_scene(scene: Scene) -> str:
-    """The source of a scene's module. Raises `SceneError` as `elaborate` and `generate` do."""
-    return compile_model(assembled(elaborate(scene)))

@@ -14,7 +14,7 @@ from eomgen.dynamics.start.assembly import assembled
 from eomgen.language.formula import names_in
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_program, python_module
+from eomgen.pipeline import compile_program, generate, python_module
 from eomgen.program.extended import evaluator
 from eomgen.program.tape import TIME
 from eomgen.run.module import load_module
@@ -25,7 +25,7 @@ from eomgen.study.verification.states import random_state
 
 __all__ = [
     "MP", "STEP", "Digits", "Engine", "along", "apart", "engine", "exact", "plain", "quick", "read",
-    "varied",
+    "text_of", "varied",
 ]  # fmt: skip
 
 STEP = MP.mpf(10) ** -20
@@ -134,6 +134,12 @@ def _engine(scene: str, route: str, leave_out: tuple[str, ...], tangents: bool) 
         system = compile_program(model, jacobian="jacobian" not in leave_out).system
     source = python_module(system)
     return Engine(model, system, source, load_module(source, f"tested_{model.name}"))
+
+
+def text_of(source: Scene | Model) -> str:
+    """The module that is written of a scene, or of a model as it is."""
+    model = assembled(elaborate(source)) if isinstance(source, Scene) else source
+    return generate(model).module
 
 
 def along(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, way: np.ndarray) -> np.ndarray:

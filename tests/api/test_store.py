@@ -496,9 +496,10 @@ def test_the_key_names_all_that_shapes_the_code(monkeypatch: pytest.MonkeyPatch)
     """Each library that is loaded to generate code, each such file of this program, and Python."""
     code = (
         "import sys; before = set(sys.modules)\n"
-        "from eomgen.pipeline import compile_scene; from eomgen.scene.reader import read_scene\n"
+        "from eomgen.model.elaborate import elaborate; from eomgen.pipeline import generate\n"
+        "from eomgen.scene.reader import read_scene\n"
         "for name in ('two_body', 'spinning_top', 'bouncing_two_body'):\n"
-        "    compile_scene(read_scene(name))\n"
+        "    generate(elaborate(read_scene(name)))\n"
         "print(*(set(sys.modules) - before))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -17,12 +17,12 @@ import sympy as sp
 
 from eomgen.derivation.handout.closed import derive
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_model
+from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import read_scene
 
 MODEL = elaborate(read_scene("two_body"))
-MODULE = load_module(compile_model(MODEL))
+MODULE = load_module(generate(MODEL).module)
 ONE = MODULE.initial_state()
 MANY = np.random.default_rng(1).normal(scale=2.0, size=(8, 1000))
 

@@ -27,7 +27,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_model
+from eomgen.pipeline import generate
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.run.problem import FloatArray, Problem
@@ -77,7 +77,7 @@ def scene() -> tuple[GeneratedModule, Motion]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "two_body.toml"
         path.write_text(text, "utf-8")
-        module = load_module(compile_model(elaborate(read_scene(str(path)))))
+        module = load_module(generate(elaborate(read_scene(str(path)))).module)
     p = module.PARAMETERS
     assert p["g"] == 0.0
     problem = as_problem(module)

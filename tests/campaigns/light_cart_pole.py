@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from eomgen.pipeline import compile_scene
+from eomgen.model.elaborate import elaborate
+from eomgen.pipeline import generate
 from eomgen.run.module import load_module
 from eomgen.scene.reader import read_scene
 
@@ -114,7 +115,7 @@ def error(y: np.ndarray) -> float:
 @cache
 def module() -> ModuleType:
     """The scene's, in closed form."""
-    return load_module(compile_scene(read_scene("light_cart_pole")), "light_cart_pole")
+    return load_module(generate(elaborate(read_scene("light_cart_pole"))).module, "light_cart_pole")
 
 
 def by_lu(_t: float, y: np.ndarray) -> np.ndarray:

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign import BUILT_IN, some
+from engine import text_of
 from mechanisms import SEEDS, Compiled, Scene, compiled, load, quarter_poses, random_tree
 from spatial_newton_euler import SpatialMotion
 from spatial_trees import SpatialTree
 
 from eomgen.base.errors import SceneError
-from eomgen.pipeline import compile_scene
 from eomgen.scene.reader import parse_scene
 from eomgen.study.verification.states import random_state
 
@@ -133,8 +133,7 @@ def test_points() -> None:
     text = tree.text.replace('outputs = "all"', f"outputs = {[*names]}")
     text += '\n[[points]]\nname = "p"\nbody = "b1"\nat = [0.3, "-l/2"]\n'
     closed, aba = (
-        load(compile_scene(parse_scene(f'route = "{route}"\n{text}')))
-        for route in ("closed", "aba")
+        load(text_of(parse_scene(f'route = "{route}"\n{text}'))) for route in ("closed", "aba")
     )
     rng = np.random.default_rng(29)
     for _ in range(TRIES):
@@ -304,7 +303,7 @@ def test_inertia_that_is_zero_by_its_parameter() -> None:
     joints = [{ name = "a", type = "revolute", parent = "world", child = "A", r_child = [-0.5, 0] }]
     effects = [{ type = "gravity", g = 9.81 }]
     """
-    module = load(compile_scene(parse_scene(text)))
+    module = load(text_of(parse_scene(text)))
     assert module.derivative(0.0, np.zeros(2))[1] == pytest.approx(-9.81 / 0.5, rel=1e-14)
     heavy = module.derivative(0.0, np.zeros(2), {"I": 0.5})[1]
     assert heavy == pytest.approx(-2.0 * 0.5 * 9.81 / (0.5 + 2.0 * 0.5**2), rel=1e-14)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from campaign import FULL, some
-from engine import MP
+from engine import MP, text_of
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 import eomgen.derivation.projected
@@ -30,7 +30,7 @@ from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why
 from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_model, compile_program
+from eomgen.pipeline import compile_program
 from eomgen.program.extended import evaluator
 from eomgen.run.module import load_module
 from eomgen.scene.joints import Free
@@ -366,7 +366,7 @@ def test_a_module_observes_what_the_recursions_do() -> None:
     """Energies, places, joint forces and Jacobians of a generated module, in doubles."""
     drawn, text = random_spatial_tree(1, SPACE, 3)
     model = replace(elaborate(parse_scene(text.replace("outputs =", "# outputs ="))))
-    closed, aba = (load_module(compile_model(replace(model, route=r))) for r in ("closed", "aba"))
+    closed, aba = (load_module(text_of(replace(model, route=r))) for r in ("closed", "aba"))
     rng = np.random.default_rng(3)
     q, v = random_state(drawn, rng)
     y = np.empty(len(closed.STATES))

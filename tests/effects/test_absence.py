@@ -14,11 +14,10 @@ import pytest
 from bookkeeping import ENERGIES, compiled_light, light
 from campaign import FULL
 from effect_cases import BASES, CASES, TRIED, Case
-from engine import Engine
+from engine import Engine, text_of
 
 from eomgen.codegen.backends.python import OWN
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_scene
 from eomgen.scene.effects import Effect
 from eomgen.scene.reader import parse_scene
 from eomgen.study.cost.variants import removed, without_effects
@@ -61,11 +60,11 @@ def test_absence_of_many(base: str) -> None:
     bare = BASES[base].format(outputs='outputs = ["potential_energy"]')
     scene = parse_scene(bare + "".join(f"[[effects]]\n{table}\n" for table in named))
     assert len(scene.effects) > 3
-    check_tidy(compile_scene(scene))
-    assert compile_scene(removed(scene, scene.effects)) == compile_scene(parse_scene(bare))
+    check_tidy(text_of(scene))
+    assert text_of(removed(scene, scene.effects)) == text_of(parse_scene(bare))
     first, *others = scene.effects
-    alone = compile_scene(removed(scene, others))
-    assert alone == compile_scene(parse_scene(f"{bare}[[effects]]\n{named[0]}"))
+    alone = text_of(removed(scene, others))
+    assert alone == text_of(parse_scene(f"{bare}[[effects]]\n{named[0]}"))
     assert removed(scene, others).effects == (first,)
 
 
@@ -128,7 +127,7 @@ def test_nothing_unused_in_generated_modules(name: str) -> None:
 
 def test_the_check_finds_what_is_unused() -> None:
     """An import, a helper, a value more: each is found."""
-    source = compile_scene(parse_scene(CASES[0].text()))
+    source = text_of(parse_scene(CASES[0].text()))
     check_tidy(source)
     for old, new in (
         ("import cos", "import atan, cos"),

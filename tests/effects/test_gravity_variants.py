@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from engine import engine, plain, quick
+from engine import engine, plain, quick, text_of
 from scipy.integrate import solve_ivp
 
 from eomgen.base.errors import SceneError
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_scene
 from eomgen.run.module import as_problem
 from eomgen.scene.reader import parse_scene
 
@@ -312,7 +311,7 @@ def test_plain_gravity_is_as_it_was() -> None:
             found, right = getattr(closed, name)(0.0, y), getattr(aba, name)(0.0, y)
             np.testing.assert_allclose(found, right, rtol=1e-12, atol=1e-12, err_msg=name)
         with pytest.raises(SceneError, match="and in momenta it takes no 'gravity'"):
-            compile_scene(parse_scene('form = "redundant"\n' + PLANE + effect(more)))
+            text_of(parse_scene('form = "redundant"\n' + PLANE + effect(more)))
 
 
 MISTAKES = [

@@ -4,11 +4,11 @@ import time
 
 import numpy as np
 import pytest
+from engine import text_of
 
 from eomgen.base.errors import SceneError
 from eomgen.codegen.recording import Recording
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_scene
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene
 
@@ -91,10 +91,8 @@ def cart(definitions: str = "", **fields: str) -> str:
 
 def test_a_definition_is_what_it_stands_for() -> None:
     """The same bytes as with every formula written out: no parameter, state or operation more."""
-    assert compile_scene(parse_scene(cart(DEFINITIONS, **NAMED))) == compile_scene(
-        parse_scene(cart())
-    )
-    assert compile_scene(parse_scene(cart(DEFINITIONS))) == compile_scene(parse_scene(cart()))
+    assert text_of(parse_scene(cart(DEFINITIONS, **NAMED))) == text_of(parse_scene(cart()))
+    assert text_of(parse_scene(cart(DEFINITIONS))) == text_of(parse_scene(cart()))
 
 
 def test_what_is_shared_is_computed_once() -> None:
@@ -113,7 +111,7 @@ def test_of_parameters_alone_the_closed_form_takes_them() -> None:
     text = text[: text.index('[[effects]]\ntype = "controller"')] + text[text.index("[initial]") :]
     y = np.array([0.1, 0.4, 0.2, -0.7])
     closed, recursive = (
-        load_module(compile_scene(parse_scene(f'route = "{route}"\n{text}'))).derivative(0.3, y)
+        load_module(text_of(parse_scene(f'route = "{route}"\n{text}'))).derivative(0.3, y)
         for route in ("closed", "aba")
     )
     assert closed == pytest.approx(recursive, rel=1e-12)

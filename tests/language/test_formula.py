@@ -10,7 +10,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 from campaign import some
-from engine import plain, quick
+from engine import plain, quick, text_of
 
 from eomgen.base.errors import SceneError
 from eomgen.codegen.backends.javascript import DIALECT
@@ -26,7 +26,6 @@ from eomgen.language.formula import (
     parse,
     written,
 )
-from eomgen.pipeline import compile_scene
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scalars.functions import BY_MATH, FUNCTIONS
 from eomgen.scene.reader import parse_scene
@@ -330,7 +329,7 @@ def test_functions_of_parameters_alone(name: str) -> None:
 def test_what_has_no_meaning(torque: str, message: str) -> None:
     """A part that can have no value, whatever the motion; a name that nothing has."""
     with pytest.raises(SceneError) as error:
-        compile_scene(parse_scene(SCENE.format(torque)))
+        text_of(parse_scene(SCENE.format(torque)))
     assert str(error.value) == f"effects[0].torque: {message}"
 
 
@@ -344,6 +343,6 @@ def test_a_parameter_may_have_a_function_s_name() -> None:
 
 def test_numbers_too_large_fold_to_no_name() -> None:
     """What overflows is an error of the run, never a word in the code that nothing defines."""
-    source = compile_scene(parse_scene(SCENE.format("x*1e200*1e200")))
+    source = text_of(parse_scene(SCENE.format("x*1e200*1e200")))
     kernels = source[source.index("def _fixed(") : source.index("def _numbers(")]
     assert "inf" not in kernels and "nan" not in kernels

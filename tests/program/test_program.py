@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import BUILT_IN
-from engine import MP
+from engine import MP, text_of
 from mechanisms import body, compiled, load, plane, random_tree
 from spatial_newton_euler import solve
 from spatial_trees import SpatialTree
 
 from eomgen.codegen.from_equations import from_equations
 from eomgen.codegen.system import optimised
-from eomgen.pipeline import compile_scene
 from eomgen.program.differentiate import jacobian
 from eomgen.program.extended import evaluator
 from eomgen.program.ordering import ordered
@@ -508,7 +507,7 @@ def test_awkward_bodies(bodies: str) -> None:
 
 def assert_module_is(text: str, tree: SpatialTree, joints: list[str]) -> ModuleType:
     """The module of a scene, executed, against the independent solver and its energies."""
-    module = load(compile_scene(parse_scene(text)))
+    module = load(text_of(parse_scene(text)))
     assert list(module.STATES) == [*joints, *(f"{joint}_dot" for joint in joints)]
     rng, n = np.random.default_rng(55), len(joints)
     for _ in range(5):
@@ -558,7 +557,7 @@ def test_formulas(formula: str, value: Callable[[float], float]) -> None:
     child = "A"
     r_child = [0.5, "{formula}"]
     """
-    module = load(compile_scene(parse_scene(text)))
+    module = load(text_of(parse_scene(text)))
     y = np.array([0.4, 1.2])
     for length in (0.3, 1.1):
         bob = body("A", 2.0, 0.1, "a_angle", "a", (0.0, 0.5))

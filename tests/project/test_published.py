@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from engine import text_of
 from scipy.special import ellipj
 
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.trajectory import Trajectory
@@ -27,13 +27,13 @@ PRINTED = 1e-4
 @cache
 def loaded(scene: str) -> Any:
     """The module of a built-in scene."""
-    return load_module(compile_scene(read_scene(scene)), f"published_{scene}")
+    return load_module(text_of(read_scene(scene)), f"published_{scene}")
 
 
 def unconditional(scene: str) -> Any:
     """The same, of whatever moments of inertia: some published ones are of no body."""
     model = replace(elaborate(read_scene(scene)), conditions=())
-    return load_module(compile_model(model), f"published_{scene}")
+    return load_module(text_of(model), f"published_{scene}")
 
 
 def state(module: ModuleType, values: Mapping[str, float]) -> np.ndarray:
@@ -206,7 +206,7 @@ effects = [{ type = "gravity", g = 9.81 }]
 )
 def test_two_links_of_the_toolbox(q: list[float], torques: list[float]) -> None:
     """models/mdl_twolink.m, rne_test of SerialLinkTest.m: exact multiples of g hold it."""
-    module: Any = load_module(compile_scene(parse_scene(TWO_LINKS)), "two_links")
+    module: Any = load_module(text_of(parse_scene(TWO_LINKS)), "two_links")
     tau = module.inverse_dynamics(q, np.zeros(2), np.zeros(2))
     np.testing.assert_allclose(tau, 9.81 * np.array(torques), atol=1e-14)
 

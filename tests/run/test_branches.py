@@ -12,9 +12,9 @@ from functools import cache
 import numpy as np
 import pytest
 from campaign import FULL, some
+from engine import text_of
 
 from eomgen.commands.main import main
-from eomgen.pipeline import compile_scene
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, Adaptive
 from eomgen.run.intervals import BY_INTERVALS, Interval
@@ -61,7 +61,7 @@ PULSES = {
 @cache
 def module(scene: str):
     """The module of a scene."""
-    return load_module(compile_scene(parse_scene(scene)))
+    return load_module(text_of(parse_scene(scene)))
 
 
 @pytest.mark.every(6)

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from bookkeeping import light
-from engine import read
+from engine import read, text_of
 
 from eomgen.commands.main import main
-from eomgen.pipeline import compile_scene
 from eomgen.run.archive import checked, packed, unpacked
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
@@ -145,7 +144,7 @@ def test_the_redundant_state_drifts_and_the_reduced_one_does_not() -> None:
     gaps = {}
     for form, count in (("redundant", 12), ("momentum", 8)):
         scene = read("two_body").replaced(form=form, outputs=("body_poses",))
-        module = load_module(compile_scene(scene), f"two_body_{form}")
+        module = load_module(text_of(scene), f"two_body_{form}")
         assert len(module.STATES) == count
         run = ran(as_problem(module), "rk4", 20.0, dt=0.02, samples=101)
         gaps[form] = _gap(module, run)

@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 from campaign import some
+from engine import text_of
 
 from eomgen.base.errors import RunError
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, Adaptive
 from eomgen.run.module import as_problem, load_module
@@ -29,7 +29,7 @@ SCENES = ("tumbling_body", "spinning_top")
 def problem(scene: str) -> Problem:
     """A built-in scene."""
     model = replace(elaborate(read_scene(scene)), outputs=SHOWN, route="aba")
-    found = as_problem(load_module(compile_model(model), scene))
+    found = as_problem(load_module(text_of(model), scene))
     assert len(found.quaternions) == 1
     return found
 

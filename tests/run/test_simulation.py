@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from engine import text_of
 
 from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
-from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.scene.reader import read_scene
@@ -19,7 +19,7 @@ from eomgen.scene.reader import read_scene
 def loaded(scene: str, form: Any = "velocity") -> tuple[Model, GeneratedModule]:
     """Model and module of a built-in scene in one state form."""
     model = replace(elaborate(read_scene(scene)), form=form)
-    return model, load_module(compile_model(model), f"{scene}_{form}")
+    return model, load_module(text_of(model), f"{scene}_{form}")
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from engine import text_of
 
 from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_model, compile_scene
 from eomgen.run.module import load_module
 from eomgen.scene.reader import parse_scene, read_scene
 from eomgen.study import timing
@@ -112,7 +112,7 @@ def items(found: Bill) -> dict[str, Item]:
 
 def counted(scene: object) -> int:
     """Operations of a derivative as the scene's whole module says."""
-    total: int = load_module(compile_scene(scene)).COST["derivative"]["total"]
+    total: int = load_module(text_of(scene)).COST["derivative"]["total"]
     return total
 
 
@@ -152,7 +152,7 @@ def test_inputs_and_removed_effects() -> None:
     assert not [p for p in air.model.parameters if p.name.startswith("air")]
     bare = parse_scene(STONE[: STONE.index('[[effects]]\ntype = "drag"')])
     outputs = elaborate(bare).outputs
-    assert compile_model(replace(air.model, outputs=outputs)) == compile_scene(bare)
+    assert text_of(replace(air.model, outputs=outputs)) == text_of(bare)
 
 
 def test_routes() -> None:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from engine import text_of
 from scipy.linalg import expm
 
 from eomgen.base.errors import RunError
 from eomgen.commands.main import main
 from eomgen.model.elaborate import elaborate
-from eomgen.pipeline import compile_model
 from eomgen.run.integrate import integrate
 from eomgen.run.module import GeneratedModule, as_problem, load_module
 from eomgen.scene.reader import parse_scene, read_scene
@@ -28,7 +28,7 @@ def module_of(scene: str, text: str = "", outputs: bool = True) -> GeneratedModu
     model = elaborate(parse_scene(text) if text else read_scene(scene))
     wanted = ("input_jacobian",) if outputs and model.inputs else ()
     model = replace(model, outputs=(*SHOWN, *wanted), route="aba")
-    return load_module(compile_model(model), scene)
+    return load_module(text_of(model), scene)
 
 
 def accelerations(module: GeneratedModule, y: np.ndarray, u: np.ndarray) -> np.ndarray:
