@@ -54,7 +54,7 @@ from eomgen.derivation.reading import (
 )
 from eomgen.derivation.recursion import recursive_steps
 from eomgen.derivation.simplified import simplified, solved_directly, tidied
-from eomgen.derivation.state_forms import form_step, momentum_form, plain_form, velocity_form
+from eomgen.derivation.state_forms import form_step, momentum_form, plain_form
 from eomgen.derivation.steps import Definition, Equation, Kind, Step
 from eomgen.derivation.supported import (
     MOST_REPORTED,
@@ -182,10 +182,9 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
         read = {x.xreplace(shown): e.xreplace(shown) for x, e in zip(s.a, direct, strict=True)}
         steps[place] = _renamed(_directly(steps[place], read), names)
         whole = _with(whole, direct)
-        written = plain_form(model, [real(c.acceleration) for c in model.velocities])
-    else:
-        written = velocity_form(equations) if form == "velocity" else momentum_form(equations)
-    last = form_step(model, form, written, parts.effects)
+    last = _last(model, parts)
+    if form != "velocity":
+        last = form_step(model, form, momentum_form(equations), parts.effects)
     ends = [*_symmetry(equations), *impact_steps(model, parts.effects), last]
     inner = _numbered_within(_effect_steps(model, parts), "36")
     steps = [

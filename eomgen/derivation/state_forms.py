@@ -8,10 +8,10 @@ import sympy as sp
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.effects import DerivedEffect
 from eomgen.derivation.handout.closed import Equations
-from eomgen.derivation.handout.forms import StateForm, state_form
+from eomgen.derivation.handout.forms import state_form
 from eomgen.derivation.linkage import quaternion_rates
 from eomgen.derivation.steps import Equation, Step
-from eomgen.derivation.symbols import Expr, over_coordinates, real
+from eomgen.derivation.symbols import Expr, real
 from eomgen.model.model import Model
 
 FORMS = {
@@ -67,23 +67,6 @@ def momentum_form(equations: Equations) -> WrittenForm:
         (symbol, _in_state(e, given)) for symbol, e in needed if symbol not in coordinates
     ]
     return WrittenForm(form.symbols, rates, needed_by(rates, definitions))
-
-
-def velocity_form(equations: Equations) -> WrittenForm:
-    """[q, v] by the closed form (37), in coordinates."""
-    s = equations.symbols
-    accelerations = {*s.xdd, *s.ydd, *s.alpha}
-    turned = over_coordinates(equations.model, s)
-    given = {symbol: e for symbol, e in turned.items() if symbol not in accelerations}
-    form: StateForm = state_form(equations)
-    still = dict.fromkeys(s.tau, sp.Integer(0))
-    own = {*s.q, *s.v}
-    given |= {symbol: e for symbol, e in form.defined.items() if symbol not in own}
-    definitions = [
-        (symbol, _in_state(e.xreplace(still), given))
-        for symbol, e in equations.solution.definitions
-    ]
-    return WrittenForm(form.symbols, form.rates, needed_by(form.rates, definitions))
 
 
 def _in_state(expression: Expr, given: Mapping[Expr, Expr]) -> Expr:
