@@ -12,7 +12,7 @@ that closes a loop blocks directions between two bodies as any other does; in th
 that the tree leaves free.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -71,6 +71,11 @@ class BodyMotion:
     velocity: np.ndarray
     spin: np.ndarray
     angle: float = 0.0
+
+    def at(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Place and velocity of a point in its axes."""
+        arm = self.axes @ point
+        return self.place + arm, self.velocity + _cross(self.spin, arm)
 
 
 STILL = BodyMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
@@ -169,6 +174,33 @@ def solve(
     return replace(
         report, driving={name: float(found[ends[k] + i]) for name, (k, i) in driven.items()}
     )
+
+
+def under(
+    tree: SpatialTree,
+    q: np.ndarray,
+    v: np.ndarray,
+    loads: Sequence[tuple[int, np.ndarray, np.ndarray]],
+    u: Mapping[str, float] | None = None,
+) -> np.ndarray:
+    """Accelerations under more forces: body, point in its axes, force in world axes."""
+    more = [(f"load_{i}", k, at, force) for i, (k, at, force) in enumerate(loads)]
+    given = {
+        f"{name}_{x}": part
+        for name, _, _, force in more
+        for x, part in zip("xyz", force, strict=True)
+    }
+    pushes = (*tree.pushes, *((name, k, tuple(at)) for name, k, at, _ in more))
+    return solve(replace(tree, pushes=pushes), q, v, {**(u or {}), **given}).accelerations
+
+
+def carried(motion: SpatialMotion, k: int) -> BodyMotion:
+    """A body, in three components in the plane, too."""
+    pose, moved = motion.body_poses[k], motion.body_velocities[k]
+    if len(moved) > 3:
+        return BodyMotion(pose[:, 3], pose[:, :3], moved[:3], moved[3:])
+    place, velocity = np.array([*pose[:2], 0.0]), np.array([*moved[:2], 0.0])
+    return BodyMotion(place, _turn(Z, pose[2]), velocity, moved[2] * np.array(Z), pose[2])
 
 
 def _pairs(tree: SpatialTree, q: np.ndarray, v: np.ndarray) -> list["_Pair"]:

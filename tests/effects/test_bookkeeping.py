@@ -1,5 +1,5 @@
-"""Where energy goes: what effects do to a motion is what it gains, of every effect. Built-in scenes
-keep to it too: see `test_laws`.
+"""Where energy goes: what effects do to a motion is what it gains, of every effect; and what their
+Jacobians are. Built-in scenes keep to it too: see `test_laws`.
 
 In 60 digits along the motion, as inputs and time have it. What is off by more than 1e-10 of the
 terms would be an error of the equations; what is off by less is the rounding of directions that
@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 from bookkeeping import growth, light
 from effect_cases import TRIED, Case
-from engine import Engine, apart, exact
+from engine import Engine, along, apart, engine, exact
+
+from eomgen.tables.outputs import DERIVATIVES, OUTPUTS
 
 EXACT = 1e-14
+OTHERS = tuple(name for name in OUTPUTS if name not in DERIVATIVES)
 RELAXED = 0.7
 """Extent of states that are neither angles nor places."""
 IDLE = ('"impact"', "restitution = 0.5", '"avoid"')
@@ -74,3 +77,31 @@ def test_potential_energy_is_given_back(case: Case) -> None:
         powers = made.exactly("effect_powers", exact(y), u, p, t=t)
         assert apart(-lost, np.sum(powers), powers, energy) < EXACT
     assert (stored > 1e-3) == (case.conserves is not None)
+
+
+@pytest.mark.every(6)
+@pytest.mark.parametrize("case", TRIED, ids=lambda case: case.name)
+def test_jacobians_are_those_of_differences(case: Case) -> None:
+    """By state, inputs and parameters; in space along directions, as large scenes have them, and in
+    the plane by `ldl`.
+    """
+    route, space = ("aba", True) if case.base == "space" else ("ldl", False)
+    made = engine(case.text(), route, leave_out=OTHERS, tangents=space)
+    y, t, u = moments(made, 1)[0]
+    p = {name: float(x) for name, x in made.module.PARAMETERS.items()}
+    given = exact(y), exact([*u.values()]), exact([*p.values()])
+
+    def rates(y: np.ndarray, u_now: np.ndarray, p_now: np.ndarray) -> np.ndarray:
+        named = (dict(zip(names, x, strict=True)) for names, x in ((u, u_now), (p, p_now)))
+        return made.exactly("derivative", y, *named, t=t)
+
+    for i, name in enumerate(("jacobian", "input_jacobian", "parameter_jacobian")):
+        if not len(given[i]):
+            continue
+        ways = exact(np.eye(len(given[i])))
+        columns = [
+            along(lambda x, i=i: rates(*given[:i], x, *given[i + 1 :]), given[i], way)
+            for way in ways
+        ]
+        found = getattr(made.module, name)(t, y, u=u)
+        assert apart(found, np.array(columns).T) < 1e-11, name

@@ -6,9 +6,8 @@ digits.
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import cache, partial
-from itertools import islice, product
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ import pytest
 from engine import MP, Digits, Engine, along, apart, engine, exact
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from spatial_newton_euler import SpatialMotion, solve
+from spatial_newton_euler import STILL, SpatialMotion, carried, solve, under
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.base.errors import SceneError
@@ -230,20 +229,7 @@ def test_what_slides_ends_up_rolling(shape: str) -> None:
 # Random trees, with the loads put in by hand.
 
 
-def point(motion: SpatialMotion, k: int, at: np.ndarray) -> tuple[np.ndarray, ...]:
-    """World place and velocity of a point of a body, its axes, and its spin; three components."""
-    pose, moved = motion.body_poses[k], motion.body_velocities[k]
-    if len(moved) == 3:
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        axes = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-        base, speed, spin = np.array([*pose[:2], 0]), np.array([*moved[:2], 0]), moved[2] * Z
-    else:
-        axes, base, speed, spin = pose[:, :3], pose[:, 3], moved[:3], moved[3:]
-    return base + axes @ at, speed + np.cross(spin, axes @ at), axes, base, spin
-
-
-Z, ORIGIN = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-STILL = (ORIGIN, ORIGIN, np.eye(3), ORIGIN, ORIGIN)
+ORIGIN = np.zeros(3)
 Put = tuple[int, np.ndarray, np.ndarray]
 
 
@@ -258,12 +244,12 @@ def soft(law: tuple[str, ...], d: float, rate: float, slip: np.ndarray, n: np.nd
 
 def put_in(law: tuple[str, ...], p: np.ndarray, n: np.ndarray, d: float, *ends: Any) -> list[Put]:
     """What the two bodies get at a point of both that p is; each end is a body and its motion."""
-    u = ORIGIN
-    for sign, (_, (_, _, _, base, spin), speed) in zip((1, -1), ends, strict=True):
-        u = u + sign * (speed + np.cross(spin, p - base))
+    spots = [body.axes.T @ (p - body.place) for _, body in ends]
+    (_, one), (_, other) = (body.at(at) for (_, body), at in zip(ends, spots, strict=True))
+    u = one - other
     force = soft(law, d, -float(n @ u), u - (n @ u) * n, n)
-    puts = zip((1, -1), ends, strict=True)
-    return [(k, axes.T @ (p - b), s * force) for s, (k, (_, _, axes, b, _), _) in puts if k >= 0]
+    puts = zip((1, -1), ends, spots, strict=True)
+    return [(k, at, sign * force) for sign, (k, _), at in puts if k >= 0]
 
 
 def loads_by_hand(tree: SpatialTree, motion: SpatialMotion, law: tuple[str, ...]) -> list[Put]:
@@ -272,19 +258,19 @@ def loads_by_hand(tree: SpatialTree, motion: SpatialMotion, law: tuple[str, ...]
     slant = np.array([0.3, 0.2, 1.0]) if zs else np.array([0.3, 1.0, 0.0])
     slant = slant / np.linalg.norm(slant)
     at = np.array([0.1, -0.2, 0.3 * zs])
-    still = (-1, STILL, ORIGIN)
-    moves = {k: point(motion, k, ORIGIN) for k in (0, last)}
-    ends = {k: (k, moves[k], moves[k][1]) for k in moves}
+    still = (-1, STILL)
+    ends = {k: (k, carried(motion, k)) for k in (0, last)}
+    first, final = ends[0][1], ends[last][1]
     found = []
     for signs in product((-1, 1), repeat=3 if zs else 2):  # corners on a slanted plane
         half = np.array([*signs, 0.0])[:3] * np.array([0.3, 0.2, 0.4])
-        corner = point(motion, 0, at + half)[0]
+        corner, _ = first.at(at + half)
         p = corner - 0.05 * slant
         found += put_in(law, p, slant, 0.2 - slant @ p, ends[0], still)
-    on = moves[0][2] @ (np.array([0.0, -0.6, 0.8]) if zs else np.array([-0.6, 0.8, 0.0]))
-    p = point(motion, last, at)[0] - 0.7 * on  # a sphere on a plane of a body
-    found += put_in(law, p, on, 0.1 - on @ (p - moves[0][3]), ends[last], ends[0])
-    a, b = point(motion, 0, at)[0], point(motion, last, at)[0]
+    on = first.axes @ (np.array([0.0, -0.6, 0.8]) if zs else np.array([-0.6, 0.8, 0.0]))
+    a, b = first.at(at)[0], final.at(at)[0]
+    p = b - 0.7 * on  # a sphere on a plane of a body
+    found += put_in(law, p, on, 0.1 - on @ (p - first.place), ends[last], ends[0])
     d = np.linalg.norm(a - b)
     p = b + (a - b) * 0.9 / 2.0  # two spheres, divided as their radii
     found += put_in(law, p, (a - b) / d, 2.0 - float(d), ends[0], ends[last])
@@ -333,11 +319,7 @@ def test_random_trees_move_as_under_loads_put_in_by_hand(
             motion = solve(tree, q, v, u)
             puts = loads_by_hand(tree, motion, law)
             worked += sum(bool(np.any(force)) for _, _, force in puts)
-            expected = motion.accelerations.copy()
-            for k, spot, force in puts:
-                pushed = replace(tree, pushes=(("push", k, tuple(spot)),))
-                load = dict(zip(("push_x", "push_y", "push_z"), force, strict=True))
-                expected += solve(pushed, q, v, {**u, **load}).accelerations - motion.accelerations
+            expected = under(tree, q, v, puts, u)
             y = np.empty(len(places))
             y[places] = np.concatenate((q, v))
             rates = module.derivative(0.0, y, None, u)[places][len(q) :]
@@ -436,22 +418,6 @@ def test_the_change_of_energy_is_the_power_of_the_contacts(
             assert np.max(np.abs(change)) < 1e-25 * size
             assert abs(here.power(effect) - power(here, tuple(effect.loads(here)))) < 1e-40 * size
     assert worked > 0.1
-
-
-@pytest.mark.every(6)
-@pytest.mark.parametrize("dimensions", [PLANE, SPACE])
-@pytest.mark.parametrize("geometry", GEOMETRY)
-def test_jacobians_are_those_of_central_differences(geometry: str, dimensions: int) -> None:
-    """At random states in touch: written out in the plane, by a tangent in space."""
-    law = DAMPED if dimensions == PLANE else HUNT
-    found = made(scene(geometry, dimensions, *law, *RUB), tangents=dimensions == SPACE)
-    touching = (y for y in states(found, 8, 30) if any(found.exactly("applied_force", y)))
-    for y in islice(touching, 4 - dimensions):
-        ways = exact(np.eye(len(y)))
-        columns = [along(partial(found.exactly, "derivative"), y, way) for way in ways]
-        expected = np.array(columns).T.astype(float)
-        assert apart(found.module.jacobian(0.0, y.astype(float)), expected) < 1e-10
-        assert np.abs(expected[len(y) // 2 + 1 :]).max() > 1.0
 
 
 @pytest.mark.parametrize("law", [SPRING, DAMPED, (*HUNT, *RUB)])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from engine import engine, plain, quick
+from engine import plain, quick
 from scipy.integrate import solve_ivp
 
 from eomgen.base.errors import SceneError
@@ -246,30 +246,6 @@ def test_numbers_are_parameters() -> None:
     module = plain(WHEEL + servo("pid", "limit = 3.0\nlag = 0.02")).module
     names = ("target", "stiffness", "damping", "integral_gain", "limit", "lag")
     assert all(f"hold_{name}" in module.PARAMETERS for name in names)
-
-
-@pytest.mark.every(6)
-@pytest.mark.parametrize("tangents", [False, True])
-@pytest.mark.parametrize("name", SCENES)
-def test_jacobian(name: str, tangents: bool) -> None:
-    """By state, inputs and parameters as central differences have them, by both routes."""
-    scene = SCENES[name]
-    left = () if tangents else ("point_jacobians",)
-    module = engine(scene, "aba" if tangents else "ldl", leave_out=left, tangents=tangents).module
-    y, h, t = random_state(module, 11), 1e-6, 0.4
-
-    def slopes(f, x: np.ndarray) -> np.ndarray:
-        return np.array([(f(x + h * e) - f(x - h * e)) / (2 * h) for e in np.eye(len(x))]).T
-
-    near = {"rtol": 1e-6, "atol": 1e-6}
-    expected = slopes(lambda x: module.derivative(t, x), y)
-    assert np.allclose(module.jacobian(t, y), expected, **near)
-    p = np.array(list(module.PARAMETERS.values()))
-    named = lambda x: module.derivative(t, y, dict(zip(module.PARAMETERS, x, strict=True)))  # noqa: E731
-    assert np.allclose(module.parameter_jacobian(t, y), slopes(named, p), rtol=1e-5, atol=1e-5)
-    if module.INPUTS:
-        given = lambda x: module.derivative(t, y, None, {"u_in": float(x[0])})  # noqa: E731
-        assert np.allclose(module.input_jacobian(t, y), slopes(given, np.zeros(1)), **near)
 
 
 @pytest.mark.every(3)

