@@ -45,6 +45,8 @@ TREES = {  # of up to 5 bodies; together they have everything
     "space_293": (293, 3),
     "space_377": (377, 3),
 }
+PINS = {f"pins_{seed}": seed for seed in (7, 9, 16)}
+"""Trees of pins and free bodies, for the closed form."""
 ALIKE = "chain_in_wind hanging_figure quadruped ragdoll stiff_beam walker_motors".split()
 LIKE_OTHERS = some(ALIKE, [])
 LOOPS = [
@@ -56,6 +58,7 @@ LOOPS = [
 OWN = [name for name in built_in_names() if name not in (*LIKE_OTHERS, *LOOPS)]
 CASES = [(name, "") for name in OWN]
 CASES += [(name, ("aba", "ldl")[i % 2]) for i, name in enumerate(TREES)]
+CASES += [(name, "closed") for name in PINS]
 SMALL = [name for name in OWN if name not in LARGE]
 CASES += some([], [(name, route) for name in SMALL for route in ("aba", "ldl")])
 CASES += some([], [("puma560", "ldl")])
@@ -70,6 +73,8 @@ def compiled(name: str, route: str = "") -> Engine:
     text = name
     if name in TREES:
         text = random_spatial_tree(TREES[name][0], TREES[name][1], 5)[1]
+    if name in PINS:
+        text = random_spatial_tree(PINS[name], 2, pins=True)[1]
     return engine(text, route, leave_out=DERIVATIVES)
 
 
@@ -721,7 +726,7 @@ def test_the_figures_are_figures() -> None:
         model = compiled(name).model
         assert len(model.bodies) >= 15
         assert len(model.velocities) >= 28
-    assert {name for name, _ in CASES} == {*OWN, *TREES}
+    assert {name for name, _ in CASES} == {*OWN, *TREES, *PINS}
     assert len(built_in_names()) >= 15
     models = [moment(*case, 61).model for case in CASES]
     kinds = {(body.joint.type, model.dimensions) for model in models for body in model.bodies}
