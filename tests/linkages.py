@@ -30,7 +30,7 @@ def hinged(lengths: list[float], twists: list[float], angles: list[float], tilt:
         joint = TreeJoint(f"j{k}", "revolute", k - 1, at, bar, turned, (Z,), 0.0, *own)
         moments = (*np.round(rng.uniform(0.01, 0.015, 3), 4).tolist(), 0.0, 0.0, 0.0)
         bodies.append(TreeBody(f"b{k}", float(np.round(rng.uniform(0.5, 2), 2)), moments, joint))
-    tree = SpatialTree("linkage", SPACE, tuple(bodies), GRAVITY, -1, None, (), {})
+    tree = SpatialTree("linkage", SPACE, tuple(bodies), GRAVITY, -1, (), (), {})
     q, last = np.array(angles), len(bodies) - 1
     there = at_rest(tree, q)
     twist = Rotation.from_euler("x", twists[-2], degrees=True)

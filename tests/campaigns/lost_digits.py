@@ -95,7 +95,7 @@ def tree(
     for k, mass in enumerate(masses):
         near = k - 1 if r.random() < straight else r.randrange(k) if k else -1
         bodies.append(body(k, dimensions, mass, "revolute" if k else first, near, r))
-    return SpatialTree(f"tree_{seed}", dimensions, tuple(bodies), 9.81, -1, None, (), {})
+    return SpatialTree(f"tree_{seed}", dimensions, tuple(bodies), 9.81, -1, (), (), {})
 
 
 def text(tree: SpatialTree) -> str:

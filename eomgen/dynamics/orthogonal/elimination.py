@@ -289,18 +289,31 @@ class Elimination:
         others = _Others(kept, free)
         for axis in axes:
             held = axis[0].unit in own[axis[0].angular]
-            first, sources, others, gathered = self._pivot_row(axis[0], held, others)
-            # The rows of rotors of several axes contain all of these.
-            early = len(link.free) > 1 and not s.is_zero(link.armature)
-            one, others, term = self._eliminate_axis(
-                link, axis, first, others, term, tau[axis[1]], early=early
-            )
-            taken.append(replace(one, rows=sources, gathered=gathered, before=tuple(rotations)))
+            one, others, term = self._eliminate_free_axis(link, axis, held, others, term, tau)
+            taken.append(replace(one, before=tuple(rotations)))
             rotations.clear()
         rest = [*others.kept.values(), *others.free]
         empty = tuple(row for row in (*loose, *rest) if self._rows.is_empty(row))
         holding = tuple(row for row in rest if not self._rows.is_empty(row))
         return EliminatedLink(tuple(taken), tuple(rotations), holding, empty), term
+
+    def _eliminate_free_axis(
+        self,
+        link: Link,
+        axis: tuple[MotionAxis, int],
+        held: bool,
+        others: _Others,
+        term: Wrench,
+        tau: Sequence[Scalar],
+    ) -> tuple[EliminatedAxis, _Others, Wrench]:
+        """Choose the pivot row of a motion axis, and eliminate the axis from the other rows."""
+        first, sources, others, gathered = self._pivot_row(axis[0], held, others)
+        # The rows of rotors of several axes contain all of these.
+        early = len(link.free) > 1 and not self._scalars.is_zero(link.armature)
+        one, others, left = self._eliminate_axis(
+            link, axis, first, others, term, tau[axis[1]], early=early
+        )
+        return replace(one, rows=sources, gathered=gathered), others, left
 
     def _rows_about(
         self,
