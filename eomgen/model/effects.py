@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from eomgen.base.errors import SceneError, check_known
+from eomgen.language.base import Table
 from eomgen.language.conditions import require
 from eomgen.language.formula import ZERO, names_in
 from eomgen.language.quantity import about_slides, of_joint, with_components
@@ -198,13 +199,17 @@ def _check_names_in(
 def _names_in(
     effect: EffectTable, fields: Sequence[str], location: str
 ) -> Iterator[tuple[str, str]]:
-    """Each name that some fields hold, with its location. A field is a name, a list or a table."""
+    """Each name that some fields hold, with its location. A field is a name, a list, a table by
+    names, or one of tables that name a `body`.
+    """
     for field in fields:
         value = getattr(effect, field)
         if isinstance(value, str):
             if (field, value) not in (("bodies", "all"), ("joints", "all")):
                 yield value, f"{location}.{field}"
         elif isinstance(value, dict):
-            yield from ((name, f"{location}.{field}.{name}") for name in value)
+            for key, inner in value.items():
+                at, within = f"{location}.{field}.{key}", isinstance(inner, Table)
+                yield (inner.body, f"{at}.body") if within else (key, at)
         elif value is not None:
             yield from ((name, f"{location}.{field}[{i}]") for i, name in enumerate(value))

@@ -8,7 +8,7 @@ from statistics import median
 from eomgen.language.formula import Formula
 from eomgen.model.model import Body, Model
 from eomgen.scene.effects.base import EffectTable
-from eomgen.scene.effects.elements import Link
+from eomgen.scene.effects.elements import Link, Touching
 from eomgen.scene.joints.base import WORLD
 from eomgen.show.effect_elements import elements_of_constraints
 
@@ -27,6 +27,7 @@ class BodyPoints:
     others   points at which effects act or that have a name
     spheres  centre and radius of its spheres in contacts
     boxes    centre, half sizes and rounding of its boxes in contacts
+    solids   its other shapes in contacts
     """
 
     joints: list[Vector] = field(default_factory=list)
@@ -34,6 +35,7 @@ class BodyPoints:
     carries: bool = False
     spheres: list[tuple[Vector, Formula]] = field(default_factory=list)
     boxes: list[tuple[Vector, Vector, Formula]] = field(default_factory=list)
+    solids: list[Touching] = field(default_factory=list)
 
 
 def points_of(model: Model) -> list[BodyPoints]:
@@ -77,7 +79,9 @@ def _add_sizes(
     """Note the spheres or boxes of the bodies of a contact; points and repeats are left out."""
     for shape in effect.shapes_in_contact(tuple(index)):
         own = found[index[shape.body]]
-        if shape.corners is not None:
+        if shape.end or shape.semi_axes or shape.orientation_deg:
+            own.solids.append(shape)
+        elif shape.corners is not None:
             if (box := (shape.at, shape.corners, shape.radius)) not in own.boxes:
                 own.boxes.append(box)
         elif is_drawn(model.value(shape.radius)) and shape.at not in dict(own.spheres):

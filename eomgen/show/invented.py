@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from statistics import median
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 from eomgen.language.formula import Constant
 from eomgen.language.rewriting import constant, scaled, sum_of, times, total
 from eomgen.model.model import Body, Model
+from eomgen.scene.effects.elements import Touching
 from eomgen.scene.joints.base import kinds_of, spatial
-from eomgen.scene.look import Box, Cylinder, Disc, Polygon, Rod, Shape, Sphere
+from eomgen.scene.look import Box, Cylinder, Disc, Ellipsoid, Polygon, Rod, Shape, Sphere
 from eomgen.show.body_points import BodyPoints, Vector, gyration, is_drawn, length_of
 from eomgen.show.colours import shade
 from eomgen.show.joint_axes import slides
@@ -112,6 +114,7 @@ def _touching(inventor: Inventor, body: Body, points: BodyPoints, color: str) ->
     """The spheres and boxes with which a body touches others, and a mark that shows rotation."""
     model = inventor.model
     dark = shade(color)
+    yield from (_solid_in_contact(solid, color) for solid in points.solids)
     for at, corners, rounding in points.boxes:
         size = tuple(times(2.0, total(half, rounding)) for half in corners)
         yield Box(type="box", size=size, center=at, color=color)
@@ -126,6 +129,19 @@ def _touching(inventor: Inventor, body: Body, points: BodyPoints, color: str) ->
         else:
             yield Sphere(type="sphere", radius=radius, center=at, color=color)
             yield Sphere(type="sphere", radius=times(0.4, radius), center=end, color=dark)
+
+
+def _solid_in_contact(solid: Touching, color: str) -> Shape:
+    """A capsule, or a box or an ellipsoid that is turned."""
+    at, radius = solid.at, solid.radius
+    if solid.end:
+        return Rod(type="rod", start=at, end=solid.end, width=times(2.0, radius), color=color)
+    sizes = tuple(total(half, radius) for half in solid.corners or solid.semi_axes or ())
+    turned: Any = {"orientation_deg": solid.orientation_deg} if solid.orientation_deg else {}
+    if solid.semi_axes:
+        return Ellipsoid(type="ellipsoid", radii=sizes, center=at, color=color, **turned)
+    size = tuple(times(2.0, half) for half in sizes)
+    return Box(type="box", size=size, center=at, color=color, **turned)
 
 
 def _is_thick(model: Model, body: Body, arm: Vector) -> bool:

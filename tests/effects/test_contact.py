@@ -333,6 +333,10 @@ def test_random_trees_move_as_under_loads_put_in_by_hand(
 
 EACH = 'against = "each_other"'
 OFF_CENTRE = 'against = "ball"', "other_AT", "radius = 0.7", "other_radius = 1.1"
+ROD = 'rod = { body = "a", at = [0.3, -0.2~], end = [-0.9, 0.5~], radius = 0.3 }'
+EGG = 'egg = { body = "b", at = [0.3, -0.2~], semi_axes = [1.1, 0.5~], TURN }'
+CRATE = 'crate = { body = "a", half_sizes = [1.1, 0.5~], radius = 0.1, TURN }'
+ROCK = 'rock = { body = "a", vertices = [[0.8, 0.1~], [-0.3, 0.7~], [-0.6, -0.9~]] }'
 GEOMETRY = {
     "points on a plane": ('bodies = "all"', "offset = 0.3"),
     "off-centre spheres on a slope": ('bodies = ["a", "b"]', "radius = 0.8", "AT", "NORMAL"),
@@ -341,6 +345,8 @@ GEOMETRY = {
     "spheres": ('bodies = "all"', EACH, "AT", "radius = 0.9", "radii = { a = 1.4 }"),
     "a point in the world's sphere": ('body = "a"', 'against = "ball"', "AT", "other_radius = 2.0"),
     "spheres off-centre": ('body = "a"', 'other = "b"', *OFF_CENTRE),
+    "shapes on a slope": (f"shapes = {{ {ROD}, {EGG}, {ROCK} }}", "NORMAL"),
+    "a box on a body": (f"shapes = {{ {CRATE} }}", "NORMAL", 'other = "b"'),
 }  # fmt: skip
 VECTORS = {"AT": "at = [0.3, -0.2", "NORMAL": "normal = [0.5, -1", "CORNERS": "corners = [0.9, 0.6"}
 VECTORS["other_AT"] = "other_at = [0.1, 0.4"
@@ -350,6 +356,8 @@ def scene(geometry: str, dimensions: int, *lines: str) -> str:
     """Two free bodies and a contact."""
     end = ", 0.4]" if dimensions == SPACE else "]"
     own = [VECTORS[line] + end if line in VECTORS else line for line in GEOMETRY[geometry]]
+    turn = f"orientation_deg = {'[20, -50, 35]' if dimensions == SPACE else 35}"
+    own = [line.replace("~]", end).replace("TURN", turn) for line in own]
     return free("a", "b", dimensions=dimensions, inertia=0.3) + contact(*own, *lines)
 
 
@@ -513,6 +521,7 @@ def test_slip_is_that_of_the_touching_point() -> None:
 NAMED = {
     "a box on a slope": [f"e_a_{k}" for k in range(1, 5)],
     "points on a plane": ["e_a", "e_b"],
+    "shapes on a slope": ["e_rod_1", "e_rod_2", "e_egg", "e_rock_1", "e_rock_2", "e_rock_3"],
     "spheres": ["e_a_b"],
     "spheres off-centre": ["e_a"],
 }

@@ -23,6 +23,9 @@ class OnBodies(EffectTable):
     vector_fields: ClassVar[tuple[str, ...]] = ("at",)
     points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {"at": ("body", "bodies")}
 
+    naming: ClassVar[tuple[str, ...]] = ("body", "bodies", "points")
+    """The keys of which one says where it acts."""
+
     body: Identifier | None = Field(default=None, description="body it acts on")
     bodies: Literal["all"] | Annotated[tuple[Identifier, ...], Field(min_length=1)] | None = Field(
         default=None, description="bodies it acts on, if several; 'all' are all of the scene"
@@ -36,11 +39,11 @@ class OnBodies(EffectTable):
 
     @model_validator(mode="after")
     def _one_or_several(self) -> Self:
-        given = [key for key in ("body", "bodies", "points") if getattr(self, key) is not None]
+        given = [key for key in self.naming if getattr(self, key)]
         if len(given) != 1:
             what = f"is given in addition to '{given[1]}'" if given else "is missing"
             key = given[0] if given else "body"
-            raise wrong(key, f"{what}; give one of body, bodies, points")
+            raise wrong(key, f"{what}; give one of {', '.join(self.naming)}")
         if given == ["points"] and self.at:
             raise wrong("at", "named points have their own positions; leave it out")
         listed = getattr(self, given[0])

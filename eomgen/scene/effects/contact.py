@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
-from typing import ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -17,11 +17,12 @@ from eomgen.scalars.exact import direction
 from eomgen.scene.effects.base import Contact, Load, Mechanism, Scalar
 from eomgen.scene.effects.base import Vector as Components
 from eomgen.scene.effects.bodies import OnBodies, wrong
+from eomgen.scene.effects.contact_shapes import CORES, ContactShape
 from eomgen.scene.effects.elements import Element, Layout, Round, Touching
 from eomgen.scene.effects.elements import Plane as PlaneElement
 from eomgen.scene.effects.touching import (
-    Ball,
     Plane,
+    Solid,
     Touch,
     gap_rate_and_slip,
     gap_rate_of,
@@ -49,6 +50,7 @@ AGAINST = {
 """The keys of contact with each of these, in addition to the common ones."""
 
 
+MOST_SHAPES = 1000
 MOST_CORNERS = 400
 """More corners of boxes in contact than these are not drawn."""
 
@@ -64,6 +66,9 @@ class BodyContact(OnBodies):
     - `against = "plane"`: the half-space n·x <= `offset`, with n along `normal`, by default up;
     - `against = "ball"`: the sphere of `other_radius` at `other_at`;
     - `against = "each_other"`: each other, every pair of `bodies`.
+
+    With `shapes` in place of bodies, these are capsules, boxes, ellipsoids and hulls, each of one
+    body: see `shapes of contacts`.
 
     Plane and ball are fixed in the world, or to the body `other`; then they are given relative to
     its centre of mass, in its axes. An offset cannot depend on time: a moving floor is a body.
@@ -93,8 +98,9 @@ offset = -1.0
 stiffness = 5e4
 dissipation = 0.2
 """
+    naming: ClassVar[tuple[str, ...]] = (*OnBodies.naming, "shapes")
     body_fields: ClassVar[tuple[str, ...]] = ("body", "bodies", "radii")
-    anchor_fields: ClassVar[tuple[str, ...]] = ("other",)
+    anchor_fields: ClassVar[tuple[str, ...]] = ("other", "shapes")
     vector_fields: ClassVar[tuple[str, ...]] = ("at", "corners", "other_at")
 
     points_of: ClassVar[Mapping[str, tuple[str, ...]]] = {
@@ -155,6 +161,9 @@ dissipation = 0.2
     allow_active: bool = Field(
         default=False, strict=True, description="whether stiffness and damping may be negative"
     )
+    shapes: Annotated[dict[Identifier, ContactShape], Field(max_length=MOST_SHAPES)] = Field(
+        default={}, description="shapes that touch, by name, in place of bodies"
+    )
 
     @model_validator(mode="after")
     def _keys_fit(self) -> Self:
@@ -176,14 +185,30 @@ dissipation = 0.2
         return self
 
     @model_validator(mode="after")
+    def _shapes_fit(self) -> Self:
+        for key in ("at", "radius", "radii", "corners") if self.shapes else ():
+            if key in self.model_fields_set:
+                raise wrong(key, "each of the shapes has its own; leave it out")
+        for name, shape in self.shapes.items():
+            if shape.body == self.other and self.against != "each_other":
+                what = "does not move on" if self.other == WORLD else "cannot touch"
+                raise wrong(f"shapes.{name}.body", f"'{shape.body}' {what} itself; name another")
+            if self.against != "plane" and any(getattr(shape, key) for key in CORES):
+                raise wrong(f"shapes.{name}", f"touches no {self.against}; give against = 'plane'")
+        return self
+
+    @model_validator(mode="after")
     def _bodies_fit(self) -> Self:
         listed = self.bodies if isinstance(self.bodies, tuple) else (self.body,)
+        listed = tuple(self.shapes) or listed
         if self.points is not None and self.against == "each_other":
             raise wrong("points", "may be on one body; give bodies instead")
         if self.points is not None and self.radii:
             raise wrong("radii", "named points have one radius; give each effect its own points")
         if self.against == "each_other" and len(listed) < 2 and self.bodies != "all":
             key = "body" if self.bodies is None else "bodies"
+            if self.shapes:
+                raise wrong("shapes", "one shape has no other to touch; give two or more")
             raise wrong(key, "one body has no other to touch; give two or more in bodies")
         if self.other != WORLD and self.other in listed:
             raise wrong("other", f"'{self.other}' cannot touch itself; name another body or world")
@@ -193,17 +218,22 @@ dissipation = 0.2
         return self
 
     def checked(self, dimensions: int, location: str) -> Self:
-        """Set the default normal; check that it is not zero."""
+        """Set the default normal; check that it is not zero, and the shapes."""
         up = (0.0,) * (dimensions - 1) + (1.0,)
         normal = with_components(self.normal or up, 0.0, dimensions, f"{location}.normal")
         if not any(normal):
             raise SceneError(f"{location}.normal: has no direction; give one that is not zero")
-        return self.replaced(normal=normal)
+        shapes = {
+            name: shape.checked(dimensions, f"{location}.shapes.{name}")
+            for name, shape in self.shapes.items()
+        }
+        return self.replaced(normal=normal, shapes=shapes)
 
     def conditions(self, location: str) -> Iterator[Condition]:
         """Radii are not negative, two points do not touch, restitution is from 0 to 1."""
         radii = {f"radii.{name}": radius for name, radius in self.radii.items()}
         radii |= {"radius": self.radius, "other_radius": self.other_radius}
+        radii |= {f"shapes.{name}.radius": shape.radius for name, shape in self.shapes.items()}
         for key, radius in radii.items():
             yield not_negative(f"{location}.{key}", radius, "m")
         yield a_part(f"{location}.restitution", self.restitution)
@@ -211,6 +241,7 @@ dissipation = 0.2
         if self.bodies == "all" and self.radii:
             return  # the bodies without a radius of their own are not known here
         own = [radii.get(f"radii.{name}", self.radius) for name in listed]
+        own = [shape.radius for shape in self.shapes.values()] or own
         if self.against == "ball":
             for radius in dict.fromkeys(own):
                 yield can_meet(f"{location}.other_radius", (radius, self.other_radius))
@@ -261,6 +292,9 @@ dissipation = 0.2
         if self.against == "ball":
             yield Round("ball", self.name, other, self.other_at, self.other_radius)
         names = tuple(layout.bodies)[1:]
+        for shape in self.shapes.values():
+            for at in shape.places(layout.dimensions):
+                yield Round("ball", self.name, layout.bodies[shape.body], at, shape.radius)
         for k, at in self.points_drawn(layout):
             radius = self.radii.get(names[k], self.radius)
             if self.corners is not None:
@@ -274,8 +308,13 @@ dissipation = 0.2
             kind: Literal["ball", "wheel"] = "ball" if axis is None else "wheel"
             yield Round(kind, self.name, k, at, radius, axis=axis or None)
 
-    def from_centres(self, centres: Mapping[str, Vector]) -> Mapping[str, Formula]:
-        """The offset of a plane, which the frame of `other` gives, from its centre of mass."""
+    def from_centres(self, centres: Mapping[str, Vector]) -> Mapping[str, Any]:
+        """The offset of a plane, which the frame of `other` gives, from its centre of mass; and the
+        points of shapes.
+        """
+        if self.shapes:
+            shapes = {name: shape.from_centre(centres) for name, shape in self.shapes.items()}
+            return {"shapes": shapes, **self.replaced(shapes={}).from_centres(centres)}
         if self.against != "plane" or self.other not in centres:
             return {}
         centre, offset = centres[self.other], self.offset
@@ -296,7 +335,9 @@ dissipation = 0.2
             yield layout.bodies[body], self.at
 
     def shapes_in_contact(self, bodies: Sequence[str]) -> Iterator[Touching]:
-        """Of each body that it names."""
+        """Of each body that it names, and its shapes."""
+        for shape in self.shapes.values():
+            yield from shape.touching(len(self.normal))
         for body in self._in_contact(bodies) if self.points is None else ():
             yield Touching(body, self.at, self.radii.get(body, self.radius), self.corners)
 
@@ -326,14 +367,15 @@ dissipation = 0.2
         """
         if self.law != "impact":
             return ()
-        touching = self.points or self._in_contact(bodies)
+        touching = self.points or tuple(self.shapes) or self._in_contact(bodies)
         if self.against == "each_other":
             return tuple(f"{self.name}_{a}_{b}" for a, b in combinations(touching, 2))
-        names = [f"{self.name}_{body}" for body in touching]
-        if self.corners is None:
-            return tuple(names)
-        numbers = range(1, 2 ** len(self.corners) + 1)
-        return tuple(f"{name}_{number}" for name in names for number in numbers)
+        names, n = list[str](), len(self.normal)
+        for touched in touching:
+            count = self.shapes[touched].count(n) if self.shapes else 2 ** len(self.corners or ())
+            name = f"{self.name}_{touched}"
+            names += [f"{name}_{number + 1}" for number in range(count)] if count > 1 else [name]
+        return tuple(names)
 
     def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
         """For law "impact" a contact for each point, sphere, corner or pair of spheres."""
@@ -387,30 +429,38 @@ dissipation = 0.2
 
     def _in_contact(self, bodies: Sequence[str]) -> list[str]:
         """Names of the bodies whose spheres or corners may touch."""
-        if self.body is not None:
-            return [self.body]
+        if self.body is not None or self.shapes:
+            return [self.body] if self.body else []
         listed = self.bodies if isinstance(self.bodies, tuple) else bodies
         return [body for body in listed if body != self.other]
 
+    def _solids(self, mechanism: Mechanism) -> Iterator[Solid]:
+        """What touches: its shapes, or the spheres or boxes of bodies."""
+        for shape in self.shapes.values():
+            yield shape.solid(mechanism)
+        if self.shapes:
+            return
+        edges = list[Components]()
+        for k, size in enumerate(self.corners or ()):
+            zeros = [mechanism.zero] * mechanism.dimensions
+            edges.append((*zeros[:k], mechanism.value(size), *zeros[k + 1 :]))
+        for body, at in self.loaded_points(mechanism):
+            if body != self.other:
+                radius = mechanism.value(self.radii.get(body, self.radius))
+                yield Solid(body, at, radius, edges=tuple(edges))
+
     def _touches(self, mechanism: Mechanism) -> Iterator[Touch]:
-        balls = [
-            Ball(body, at, mechanism.value(self.radii.get(body, self.radius)))
-            for body, at in self.loaded_points(mechanism)
-            if body != self.other
-        ]
+        solids = list(self._solids(mechanism))
         if self.against == "each_other":
-            yield from (on_ball(mechanism, *pair) for pair in combinations(balls, 2))
+            yield from (on_ball(mechanism, *pair) for pair in combinations(solids, 2))
             return
         if self.against == "ball":
             centre = tuple(mechanism.value(part) for part in self.other_at)
-            ball = Ball(self.other, centre, mechanism.value(self.other_radius))
-            yield from (on_ball(mechanism, first, ball) for first in balls)
+            ball = Solid(self.other, centre, mechanism.value(self.other_radius))
+            yield from (on_ball(mechanism, first, ball) for first in solids)
             return
         zeros = (mechanism.zero,) * mechanism.dimensions
         normal = tuple(mechanism.number(x) for x in direction(self.normal))
         plane = Plane(self.other, zeros, normal, mechanism.value(self.offset))
-        corners: Components | None = None
-        if self.corners is not None:
-            corners = tuple(mechanism.value(part) for part in self.corners)
-        for ball in balls:
-            yield from on_plane(mechanism, plane, ball, corners)
+        for solid in solids:
+            yield from on_plane(mechanism, plane, solid)

@@ -116,13 +116,17 @@ class Round:
 @dataclass(frozen=True)
 class Touching:
     """A sphere of a body, a circle in the plane, or a box of half sizes `corners` rounded by the
-    radius, with which it touches others.
+    radius, with which it touches others; or a capsule to its other `end`, or an ellipsoid. Boxes
+    and ellipsoids are turned by angles about x, then y, then z.
     """
 
     body: str
     at: Vector
     radius: Formula
     corners: Vector | None
+    end: Vector | None = None
+    semi_axes: Vector | None = None
+    orientation_deg: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -53,44 +53,67 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Ball:
-    """A sphere, or a circle in the plane, with centre `at` on a body or in the world."""
+class Solid:
+    """What touches: a core on a body or in the world, rounded by `radius`, m.
+
+    Vectors are in body axes, m; `at` is from the centre of mass. The core is the points
+    at `arms` from there, of which () is `at` itself; with `edges` the box of these half edges,
+    whose corners are their signed sums, or, if it is `smooth`, the ellipsoid of these half-axes.
+    """
 
     body: str
     at: Vector
     radius: Scalar
+    arms: tuple[Vector, ...] = ((),)
+    edges: tuple[Vector, ...] = ()
+    smooth: bool = False
 
 
-def on_plane(
-    mechanism: Mechanism, plane: Plane, ball: Ball, corners: Vector | None = None
-) -> Iterator[Touch]:
-    """The contact of a ball with a plane; with `corners`, half sizes of a box centred at the ball's
-    `at`, those of a ball at each corner.
+def on_plane(mechanism: Mechanism, plane: Plane, solid: Solid) -> Iterator[Touch]:
+    """The contacts of a solid with a plane: at the points or corners of its core, or at the lowest
+    point of an ellipsoid.
 
     The signs of the corners' x, y, z are in the order (-, -, -), (+, -, -), (-, +, -), …
     """
     normal = mechanism.outward(plane.body, plane.normal)
-    centre = mechanism.position(ball.body, ball.at)
+    centre = mechanism.position(solid.body, solid.at)
     if plane.body != WORLD:
         centre = sub(centre, mechanism.position(plane.body, plane.at))
     normal = mechanism.called("n", *normal)
-    height = dot(normal, centre) - (plane.offset + ball.radius)
-    arms: list[Vector] = [()]
-    lifts = [mechanism.zero]
-    if corners is not None:
-        edges = [_edge(mechanism, ball.body, size, i) for i, size in enumerate(corners)]
-        sums = _signed_sums([(*edge, dot(normal, edge)) for edge in edges])
-        arms, lifts = [x[:-1] for x in sums], [x[-1] for x in sums]
-    for arm, lift in zip(arms, lifts, strict=True):
-        sides = [Side(ball.body, ball.at, arm, -ball.radius)]
+    height = dot(normal, centre) - (plane.offset + solid.radius)
+    for arm, lift in _lowest(mechanism, solid, normal):
+        sides = [Side(solid.body, solid.at, arm, -solid.radius)]
         if plane.body != WORLD:
             from_plane = add(centre, arm) if arm else centre
-            sides.append(Side(plane.body, plane.at, from_plane, -ball.radius))
+            sides.append(Side(plane.body, plane.at, from_plane, -solid.radius))
         (gap,) = mechanism.called("g", height + lift)
         yield Touch(normal, gap, tuple(sides))
 
 
-def on_ball(mechanism: Mechanism, first: Ball, second: Ball) -> Touch:
+def _lowest(mechanism: Mechanism, solid: Solid, normal: Vector) -> Iterator[tuple[Vector, Scalar]]:
+    """The points of a core that a plane touches first: arms from `at` in world axes, m, () for
+    none, with their heights above it along the normal n.
+
+    The support function of an ellipsoid with half-axes w is h = sqrt(Σ (w·n)²), and its lowest
+    point -∂h/∂n, so the speed of the gap is that of the body's point there.
+    """
+    edges = [mechanism.outward(solid.body, edge) for edge in solid.edges]
+    if solid.smooth:
+        parts = [dot(normal, edge) for edge in edges]
+        reach = mechanism.call("sqrt", dot(tuple(parts), tuple(parts)))
+        arm = scale(parts[0], edges[0])
+        for part, edge in zip(parts[1:], edges[1:], strict=True):
+            arm = add(arm, scale(part, edge))
+        yield tuple(-(x / reach) for x in arm), -reach
+    elif edges:
+        sums = _signed_sums([(*edge, dot(normal, edge)) for edge in edges])
+        yield from ((x[:-1], x[-1]) for x in sums)
+    for own in solid.arms if not edges else ():
+        arm = mechanism.outward(solid.body, own) if own else ()
+        yield arm, dot(normal, arm) if arm else mechanism.zero
+
+
+def on_ball(mechanism: Mechanism, first: Solid, second: Solid) -> Touch:
     """The contact of two balls, at least one with a radius > 0.
 
     P divides the line between the centres in the ratio of the radii. It is one point of both bodies
@@ -199,13 +222,6 @@ def _speed(mechanism: Mechanism, side: Side, lever: Vector) -> Vector:
 def _relative(speeds: Sequence[Vector]) -> Vector:
     """The velocity of the first side relative to the second, if there is one."""
     return sub(*speeds) if len(speeds) == 2 else speeds[0]
-
-
-def _edge(mechanism: Mechanism, body: str, size: Scalar, axis: int) -> Vector:
-    """Half an edge of a box along an axis of its body, in world axes, m."""
-    zero = mechanism.zero
-    parts = [size if i == axis else zero for i in range(mechanism.dimensions)]
-    return mechanism.outward(body, tuple(parts))
 
 
 def _signed_sums(parts: Sequence[Vector]) -> list[Vector]:
