@@ -14,6 +14,7 @@ def import_robot(
     *,
     floating: bool = False,
     stops: bool = False,
+    contacts: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Imported:
     """Read a robot file, URDF or MJCF: its `tables`, as a scene's file holds them, and `remarks`.
@@ -22,6 +23,8 @@ def import_robot(
     floating  of a URDF, whether its root link moves freely; else it is fixed to the world
     stops     whether the limits of joints are rigid stops without bounce; else a coordinate beyond
               them is reported
+    contacts  whether collision geometry touches the ground, softly: the planes of an MJCF file's
+              world; z = 0 for a URDF, which then starts on it if it moves freely
     allow     folders in which meshes and included files may lie, beside the file's own
 
     All functions that take a scene take `tables`, and the path of a robot file as well. `toml()`
@@ -30,5 +33,6 @@ def import_robot(
     URDF, `pinocchio(module)` to `q` and `v` of Pinocchio. Raises `SceneError` for a file that is no
     robot.
     """
-    wishes = Wishes(floating=floating, stops=stops, allowed=tuple(map(Path, allow)))
+    allowed = tuple(map(Path, allow))
+    wishes = Wishes(floating=floating, stops=stops, contacts=contacts, allowed=allowed)
     return import_file(find_scene(str(path)), wishes)

@@ -12,7 +12,8 @@ from eomgen.scene.reader import LARGEST_FILE, imported_scene, parse_scene
 def import_(given: Arguments) -> int:
     """Write a robot file as a scene."""
     source = Path(given.robot)
-    found = import_robot(source, floating=given.floating, stops=given.stops, allow=given.allow)
+    wishes = {"floating": given.floating, "stops": given.stops, "contacts": given.contacts}
+    found = import_robot(source, **wishes, allow=given.allow)
     path: Path = given.output or Path(f"{imported_scene(found, source.name).name}.toml")
     if path.exists() and not given.force:
         raise RunError(f"{path}: exists; choose another name with -o, or give --force")

@@ -253,6 +253,9 @@ class Imported(Forced):
     stops: bool = option(
         False, "make rigid stops of the limits of a URDF's joints, which are else reported"
     )
+    contacts: bool = option(
+        False, "let collision geometry touch the ground: planes of an MJCF file, else z = 0"
+    )
     allow: Sequence[Path] = option(
         (),
         "also read meshes and included files in this folder; else only beside ROBOT",

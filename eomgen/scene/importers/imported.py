@@ -17,11 +17,13 @@ class Wishes:
 
     floating  the root link moves freely instead of being fixed to the world
     stops     the limits of joints are rigid stops
+    contacts  collision geometry touches the ground
     allowed   folders that files named in the robot file may lie in, beside its own folder
     """
 
     floating: bool = False
     stops: bool = False
+    contacts: bool = False
     allowed: tuple[Path, ...] = ()
 
 

@@ -1,4 +1,4 @@
-"""The bounds of meshes that a robot file names, and where these files are.
+"""The corners of meshes that a robot file names, and where these files are.
 
 Only files in the robot file's own folder and in allowed folders are read, and none from a network.
 """
@@ -6,7 +6,6 @@ Only files in the robot file's own folder and in allowed folders are read, and n
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -15,8 +14,9 @@ import numpy.typing as npt
 
 from eomgen.base.errors import EomgenError, RunError
 from eomgen.base.files import read_plain
-from eomgen.scene.importers.collada import corners_of
+from eomgen.scene.importers.collada import corners_of as collada_corners
 
+Array = npt.NDArray[np.float64]
 LARGEST_MESH = 100_000_000
 LARGEST = 1e30
 """Greatest coordinate of a mesh, in its own unit."""
@@ -25,14 +25,6 @@ HEADER = 84
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("about", "<u2")])
 _CORNER = re.compile(rb"^[ \t]*v(?:ertex)?[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 """A corner of a mesh in text: "vertex x y z" of STL, "v x y z" of OBJ."""
-
-
-@dataclass(frozen=True)
-class Bounds:
-    """The least and the greatest coordinates of a mesh, in its own unit and axes."""
-
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
 
 
 ABSENT, OUTSIDE = "is not there", "is outside of the file's folder"
@@ -77,8 +69,8 @@ def local(path: str, system: str = os.name) -> str:
     return path.lstrip("/") if system == "nt" and _DRIVE.match(path) else path
 
 
-def bounds_of(path: Path) -> Bounds:
-    """The bounds of a mesh, STL, OBJ or COLLADA. Raises `MeshError`."""
+def corners_of(path: Path) -> Array:
+    """The corners (k, 3) of a mesh, STL, OBJ or COLLADA, in its own unit. Raises `MeshError`."""
     kind = path.suffix.lower()
     if kind not in (".stl", ".obj", ".dae"):
         raise MeshError("is not STL, OBJ or DAE")
@@ -88,15 +80,14 @@ def bounds_of(path: Path) -> Bounds:
         raise MeshError("cannot be read") from None
     try:
         if kind == ".dae":
-            corners = corners_of(data)
+            corners = collada_corners(data)
         else:
             corners = _binary(data) if kind == ".stl" and _is_binary(data) else _text(data)
     except (ValueError, TypeError):
         raise MeshError("has corners that are not numbers") from None
     if not len(corners) or not (np.abs(corners) < LARGEST).all():
         raise MeshError("has no corners, or some that are not finite")
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    return Bounds(tuple(low.tolist()), tuple(high.tolist()))
+    return corners
 
 
 def _is_binary(data: bytes) -> bool:
@@ -108,7 +99,7 @@ def _is_binary(data: bytes) -> bool:
     return exact or not data.lstrip().startswith(b"solid")
 
 
-def _binary(data: bytes) -> npt.NDArray[np.float64]:
+def _binary(data: bytes) -> Array:
     count = min(
         int.from_bytes(data[80:HEADER], "little"), (len(data) - HEADER) // TRIANGLE.itemsize
     )
@@ -116,5 +107,5 @@ def _binary(data: bytes) -> npt.NDArray[np.float64]:
     return found.astype(np.float64)
 
 
-def _text(data: bytes) -> npt.NDArray[np.float64]:
+def _text(data: bytes) -> Array:
     return np.array(_CORNER.findall(data)).astype(np.float64).reshape(-1, 3)

@@ -17,6 +17,7 @@ class Parts:
     """The parts of a scene, collected one after another. `start` holds the initial coordinates."""
 
     inputs: Tables = field(default_factory=list)
+    parameters: dict[str, Any] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
     bodies: Tables = field(default_factory=list)
     joints: Tables = field(default_factory=list)
@@ -36,7 +37,9 @@ class Parts:
             found["inputs"] = self.inputs
         if any("coulomb" in effect for effect in self.effects):
             about = "speed at which Coulomb friction is smoothed, rad/s or m/s"
-            found["parameters"] = {SLIDING_SPEED: {"value": SPEED, "about": about}}
+            self.parameters[SLIDING_SPEED] = {"value": SPEED, "about": about}
+        if self.parameters:
+            found["parameters"] = self.parameters
         if self.definitions:
             found["definitions"] = self.definitions
         found |= {"bodies": self.bodies, "joints": self.joints, "effects": self.effects}

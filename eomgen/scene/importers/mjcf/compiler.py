@@ -29,7 +29,9 @@ PREFIXES = (
     "tendon_",
     "wrap_",
     "eq_",
+    "exclude_",
     "mat_rgba",
+    "mesh_vert",
     "qpos",
 )
 SINGLE = (
@@ -50,7 +52,10 @@ SINGLE = (
     "nmocap",
     "nv",
 )
-OPTIONS = ("gravity", "density", "viscosity", "wind", "magnetic", "disableflags", "disableactuator")
+OPTIONS = (
+    *("gravity", "density", "viscosity", "wind", "magnetic"),
+    *("disableflags", "disableactuator", "timestep"),
+)
 
 
 def arrays_of(model: Any) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from eomgen.scene.importers.imported import Imported, Wishes
 from eomgen.scene.importers.mjcf.actuators import add_actuators
 from eomgen.scene.importers.mjcf.bodies import add_bodies, is_split, joints_of
 from eomgen.scene.importers.mjcf.compiled import Compiled, compiled
+from eomgen.scene.importers.mjcf.contacts import add_contacts
 from eomgen.scene.importers.mjcf.equalities import add_equalities
 from eomgen.scene.importers.mjcf.files import check_files
 from eomgen.scene.importers.mjcf.forces import add_gravity, add_passive
@@ -44,6 +45,8 @@ def imported(path: Path, root: Element, wishes: Wishes) -> Imported:
             f"the file's pose is beyond the limits of {listed(map(repr, moved))}, which start "
             "between them"
         )
+    if wishes.contacts:
+        add_contacts(model, names, made)
     made.remarks |= dict.fromkeys(_remarks(model, made, wishes))
     if changed:
         made.remark(f"renamed: {listed(changed)}")
@@ -124,8 +127,9 @@ def _remarks(model: Compiled, made: Mechanism, wishes: Wishes) -> Iterable[str]:
             f"left out: forces of the medium of density {model['opt_density']:g} kg/m^3 and "
             f"viscosity {model['opt_viscosity']:g} Pa s; an effect drag may replace them"
         )
-    if any(model["geom_contype"]) or any(model["geom_conaffinity"]):
-        yield "left out: contacts between geoms; contacts are effects that a scene adds"
+    touching = any(model["geom_contype"]) or any(model["geom_conaffinity"])
+    if touching and not wishes.contacts:
+        yield "left out: contacts between geoms; import with --contacts adds those with planes"
     if any("limits" in joint for joint in made.joints) and not wishes.stops:
         yield (
             "a coordinate beyond the limits of its joint is reported, not prevented; import with "

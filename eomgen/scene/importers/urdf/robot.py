@@ -12,6 +12,7 @@ from eomgen.scene.importers.names import TAKEN, identifiers, renamed, scene_name
 from eomgen.scene.importers.parts import SLIDING_SPEED, SPEED
 from eomgen.scene.importers.rotations import is_slight
 from eomgen.scene.importers.stops import add_stops
+from eomgen.scene.importers.urdf.contacts import add_contacts
 from eomgen.scene.importers.urdf.joints import (
     Mechanism,
     Names,
@@ -60,8 +61,10 @@ def imported(path: Path, robot: Element, wishes: Wishes) -> Imported:
         raise robot.error("nothing can move; let the root move freely with --floating")
     if wishes.stops:
         add_stops(made)  # all start between their limits
+    if wishes.contacts:
+        remarks += add_contacts(tree, inertials, names, made, meshes)
     remarks += _remarks(robot, tree, names, made)
-    remarks += _remarks_on_bodies(tree, meshes, changes)
+    remarks += _remarks_on_bodies(tree, meshes, changes, wishes)
     name = scene_name(robot.attributes.get("name", ""), path.stem)
     states = convention_of(read, tree, names, made)
     return Imported(made.tables(name, path.name), tuple(remarks), states)
@@ -163,7 +166,9 @@ def _remarks(robot: Element, tree: Tree, names: Names, made: Mechanism) -> Itera
         yield f"renamed: {listed(changed)}"
 
 
-def _remarks_on_bodies(tree: Tree, meshes: Meshes, changes: Changes) -> Iterator[str]:
+def _remarks_on_bodies(
+    tree: Tree, meshes: Meshes, changes: Changes, wishes: Wishes
+) -> Iterator[str]:
     """The same of links."""
     if changes.strange:
         yield f"no body has the inertia of {_listed(changes.strange)}; taken as it is"
@@ -175,8 +180,8 @@ def _remarks_on_bodies(tree: Tree, meshes: Meshes, changes: Changes) -> Iterator
         yield f"inertias of links without mass count with what carries them: {lent}"
     if changes.still:
         yield f"left out: inertias of links that cannot move: {_listed(changes.still)}"
-    if any(link.first("collision") for link in tree.links.values()):
-        yield "left out: collision geometry; contacts are effects that a scene adds"
+    if not wishes.contacts and any(link.first("collision") for link in tree.links.values()):
+        yield "left out: collision geometry; import with --contacts lets it touch the ground"
     if meshes.drawn:
         yield f"{meshes.drawn} meshes are drawn as the boxes around them"
     for reason in dict.fromkeys(meshes.missing.values()):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from eomgen.scene.importers.attributes import number, required, vector
-from eomgen.scene.importers.meshes import Bounds, MeshError, bounds_of, find_file
+from eomgen.scene.importers.meshes import Array, MeshError, corners_of, find_file
 from eomgen.scene.importers.rotations import image, rotation, squared
 from eomgen.scene.importers.vectors import Vector
 from eomgen.scene.importers.xml_elements import Element
@@ -23,15 +23,15 @@ class Meshes:
     """
 
     folders: Sequence[Path]
-    found: dict[str, Bounds] = field(default_factory=dict)
+    found: dict[str, Array] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     drawn: int = 0
 
-    def bounds(self, name: str) -> Bounds | None:
-        """The bounds of a mesh, None without a file that can be read."""
+    def corners(self, name: str) -> Array | None:
+        """The corners (k, 3) of a mesh, None without a file that can be read."""
         if name not in self.found and name not in self.missing:
             try:
-                self.found[name] = bounds_of(find_file(name, self.folders))
+                self.found[name] = corners_of(find_file(name, self.folders))
             except MeshError as error:
                 self.missing[name] = str(error)
         return self.found.get(name)
@@ -89,10 +89,10 @@ def _shapes(element: Element, what: str, meshes: Meshes) -> Iterator[dict[str, A
     for shape in geometry.children if geometry else ():
         match shape.tag:
             case "box":
-                size = _lengths(shape, what)
+                size = lengths_of(shape, what)
                 yield _box(size, at, angles)
             case "sphere":
-                radius = _length(shape, "radius", what)
+                radius = length_of(shape, "radius", what)
                 yield {"type": "sphere", "radius": radius, "center": list(at)}
             case "cylinder" | "capsule":
                 yield _cylinder(shape, what, at, angles)
@@ -108,7 +108,7 @@ def _box(size: Vector, center: Vector, angles: Vector) -> dict[str, Any]:
 
 
 def _cylinder(shape: Element, what: str, at: Vector, angles: Vector) -> dict[str, Any]:
-    radius, half = _length(shape, "radius", what), _length(shape, "length", what) / 2
+    radius, half = length_of(shape, "radius", what), length_of(shape, "length", what) / 2
     arm = image(rotation(angles), (0.0, 0.0, half))
     return {
         "type": "cylinder",
@@ -124,17 +124,19 @@ def _mesh(
     """The box around a mesh."""
     name = required(shape, "filename", what)
     scale = vector(shape, "scale", what, (1.0, 1.0, 1.0))
-    bounds = meshes.bounds(name)
-    if bounds is None:
+    corners = meshes.corners(name)
+    if corners is None:
         return
-    pairs = list(zip(bounds.low, bounds.high, scale, strict=True))
+    bounds = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    pairs = list(zip(*bounds, scale, strict=True))
     middle = image(rotation(angles), [s * (low + high) / 2 for low, high, s in pairs])
     x, y, z = (max(abs(s) * (high - low), THINNEST) for low, high, s in pairs)
     meshes.drawn += 1
     yield _box((x, y, z), (at[0] + middle[0], at[1] + middle[1], at[2] + middle[2]), angles)
 
 
-def _lengths(shape: Element, what: str) -> Vector:
+def lengths_of(shape: Element, what: str) -> Vector:
+    """The edges of a box, m."""
     required(shape, "size", what)
     size = vector(shape, "size", what)
     if min(size) <= 0:
@@ -142,7 +144,8 @@ def _lengths(shape: Element, what: str) -> Vector:
     return size
 
 
-def _length(shape: Element, key: str, what: str) -> float:
+def length_of(shape: Element, key: str, what: str) -> float:
+    """A length of a shape, m."""
     length = number(shape, key, what)
     if length <= 0:
         raise shape.error(

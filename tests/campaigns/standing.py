@@ -1,0 +1,104 @@
+"""Imported robots on the ground: they settle, gain no energy, and sink in by little.
+
+    python tests/campaigns/standing.py FILE… [--allow DIR]… [--count 20] [--time 5]
+
+Robots are passive: their actuators, and bounds of joints, are left out on both sides. Each is
+dropped from where its file has it, a URDF from where it touches the ground. Printed are the energy
+at the start and the end, J; the greatest gain of energy between two rows relative to all that is
+lost; the greatest depth at the end, mm; the greatest speed there; and how high the root is then,
+with MuJoCo's for an MJCF file that has a free body.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import eomgen
+from eomgen.base.errors import EomgenError
+from eomgen.dynamics.dynamics import Dynamics
+from eomgen.dynamics.start.diagnostics import values_at
+from eomgen.scalars.floats import FloatScalars
+
+DEEPEST = 5e-3
+GAIN = 1e-6
+RATES = ("_dot", "_wx", "_wy", "_wz")
+ACTIVE = ("motor", "controller", "servo", "pd", "pid", "external_force")
+
+
+def depth_of(model: Any, y: np.ndarray) -> float:
+    """The greatest depth of the contacts of a model at a state, m."""
+    dynamics = Dynamics(model, values_at(model, 0.0, y.tolist(), {}, {}), FloatScalars())
+    return max(float(effect.overlap(dynamics)) for effect in model.effects)
+
+
+def height_in_mujoco(path: Path, seconds: float) -> float:
+    """Where MuJoCo has the first free body after some time, passive and without bounds, m."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    off = mujoco.mjtDisableBit
+    model.opt.disableflags |= off.mjDSBL_LIMIT | off.mjDSBL_ACTUATION
+    data = mujoco.MjData(model)
+    while data.time < seconds:
+        mujoco.mj_step(model, data)
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    return float(data.qpos[model.jnt_qposadr[free[0]] + 2]) if len(free) else np.nan
+
+
+def settled(path: Path, allow: list[str], seconds: float) -> tuple[str, bool]:
+    """What is printed of a robot, and whether it is within the bounds."""
+    given = eomgen.import_robot(
+        path, floating=path.suffix == ".urdf", contacts=True, allow=[path.parent, *allow]
+    )
+    tables = dict(given.tables)
+    tables["effects"] = [e for e in tables["effects"] if e["type"] not in ACTIVE]
+    if not any(e["type"] == "contact" for e in tables["effects"]):
+        raise EomgenError("has no contact with the ground")
+    tables["outputs"] = ["kinetic_energy", "potential_energy"]
+    run = eomgen.simulate(tables, t_end=seconds, rtol=1e-4, atol=1e-6)
+    energy = np.asarray(run.energy)
+    lost = energy[0] - energy[-1]
+    gain = max(float(np.diff(energy).max()), 0.0) / max(lost, 1e-3)
+    depth = depth_of(run.model, np.asarray(run.y[-1]))
+    heights = [np.nan, np.nan]
+    if path.suffix != ".urdf":
+        heights[0] = float(given.mujoco(eomgen.load(run.module)).position(np.asarray(run.y[-1]))[2])
+        heights[1] = height_in_mujoco(path, seconds)
+    moving = [i for i, name in enumerate(run.states) if name.endswith(RATES)]
+    speeds = np.abs(np.asarray(run.y[-1])[moving])
+    within = run.finished and gain <= GAIN and depth <= DEEPEST
+    return (
+        f"{energy[0]:.4g} J to {energy[-1]:.4g} J, gain {gain:.1e}, depth {1e3 * depth:.2f} mm, "
+        f"speed {speeds.max():.1e}, height {heights[0]:.4f} m, in MuJoCo {heights[1]:.4f} m"
+    ), bool(within)
+
+
+def main() -> int:
+    """Drop all robots; the exit code is 1 if one is beyond the bounds."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", nargs="+", type=Path)
+    parser.add_argument("--allow", action="append", default=[])
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--time", type=float, default=5.0)
+    given = parser.parse_args()
+    good = tried = 0
+    for path in given.files[: given.count]:
+        start = time.process_time()
+        try:
+            said, within = settled(path, given.allow, given.time)
+        except EomgenError as error:
+            print(f"{path.name}: {error}", flush=True)
+            continue
+        tried, good = tried + 1, good + within
+        spent = time.process_time() - start
+        print(f"{path.name}: {said} {'' if within else 'BEYOND '}({spent:.1f} s)", flush=True)
+    print(f"{good} of {tried} settle within the bounds")
+    return int(good < tried)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
