@@ -1,8 +1,16 @@
-"""Random complementarity problems."""
+"""Random complementarity problems, and what solves them in units and on pages."""
+
+import re
 
 import numpy as np
+from languages import Given
 
+from eomgen.api.given import model_of, read
 from eomgen.engine.complementarity import complementary
+from eomgen.engine.printed import SIZES, steps_of_pages
+from eomgen.exports.fmu_source import MAIN, sources_of
+from eomgen.exports.fmu_unit import unit_of
+from eomgen.exports.steps import method_of
 from eomgen.run.problem import FloatArray
 
 MOST = 8
@@ -35,3 +43,22 @@ def solution(matrix: FloatArray, offset: FloatArray) -> FloatArray | None:
     forces = np.zeros(len(offset))
     found = complementary(len(offset), matrix.tolist(), offset.tolist(), forces)
     return forces if found else None
+
+
+def of_unit_and_page() -> Given:
+    """The source of an FMU with contacts, and what pages step by; both have `complementary`."""
+    scene = read("bouncing_two_body")
+    model = model_of(scene, scene)
+    unit = unit_of(model, scene.simulation)
+    method = method_of("DOP853", model, unit.interface, adaptive=True)
+    files = dict(sources_of(unit, method)[0])
+
+    def with_included(name: str) -> str:
+        text = files.pop(name, "")
+        return re.sub(r'#include "([\w.-]+)"', lambda found: with_included(found[1]), text)
+
+    head, _, names = steps_of_pages().rpartition("return { ")
+    page = f"{head}return {{ complementary, {names}".replace("makeSteps", "madeOfPage", 1)
+    sizes = ", ".join(f"{name}: 1" for name in SIZES)
+    javascript = f"{page}const {{ complementary }} = madeOfPage({{ {sizes} }});"
+    return Given(None, with_included(MAIN), javascript + "\nconst system = {};", whole=True)

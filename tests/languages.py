@@ -49,13 +49,15 @@ return given.map((args) => {
 @dataclass
 class Given:
     """A protocol's functions: an object in Python, and the same in C and JavaScript. Those in C
-    that need the engine's structures follow it.
+    that need the engine's structures follow it. Or C and JavaScript that have the engine's
+    functions themselves, if they are `whole`.
     """
 
     python: Any
     c: str = "typedef struct { int none; } System;\n"
     javascript: str = "const system = {};\n"
     c_after: str = ""
+    whole: bool = False
 
 
 NONE = Given(None)
@@ -93,10 +95,11 @@ def _in_python(text: Text, name: str, cases: Any, known: Any, given: Given) -> l
 
 def _in_c(text: Text, name: str, cases: Any, known: Any, given: Given) -> list[list[str]]:
     own = own_name(name, known)
-    shared = printed(text, [(name, known)], C).replace(
-        f"static inline {_result(text, name)} {own}(", f"{_result(text, name)} {own}("
-    )
-    source = "\n".join((C.prelude, given.c, shared, given.c_after))
+    source = given.c
+    if not given.whole:
+        source = "\n".join((C.prelude, given.c, printed(text, [(name, known)], C), given.c_after))
+    head = f"{_result(text, name)} {own}("
+    source = source.replace(f"static inline {head}", head)
     library = compiled_library(source, lambda: {"engine.c": source}, "engine.c")
     call, found = library[own], []
     call.restype = {"void": None, "double": ctypes.c_double}.get(
@@ -132,9 +135,9 @@ def _as_c(x: Any) -> Any:
 
 def _in_node(text: Text, name: str, cases: Any, known: Any, given: Given) -> list[list[str]]:
     own = own_name(name, known)
-    source = "\n".join(
-        (JAVASCRIPT.prelude, given.javascript, printed(text, [(name, known)], JAVASCRIPT))
-    )
+    source = given.javascript
+    if not given.whole:
+        source = "\n".join((JAVASCRIPT.prelude, source, printed(text, [(name, known)], JAVASCRIPT)))
     passed = [[None if x is given else _encoded(x) for x in case] for case in cases]
     found: list[list[str]] = run_in_node(source, BY_BITS.replace("CALLED", own), passed, scripts=())
     return [[each.rjust(16, "0") for each in case] for case in found]

@@ -1,5 +1,4 @@
-"""Random complementarity problems of contact forces by the engine's text in three languages: Python
-as it stands, C, JavaScript.
+"""Random complementarity problems of contact forces, as Python, an FMU and a page solve them.
 
     python tests/campaigns/contact_forces.py [COUNT] [SEED]
 
@@ -15,7 +14,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).parent.parent))
 
-from complementarity import drawn, solution
+from complementarity import drawn, of_unit_and_page, solution
 from languages import results
 
 from eomgen.engine import complementarity
@@ -32,9 +31,9 @@ def main() -> None:
         none = sum(solution(*problem) is None for problem in problems)
     print(f"{count} problems: {none} without forces, {lemke.call_count} by Lemke")
     cases = [[len(b), a, b, np.zeros(len(b))] for a, b in problems]
-    python, c, javascript = results(text(), "complementary", cases)
+    python, unit, page = results(text(), "complementary", cases, given=of_unit_and_page())
     wrong = 0
-    for name, found in (("C", c), ("JavaScript", javascript)):
+    for name, found in (("the FMU", unit), ("the page", page)):
         differ = [k for k, pair in enumerate(zip(python, found, strict=True)) if pair[0] != pair[1]]
         print(f"{name}: {len(differ)} differ in a bit {differ[:10]}", flush=True)
         wrong += len(differ)
