@@ -136,12 +136,17 @@ class Function(Expressions):
         return made
 
     def statements(self, body: Iterable[ast.stmt]) -> None:
-        """Add what statements become."""
+        """Add what statements become. Raises `NotInSubsetError` for one of which something is not
+        found that the subset needs.
+        """
         for s in body:
-            self.statement(s)
+            try:
+                self.statement(s)
+            except (AttributeError, LookupError, TypeError, ValueError) as error:
+                raise NotInSubsetError(s, "not in the subset") from error
 
     def statement(self, s: ast.stmt) -> None:
-        """Add what a statement becomes. Raises `NotInSubsetError`."""
+        """Add what a statement becomes."""
         words = self.to.words
         match s:
             case ast.Expr(ast.Constant()) | ast.Pass():
@@ -167,8 +172,6 @@ class Function(Expressions):
                 stores = {_stored(n) for s in body for n in ast.walk(s)}
                 if stores & {name, *(base for base, _ in start.reads | end.reads)}:
                     raise NotInSubsetError(s.iter, "changes in the loop")
-            case ast.For():
-                raise NotInSubsetError(s, "loops are over range(…), or unrolled(…)")
             case ast.While(test, body, []):
                 found = self.of(test)
                 self._add(words["while"].format(found.text), [found], body, words["done"])
@@ -197,11 +200,8 @@ class Function(Expressions):
 
     def _range(self, args: list[ast.expr]) -> tuple[Value, Value, str]:
         start, end, *rest = args if len(args) > 1 else (ast.Constant(0), *args)
-        step = rest[0] if rest else ast.Constant(1)
-        by = self.of(step).known
-        if by not in (1, -1):
-            raise NotInSubsetError(step, "steps are 1 or -1")
-        return self.of(start), self.of(end), self.to.words["range" if by == 1 else "back"]
+        step = self.of(rest[0] if rest else ast.Constant(1))
+        return self.of(start), self.of(end), self.to.words[{1: "range", -1: "back"}[step.known]]
 
     def _declare(self, name: ast.Name, x: Value) -> None:
         """Give a name the kind of its value."""

@@ -96,7 +96,7 @@ JAVASCRIPT = Language(
     number="let",
     whole="let",
     names={
-        **{name: f"Math.{name}" for name in ("abs", "pow", *OF_NUMBERS)},
+        **{name: f"Math.{name}" for name in ("abs", *OF_NUMBERS)},
         "nan": "NaN", "inf": "Infinity",
         "isfinite": "Number.isFinite", "next_after": "nextAfter",
     },

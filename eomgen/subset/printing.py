@@ -6,7 +6,7 @@ from typing import Any
 
 from eomgen.subset.functions import Function, type_of
 from eomgen.subset.languages import Language
-from eomgen.subset.text import NotInSubsetError, Text, fields_of, functions_of, own_name
+from eomgen.subset.text import NotInSubsetError, Text, own_name
 
 Roots = Iterable[tuple[str, Mapping[str, Any]]]
 
@@ -49,13 +49,10 @@ def _structures(text: Text, functions: Iterable[Function], language: Language) -
     """C's structures of the records that are arguments."""
     names = [x.of for f in functions for x in f.arguments.values()]
     for name in reversed(names):  # records in records come first
-        record = text.classes.get(name)
-        if record and functions_of(record) is None:
-            names = [*(kind.of for kind in fields_of(record).values()), *names]
+        names = [*(kind.of for kind in text.fields(name).values()), *names]
     for name in dict.fromkeys(names):
-        record = text.classes.get(name)
-        if record and functions_of(record) is None:
+        if fields := text.fields(name):
             yield f"typedef struct {name} {{"
-            for each, kind in fields_of(record).items():
+            for each, kind in fields.items():
                 yield f"    {type_of(kind, language)}{each};"
             yield f"}} {name};"

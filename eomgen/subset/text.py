@@ -4,7 +4,6 @@ import ast
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from types import ModuleType
 from typing import Any
 
@@ -64,6 +63,22 @@ class Text:
             elif isinstance(d, ast.ClassDef):
                 self.classes[name] = d
 
+    def fields(self, record: str) -> Mapping[str, Kind]:
+        """The kinds of a record's fields; none if there is no record of that name."""
+        return {
+            d.target.id: kind_of(d.annotation)
+            for d in self._body(record)
+            if isinstance(d, ast.AnnAssign) and isinstance(d.target, ast.Name)
+        }
+
+    def given(self, protocol: str) -> Mapping[str, Kind]:
+        """The kinds of what the functions of a protocol return."""
+        functions = (d for d in self._body(protocol) if isinstance(d, ast.FunctionDef))
+        return {d.name: kind_of(d.returns) for d in functions}
+
+    def _body(self, name: str) -> list[ast.stmt]:
+        return self.classes[name].body if name in self.classes else []
+
 
 def own_name(name: str, known: Mapping[str, Any]) -> str:
     """That of a function which is printed for values of its `Known` parameters."""
@@ -89,21 +104,3 @@ def kind_of(annotation: ast.expr | None) -> Kind:
                 return Kind(name)
             return Kind(ARRAYS[name], tuple(ast.literal_eval(size) for size in sizes))
     raise NotInSubsetError(annotation, "not a kind of the subset")
-
-
-@cache
-def fields_of(record: ast.ClassDef) -> Mapping[str, Kind]:
-    """The kinds of a record's fields."""
-    return {
-        d.target.id: kind_of(d.annotation)
-        for d in record.body
-        if isinstance(d, ast.AnnAssign) and isinstance(d.target, ast.Name)
-    }
-
-
-@cache
-def functions_of(protocol: ast.ClassDef) -> Mapping[str, Kind] | None:
-    """The kinds of what the functions of a protocol return; None for another class."""
-    if not any(isinstance(base, ast.Name) and base.id == "Protocol" for base in protocol.bases):
-        return None
-    return {d.name: kind_of(d.returns) for d in protocol.body if isinstance(d, ast.FunctionDef)}

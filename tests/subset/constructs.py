@@ -74,7 +74,7 @@ def numbers(a: float, b: float, n: int) -> float:
     if (a < b and not a <= 0.0) or n > 3:
         total = -a + b * 2.0 - a / 3.0
     elif a >= b:
-        total = abs(a) ** 0.5 + sqrt(abs(b))
+        total = abs(a) + sqrt(abs(b))
     else:
         total = inf if n != 1 else nan
     for i in range(n):
