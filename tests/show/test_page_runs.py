@@ -13,6 +13,8 @@ import numpy as np
 import other_functions
 import pytest
 from campaign import some
+from crank_rocker import STOPPED
+from falling_block import BLOCK
 from live import NODE, run_in_node
 
 import eomgen.engine.taylor
@@ -86,7 +88,8 @@ if (!names.includes(given.method)) return { names };
 engine.setMethod(given.method, given.dt);
 engine.reset(Float64Array.from(given.y));
 engine.advance(given.seconds);
-return { names, rows, t: engine.t, y: Array.from(engine.y), error: engine.error, loops };
+const { t, y, error, events } = engine;
+return { names, rows, t, y: Array.from(y), error, events, loops };
 """
 
 
@@ -121,10 +124,10 @@ def in_python(model: Model) -> Problem:
     return replace(problem, jacobian=jacobian, series={"taylor": series})
 
 
-def both_runs(name: str, method: str, dt: float, seconds: float) -> tuple[Any, Trajectory]:
-    """The page's run and the one in Python, with rows at the same times."""
-    scene = read(name).replaced(loops="projected")
-    model = model_of(scene, name)
+def both_runs(of: str, method: str, dt: float, seconds: float) -> tuple[Any, Trajectory]:
+    """The page's run and the one in Python of a scene, with rows at the same times."""
+    scene = read(of).replaced(loops="projected")
+    model = model_of(scene, of)
     code, problem = live_code(model, series=method == "taylor"), in_python(model)
     given: dict[str, Any] = {
         "data": live_table(model, code, scene.simulation),
@@ -183,6 +186,19 @@ def test_the_same_bits(name: str, method: str) -> None:
         np.testing.assert_allclose(found["y"], y, rtol=1e-12, atol=1e-12 * np.abs(y).max())
     else:
         assert np.array_equal(np.array(found["y"]), run.y[-1])
+
+
+@pytest.mark.every(2)
+@pytest.mark.parametrize("scene", [STOPPED, BLOCK])
+def test_contacts_strike_and_are_held(scene: str) -> None:
+    """At the same times, with the same speeds, to the same state."""
+    found, run = both_runs(scene, "rk4", 0.005, 1.5)
+    events = [
+        (event["t"], event["contact"], event["kind"], event["speed"]) for event in found["events"]
+    ]
+    assert events == [(event.t, event.contact, event.kind, event.speed) for event in run.events]
+    assert {"impact", "rest"} <= {event.kind for event in run.events}
+    assert found["error"] is None and np.array_equal(found["y"], run.y[-1])
 
 
 def test_dop853_passes_over_no_corner() -> None:
