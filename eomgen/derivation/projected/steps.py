@@ -8,7 +8,7 @@ from eomgen.derivation.dots import dotted
 from eomgen.derivation.projected.constraints import Constraint
 from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.projected.simplify import gathered
-from eomgen.derivation.reading import words_on_names
+from eomgen.derivation.reading import brief_coordinates, words_on_names
 from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import written
@@ -283,14 +283,16 @@ def _readable(equations: ProjectedEquations) -> dict[Expr, Expr]:
         for body, first in zip(model.bodies, model.first_velocity, strict=True)
         if len(body.velocities) == 1
     }
+    short = {c: name.partition("_")[2] for c, name in brief_coordinates(model).items()}
     for i, (v, a) in enumerate(zip(s.v, s.a, strict=True)):
         name = v.name.removesuffix("_dot")
-        words[v.name] = single.get(i, name)
+        words[v.name] = single.get(i) or short.get(name, name)
         if name != v.name:
             show(v, dotted(name))
             show(a, dotted(name, 2))
         else:
             prefix, _, axis = name.rpartition("_w")
+            words[v.name] = f"{prefix},{axis}"
             show(v, f"omega_{prefix},{axis}")
             show(a, dotted(f"omega_{prefix},{axis}"))
     for formula, symbol in s.formulas.items():
