@@ -12,10 +12,12 @@ from eomgen.derivation.effects import DerivedEffect, derived_effects
 from eomgen.derivation.evaluate import Numbers, array, define, follow, number
 from eomgen.derivation.exposition import used_bodies
 from eomgen.derivation.frames import frames_of
+from eomgen.derivation.own_names import own_name
 from eomgen.derivation.poses import poses
 from eomgen.derivation.reading import reading_names
 from eomgen.derivation.recursion import recursive_steps
 from eomgen.derivation.steps import Equation, Step
+from eomgen.derivation.symbols import names_of_scene, of_scene
 from eomgen.dynamics.dynamics import Dynamics, Values
 from eomgen.dynamics.start.constraint_equations import ConstraintEquations, newton
 from eomgen.model.model import Model
@@ -56,6 +58,7 @@ def instant(model: Model, seed: int = 0, shake: float = 0.3, *, closed: bool = F
     for c, motion in zip(model.prescribed, solver.given, strict=True):
         words = (c.position.name, c.velocity.name, c.velocity.acceleration)
         known |= dict(zip(words, motion, strict=True))
+    known |= {of_scene(name).name: x for name, x in {**model.defaults, **inputs}.items()}
     return Instant(solver, known)
 
 
@@ -73,6 +76,7 @@ class LookedUp(dict[str, Any]):
             for i, symbol in enumerate(_defined(line)):
                 self.lines.setdefault(symbol.name, []).append((line, i))
         self._busy: set[int] = set()
+        self._given = names_of_scene(model)
         self._frames = {frame.name: frame for frame in frames_of(model)}
 
     def __missing__(self, name: str) -> Any:
@@ -92,11 +96,12 @@ class LookedUp(dict[str, Any]):
 
     def _ordered(self, name: str, value: Any) -> Any:
         """Rows and columns in the order v_d, v_i, if that is the order of the equations."""
-        if name not in ("M", "h_0") or "v_d" not in self.lines:
+        matrix = name in ("M", "M_own")
+        if not (matrix or name in ("h_0", "h_0,own")) or not {"v_d", "v_d,own"} & {*self.lines}:
             return value
         dependent = [j for _, j in self.model.pivots]
         order = [*dependent, *(j for j in range(len(value)) if j not in dependent)]
-        return value[np.ix_(order, order)] if name == "M" else value[order]
+        return value[np.ix_(order, order)] if matrix else value[order]
 
     def _of_line(self, line: Equation, i: int) -> Any:
         if isinstance(line.left, sp.MatrixBase):
@@ -108,26 +113,32 @@ class LookedUp(dict[str, Any]):
             return array(line.right, self)
         return number(line.right, self)
 
+    def own(self, name: str) -> Any:
+        """A quantity of the derivation, which the scene may have taken the name of."""
+        return self[own_name(name) if name in self._given else name]
+
     def _by_words(self, name: str) -> Any:
         """What the words between the equations say."""
+        if own_name(name.partition(",own")[0].removesuffix("_own")) == name:
+            name = name.partition(",own")[0].removesuffix("_own")
         letter, _, rest = name.partition("_")
         velocities = self.model.velocities
         free = [f for f in self._frames.values() if f.free]
         if letter in ("r^×", "c^×"):
-            (x,), (y,), (z,) = self[f"{letter[0]}_{rest}"]
+            (x,), (y,), (z,) = self.own(f"{letter[0]}_{rest}")
             return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         if letter == "W" and "," in rest:
             body, _, place = rest.rpartition(",")
-            return self[f"W_{body}"]["xyz".index(place[0]), "xyz".index(place[1])]
+            return self.own(f"W_{body}")["xyz".index(place[0]), "xyz".index(place[1])]
         if name == "h_0" and free:
-            return np.vstack([self[f"h_{frame.name}"] for frame in free])
-        if name in ("M", "M_all") and free:
+            return np.vstack([self.own(f"h_{frame.name}") for frame in free])
+        if name == "M" and free:
             rows = [[self._block(a, b) for b in free] for a in free]
             return np.block(rows)
         if letter == "J" and rest in ("d", "i"):
             dependent = [j for _, j in self.model.pivots]
             others = [j for j in range(len(velocities)) if j not in dependent]
-            return self["J"][:, dependent if rest == "d" else others]
+            return self.own("J")[:, dependent if rest == "d" else others]
         if name == "J":
             words = [c.name.removesuffix("_dot") for c in velocities]
             return np.array(

@@ -69,15 +69,10 @@ def composite_steps(
 def solved_algorithm(model: Model) -> Step:
     """dv/dt of a tree from M and h_0."""
     n = len(model.velocities)
-    # A scene may have a number of the name M.
-    taken = "M" in model.defaults or any(x.name == "M" for x in model.inputs)
-    mass, bias = sp.MatrixSymbol("M_all" if taken else "M", n, n), sp.MatrixSymbol("h_0", n, 1)
+    mass, bias = sp.MatrixSymbol("M", n, n), sp.MatrixSymbol("h_0", n, 1)
     rates = sp.Matrix([real(c.acceleration) for c in model.velocities])
     line = Equation(rates, sp.MatMul(-1, sp.Inverse(mass), bias))
-    words = f"The equations are {mass.name} dv/dt + h_0 = 0."
-    if taken:
-        words += " M_all is the mass matrix, which is not the scene's M."
-    return Step("solution", "Solved", words, (line,))
+    return Step("solution", "Solved", "The equations are M dv/dt + h_0 = 0.", (line,))
 
 
 def _acceleration(r: Recursion, k: int) -> Iterator[Equation]:

@@ -11,7 +11,7 @@ import sympy as sp
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.mechanism import AXES, NamingMechanism, Notes
 from eomgen.derivation.steps import Definition, Equation
-from eomgen.derivation.symbols import Expr, real
+from eomgen.derivation.symbols import OF_SCENE, Expr, names_of_scene, of_scene, real
 from eomgen.language.formula import Name
 from eomgen.language.quantity import of_joint
 from eomgen.model.dependence import is_plain
@@ -111,7 +111,7 @@ def _forces(loads: Iterable[AnyLoad]) -> Iterator[Expr]:
 
 
 def _moves(model: Model) -> Any:
-    still = {real(name) for name in (*model.defaults, *(i.name for i in model.inputs))}
+    still = {of_scene(name) for name in names_of_scene(model)}
     return lambda force: bool(getattr(force, "free_symbols", set()) - still)
 
 
@@ -178,7 +178,7 @@ def equations_of(definitions: Sequence[Definition]) -> list[Equation]:
 
 
 class StandIn(EffectTable):
-    """Stands in for an effect that depends on the motion: its loads are inputs of the same names.
+    """Stands in for an effect that depends on the motion: its loads are inputs of these names.
 
     M, V and G do not depend on them, and F is linear in them.
     """
@@ -193,19 +193,18 @@ class StandIn(EffectTable):
     def inputs(self, dimensions: int) -> tuple[Input, ...]:
         """Each force that is not 0."""
         parts = (f for f in _forces(self.derived.loads) if f != 0)
-        return tuple(Input(f.name, "", "") for f in parts)
+        return tuple(Input(OF_SCENE + f.name, "", "") for f in parts)
 
     def loads(self, mechanism: Mechanism) -> Iterator[AnyLoad]:
         """The loads, at the points of the effect."""
 
         def given(value: Expr) -> Expr:
-            return value if value == 0 else mechanism.input(value.name)
+            return value if value == 0 else mechanism.input(OF_SCENE + value.name)
 
         def fixed(value: Expr) -> Expr:
-            free = getattr(value, "free_symbols", ())
-            return (
-                value.xreplace({s: mechanism.value(Name(s.name)) for s in free}) if free else value
-            )
+            names = {s: s.name.removesuffix(OF_SCENE) for s in getattr(value, "free_symbols", ())}
+            known = {s: mechanism.value(Name(name)) for s, name in names.items()}
+            return value.xreplace(known) if known else value
 
         for load in self.derived.loads:
             if isinstance(load, JointLoad):

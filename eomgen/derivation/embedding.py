@@ -21,7 +21,7 @@ from eomgen.derivation.poses import poses
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
-from eomgen.derivation.symbols import Expr, real
+from eomgen.derivation.symbols import Expr, of_scene, real
 from eomgen.dynamics.loops.dependent_coordinates import Turn, angle_of, solved
 from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
 from eomgen.model.groups import Group
@@ -227,9 +227,9 @@ def _positions(model: Model, group: Group) -> tuple[list[Definition], list[Defin
     scalars = _Naming(group.constraint)
 
     def symbols(items: Sequence[Any]) -> dict[str, Expr]:
-        return {x.name: real(x.name) for x in items}
+        return {x.name: of_scene(x.name) for x in items}
 
-    q, v = (list(symbols(x).values()) for x in (model.coordinates, model.velocities))
+    q, v = ([real(c.name) for c in x] for x in (model.coordinates, model.velocities))
     values = Values(symbols(model.parameters), symbols(model.inputs), q, v, {}, real("t"))
     d = MechanismState(model, values, scalars)
     found = [simplified(x) if not isinstance(x, Turn) else x for x in solved(d, group)]

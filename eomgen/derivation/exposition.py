@@ -33,6 +33,7 @@ from eomgen.derivation.loops import (
     polygon_steps,
 )
 from eomgen.derivation.matrices import Matrices, of_pins, of_projected, projected_definitions
+from eomgen.derivation.own_names import names_within, other_names, with_names_of_scene
 from eomgen.derivation.poses import poses
 from eomgen.derivation.prescribed import (
     PRESCRIBED,
@@ -49,7 +50,6 @@ from eomgen.derivation.reading import (
     is_of_handout,
     numbered,
     read_all,
-    reading_names,
     renumbered,
 )
 from eomgen.derivation.recursion import recursive_steps
@@ -133,6 +133,18 @@ def exposition_of(
 
     Raises `SceneError` for a form or a method that the mechanism does not have.
     """
+    found = _explained(model, form, method)
+    steps, matrices = list(found.steps), found.matrices
+    if words := other_names(steps, model):
+        place = _first(steps, "state")
+        first, gap, rest = steps[place].words.partition("\n\n")
+        steps[place] = replace(steps[place], words=first + words + gap + rest)
+    if matrices is not None:
+        matrices = with_names_of_scene(matrices, model)
+    return replace(found, steps=tuple(steps), matrices=matrices)
+
+
+def _explained(model: Model, form: Form | None, method: Method | None) -> Exposition:
     form = form or model.form
     model = with_closed_form(model)
     effects, constraints = derived_effects(model), derived_constraints(model)
@@ -234,9 +246,11 @@ def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Expositi
         if direct is None and not by_pivots:
             equations = solved_projected(equations)
             tree = replace(tree, definitions=projected_definitions(equations))
-    names = reading_names(model)
+    names = names_within(model)
     said = {**names, **{s.name: text for s, text in tree.formulas.items()}}
-    found = [_renamed(step, names) for step in projected_steps(equations)]
+    told = projected_steps(equations)
+    solution = told[_first(told, "solution")]
+    found = [_renamed(step, names) for step in told]
     joints = _first(found, "balance", "equations")
     words = (
         "Each body by itself, with its weight, the forces of the effects, and those of its joints."
@@ -249,32 +263,27 @@ def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Expositi
         *found[1:joints],
     ]
     if method == "lagrange":
-        energies = [_renamed(step, said) for step in energies]
-        found = [*found[:joints], *energies, found[_first(found, "solution")]]
-    place = _first(found, "solution")
+        balance = [_renamed(step, said) for step in energies]
+    else:
+        balance = found[joints : _first(found, "solution")]
     if parts.constraints:
-        return _of_tied(model, parts, start, found[joints:place], tree)
+        return _of_tied(model, parts, start, balance, tree)
     whole = _whole(tree, model, parts)
     if direct is None and by_pivots:
-        solution = tuple(solved_for([x.name for x in tree.a], tree.M, tree.F - tree.V - tree.G))
-        lines = dict(solution)
-        words = f"{SOLVED} {ELIMINATED}"
-        found[place] = _renamed(replace(_directly(found[place], lines), words=words), said)
-        whole = replace(whole, definitions=(*whole.definitions, *solution))
+        lines = tuple(solved_for([x.name for x in tree.a], tree.M, tree.F - tree.V - tree.G))
+        solution = replace(_directly(solution, dict(lines)), words=f"{SOLVED} {ELIMINATED}")
+        whole = replace(whole, definitions=(*whole.definitions, *lines))
     if direct:
-        lines = dict(zip(tree.a, direct, strict=True))
-        found[place] = _renamed(_directly(found[place], lines), said)
+        solution = _directly(solution, dict(zip(tree.a, direct, strict=True)))
         whole = _with(whole, direct)
-    left = [_renamed(free_step(tree), said)] if model.prescribed else []
-    ends = [*impact_steps(model, parts.effects), _last(model, parts)]
-    steps = [
-        *start,
-        *found[joints:place],
-        *(_renamed(step, names) for step in _effect_steps(model, parts)),
-        *left,
-        *found[place:],
-        *(_renamed(step, names) for step in ends),
+    ends = [
+        *_effect_steps(model, parts),
+        *([free_step(tree)] if model.prescribed else []),
+        solution,
+        *impact_steps(model, parts.effects),
+        _last(model, parts),
     ]
+    steps = [*start, *balance, *(_renamed(step, said) for step in ends)]
     return _told("", steps, whole, parts)
 
 
@@ -295,7 +304,7 @@ def _of_tied(
         before, ends = [], [*effects, *constraint_steps(model, parts.constraints)]
         ends += elimination_steps(model, parts.constraints, bias_of(len(model.velocities)))
     ends += [*impact_steps(model, parts.effects), _last(model, parts)]
-    names = reading_names(model)
+    names = names_within(model)
     names |= {s.name: text for s, text in tree.formulas.items()}
     before, ends = ([_renamed(step, names) for step in x] for x in (before, ends))
     return _told("", [*start, *before, *balance, *ends], matrices, parts)
@@ -320,7 +329,7 @@ def _recursive(model: Model, parts: Parts, method: Method | None) -> Exposition:
         steps += composite_steps(model, frames, parts.effects)
         steps += elimination_steps(model, parts.constraints)
     steps += [*impact_steps(model, parts.effects), _last(model, parts)]
-    names = reading_names(model)
+    names = names_within(model)
     return _told(RECURSIVE, [_renamed(step, names) for step in steps], None, parts)
 
 
@@ -445,7 +454,7 @@ def _symmetry(equations: Equations) -> Iterator[Step]:
 
 
 def _names(model: Model, shown: dict[Expr, Expr]) -> dict[str, str]:
-    names = reading_names(model)
+    names = names_within(model)
     own = {x.name: names.get(other.name, other.name) for x, other in shown.items()}
     return {**names, **own}
 

@@ -15,7 +15,7 @@ import sympy as sp
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.steps import Definition
 from eomgen.derivation.symbolic_scalars import SymbolicScalars
-from eomgen.derivation.symbols import Expr, real
+from eomgen.derivation.symbols import Expr, names_of_scene, of_scene, real
 from eomgen.language.formula import Formula, evaluate
 from eomgen.model.model import Model, dofs_of
 from eomgen.model.partials import gradient_of, partials_of
@@ -136,9 +136,10 @@ class NamingMechanism(SymbolicMechanism):
     """A model over symbols that a person reads, with names for what effects use."""
 
     def __init__(self, model: Model, notes: Notes) -> None:
-        names = [x.name for group in (model.parameters, model.inputs, model.extra) for x in group]
+        names = ["t", *(x.name for x in model.extra)]
         names += [c.name for body in model.bodies for c in (*body.positions, *body.velocities)]
-        symbols = {"t": real("t"), **{name: real(name) for name in names}}
+        symbols = {name: real(name) for name in names}
+        symbols |= {name: of_scene(name) for name in names_of_scene(model)}
         super().__init__(model, symbols, SymbolicScalars())
         self.notes = notes
         self._points: dict[tuple[str, Vector], str] = {}

@@ -8,7 +8,7 @@ import sympy as sp
 
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.steps import LEVELS, Equation, Step
-from eomgen.derivation.symbols import Expr
+from eomgen.derivation.symbols import OF_SCENE, Expr
 from eomgen.model.model import Model
 from eomgen.tables.details import DETAILS, Detail
 
@@ -112,7 +112,10 @@ def read(expression: Expr, names: Mapping[str, str]) -> Expr:
     for symbol in expression.free_symbols:
         if (name := names.get(symbol.name)) is not None:
             shaped = isinstance(symbol, sp.MatrixSymbol)
-            renamed[symbol] = sp.MatrixSymbol(name, *symbol.shape) if shaped else sp.Symbol(name)
+            kept = symbol.assumptions0 if OF_SCENE in symbol.name else {}
+            renamed[symbol] = (
+                sp.MatrixSymbol(name, *symbol.shape) if shaped else sp.Symbol(name, **kept)
+            )
     if isinstance(expression, sp.MatrixBase):
         return expression.applyfunc(lambda e: e.xreplace(renamed))
     return expression.xreplace(renamed)

@@ -94,7 +94,7 @@ def make_symbols(model: Model) -> Symbols:
         if isinstance(quantity, Name)
     }
     parameters = {
-        p.name: sp.Symbol(p.name, positive=True) if p.name in positive else real(p.name)
+        p.name: of_scene(p.name, positive=True) if p.name in positive else of_scene(p.name)
         for p in model.parameters
     }
 
@@ -113,7 +113,7 @@ def make_symbols(model: Model) -> Symbols:
     return Symbols(
         parameters=parameters,
         formulas=formulas,
-        inputs={i.name: real(i.name) for i in model.inputs},
+        inputs={i.name: of_scene(i.name) for i in model.inputs},
         mass=tuple(quantity(body.mass) for body in model.bodies),
         inertia=tuple(quantity(body.moment) for body in model.bodies),
         q=each(coordinates, "{}"),
@@ -138,8 +138,28 @@ def make_symbols(model: Model) -> Symbols:
 
 
 def real(name: str) -> Expr:
-    """A real symbol. Names of scenes contain no two underscores, so these never clash."""
+    """A real symbol."""
     return sp.Symbol(name, real=True)
+
+
+OF_SCENE = "!"
+"""Ends the names of symbols of a scene's parameters and inputs, so that the derivation's own never
+clash with them. SymPy sorts terms by names, and it sorts before what else these consist of.
+"""
+
+
+def of_scene(name: str, **assumptions: bool) -> Expr:
+    """The symbol of a parameter or an input of a scene; of an input that stands for a symbol of the
+    derivation, whose name begins with the mark, this symbol.
+    """
+    if name.startswith(OF_SCENE):
+        return real(name.removeprefix(OF_SCENE))
+    return sp.Symbol(name + OF_SCENE, **(assumptions or {"real": True}))
+
+
+def names_of_scene(model: Model) -> list[str]:
+    """The names of parameters and inputs."""
+    return [*(p.name for p in model.parameters), *(i.name for i in model.inputs)]
 
 
 def rotate(vector: Vec, angle: Expr) -> Vec:

@@ -7,7 +7,9 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.effects import DerivedEffect
-from eomgen.derivation.reading import read, reading_names
+from eomgen.derivation.own_names import names_within
+from eomgen.derivation.reading import read
+from eomgen.derivation.symbols import OF_SCENE
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
@@ -41,7 +43,7 @@ def named_loads(
 
 def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Drawing:
     model, body = pose.model, shape.body
-    names = reading_names(model)
+    names = names_within(model)
     found = [
         (start, direction, read(label, names), style)
         for derived in effects
@@ -235,7 +237,7 @@ def _joint_name(load: JointLoad, derived: DerivedEffect) -> Expr:
 
 def _vector_name(parts: Sequence[Expr]) -> str:
     """The shared name of components that are symbols: f_A of f_A_x and f_A_y."""
-    names = [part.name for part in parts if part != 0 and part.is_Symbol]
+    names = [x.name.removesuffix(OF_SCENE) for x in parts if x != 0 and x.is_Symbol]
     if len(names) != sum(part != 0 for part in parts):
         return ""
     if len(parts) == 1:

@@ -11,7 +11,9 @@ from typing import Any
 import sympy as sp
 
 from eomgen.derivation.effects import DerivedEffect
-from eomgen.derivation.reading import read, reading_names
+from eomgen.derivation.own_names import names_within
+from eomgen.derivation.reading import read
+from eomgen.derivation.symbols import of_scene
 from eomgen.dynamics.tree.mechanism_state import MechanismState, Values
 from eomgen.model.model import Body, Model
 from eomgen.scalars.floats import FloatScalars
@@ -127,7 +129,7 @@ def mechanism_sketch(model: Model, effects: Sequence[DerivedEffect]) -> Drawing:
     items: list[Item] = []
     for shape in shapes:
         items += skeleton(shape, fit.at)
-    few, names = len(shapes) <= MOST_NAMED, reading_names(model)
+    few, names = len(shapes) <= MOST_NAMED, names_within(model)
     if model.dimensions == 2:
         for shape in shapes:
             items += _angle(pose, shapes, shape, fit.at)
@@ -262,7 +264,7 @@ def _world_axes(pose: Pose) -> Iterator[Item]:
 
 def numbers(model: Model, at: Sequence[Expr]) -> tuple[float, ...]:
     """A point in body axes by its symbols' values."""
-    values = model.defaults
+    values = {of_scene(name).name: value for name, value in model.defaults.items()}
     return tuple(float(sp.N(x.subs({s: values[s.name] for s in x.free_symbols})))
                  for x in at)  # fmt: skip
 

@@ -27,6 +27,7 @@ from eomgen.derivation.projected.simplify import gathered, sum_of_squares
 from eomgen.derivation.projected.steps import projected_steps
 from eomgen.derivation.projected.symbols import Ledger, make_symbols
 from eomgen.derivation.supported import MOST_GENERAL_BODIES, why_not_closed, why_not_tried
+from eomgen.derivation.symbols import OF_SCENE, of_scene
 from eomgen.dynamics.start.singularity import check_nonsingular
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -186,7 +187,7 @@ def accelerations(equations: ProjectedEquations) -> list[sp.Expr]:
 def named(equations: ProjectedEquations, names: str) -> list[sp.Expr]:
     """Symbols by name."""
     s = equations.symbols
-    known = {x.name: x for x in (*s.parameters.values(), *s.inputs.values(), *s.q, *s.v)}
+    known = {**s.parameters, **s.inputs, **{x.name: x for x in (*s.q, *s.v)}}
     return [known[name] for name in names.split()]
 
 
@@ -265,7 +266,7 @@ def is_positive(expression: sp.Expr, given: dict[sp.Expr, sp.Expr], masses: set[
     if e.is_Number:
         return bool(e > 0)
     if e.is_Symbol:
-        return e.name in masses
+        return e.name.removesuffix(OF_SCENE) in masses
     if e.is_Add or e.is_Mul:
         return all(is_positive(part, given, masses) for part in e.args)
     if e.is_Pow and e.exp.is_Integer:
@@ -416,7 +417,7 @@ def test_what_is_reported_is_true(name: str) -> None:
     equations = scene(name)
     model = equations.model
     given = values(model, np.random.default_rng(2))
-    found = {name: float(x) for name, x in given.items()}
+    found = {x: float(given[name]) for name in given for x in (name, of_scene(name).name)}
     recording = from_recursion(Recording(replace(model, outputs=("body_poses",)), "aba"))
     rates, poses = (evaluator(recording.program, x)(given) for x in ("derivative", "body_poses"))
     state, *steps = projected_steps(equations)

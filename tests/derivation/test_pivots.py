@@ -10,6 +10,7 @@ from mechanisms import REPORTED, SEEDS, Scene, compiled, random_tree
 from spatial_newton_euler import mass_matrix, velocities_of
 
 from eomgen.derivation.handout.closed import Equations, derive
+from eomgen.derivation.symbols import OF_SCENE
 from eomgen.model.elaborate import elaborate
 from eomgen.scene.reader import parse_scene
 
@@ -60,7 +61,7 @@ class Signs:
         if e in self._meaning:
             return self.of(self._meaning[e])
         if e.is_Symbol:
-            return POSITIVE if e.name in self._positive else None
+            return POSITIVE if e.name.removesuffix(OF_SCENE) in self._positive else None
         if e.is_Number:
             return POSITIVE if e > 0 else None
         parts = [self.of(part) for part in e.args]

@@ -1,19 +1,22 @@
 """Derivations read to their end: Ẏ by nothing but the printed equations is that of the module."""
 
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
-from campaign import some
+from campaign import FULL, some
 from followed import LookedUp, instant
 
 import eomgen
 from eomgen.api.derivation import Derivation
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.symbols import names_of_scene
 from eomgen.dynamics.start.assembly import assembled
 from eomgen.dynamics.start.assur import with_closed_form
 from eomgen.model.elaborate import elaborate
@@ -65,6 +68,8 @@ effects = [
 ]
 locked = { beta = 0.3 }
 """  # noqa: E501
+SCENES_AT = Path(eomgen.__file__).parent / "scenes"
+NAMED = ("rattleback", "four_bar", "peaucellier", "bicycle", "cart_pole", "puma560", "spinning_top")
 LOOPS = ("four_bar", "slider_crank", "differential", "peaucellier", "rattleback", "bicycle",
          "car_suspension", "stewart_platform")  # fmt: skip
 SCENES = some(
@@ -114,6 +119,44 @@ def test_the_same_by_each_method(scene: str, method: Method) -> None:
         assert method != "newton-euler" and "newton-euler" in str(error)
         return
     _follow(scene, found)
+
+
+LETTERS = (
+    "M V G F K J Q q v h_0 a_0 A beta kappa T Y M_r J_d v_i u lambda_end I_crank psi_bar U S X p"
+)
+"""Names of the derivation itself."""
+
+
+def with_names(scene: str, names: Sequence[str]) -> str:
+    """A scene with parameters of these names, on which the masses of its bodies depend."""
+    text = scene if "\n" in scene else (SCENES_AT / f"{scene}.toml").read_text()
+    more = "".join(f" + 0.001*{name}" for name in names)
+    text = re.sub(r'mass = "?([^",\n]+)"?', rf'mass = "\1{more}"', text)
+    given = [f"{name} = {1 + i / 16}" for i, name in enumerate(names)]
+    if "parameters = {" in text:
+        return text.replace("parameters = {", f"parameters = {{ {', '.join(given)},", 1)
+    return text.replace("[parameters]", "\n".join(["[parameters]", *given]), 1)
+
+
+@pytest.mark.usefixtures("deep")
+@pytest.mark.parametrize("scene", some((ATWOOD,), (ATWOOD, SHAKEN, *NAMED)))
+def test_parameters_with_the_names_of_the_derivation(scene: str) -> None:
+    """What has a name of the scene is of the scene, and nothing else has it."""
+    names = {*some(LETTERS.split()[:9], LETTERS.split())}
+    if FULL:
+        found = eomgen.derive(scene).steps
+        lines = [e for step in found for line in step.equations for e in (line.left, line.right)]
+        names |= {s.name for e in lines for s in e.free_symbols if s.name.isidentifier()}
+    model = model_of(scene)
+    taken = {*names_of_scene(model), *(c.name for c in (*model.coordinates, *model.velocities))}
+    ordered = sorted(names - taken - {"t"})
+    for chosen in (ordered[k : k + 12] for k in range(0, len(ordered), 12)):
+        text = with_names(scene, chosen)
+        found = eomgen.derive(text)
+        _follow(text, found)
+        kept = {x.name for x in found.model.parameters}
+        lines = (line for step in found.steps for line in step.equations)
+        assert not {getattr(line.left, "name", "") for line in lines} & kept
 
 
 def _follow(scene: str, found: Derivation) -> None:

@@ -6,7 +6,13 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from eomgen.derivation.projected.simplify import gathered
-from eomgen.derivation.symbols import Expr, SympyScalars, functions_of_parameters, real
+from eomgen.derivation.symbols import (
+    Expr,
+    SympyScalars,
+    functions_of_parameters,
+    of_scene,
+    real,
+)
 from eomgen.language.formula import Formula, Name, evaluate
 from eomgen.model.model import Model
 from eomgen.model.orientation import rows_of, turns_of
@@ -67,14 +73,14 @@ def make_symbols(model: Model) -> Symbols:
     called = dict.fromkeys(functions_of_parameters(model))
     return Symbols(
         parameters={
-            p.name: sp.Symbol(p.name, positive=True) if p.name in positive else real(p.name)
+            p.name: of_scene(p.name, positive=True) if p.name in positive else of_scene(p.name)
             for p in model.parameters
         },
         formulas={formula: real(f"formula__{i}") for i, formula in enumerate(called, 1)},
         numbers={
             x: sp.Symbol(f"number__{i}", positive=True) for i, x in enumerate(_sizes(model), 1)
         },
-        inputs={i.name: real(i.name) for i in model.inputs},
+        inputs={i.name: of_scene(i.name) for i in model.inputs},
         q=tuple(real(c.name) for c in model.coordinates),
         v=tuple(real(c.name) for c in model.velocities),
         a=tuple(real(c.acceleration) for c in model.velocities),
