@@ -81,7 +81,7 @@ def results(
 
 
 def _in_python(text: Text, name: str, cases: Any, known: Any, given: Given) -> list[list[str]]:
-    function, found = text.python[name], []
+    function, found = text.modules[name][name], []
     for case in cases:
         made = deepcopy([given.python if x is given else x for x in case])
         left = iter(made)

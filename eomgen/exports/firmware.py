@@ -154,8 +154,8 @@ def _text(number: Number) -> Text:
     text = printed.text()
     if number == "double":
         return text
-    constants: dict[str, Mapping[str, Any]] = {
+    modules: dict[str, Mapping[str, Any]] = {
         name: {**each, **{key: x for key, x in IN_FLOAT.items() if key in each}}
-        for name, each in text.constants.items()
+        for name, each in text.modules.items()
     }
-    return replace(text, constants=constants)
+    return replace(text, modules=modules)

@@ -2,12 +2,13 @@
 
 import ast
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
 NONE: Mapping[str, Any] = {}
+"""The names of no module."""
 ARRAYS = {"Vector": "float", "Matrix": "float", "Whole": "int"}
 
 
@@ -30,36 +31,32 @@ class Kind:
 
 @dataclass
 class Text:
-    """The engine's text: its functions, and the fields and functions of its records and protocols,
-    by name; the constants of each function's module; and the functions themselves.
+    """The engine's text: its functions, and its records and protocols, by name; and the names of
+    each function's module.
     """
 
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     classes: dict[str, ast.ClassDef] = field(default_factory=dict)
-    constants: dict[str, Mapping[str, Any]] = field(default_factory=dict)
-    python: dict[str, Callable[..., Any]] = field(default_factory=dict)
+    modules: dict[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, *modules: ModuleType) -> "Text":
         """The text of modules. Raises `NotInSubsetError` if two things have one name."""
         text = cls()
         for module in modules:
-            constants = {n: x for n, x in vars(module).items() if n.isupper()}
-            text.add(inspect.getsource(module), constants, vars(module))
+            text.add(inspect.getsource(module), vars(module))
         return text
 
-    def add(
-        self, source: str, constants: Mapping[str, Any] = NONE, python: Mapping[str, Any] = NONE
-    ) -> None:
-        """Add what a source defines. Raises `NotInSubsetError` if a name is there already."""
+    def add(self, source: str, module: Mapping[str, Any] = NONE) -> None:
+        """Add what the source of a module defines. Raises `NotInSubsetError` if a name is there
+        already.
+        """
         for d in ast.parse(source).body:
             name = d.name if isinstance(d, ast.FunctionDef | ast.ClassDef) else ""
             if name in self.functions or name in self.classes:
                 raise NotInSubsetError(d, "another module of the text has this name")
             if isinstance(d, ast.FunctionDef):
-                self.functions[name], self.constants[name] = d, constants
-                if name in python:
-                    self.python[name] = python[name]
+                self.functions[name], self.modules[name] = d, module
             elif isinstance(d, ast.ClassDef):
                 self.classes[name] = d
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from eomgen.subset.languages import OF_NUMBERS, Language
 from eomgen.subset.text import (
+    NONE,
     Kind,
     NotInSubsetError,
     Text,
@@ -93,7 +94,7 @@ class Expressions:
 
     def __init__(self, text: Text, to: Language, name: str, make: Callable[..., Any]) -> None:
         self.text, self.to, self.make = text, to, make
-        self.d, self.constants = text.functions[name], text.constants.get(name, {})
+        self.d, self.module = text.functions[name], text.modules.get(name, NONE)
         self.names: dict[str, Value] = {}
         self.altered: set[str] = set()
 
@@ -279,8 +280,8 @@ class Expressions:
     def _named(self, e: ast.expr, name: str) -> Value:
         if name in self.names:
             return self.names[name]
-        if name in self.constants:
-            return self.known(e, self.constants[name])
+        if name.isupper() and name in self.module:
+            return self.known(e, self.module[name])
         if name.isupper() or name in ("inf", "nan"):
             return Value(
                 "int" if name.isupper() else "float", lambda _: self.to.names.get(name, name)

@@ -223,7 +223,7 @@ def test_statements_share_loops_where_nothing_changes() -> None:
     source = f"{source}    return s\n"
     module = load_source(f"from eomgen.subset.words import *\n{TYPING}\n{source}", "mixed")
     text = Text()
-    text.add(source, python=vars(module))
+    text.add(source, vars(module))
     order = np.array([2, 0, 3, 1])
     given = [[i, N, some(N), some(N), some(N, N), order] for i in range(len(cases))]
     python, *others = results(text, "mixed", given)
