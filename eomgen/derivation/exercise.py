@@ -8,7 +8,7 @@ import sympy as sp
 
 from eomgen.base.errors import SceneError
 from eomgen.derivation.exposition import Exposition
-from eomgen.derivation.matrices import Matrices, written_out
+from eomgen.derivation.matrices import Matrices, written_out, written_size
 from eomgen.derivation.reading import read, reading_names
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Equation, Step
@@ -18,6 +18,8 @@ from eomgen.model.model import Model
 MOST_QUESTIONS = 5
 LONGEST = 60
 """The size of a result up to which it is asked for."""
+MOST_WRITTEN = 250
+"""Symbols and numbers of a result, before it is simplified, up to which it is tried."""
 BLANK = sp.Symbol("…")
 ASKED = (
     "Write each result as a formula of the symbols in the equations above it. M, V and G are those "
@@ -107,14 +109,17 @@ def _results(found: Matrices) -> Iterator[Question]:
             for j in range(i, whole.cols) if letter == "M" else (0,):
                 index = f"_{i + 1},{j + 1}" if letter == "M" else f"_{i + 1}"
                 symbol = sp.Symbol(letter + (index if several else ""))
-                yield from _asked(symbol, simplified(written_out(whole[i, j], found.definitions)))
+                yield from _asked(symbol, whole[i, j], found)
     for a in found.a:
         right = dict(found.definitions).get(a, a)
         if size(right) <= LONGEST:
-            yield from _asked(a, simplified(written_out(right, found.definitions)))
+            yield from _asked(a, right, found)
 
 
-def _asked(left: Expr, right: Expr) -> Iterator[Question]:
+def _asked(left: Expr, short: Expr, found: Matrices) -> Iterator[Question]:
+    if written_size(short, found.definitions) > MOST_WRITTEN:
+        return
+    right = simplified(written_out(short, found.definitions))
     plain = all(isinstance(f, FUNCTIONS) for f in right.atoms(sp.Function))
     if right.free_symbols and plain and size(right) <= LONGEST:
         yield Question(left, right, {})

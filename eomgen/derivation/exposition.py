@@ -15,6 +15,7 @@ import sympy as sp
 from eomgen.base.errors import SceneError
 from eomgen.derivation.composite import composite_steps, solved_algorithm
 from eomgen.derivation.constraints import DerivedConstraint, derived_constraints, tree_of
+from eomgen.derivation.dependent_velocities import of_freedoms
 from eomgen.derivation.effects import DerivedEffect, derived_effects, equations_of, with_symbols
 from eomgen.derivation.embedding import embedded, solved_for
 from eomgen.derivation.frames import frames_of
@@ -301,6 +302,8 @@ def _of_tied(
         # Velocities and accelerations follow from the constraints, and so need not be read here.
         start = [replace(x, kind="variant") if x.kind == "motion" else x for x in start]
     else:
+        rest, following = of_freedoms(model, tree, parts.constraints)
+        matrices = _whole(rest, model, parts, following)
         before, ends = [], [*effects, *constraint_steps(model, parts.constraints)]
         ends += elimination_steps(model, parts.constraints, bias_of(len(model.velocities)))
     ends += [*impact_steps(model, parts.effects), _last(model, parts)]

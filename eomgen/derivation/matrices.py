@@ -8,6 +8,7 @@ import sympy as sp
 from eomgen.derivation.handout.closed import Equations
 from eomgen.derivation.handout.solution import Definition
 from eomgen.derivation.projected.derive import ProjectedEquations
+from eomgen.derivation.state_forms import needed_by
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula, written
 
@@ -35,9 +36,22 @@ class Matrices:
 
 def written_out(expression: Expr, definitions: Iterable[Definition]) -> Expr:
     """An expression with all definitions substituted. For a long solution it is very long."""
-    for symbol, value in reversed(tuple(definitions)):
-        expression = expression.xreplace({symbol: value})
-    return expression
+    known: dict[Expr, Expr] = {}
+    for symbol, value in needed_by([expression], tuple(definitions)):
+        known[symbol] = value.xreplace(known)
+    return expression.xreplace(known)
+
+
+def written_size(expression: Expr, definitions: Iterable[Definition]) -> int:
+    """The symbols and numbers that an expression has with all definitions substituted."""
+    counts: dict[Expr, int] = {}
+
+    def leaves(e: Expr) -> int:
+        return sum(counts.get(x, 1) for x in sp.preorder_traversal(e) if x.is_Atom)
+
+    for symbol, value in needed_by([expression], tuple(definitions)):
+        counts[symbol] = leaves(value)
+    return leaves(expression)
 
 
 def of_pins(equations: Equations) -> Matrices:

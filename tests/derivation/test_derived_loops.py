@@ -166,6 +166,24 @@ def test_matrices_of_the_freedoms_against_the_module(scene: str) -> None:
         assert_close(M * want, F - V - G)
 
 
+@pytest.mark.parametrize("scene", ("rattleback",))
+def test_matrices_where_positions_are_not_closed(scene: str) -> None:
+    """M u̇ + V + G = F of the independent velocities, over all states and named quantities."""
+    found, model = eomgen.derive(scene), with_closed_form(model_of(scene))
+    module = eomgen.load(eomgen.generate(scene))
+    assert len(found.M) == (len(model.velocities) - len(model.rows)) ** 2
+    at = instant(model, 0, 0.05, closed=True)
+    rates = module.derivative(0.4, np.array([at.known[name] for name in module.STATES]))
+    want = [rates[module.STATES.index(v.name)] for v in found.matrices.v]
+    known = {name: x for name, x in at.known.items() if name not in found.matrices.a}
+    define(found.matrices.definitions, known)
+    assert_close([known[a.name] for a in found.matrices.a], want)
+    M, V, G, F = (array(x, known) for x in (found.M, found.V, found.G, found.F))
+    assert_close(M @ want, F - V - G)
+    first = found.written_out(found.M[0, 0])
+    assert {s.name for s in first.free_symbols} <= {*model.states, *model.defaults}
+
+
 def test_three_formats_and_sketches() -> None:
     """The steps in text, HTML and LaTeX; the loop's force at both bodies."""
     found = eomgen.derive("four_bar", detail="all")
