@@ -10,21 +10,17 @@ from dataclasses import dataclass
 
 from campaign import some
 
-PLANE = """\
+TWO = """\
 name = "mechanism"
-{outputs}
+{{outputs}}
 [[bodies]]
 name = "a"
 mass = 1.1
-inertia_com = 0.31
+inertia_com = {a}
 [[bodies]]
 name = "b"
 mass = 0.7
-inertia_com = 0.12
-[[bodies]]
-name = "c"
-mass = 0.4
-inertia_com = 0.05
+inertia_com = {b}
 [[joints]]
 name = "flight"
 type = "free"
@@ -34,88 +30,43 @@ name = "hinge"
 type = "revolute"
 parent = "a"
 child = "b"
-r_parent = [0.3, 0.1]
-r_child = [-0.2, 0.05]
+{hinge}
 coordinate = "q"
+"""
+THREE = f"""{TWO}[[bodies]]
+name = "c"
+mass = 0.4
+inertia_com = {{c}}
 [[joints]]
 name = "rail"
 type = "prismatic"
 parent = "b"
 child = "c"
-axis = [0.6, 0.8]
-r_parent = [0.2, -0.1]
+axis = [0.6, 0.8{{z}}]
+r_parent = [0.2, -0.1{{up}}]
 coordinate = "s"
 [[points]]
 name = "tip"
 body = "c"
-at = [0.1, 0.2]
+at = [0.1, 0.2{{down}}]
 """
-SPACE = """\
-name = "mechanism"
-dimensions = 3
-{outputs}
-[[bodies]]
-name = "a"
-mass = 1.1
-inertia_com = [0.31, 0.22, 0.27, 0.01, 0.02, -0.01]
-[[bodies]]
-name = "b"
-mass = 0.7
-inertia_com = [0.12, 0.13, 0.14]
-[[bodies]]
-name = "c"
-mass = 0.4
-inertia_com = [0.05, 0.06, 0.07]
-[[joints]]
-name = "flight"
-type = "free"
-child = "a"
-[[joints]]
-name = "hinge"
-type = "revolute"
-parent = "a"
-child = "b"
-axis = [0.0, 0.6, 0.8]
-r_parent = [0.3, 0.1, 0.2]
-r_child = [-0.2, 0.05, 0.1]
-coordinate = "q"
-[[joints]]
-name = "rail"
-type = "prismatic"
-parent = "b"
-child = "c"
-axis = [0.6, 0.8, 0.0]
-r_parent = [0.2, -0.1, 0.1]
-coordinate = "s"
-[[points]]
-name = "tip"
-body = "c"
-at = [0.1, 0.2, -0.1]
-"""
-PINS = """\
-name = "mechanism"
-{outputs}
-[[bodies]]
-name = "a"
-mass = 1.1
-inertia_com = 0.31
-[[bodies]]
-name = "b"
-mass = 0.7
-inertia_com = 0.12
-[[joints]]
-name = "flight"
-type = "free"
-child = "a"
-[[joints]]
-name = "hinge"
-type = "revolute"
-parent = "a"
-child = "b"
-r_parent = [0.3, 0]
-r_child = [-0.2, 0]
-coordinate = "q"
-"""
+PINS = TWO.format(a=0.31, b=0.12, hinge="r_parent = [0.3, 0]\nr_child = [-0.2, 0]")
+PLANE = THREE.format(
+    a=0.31,
+    b=0.12,
+    c=0.05,
+    hinge="r_parent = [0.3, 0.1]\nr_child = [-0.2, 0.05]",
+    **dict.fromkeys(("z", "up", "down"), ""),
+)
+SPACE = THREE.replace("{{outputs}}", "dimensions = 3\n{{outputs}}").format(
+    a=[0.31, 0.22, 0.27, 0.01, 0.02, -0.01],
+    b=[0.12, 0.13, 0.14],
+    c=[0.05, 0.06, 0.07],
+    hinge="axis = [0.0, 0.6, 0.8]\nr_parent = [0.3, 0.1, 0.2]\nr_child = [-0.2, 0.05, 0.1]",
+    z=", 0.0",
+    up=", 0.1",
+    down=", -0.1",
+)
 BASES = {"plane": PLANE, "space": SPACE, "pins": PINS}
 """`pins` is for the closed form."""
 
