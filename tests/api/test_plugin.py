@@ -16,22 +16,7 @@ from campaign import FULL
 
 ROOT = Path(__file__).parent.parent.parent
 PLUGIN = ROOT / "tests" / "plugin"
-BOAT = """
-name = "boat"
-bodies = [
-    { name = "hull", mass = 3.0, inertia_com = 0.5 },
-    { name = "mast", mass = 0.5, inertia_com = 0.1 },
-]
-joints = [
-    { name = "sea", type = "telescope", parent = "world", child = "hull" },
-    { name = "foot", type = "revolute", parent = "hull", child = "mast", r_child = [0, -0.5] },
-]
-effects = [
-    { type = "gravity", g = 9.81 },
-    { type = "buoyancy", name = "water", body = "hull", lift = 200.0 },
-]
-initial = { q = { foot_angle = 0.1 } }
-"""
+BOAT = (PLUGIN / "boat.toml").read_text("utf-8")
 USE = f"""
 import numpy as np
 import eomgen

@@ -13,24 +13,9 @@ import pytest
 
 ROOT = Path(__file__).parent.parent.parent
 OURS = ROOT / "tests" / "plugin" / "eomgen_example"
-TREE = """
-name = "boat"
-outputs = ["energy_again"]
-bodies = [
-    { name = "hull", mass = 3.0, inertia_com = 0.5 },
-    { name = "mast", mass = 0.5, inertia_com = 0.1 },
-]
-joints = [
-    { name = "sea", type = "telescope", parent = "world", child = "hull" },
-    { name = "foot", type = "revolute", parent = "hull", child = "mast", r_child = [0, -0.5] },
-]
-effects = [
-    { type = "gravity", g = 9.81 },
-    { type = "buoyancy", name = "water", body = "hull", lift = 200.0 },
-]
-initial = { q = { foot_angle = 0.1 } }
-simulation = { t_end = 0.2 }
-"""
+TREE = (ROOT / "tests" / "plugin" / "boat.toml").read_text("utf-8").replace(
+    "bodies = [", 'outputs = ["energy_again"]\nbodies = [', 1
+) + "simulation = { t_end = 0.2 }\n"
 LOOP = (
     TREE.replace("boat", "tram")
     .replace("telescope", "planar")
