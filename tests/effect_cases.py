@@ -194,6 +194,9 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
     ("contact", "each other",
      'law = "spring_damper"; against = "each_other"; bodies = "all"; radius = 0.7; '
      "stiffness = -40.0; allow_active = true", CONSERVES),
+    ("contact", "shapes",
+     'law = "spring_damper"; shapes = { rod = { body = "c", at = <0.1 0 0.1>, end = <-0.3 0.2 0>, '
+     "radius = 0.1 } }; stiffness = 300.0; offset = 0.4", CONSERVES),
     ("contact", "impact", 'law = "impact"; bodies = "all"; restitution = 0.5', NO_ENERGY),
     ("external_force", "constant", 'body = "b"; force = <1 2 3>; at = <0.1 0 0.2>', NO_ENERGY),
     ("external_force", "formula", 'body = "b"; axes = "body"; force = <"sin(3*t)" "q_dot*s" 0>',

@@ -254,7 +254,7 @@ def test_names_and_vectors(kind: str) -> None:
             missing = refusal(crane(kind, **{field: None}))
             assert missing in (
                 f"{place}: missing; every such table needs it",
-                f"{place}: is missing; give one of body, bodies, points",
+                f"{place}: is missing; give one of {', '.join(getattr(member, 'naming', ()))}",
             )
         if field in member.body_fields:
             assert refusal(crane(kind, **{field: '"world"'})) == (
