@@ -90,6 +90,29 @@ def _expected(detail: ErrorDetails) -> list[str]:
     return [word.strip("'") for word in text.replace(" or ", ", ").split(", ")]
 
 
+_SENTENCES = {
+    "quantity": "{value} {msg}",
+    "value_error": "{value} {error}",
+    "finite_number": "{value} is not a finite number; give one that is",
+    "float_type": "{value} is not a number; give one",
+    "greater_than": "{value} is not positive; give a number > 0",
+    "greater_than_equal": "{value} is too small; give at least {ge}",
+    "less_than_equal": "{value} is too large; give at most {le}",
+    "bool_type": "{value} is neither true nor false; give one",
+    **dict.fromkeys(
+        ("int_type", "int_from_float", "int_parsing"), "{value} is not a whole number; give one"
+    ),
+    "list_of_lists": "has lists in it; give everything in one list",
+    "list_of_no_lists": "has entries that are not lists; give a list of lists",
+    "string_type": "{value} is not a text; give one",
+    "tuple_type": "{value} is not a list; give one",
+    **dict.fromkeys(
+        ("dict_type", "model_type", "model_attributes_type"), "{value} is not a table; give one"
+    ),
+}
+"""What is said of an error, after its location."""
+
+
 def _line(detail: ErrorDetails) -> str:
     """One pydantic error as `location: value problem; remedy`."""
     kind, context = detail["type"], detail.get("ctx", {})
@@ -105,8 +128,6 @@ def _line(detail: ErrorDetails) -> str:
             if location.endswith("]"):
                 return f"{location}: missing; the list is too short"
             return f"{location}: missing; every such table needs it"
-        case "quantity":
-            return f"{location}: {value} {detail['msg']}"
         case "union_tag_invalid":
             known = [tag.strip().strip("'") for tag in context["expected_tags"].split(",")]
             tag = str(context["tag"])
@@ -117,35 +138,14 @@ def _line(detail: ErrorDetails) -> str:
         case "literal_error":
             hint = _hint(detail) or f"; known: {', '.join(_expected(detail))}"
             return f"{location}: unknown value {value}{hint}"
-        case "value_error":
-            return f"{location}: {value} {context['error']}"
-        case "finite_number":
-            return f"{location}: {value} is not a finite number; give one that is"
-        case "float_type":
-            return f"{location}: {value} is not a number; give one"
-        case "greater_than":
-            return f"{location}: {value} is not positive; give a number > 0"
-        case "greater_than_equal":
-            return f"{location}: {value} is too small; give at least {context['ge']}"
-        case "less_than_equal":
-            return f"{location}: {value} is too large; give at most {context['le']}"
-        case "bool_type":
-            return f"{location}: {value} is neither true nor false; give one"
-        case "int_type" | "int_from_float" | "int_parsing":
-            return f"{location}: {value} is not a whole number; give one"
         case "too_long" | "too_short":
             return f"{location}: has {_entries(detail)}; give {_wanted_entries(location, context)}"
-        case "list_of_lists":
-            return f"{location}: has lists in it; give everything in one list"
-        case "list_of_no_lists":
-            return f"{location}: has entries that are not lists; give a list of lists"
-        case "string_type" | "tuple_type" | "dict_type" | "model_type" | "model_attributes_type":
-            if kind == "tuple_type" and isinstance(detail["input"], dict):
-                return f"{location}: is one table, not a list; write [[{location}]]"
-            wanted = {"string_type": "a text", "tuple_type": "a list"}.get(kind, "a table")
-            return f"{location}: {value} is not {wanted}; give one"
-        case _:
-            return f"{location}: {value}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
+        case "tuple_type" if isinstance(detail["input"], dict):
+            return f"{location}: is one table, not a list; write [[{location}]]"
+    if kind in _SENTENCES:
+        said = _SENTENCES[kind].format(**{**context, "value": value, "msg": detail["msg"]})
+        return f"{location}: {said}"
+    return f"{location}: {value}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
 
 
 def elsewhere(word: str, location: str) -> str:
