@@ -10,17 +10,15 @@ from eomgen.subset.words import Matrix, Vector, Whole, copy, next_after, ordered
 @dataclass(slots=True)
 class Records:
     """Of each step its end, the greatest length of the next one, its own length, of which an event
-    may leave a part, and its error, the least margin of constraints, what it has counted and how
-    many rows there are so far, the state, slope and lost part at its end, and `wide` terms if
-    wanted. The rows at given times. How many rows are passed, and steps made. A method leaves out
-    what it does not need.
+    may leave a part, and its error, what it has counted and how many rows there are so far, the
+    state, slope and lost part at its end, and `wide` terms if wanted. The rows at given times. How
+    many rows are passed, and steps made. There is no room for what a method does not need.
     """
 
     ends: Annotated[Vector, "most"]
     lengths: Annotated[Vector, "most"]
     last_lengths: Annotated[Vector, "most"]
     errors: Annotated[Vector, "most"]
-    margins: Annotated[Vector, "most"]
     derivatives: Annotated[Whole, "most"]
     jacobians: Annotated[Whole, "most"]
     factorisations: Annotated[Whole, "most"]

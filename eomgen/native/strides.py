@@ -4,7 +4,7 @@ import ctypes
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +33,9 @@ MEMORY = {
     "error": "errors",
 }
 """The records of what determines a solver's next step."""
+SOME = ("slopes", "errors", "jacobians", "factorisations", "terms")
+"""The records that only some steps need."""
+_NONE = np.empty(0)
 _POINTER, _WHOLE, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 Between = Callable[[float, float, Array, Array, float], Array]
@@ -48,6 +51,7 @@ class Method:
     counts   what it counts beside derivatives, by the names of records
     wide     the number of terms of a step
     between  the states in it
+    follows  whether the length of a step follows from the state where it begins
     """
 
     call: Any
@@ -55,6 +59,7 @@ class Method:
     counts: tuple[str, ...]
     wide: int
     between: Between
+    follows: bool = False
 
 
 class _Checks(ctypes.Structure):
@@ -74,7 +79,7 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
     """Steps of a method for a mechanism."""
     solver, most, touched = stretch.solver, stretch.most, stretch.touched
     watched, held, ny = stretch.watched, stretch.constrained, len(solver.y)
-    seen = _Checked.of(watched, ny)
+    seen = _Checked.of(watched, ny) if watched else _unchecked(ny)
     is_held = touched is not None and touched.now.holds.any()
     kept, records = _records(method, stretch)
     switched, values = np.empty(most), np.empty((most, seen.watch.many))
@@ -82,7 +87,7 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
     system = of.holding(ny, held, touched)
     bounds = stretch.atol, stretch.rtol, stretch.longest, stretch.until
     run = filled(Bounds(*bounds, stretch.dense, stretch.reaches))
-    at = filled(Progress(solver.t, length=float(solver.h_abs)))
+    at = filled(Progress(solver.t, length=0.0 if method.follows else float(solver.h_abs)))
     checks = _Checks(
         *map(ctypes.addressof, (system, run, *seen[2:])),
         *(watched.clear if watched else math.inf, stretch.only_whole),
@@ -122,14 +127,16 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
 def _records(method: Method, stretch: Stretch) -> tuple[Records, ctypes.Structure]:
     """Room for the records of steps and their rows, and what C is given of it."""
     ny, count, most = len(stretch.solver.y), len(stretch.times), stretch.most
-    terms = {} if stretch.dense else {"terms": np.empty((0, ny))}
+    needed = {*(MEMORY[name] for name in method.memory), *method.counts, *["terms"] * stretch.dense}
     return room(
         Records,
+        **{name: _NONE for name in SOME if name not in needed},
         most=most,
         STATES=ny,
         count=count,
         wide=method.wide,
-        **{"times": stretch.times, "rows": np.empty((count, ny)), **terms},
+        times=stretch.times,
+        rows=np.empty((count, ny)),
     )
 
 
@@ -146,15 +153,19 @@ class _Checked(NamedTuple):
     @staticmethod
     def of(watched: Watched | None, states: int) -> "_Checked":
         """The room, with what is known of the functions."""
-        watch = _watch(watched, states)
+        watch = _watch(watched, states) if watched and watched.ends else branches.watch(0, states)
         found = branches.switches(states, last=watched.switched if watched else -math.inf)
         return _Checked(watch, found, filled(watch), filled(found))
 
 
-def _watch(watched: Watched | None, states: int) -> Watch:
+@cache
+def _unchecked(states: int) -> _Checked:
+    """The same for steps that are not watched, which leave nothing there."""
+    return _Checked.of(None, states)
+
+
+def _watch(watched: Watched, states: int) -> Watch:
     """Room for the switching functions along steps, and what is known of them."""
-    if not (watched and watched.ends):
-        return branches.watch(0, states)
     (earlier, before), (here, first) = watched.ends
     made = branches.watch(len(first), states, watched.angles, watched.timed)
     made.earlier, made.before[:], made.here, made.first[:] = earlier, before, here, first

@@ -145,5 +145,5 @@ class CompiledTaylor:
         if stretch.watched or stretch.constrained or stretch.touched:
             stretch = replace(stretch, most=0)
         wide = order_of(stretch.rtol) + 1
-        method = strides.Method(self._steps, ("h_abs", "lost"), (), wide, between)
+        method = strides.Method(self._steps, ("h_abs", "lost"), (), wide, between, follows=True)
         return strides.steps(method, self._mechanism, stretch)

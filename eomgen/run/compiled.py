@@ -4,7 +4,6 @@
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from eomgen.engine.contacts import ContactLaw, Place, Touching
 from eomgen.engine.equal_steps import Course, Kept
 from eomgen.engine.sums import Sum
+from eomgen.subset.structures import copied
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -164,7 +164,8 @@ class Touched:
 
     def copy(self, t: float, y: Array, most: int) -> "Touched":
         """The same at a time and a state, for up to `most` steps."""
-        now, at = deepcopy(self.now), replace(deepcopy(self.at), t=t, y=y.copy())
+        now, at = copied(self.now), copied(self.at)
+        at.t, at.y = t, y.copy()
         calls = np.zeros((most + 1, len(CALLS)), np.int64)
         return replace(self, now=now, at=at, slack=now.slack.copy(), calls=calls)
 

@@ -12,7 +12,6 @@ in grazing a curved surface, always bounces.
 """
 
 from collections.abc import Callable, Iterator
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -44,6 +43,7 @@ from eomgen.run.failure import StepFailure
 from eomgen.run.integrators.interface import Advance, Begin, Resume
 from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import Event, Kind
+from eomgen.subset.structures import copied
 
 _NOTHING = np.empty(0), np.empty(0, np.int64)
 
@@ -101,7 +101,7 @@ def advances(
             return
         if resume is None:
             begun = (now.t, now.y)
-        holding = Holding(contacts, deepcopy(held)) if held.holds.any() else None
+        holding = Holding(contacts, copied(held)) if held.holds.any() else None
         smooth = restrained(replace(problem, initial=now.y), holding, stepper.counted)
         powers = holding.powers if holding else None
         steps = stepper.begin(smooth, now.t, made, resume, touched)

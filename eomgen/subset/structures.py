@@ -1,11 +1,12 @@
 """The engine's records as C's structures, for `ctypes`."""
 
 import ctypes
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from math import prod
-from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from operator import attrgetter
+from typing import Annotated, Any, NamedTuple, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,30 +102,57 @@ def address(array: NDArray[Any]) -> int:
         return array.ctypes.data
 
 
+class _Parts(NamedTuple):
+    """The fields of a record: what gives their values, which are arrays; the numbers, and whether
+    they are flags; and the records.
+    """
+
+    values: Callable[[Any], tuple[Any, ...]]
+    arrays: tuple[bool, ...]
+    numbers: tuple[tuple[str, bool], ...]
+    records: tuple[str, ...]
+
+
+@cache
+def _parts(record: Any) -> _Parts:
+    names = [f.name for f in fields(record)]
+    hints, arrays = get_type_hints(record), {name for name, _, _ in arrays_of(record)}
+    numbers = ((name, hints[name] is bool) for name in names if hints[name] in TYPES)
+    are_arrays = tuple(name in arrays for name in names)
+    return _Parts(attrgetter(*names), are_arrays, tuple(numbers), tuple(records_of(record)))
+
+
 def filled(record: Any) -> ctypes.Structure:
     """A structure with the numbers of a record and the addresses of its arrays, which must lie
     together and live as long, and of its records.
     """
     kind: Any = type(record)
-    of_c: Any = structure(kind)
-    own = {name: filled(getattr(record, name)) for name in records_of(kind)}
-    values = (own.get(name, getattr(record, name)) for name, _ in of_c._fields_)
-    made: ctypes.Structure = of_c(*map(_given, values))
+    parts, of_c = _parts(kind), structure(kind)
+    values = parts.values(record)
+    own = {name: filled(getattr(record, name)) for name in parts.records}
+    if own:
+        of = zip((f.name for f in fields(kind)), values, strict=True)
+        values = tuple(ctypes.addressof(own[name]) if name in own else x for name, x in of)
+    both = zip(values, parts.arrays, strict=True)
+    made: Any = of_c(*[(address(x) if x.size else 0) if is_array else x for x, is_array in both])
     made.kept = own
-    return made
-
-
-def _given(x: Any) -> Any:
-    """A number, or where an array or a record lies."""
-    if isinstance(x, np.ndarray):
-        return address(x) if x.size else 0
-    return ctypes.addressof(x) if isinstance(x, ctypes.Structure) else x
+    return cast(ctypes.Structure, made)
 
 
 def take(record: Any, made: ctypes.Structure) -> None:
     """Give a record the numbers of its structure; those in its arrays have changed in place."""
-    for f in fields(record):
-        if isinstance(value := getattr(record, f.name), float | int):
-            setattr(record, f.name, type(value)(getattr(made, f.name)))
-        elif is_dataclass(value):
-            take(value, made.kept[f.name])
+    kind: Any = type(record)
+    parts = _parts(kind)
+    for name, is_flag in parts.numbers:
+        value = getattr(made, name)
+        setattr(record, name, value != 0 if is_flag else value)
+    for name in parts.records:
+        take(getattr(record, name), made.kept[name])
+
+
+def copied(record: T) -> T:
+    """A record with copies of its arrays."""
+    kind: Any = type(record)
+    parts = _parts(kind)
+    both = zip(parts.values(record), parts.arrays, strict=True)
+    return cast(T, kind(*[x.copy() if is_array else x for x, is_array in both]))
