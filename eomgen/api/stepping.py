@@ -15,7 +15,7 @@ from eomgen.base.errors import RunError
 from eomgen.language.base import identifier
 from eomgen.model.model import Model
 from eomgen.native.lanes import columns_of
-from eomgen.native.stepper import METHODS, CompiledSteps, Limits
+from eomgen.native.stepper import METHODS, Beside, CompiledSteps, Limits
 from eomgen.run.columns import ColumnSteps, Given, check_columns, module_for_columns
 from eomgen.run.contacts import nothing_held, sizes_of
 from eomgen.run.integrators import FixedStep, find_integrator
@@ -249,18 +249,9 @@ class Stepper:
             (u,) = columns_of(given.u if given.u.ndim == 2 else given.u[:, None])
         if begun.again is not None and begun.first is not self._initial:
             (start,) = columns_of(begun.first)
-        sound = kernels(
-            y,
-            out,
-            t=t,
-            k=(self._own_columns if constants is self._own else columns_of(constants))[0],
-            u=u,
-            p=given.p,
-            steps=steps,
-            lost=lost,
-            again=begun.again,
-            first=start,
-        )
+        (k,) = self._own_columns if constants is self._own else columns_of(constants)
+        beside = Beside(t, k, u, start)
+        sound = kernels(y, out, beside, p=given.p, steps=steps, lost=lost, again=begun.again)
         return np.empty(0, np.intp) if sound.all() else np.flatnonzero(sound == 0)
 
     def _finish(

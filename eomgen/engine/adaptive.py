@@ -101,27 +101,25 @@ def first_length(
 def attempted(
     method: Known,
     system: System,
-    t: float,
-    h: float,
+    run: Bounds,
+    at: Progress,
     y: Annotated[Vector, "STATES"],
     lost: Annotated[Vector, "STATES"],
-    atol: Annotated[Vector, "STATES"],
-    rtol: float,
     k: Annotated[Matrix, "16", "STATES"],
     change: Annotated[Vector, "STATES"],
-    raw: Annotated[Vector, "STATES"],
 ) -> float:
-    """A step of h s from y, with the slope k[0], to `raw`. Returns its error, relative to the one
-    that is allowed.
+    """The change in a step of `at.h` s from y, with the slope k[0], before rounding. Returns its
+    error, relative to the one that is allowed.
     """
+    h = at.h
     for i in unrolled(range(1, method.last)):  # (II.4.1)
         place = y + h * combined(method.stages[i], k)
-        k[i] = system.derivative(t + method.nodes[i] * h, place)
+        k[i] = system.derivative(at.t + method.nodes[i] * h, place)
     change[:] = h * combined(method.end, k) + lost
-    raw[:] = y + change
+    raw = y + change
     before = abs(y)
     after = abs(raw)
-    scale = atol + larger(before, after) * rtol  # (II.4.10)
+    scale = run.atol + larger(before, after) * run.rtol  # (II.4.10)
     a = combined(method.long_error, k) / scale
     b = combined(method.short_error, k) / scale
     fifth = ordered(a * a)
@@ -141,10 +139,9 @@ def made(
     lost: Annotated[Vector, "STATES"],
     k: Annotated[Matrix, "16", "STATES"],
     change: Annotated[Vector, "STATES"],
-    raw: Annotated[Vector, "STATES"],
 ) -> bool:
-    """Make a step from y at `at.t`, with the slope k[0], to `raw` at `at.end`; `change` is the
-    difference before rounding. False if it would have to be too short.
+    """Make a step from y at `at.t`, with the slope k[0], to y + `change` at `at.end`. False if it
+    would have to be too short.
     """
     at.is_dense = False
     shortest = 10.0 * abs(next_after(at.t) - at.t)
@@ -154,17 +151,16 @@ def made(
         if not length >= shortest:
             return False
         at.end = min(at.t + length, run.until)
-        h = at.end - at.t
-        error = attempted(method, system, at.t, h, y, lost, run.atol, run.rtol, k, change, raw)
+        at.h = at.end - at.t
+        error = attempted(method, system, run, at, y, lost, k, change)
         at.derivatives += method.last - 1
         if error < 1.0:
             break
-        length = h * max(method.smallest, method.safety / eighth_root(error))
+        length = at.h * max(method.smallest, method.safety / eighth_root(error))
         factor = 1.0
     if error != 0.0:
         factor = min(factor, method.safety / eighth_root(error))
-    at.h = h
-    at.length = h * factor
+    at.length = at.h * factor
     return True
 
 
@@ -176,12 +172,15 @@ def explicit_step(
     y: Annotated[Vector, "STATES"],
     lost: Annotated[Vector, "STATES"],
     k: Annotated[Matrix, "16", "STATES"],
-    change: Annotated[Vector, "STATES"],
     raw: Annotated[Vector, "STATES"],
 ) -> bool:
-    """The same with the slope at the end of the step, and what rounding takes from it, `lost`."""
-    if not made(method, system, run, at, y, lost, k, change, raw):
+    """The same step, to `raw`, with the slope there, and with what rounding takes from it, which is
+    then `lost`. False also if that slope is not finite.
+    """
+    change = zeros(len(y))
+    if not made(method, system, run, at, y, lost, k, change):
         return False
+    raw[:] = y + change
     k[method.last] = system.derivative(at.end, raw)
     at.derivatives += 1
     round_off(y, raw, change, lost)

@@ -23,7 +23,7 @@ EQUAL: Mapping[str, Root] = {
 """What makes a step of given length, by the names of methods."""
 METHODS: Mapping[str, Root] = {
     **EQUAL,
-    "DOP853": ("made", {"method": DOP853}),
+    "DOP853": ("explicit_step", {"method": DOP853}),
     "taylor": ("expanded", {}),
     "Rodas5P": ("rodas_step", {}),
 }

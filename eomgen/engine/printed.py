@@ -48,11 +48,14 @@ CONTACT_STEPS: Roots = [("through", {})]
 ON_PAGES: tuple[Root, ...] = (
     *EQUAL.values(),
     *(("projected_change", known) for name, known in EQUAL.values() if name == "implicit_change"),
-    *[(name, {}) for name in "rattle rodas_step rodas_within expanded reach change_after".split()],
+    *[(name, {}) for name in "rattle rodas_step rodas_within expanded reach series_step".split()],
     *[(name, {}) for name in "constant_rates coupled varying moved_force differences".split()],
     *[(name, {}) for name in "add_compensated normalised moved_onto convolved".split()],
-    *[(name, {"method": DOP853}) for name in ("made", "interpolate")],
-    *[(name, {}) for name in "first_length within round_off passed_over end_at".split()],
+    *[(name, {"method": DOP853}) for name in ("explicit_step", "interpolate")],
+    *[
+        (name, {})
+        for name in "first_length within change_after order_of passed_over end_at".split()
+    ],
     *[(name, {}) for name in "begin deepest press met ended release".split()],
 )
 """What a page that goes on live calls."""

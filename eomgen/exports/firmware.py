@@ -11,6 +11,7 @@ from typing import Any
 from eomgen.base.errors import SceneError
 from eomgen.base.templating import render
 from eomgen.codegen.backends import c
+from eomgen.codegen.interface import Interface
 from eomgen.engine import implicit, printed, projection
 from eomgen.engine.contact_runs import MOST_EVENTS
 from eomgen.exports import Number, Options, Written
@@ -120,25 +121,16 @@ def files(model: Model, options: Options) -> Written:
         "solves": bool(method.needed),
         "implicit": "jacobian" in method.needed,
     }
+    kind = "solves" if method.needed else "closes" if interface.projected else ""
     header = {
         **c.header(values, interface),
         "real": number,
         "functions": circular,
         "method": INTEGRATORS[method.name].about,
         "contacts": meets,
-        "limits": LIMITS["solves" if method.needed else "closes" if interface.projected else ""]
-        + AT_EVENTS * bool(meets),
+        "limits": LIMITS[kind] + AT_EVENTS * bool(meets),
     }
-    example = {
-        "scene": name,
-        "prefix": name,
-        "measured": interface.states[0].name,
-        "index": 0,
-        "coordinates": interface.coordinates,
-        "held": len(values["held"]),
-        "parameters": len(interface.parameters),
-        "inputs": len(interface.inputs),
-    }
+    example = _example(interface, len(values["held"]))
     return Written(
         {
             f"{name}.c": render(c.TEMPLATES, "firmware.c.jinja", source),
@@ -147,6 +139,20 @@ def files(model: Model, options: Options) -> Written:
         },
         LEFT_OUT if interface.contacts and not meets else (),
     )
+
+
+def _example(interface: Interface, held: int) -> dict[str, Any]:
+    """The values of the example, for so many constants."""
+    return {
+        "scene": interface.name,
+        "prefix": interface.name,
+        "measured": interface.states[0].name,
+        "index": 0,
+        "coordinates": interface.coordinates,
+        "held": held,
+        "parameters": len(interface.parameters),
+        "inputs": len(interface.inputs),
+    }
 
 
 def _text(number: Number) -> Text:

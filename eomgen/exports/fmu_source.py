@@ -110,9 +110,10 @@ def _more(unit: Unit, method: Method) -> Iterator[Root]:
     contacts = unit.interface.contacts
     yield ("first_length" if method.adapts else "add_compensated"), {}
     if unit.series:
-        yield from [(name, {}) for name in ("reach", "change_after", "round_off", "convolved")]
+        called = "reach", "order_of", "series_step", "change_after", "convolved"
+        yield from [(name, {}) for name in called]
         if contacts:  # while they are held there are no series
-            yield "made", {"method": DOP853}
+            yield "explicit_step", {"method": DOP853}
     if method.adapts and (unit.switches or contacts):
         if "jacobian" in method.needed:
             yield "rodas_within", {}

@@ -15,9 +15,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from threading import RLock
-from typing import Any
+from typing import Any, TypeVar
 
 from eomgen.base.errors import RunError
 from eomgen.codegen.backends import c
@@ -34,6 +34,7 @@ from eomgen.run.projection import PROJECTS
 from eomgen.run.works import Powers
 from eomgen.store import interfaced_program_of, key_of, package_digest
 
+T = TypeVar("T")
 STARTING, AN_OPERATION = 0.2, 0.25e-3
 """Time to compile, s: a part for all, and a part for each operation. Measured from 11 to 24,500
 operations, within a factor of 3."""
@@ -146,64 +147,17 @@ class Accelerator:
         functions.
         """
         origin, module = module and self._module, module or self._module
-        made: dict[Any, Any] = {}
         problem = self._compilable(module, origin).problem(problem)
-        projects = PROJECTS if problem.projection else ()
-        contacts = contact_runs.FUNCTIONS if problem.contacts else ()
-
-        def once(name: str, needed: tuple[str, ...], make: Callable[..., Any]) -> Any:
-            """What is made of a mechanism and of the library of a method, as soon as all libraries
-            are there; None before that, and if kernels cannot compute what steps need.
-            """
-            if (name, needed) not in made and (libraries := self._found(needed)):
-                of = mechanism(Given(module, libraries, self._values, origin))
-                own = libraries[needed[-1] if needed[-1] not in FUNCTIONS else "derivative"]
-                made[name, needed] = of and make(of, own)
-            found = made.get((name, needed))
-            self.used = self.used or found is not None
-            return found
-
-        @cache
-        def series() -> taylor.CompiledTaylor | None:
-            return self._taylor(module)
-
-        def steps(name: str, needed: tuple[str, ...]) -> Steps | None:
-            if name == "taylor":  # its steps are not checked
-                return of.steps if not needed and (of := series()) else None
-            found: Steps | None = None
-            if name == "DOP853":
-                found = once(name, ("derivative", *needed), partial(partial, runs.dop853))
-            else:
-                met = problem if set(contacts) & set(needed) else replace(problem, contacts=None)
-                own = implicit.needed(name, met)
-                further = tuple(x for x in needed if x not in own)
-                make = partial(partial, implicit.rodas_5p, problem)
-                found = once(name, (*further, *own), make)
-            return found
-
-        def equal(name: str) -> EqualSteps | None:
-            needed, make = ("derivative", *projects, *contacts), equal_steps.steps
-            if name in implicit.GAUSS or (projects and name in equal_steps.LEAPFROGS):
-                needed, make = implicit.needed(name, problem), implicit.equal
-            found: EqualSteps | None = once(name, needed, partial(make, name, problem))
-            return found
-
-        def strikes() -> Strikes | None:
-            def make(of: Mechanism, library: ctypes.CDLL) -> Strikes:
-                return partial(contact_runs.strikes, library.strikes, of)
-
-            found: Strikes | None = once("strikes", ("derivative", *contacts), make)
-            return found
-
-        def of_solutions() -> Series:
-            found = series()
-            return found.series if found else plain()
-
+        found = _Steps(self, problem, Given(module, {}, self._values, origin))
         problem = with_series(problem, self._model, module, self._values)
         plain = problem.series["taylor"]
-        made_of = {**problem.series, "taylor": of_solutions}
+
+        def of_solutions() -> Series:
+            return found.series.series if found.series else plain()
+
+        compiled = Compiled(problem.derivative, found.steps, found.equal, found.strikes)
         return replace(
-            problem, compiled=Compiled(problem.derivative, steps, equal, strikes), series=made_of
+            problem, compiled=compiled, series={**problem.series, "taylor": of_solutions}
         )
 
     def powers(self, powers: Powers) -> Powers:
@@ -228,7 +182,7 @@ class Accelerator:
     def _compilable(self, module: Any, origin: Any) -> functions.Compilable:
         return functions.Compilable(module, self._values, origin, self._look, self._start)
 
-    def _taylor(self, module: Any) -> taylor.CompiledTaylor | None:
+    def taylor(self, module: Any) -> taylor.CompiledTaylor | None:
         """The Taylor series of a module; None without a compiler. They are compiled at once: steps
         in Python take far longer than that.
         """
@@ -250,12 +204,12 @@ class Accelerator:
     def _look(self, name: str) -> functions.Look:
         """When the library of a function is there; that of the derivative also makes steps."""
         if name == "derivative":
-            return lambda spent: (self._found((name,)) or {}).get(name)
+            return lambda spent: (self.found((name,)) or {}).get(name)
         if self._at_once:
             return lambda spent: self._library(name).beyond(math.inf)
         return self._library(name).beyond
 
-    def _found(self, names: Sequence[str]) -> Libraries | None:
+    def found(self, names: Sequence[str]) -> Libraries | None:
         """The libraries of steps, if they are in the store, or once the run has taken as long as
         compiling them will; None before that, and if there are none.
         """
@@ -306,6 +260,63 @@ class Accelerator:
 
     def _fail(self, why: str) -> None:
         self.notice = why
+
+
+class _Steps:
+    """The compiled steps of a problem of a module, which is given without libraries. What is made
+    of libraries is made once.
+    """
+
+    def __init__(self, accelerator: Accelerator, problem: Problem, given: Given) -> None:
+        self._of, self._problem, self._given = accelerator, problem, given
+        self._made: dict[Any, Any] = {}
+        self._projects = PROJECTS if problem.projection else ()
+        self._contacts = contact_runs.FUNCTIONS if problem.contacts else ()
+
+    @cached_property
+    def series(self) -> taylor.CompiledTaylor | None:
+        """The Taylor series; None without a compiler."""
+        return self._of.taylor(self._given.module)
+
+    def steps(self, name: str, needed: tuple[str, ...]) -> Steps | None:
+        """See `Compiled`."""
+        if name == "taylor":  # its steps are not checked
+            return self.series.steps if not needed and self.series else None
+        if name == "DOP853":
+            return self._once(name, ("derivative", *needed), partial(partial, runs.dop853))
+        problem, meets = self._problem, set(self._contacts) & set(needed)
+        own = implicit.needed(name, problem if meets else replace(problem, contacts=None))
+        further = tuple(x for x in needed if x not in own)
+        make = partial(partial, implicit.rodas_5p, problem)
+        return self._once(name, (*further, *own), make)
+
+    def equal(self, name: str) -> EqualSteps | None:
+        """See `Compiled`."""
+        needed, make = ("derivative", *self._projects, *self._contacts), equal_steps.steps
+        if name in implicit.GAUSS or (self._projects and name in equal_steps.LEAPFROGS):
+            needed, make = implicit.needed(name, self._problem), implicit.equal
+        return self._once(name, needed, partial(make, name, self._problem))
+
+    def strikes(self) -> Strikes | None:
+        """See `Compiled`."""
+
+        def make(of: Mechanism, library: ctypes.CDLL) -> Strikes:
+            return partial(contact_runs.strikes, library.strikes, of)
+
+        return self._once("strikes", ("derivative", *self._contacts), make)
+
+    def _once(self, name: str, needed: tuple[str, ...], make: Callable[..., T]) -> T | None:
+        """What is made of a mechanism and of the library of a method, as soon as all libraries are
+        there; None before that, and if kernels cannot compute what steps need.
+        """
+        made = self._made
+        if (name, needed) not in made and (libraries := self._of.found(needed)):
+            of = mechanism(self._given._replace(libraries=libraries))
+            own = libraries[needed[-1] if needed[-1] not in FUNCTIONS else "derivative"]
+            made[name, needed] = of and make(of, own)
+        found: T | None = made.get((name, needed))
+        self._of.used = self._of.used or found is not None
+        return found
 
 
 def with_series(problem: Problem, model: Model, module: Any, values: tuple[Any, Any]) -> Problem:

@@ -7,7 +7,7 @@ raises a flag of the floating-point unit is left to that.
 import ctypes
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +100,17 @@ class _Call(ctypes.Structure):
     )
 
 
+class Beside(NamedTuple):
+    """What is given beside states, each in columns or in one for all: times (1, n), constants of
+    parameters (nk, n), inputs (nu, n), and states (ny, n) to begin with again.
+    """
+
+    t: Columns
+    k: Columns
+    u: Columns
+    first: Columns | None = None
+
+
 class CompiledSteps(Lanes):
     """The compiled steps of a model's module by a method of `METHODS`.
 
@@ -149,23 +160,18 @@ class CompiledSteps(Lanes):
         self,
         y: FloatArray,
         out: FloatArray,
+        given: Beside,
         *,
-        t: Columns,
-        k: Columns,
-        u: Columns,
         p: FloatArray | None,
         steps: int,
         lost: FloatArray | None = None,
         again: NDArray[np.bool_] | None = None,
-        first: Columns | None = None,
     ) -> NDArray[np.int8]:
         """Make steps from states y (ny, n) into `out`, and update `lost`. Returns which columns are
         made, (n,); others are not written.
 
-        t, k, u  times (1, n), constants of parameters (nk, n) and inputs (nu, n), or one column
-        p        parameters of which these are the constants, (np,); None for the scene's own
-        again, first
-                 columns that become a column of `first` (ny, n), or (ny, 1), instead
+        p      parameters of which the constants are, (np,); None for the scene's own
+        again  columns that become a column of `given.first` instead
         """
         n = y.shape[1]
         sound = np.zeros(n, dtype=np.int8)
@@ -178,7 +184,7 @@ class CompiledSteps(Lanes):
             steps,
             None if self._rates is None else self._rates.ctypes.data,
             keeps and keeps.onto,
-            *(t, states, k, u, first or states),
+            *(given.t, states, given.k, given.u, given.first or states),
             None if again is None else again.ctypes.data,
             out.ctypes.data,
             None if lost is None else lost.ctypes.data,

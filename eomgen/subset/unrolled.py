@@ -68,7 +68,7 @@ class _Unrolled(Function):
             raise self.wrong(base, "is of single numbers, but used whole")
         yield self.to.function.format(name=own, arguments=", ".join(self.arguments))
         for vector, base in self.taken.items():
-            if base in self.arguments:
+            if base.partition(".")[0] in self.arguments:
                 part = _part_of(base, vector).removesuffix("[:]")
                 yield f"    {self._all(vector)} = {part}.tolist()"
         yield from self.written(self.body)
@@ -85,9 +85,9 @@ class _Unrolled(Function):
         """The name of a number, or of an entry."""
         if not sizes:
             return name
-        if not at or name not in {*self.arguments, *self.locals}:
+        if not at or name.partition(".")[0] not in {*self.arguments, *self.locals}:
             raise self.wrong(name, "has no entries with names")
-        vector = "_".join([name, *(str(x.known) for x in at[:-1])])
+        vector = "_".join([name.replace(".", "_"), *(str(x.known) for x in at[:-1])])
         if vector not in self.made:
             self.taken[vector] = name
         return f"{vector}_{at[-1].known}"
@@ -147,4 +147,4 @@ class _Unrolled(Function):
 
 def _part_of(base: str, vector: str) -> str:
     """The array, or its row, of which a vector has the entries."""
-    return f"{base}[{vector.removeprefix(base).removeprefix('_') or ':'}]"
+    return f"{base}[{vector[len(base) :].removeprefix('_') or ':'}]"

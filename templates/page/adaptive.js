@@ -30,12 +30,10 @@ const adaptive = (() => {
       },
       made({ end: t, last: y, slope, length, lost: before }) {
         const at = steps.records.Progress({ t, length });
-        const [change, raw, lost, k, terms] = [ny, ny, ny, SLOPES * ny, 7 * ny].map(numbers);
+        const [raw, k, terms] = [ny, SLOPES * ny, 7 * ny].map(numbers), lost = before.slice();
         k.set(slope);
-        if (!steps.made_DOP853(system, run, at, y, before, k, change, raw)) return null;
-        system.derivative(at.end, raw, k.subarray(last * ny));
+        if (!steps.explicit_step_DOP853(system, run, at, y, lost, k, raw)) return null;
         steps.interpolate_DOP853(system, at, y, raw, k, terms);
-        steps.round_off(y, raw, change, lost);
         const next = k.slice(last * ny, (last + 1) * ny);
         return areFinite(k) ? { end: at.end, at, raw, terms, slope: next, length: at.length, lost } : null;
       },
@@ -62,7 +60,7 @@ const adaptive = (() => {
   };
   const taylor = (free, system, run) => {
     const { ny, steps, series } = free;
-    const order = Math.ceil(5 - Math.log(RTOL) / 2);
+    const order = steps.order_of(RTOL);
     const room = steps.records.Terms({});
     const fixed = series.fixed(...free.arguments()).slice();
     const of = {
@@ -73,17 +71,13 @@ const adaptive = (() => {
     return {
       first: () => ({ lost: numbers(ny) }),
       made({ end: t, last: y, lost: before }) {
-        const [change, raw, lost, rows] = [ny, ny, ny, (order + 1) * ny].map(numbers);
+        const [raw, rows] = [ny, (order + 1) * ny].map(numbers), lost = before.slice();
+        const at = steps.records.Progress({ t });
         steps.expanded(of, t, y, order, room, rows);
-        const end = Math.min(t + steps.reach(run, order, rows, y), run.until);
-        if (!(end > t)) return null;
-        steps.change_after(end - t, order, rows, change);
-        for (let k = 0; k < ny; k += 1) {
-          change[k] += before[k];
-          raw[k] = y[k] + change[k];
-        }
-        steps.round_off(y, raw, change, lost);
-        return areFinite(raw) ? { end, raw, rows, lost } : null;
+        at.length = steps.reach(run, order, rows, y);
+        steps.series_step(order, rows, run, at, y, lost, raw);
+        const { end } = at;
+        return end > t && areFinite(raw) ? { end, raw, rows, lost } : null;
       },
       within({ t: start, y, rows }, t, to) {
         steps.change_after(t - start, order, rows, to);

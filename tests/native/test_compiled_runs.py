@@ -571,9 +571,9 @@ def test_what_steps_need_is_compiled_together(monkeypatch: pytest.MonkeyPatch) -
     )
     of._of_model = lambda: None  # type: ignore[assignment, return-value]
     for now[0] in (0.0, 2.9):
-        assert of._found(tuple(prices)) is None and not made
+        assert of.found(tuple(prices)) is None and not made
     now[0] = 3.1
-    assert set(of._found(tuple(prices)) or ()) == set(prices) == set(made)
+    assert set(of.found(tuple(prices)) or ()) == set(prices) == set(made)
 
 
 def test_an_unknown_backend_is_refused() -> None:

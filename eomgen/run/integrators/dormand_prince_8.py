@@ -43,13 +43,13 @@ class DormandPrince8(Solver):
     def made(self) -> tuple[float, FloatArray] | None:
         """See `Solver`."""
         y, k, at = self.y, self._k, self._at
-        raw, change = np.empty(y.shape), np.empty(y.shape)
+        change = np.empty(y.shape)
         k[0], at.t, at.length, self.bounds.until = self.f, self.t, self.h_abs, self.t_bound
         if self._is_new:
             self._made = self._how()
-        if not self._made(self, self.bounds, at, y, self.lost, k, change, raw):
+        if not self._made(self, self.bounds, at, y, self.lost, k, change):
             return None
-        self.h_abs, self._start, self._dense = at.length, y, None
+        self.h_abs, self._start, self._dense, raw = at.length, y, None, y + change
         k[DOP853.last] = self.f = self.derivative(at.end, raw)
         self.lost = np.empty(y.shape)
         round_off(y, raw, change, self.lost)
