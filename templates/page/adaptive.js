@@ -5,7 +5,7 @@
 // problem: as for `methods`, with placed(t, y), which puts a state on the constraints; given(), the numbers
 // on which the motion depends beside its state; switching(t, y), the functions that are 0 where the derivative
 // has corners, if there are some; angles, the states that are; unseen, the longest step along which these functions
-// need not be followed; whether there are pulses in time, which no long step may pass; and `series`, that of Taylor,
+// need not be followed; timed(t), those that are 0 where forces jump at given times, if there are some; and `series`, that of Taylor,
 // or null where there is none, as while something is pulled.
 
 const adaptive = (() => {
@@ -103,19 +103,35 @@ const adaptive = (() => {
       switching_at: (t, y, to) => to.set(of.switching(t, y)),
       slope_at: system.derivative,
     };
-    const begin = (t, y) => {
+    // What goes on from a time and state, of which no step before is known.
+    const first = (t, y) => {
       const many = of.switching ? of.switching(t, y).length : 0;
       const watched = { many, timed: 1, turning: of.angles.length, angles: of.angles, most: steps.MOST_PARTS };
       watch = steps.records.Watch({ ...watched, room: ROOM, earlier: NaN, here: NaN });
       found = steps.records.Switches({ last: -Infinity, unseen: of.unseen, room: ROOM });
       run.until = Infinity;
       method = (maker === taylor && !of.series ? dormandPrince : maker)(free, system, run);
-      path = [{ t, end: t, last: y.slice(), ...method.first(t, y) }];
+      return { t, end: t, last: y.slice(), ...method.first(t, y) };
+    };
+    // The last number before the derivative changes whatever the state is, and the next one; null if it does not so soon.
+    const jump = (t) => {
+      let [low, high] = [t, t + run.longest];
+      if (!of.timed || !(high < Infinity)) return null;
+      const signs = (time) => of.timed(time).map((x) => x > 0).join();
+      const [before, after] = [signs(low), signs(high)];
+      if (before === after) return null;
+      for (let middle = low + (high - low) / 2; low < middle && middle < high; middle = low + (high - low) / 2) {
+        if (signs(middle) === before) low = middle;
+        else high = middle;
+      }
+      return low > t ? { low, high } : null;
     };
     const go = () => {
       const now = path.at(-1);
       const { end: t, last: y } = now;
+      const at = jump(t);
       if (t >= run.until) run.until = Infinity;
+      if (at) run.until = Math.min(run.until, at.low);
       for (;;) {
         const made = method.made(now);
         if (!made) throw new Error("the steps become too small: the motion is not smooth here");
@@ -128,6 +144,7 @@ const adaptive = (() => {
       steps.end_at(watch, step.end);
       found.last = found.now;
       path.push(step);
+      if (at?.low === step.end) path.push({ ...first(at.high, step.last), lost: step.lost });
     };
     // The state at a time of the path.
     const state = (t) => {
@@ -145,8 +162,8 @@ const adaptive = (() => {
       return state(t).every((x, k) => x === y[k]);
     };
     const change = (problem, t, y, end) => {
-      if (!goesOn(problem, t, y)) begin(t, y);
-      if (problem.pulses) run.longest = end - t;
+      if (!goesOn(problem, t, y)) path = [first(t, y)];
+      if (problem.timed) run.longest = end - t;
       for (let count = 0; !(path.at(-1).end >= end); count += 1) {
         if (count === MOST) throw new Error("the steps become too small: the motion is not smooth here");
         go();

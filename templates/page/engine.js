@@ -69,7 +69,7 @@ const makeEngine = (mechanism, data) => {
     switching: mechanism.switchingFunctions && ((t, y) => mechanism.switchingFunctions(t, y, engine.p, engine.u)),
     angles: positions.filter((i) => data.states[i].unit === "rad"),
     unseen: (data.span ?? 10) / 1000,
-    pulses: Boolean(mechanism.switchingFunctionsOfTime),
+    timed: mechanism.switchingFunctionsOfTime && ((t) => Array.from(mechanism.switchingFunctionsOfTime(t, engine.y, engine.p, engine.u))),
   };
   let problem = free;
 

@@ -32,7 +32,6 @@ from eomgen.pipeline import python_module
 from eomgen.run.integrate import integrate
 from eomgen.run.module import as_problem, load_module
 from eomgen.run.problem import Problem
-from eomgen.run.schedule import Schedule
 from eomgen.run.trajectory import Trajectory
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import parse_scene
@@ -53,8 +52,6 @@ IMPLICIT = {"implicit_midpoint": 0.005, "gauss_4": 0.01, "gauss_6": 0.02}
 EQUAL = {**EXPLICIT, **IMPLICIT}
 ADAPTIVE = {"DOP853": 0.01, "taylor": 0.01, "Rodas5P": 0.01}
 """The methods of pages, and the lengths of their steps or those at whose ends rows are, s."""
-LONGEST = 0.1
-"""Steps by tolerance of scenes with changes in time are shorter than this, s."""
 
 CORNERS = """
 name = "wheel"
@@ -81,6 +78,18 @@ coulomb = 0.1
 speed = 0.01
 """
 """A wheel between springy stops, that a narrow cam brakes; long steps would pass over it."""
+TIMES = """
+name = "disc"
+bodies = [{ name = "disc", mass = 1.0, inertia_com = 0.4 }]
+joints = [{ name = "axle", type = "revolute", parent = "world", child = "disc", coordinate = "q" }]
+initial = { q = { q = 0.3 }, v = { q_dot = 1.0 } }
+[[effects]]
+type = "motor"
+name = "push"
+joint = "axle"
+torque = "-2*q + 3*step(1.1 - t) + 2*step(t - 2.3)"
+"""
+"""A disc on a spring that is pushed up to a time, and from another one on."""
 RUN = """
 const rows = [];
 const engine = makeEngine(mechanism, given.data);
@@ -128,9 +137,7 @@ def in_python(model: Model) -> Problem:
 
 
 def both_runs(of: str, method: str, dt: float, seconds: float) -> tuple[Any, Trajectory]:
-    """The page's run and the one in Python of a scene, with rows at the same times; and `until`
-    when no step reaches a time at which the derivative changes whatever the state is.
-    """
+    """The page's run and the one in Python of a scene, with rows at the same times."""
     scene = read(of).replaced(loops="projected")
     model = model_of(scene, of)
     code, problem = live_code(model, series=method == "taylor"), in_python(model)
@@ -154,9 +161,7 @@ def both_runs(of: str, method: str, dt: float, seconds: float) -> tuple[Any, Tra
         assert method not in found["names"]
         pytest.skip("the method does not suit the scene")
     assert method in found["names"]
-    of_time = problem.switching and problem.switching.of_time
-    change = Schedule(of_time).first(0.0, seconds) if of_time else None
-    return found | {"until": change[0] - LONGEST if change else np.inf}, run
+    return found, run
 
 
 def test_every_method_but_scipys_is_printed() -> None:
@@ -173,13 +178,12 @@ def test_every_method_but_scipys_is_printed() -> None:
 def test_the_same_bits(name: str, method: str) -> None:
     """Time and state at the end, or that both fail. On pages implicit steps of trees keep factors,
     so that their iterations end elsewhere within roundoff; and contacts are located between the
-    page's own times, so that steps by tolerance are the same up to the first. Python ends them
-    where the derivative changes whatever the state is, pages do not: they are the same up to there.
+    page's own times, so that steps by tolerance are the same up to the first.
     """
     seconds = 0.5 if method in IMPLICIT else some(0.5, 10.0)  # no longer than it is not chaotic
     found, run = both_runs(name, method, {**EQUAL, **ADAPTIVE}[method], seconds)
     if method in ADAPTIVE:
-        end = min([found["until"], *(event.t for event in run.events)])
+        end = min((event.t for event in run.events), default=np.inf)
         rows = np.array([row for row in found["rows"] if row[0] < end])
         assert len(rows) or found["error"]
         for row, t, y in zip(rows, run.t[1:], run.y[1:], strict=False):
@@ -207,6 +211,15 @@ def test_contacts_strike_and_are_held(scene: str) -> None:
     assert events == [(event.t, event.contact, event.kind, event.speed) for event in run.events]
     assert {"impact", "rest"} <= {event.kind for event in run.events}
     assert found["error"] is None and np.array_equal(found["y"], run.y[-1])
+
+
+@pytest.mark.parametrize("method", ["DOP853", pytest.param("Rodas5P", marks=pytest.mark.full)])
+def test_steps_end_where_forces_jump(method: str) -> None:
+    """At given times, which both find to the last digit."""
+    found, run = both_runs(TIMES, method, 0.25, 4.0)
+    rows = np.array(found["rows"])
+    assert rows[:, 0].tolist() == run.t[1:17].tolist()
+    assert np.array_equal(rows[:, 1:], run.y[1:17])
 
 
 def test_dop853_passes_over_no_corner() -> None:
