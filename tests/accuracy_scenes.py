@@ -6,8 +6,23 @@ the others' come from `eomgen.study.accuracy.reference`, in 113 bits.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 from mpmath import mp, mpf
+
+from eomgen.dynamics.start.assembly import assembled
+from eomgen.model.elaborate import elaborate
+from eomgen.model.model import Model
+from eomgen.native.accelerator import Accelerator
+from eomgen.run.module import GeneratedModule, load_module
+from eomgen.run.problem import Problem
+from eomgen.scene.reader import parse_scene, read_scene
+from eomgen.scene.schema import Simulation
+from eomgen.store import generated_code
+from eomgen.study.accuracy.localised import under_scrutiny
+from eomgen.study.accuracy.moved import moved_problem
+from eomgen.study.accuracy.trial import Case
+from eomgen.study.diagnosis import problem_of
 
 DIGITS = 50
 
@@ -461,3 +476,30 @@ def closed_end(name: str) -> list[mpf] | None:
         return None
     with mp.workdps(DIGITS):
         return CLOSED[name]()
+
+
+def made(scene: str) -> tuple[Model, GeneratedModule, Simulation]:
+    """Model and module of a scene of `SCENES`, of one that is built in, or of a scene's text, and
+    how it is to be run.
+    """
+    own = scene if "\n" in scene else text(scene) if scene in SCENES else None
+    tables = read_scene(scene) if own is None else parse_scene(own)
+    model = assembled(elaborate(tables))
+    return model, load_module(generated_code(model).module, model.name), tables.simulation
+
+
+def case_of(scene: str, t_end: float | None = None, *, compiled: bool = False, **kept: Any) -> Case:
+    """A scene's run, as `simulate --accuracy` makes it; in compiled code from the start on if
+    `compiled`, else in Python.
+    """
+    model, module, wanted = made(scene)
+    place: Callable[..., Problem] = lambda problem, *_: problem  # noqa: E731
+    if compiled:
+        accelerator = Accelerator(model, module, None, None)
+        accelerator.compile()
+        place = accelerator.of
+    problem = place(problem_of(module, model=model))
+    moved = moved_problem(module, model, start=problem.initial, compiled=place)
+    kept = {"samples": 1001, "rest_speed": wanted.rest_speed, **kept}
+    problem = under_scrutiny(problem, model, module)
+    return Case(problem, t_end or wanted.t_end, module.UNITS, kept, moved=moved)

@@ -12,48 +12,26 @@ from typing import Any
 
 import numpy as np
 import pytest
-from accuracy_scenes import closed_end, text
+from accuracy_scenes import case_of, closed_end, made, text
 from campaign import thinned
 from mpmath import mp, mpf
 
 from eomgen.commands.main import main
-from eomgen.model.elaborate import elaborate
-from eomgen.model.model import Model
 from eomgen.run.checks import allowed_errors
-from eomgen.run.module import GeneratedModule, as_problem, load_module
+from eomgen.run.module import as_problem
 from eomgen.run.problem import FloatArray, Problem
-from eomgen.scene.reader import built_in_names, parse_scene, read_scene
-from eomgen.scene.schema import Simulation
-from eomgen.store import generated_code, program_of
+from eomgen.store import program_of
 from eomgen.study.accuracy import search, trial
 from eomgen.study.accuracy.budgeting import within
 from eomgen.study.accuracy.choosing import meet
 from eomgen.study.accuracy.estimate import second_of
 from eomgen.study.accuracy.ladder import Ladder, Rung, Work, next_rung
-from eomgen.study.accuracy.localised import under_scrutiny
 from eomgen.study.accuracy.measure import error
-from eomgen.study.accuracy.moved import moved, moved_problem
+from eomgen.study.accuracy.moved import moved
 from eomgen.study.accuracy.reference import reference
 from eomgen.study.accuracy.trial import Case, Setting, Tried
-from eomgen.study.diagnosis import problem_of
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
-
-
-def made(scene: str) -> tuple[Model, GeneratedModule, Simulation]:
-    """A scene's model and module, built in or not, and how it is to be run."""
-    tables = read_scene(scene) if scene in built_in_names() else parse_scene(text(scene))
-    model = elaborate(tables)
-    return model, load_module(generated_code(model).module, model.name), tables.simulation
-
-
-def case_of(scene: str, t_end: float | None = None, **kept: Any) -> Case:
-    """A scene's run, as the command makes it."""
-    model, module, wanted = made(scene)
-    kept = {"samples": 1001, "rest_speed": wanted.rest_speed, **kept}
-    problem, twin = problem_of(module, model=model), moved_problem(module, model)
-    problem = under_scrutiny(problem, model, module)
-    return Case(problem, t_end or wanted.t_end, module.UNITS, kept, moved=twin)
 
 
 def end_of(scene: str, t_end: float | None = None) -> FloatArray:

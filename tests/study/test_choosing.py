@@ -8,26 +8,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from accuracy_scenes import case_of
 from campaign import some
 
 from eomgen.commands.main import main
-from eomgen.model.elaborate import elaborate
 from eomgen.run.integrators.interface import SMALLEST_RTOL
-from eomgen.run.module import load_module
 from eomgen.run.problem import Contacts, FloatArray, Problem
 from eomgen.run.trajectory import COUNTS, Trajectory
-from eomgen.scene.reader import parse_scene, read_scene
-from eomgen.store import generated_code
 from eomgen.study.accuracy import choosing
 from eomgen.study.accuracy.choosing import meet
 from eomgen.study.accuracy.estimate import STRIKES, by_second_run, difference, estimated
-from eomgen.study.accuracy.localised import under_scrutiny
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.methods import method_of
-from eomgen.study.accuracy.moved import moved_problem
 from eomgen.study.accuracy.search import Search, Trial
 from eomgen.study.accuracy.trial import Case, Setting, Tried
-from eomgen.study.diagnosis import problem_of
 
 pytestmark = pytest.mark.usefixtures("blank_figures")
 
@@ -64,17 +58,6 @@ effects = [{ type = "gravity", g = 9.81 }]
 initial = { q = { pin_angle_deg = 90 } }
 simulation = { t_end = 10 }
 """
-
-
-def case_of(scene: str) -> Case:
-    """A built-in scene's own run, or that of a scene's text."""
-    tables = parse_scene(scene) if "\n" in scene else read_scene(scene)
-    model, wanted = elaborate(tables), tables.simulation
-    module = load_module(generated_code(model).module, model.name)
-    kept = {"samples": 1001, "rest_speed": wanted.rest_speed}
-    problem = under_scrutiny(problem_of(module, model=model), model, module)
-    moved = moved_problem(module, model)
-    return Case(problem, wanted.t_end, module.UNITS, kept, moved=moved)
 
 
 def truth(case: Case, integrator: str = "DOP853", rtol: float = SMALLEST_RTOL) -> FloatArray:
