@@ -130,7 +130,8 @@ def measure(
     module, functions = compiled(model, reporter=reporter)
     generation = clock.perf_counter() - begin if module.derived else None
     given = (dict(plan.parameters), dict(plan.inputs))
-    key = records.key(module.source, *given, t_end, plan.simulation.rest_speed)
+    place = plan.options.backend
+    key = records.key(module.source, *given, t_end, plan.simulation.rest_speed, place)
     done: Mapping[Rung, Work] = {}
     if table is not None and not plan.options.fresh:
         done, earlier = records.load(table, key)
@@ -240,18 +241,26 @@ def _bench(
     potential = energy(t, y) - kinetic(t, y)
     scale = float(np.max(kinetic(t, y)) + np.ptp(potential)) or 1.0
     keeps = keeps_energy(own, inputs)
-    problem = problem_of(module, *values, own)
+    accelerator, problem = (
+        Accelerator(plan.model, module, *values),
+        problem_of(module, *values, own),
+    )
+    powers = None if keeps else as_powers(module, *values)
+    compiled = plan.options.backend == "c"
+    if compiled:
+        accelerator.compile()
+        powers = powers and accelerator.powers(powers)
+    quick = accelerator.of(problem)
     return Bench(
-        problem=replace(
-            problem, series=Accelerator(plan.model, module, *values).of(problem).series
-        ),
+        problem=quick if compiled else replace(problem, series=quick.series),
         reference=truth,
         rest_speed=plan.simulation.rest_speed,
         kinetic=kinetic,
         energy=energy if keeps else None,
         energy_scale=scale,
-        powers=None if keeps else as_powers(module, *values),
+        powers=powers,
         gap=gap if own.form == "redundant" else None,
+        compiled=compiled,
     )
 
 

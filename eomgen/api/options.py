@@ -318,6 +318,13 @@ class AccuracyOptions(Constants, Formed):
         flag=None,
     )
     fresh: bool = option(False, "do not use runs of earlier calls")
+    backend: Backend = option(
+        "numpy",
+        '"numpy": make the runs in Python; "c": in compiled C code, as `simulate` makes long ones',
+        help="numpy: make the runs in Python; c: in compiled C code",
+        value="NAME",
+        choices=("numpy", "c"),
+    )
 
 
 @dataclass(frozen=True)

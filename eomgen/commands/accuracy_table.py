@@ -6,7 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from eomgen.api.accuracy import Measurement
 from eomgen.commands.shared import print_wrapped
 from eomgen.study.accuracy.ladder import Work, order
-from eomgen.study.accuracy.reading import TARGETS, cheapest, observed_order, saved_by_jacobian
+from eomgen.study.accuracy.reading import (
+    TARGETS,
+    cheapest,
+    cost_of,
+    observed_order,
+    saved_by_jacobian,
+)
 from eomgen.study.accuracy.work_precision import Bench
 
 WORDS = {"wrong": "wrong", "failed": "failed", "over": "over", "refused": "not possible"}
@@ -73,7 +79,7 @@ def print_table(name: str, made: Measurement) -> None:
                 reasons.setdefault((method, work.status, reason), []).append(work)
     _print_troubles(reasons)
     _print_orders(methods, works)
-    _print_reading(works)
+    _print_reading(bench, works)
 
 
 def _error(work: Work) -> str:
@@ -95,10 +101,10 @@ def _time(seconds: float) -> str:
 
 
 def _share(bench: Bench, work: Work, costs: tuple[float, float]) -> str:
-    """The share of the time that is spent in generated code; "-" with rigid contacts, whose own
-    kernels also take time.
+    """The share of the time that is spent in generated code; "-" in compiled code, and with rigid
+    contacts, whose own kernels also take time.
     """
-    if bench.problem.contacts is not None or not work.derivatives:
+    if bench.compiled or bench.problem.contacts is not None or not work.derivatives:
         return "-"
     spent = work.derivatives * costs[0] + work.jacobians * costs[1]
     return f"{min(1.0, spent / work.seconds):.0%}"
@@ -136,18 +142,19 @@ def _print_orders(methods: Sequence[str], works: Sequence[Work]) -> None:
         print("\n".join(lines))
 
 
-def _print_reading(works: Sequence[Work]) -> None:
+def _print_reading(bench: Bench, works: Sequence[Work]) -> None:
     """Print the cheapest runs for a few errors, and what the generated Jacobian saves."""
-    print("    cheapest run, by counted work, for an error within")
+    by, cost = "time" if bench.compiled else "counted work", cost_of(bench)
+    print(f"    cheapest run, by {by}, for an error within")
     for target in TARGETS:
-        best = cheapest(works, target)
+        best = cheapest(works, target, cost)
         if not best:
             print(f"        {target:.0e}  none of these runs")
             continue
         first = best[0]
         text = f"{first.rung.method} at {first.rung.setting}, {_time(first.seconds)}"
         others = [
-            f"{other.rung.method} {other.units / first.units:.1f} times"
+            f"{other.rung.method} {cost(other) / cost(first):.1f} times"
             for other in best[1 : 1 + RUNNERS_UP]
         ]
         print(f"        {target:.0e}  {'; '.join([text, *others])}")

@@ -115,8 +115,10 @@ def _draw(
     force: bool,
 ) -> None:
     from eomgen.show.work_precision import Diagram, save
+    from eomgen.study.accuracy.reading import TARGETS, cheapest, cost_of
 
-    truth = bench.reference
+    truth, cost = bench.reference, cost_of(bench)
+    taken = {target: cheapest(shown, target, cost)[:1] for target in TARGETS}
     energy = ""
     if bench.energy is not None:
         energy = "Energy drift, relative to the motion's own"
@@ -125,8 +127,10 @@ def _draw(
     floor, _ = bench.floors
     about = (
         f"{model.title or model.name}, {t_end:g} s, form {model.form}; "
+        f"runs in {'compiled C code' if bench.compiled else 'Python'}; "
         "time is the least of repeated runs, outputs off\n"
         f"reference: its own error {truth.error:.1g}, errors are resolved down to {floor:.1g}; "
         f"{truth.origin.partition(';')[0]}"
     )
-    save(Diagram(name, about, floor, energy, model.form == "redundant"), shown, path, force=force)
+    diagram = Diagram(name, about, floor, energy, model.form == "redundant", taken)
+    save(diagram, shown, path, force=force)

@@ -1,8 +1,8 @@
 """The work-precision diagram: error against time on logarithmic axes, one line per method."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -35,6 +35,7 @@ COLOURS = {
     "BDF": "#ee7733",
     "BDF_differences": "#ee7733",
     "LSODA": "#009988",
+    "taylor": "#332288",
 }
 """Each method's colour in all figures; one with finite differences has that of its exact twin."""
 MARKERS: dict[Kind, str] = {"explicit": "o", "implicit": "s", "symplectic": "D"}
@@ -49,7 +50,7 @@ TROUBLES = {
     "over": (">", "stopped: took too long"),
 }
 """Statuses of runs that are marked, with marker and label."""
-AT_MOST = "v"
+AT_MOST, RING = "v", "o"
 TOP = 3.0
 """Greater errors, and failed runs, are drawn here."""
 BESIDE = 0.85
@@ -70,6 +71,7 @@ class Diagram:
     floor   error below which nothing is resolved
     energy  meaning of the energy drift; "" if it is not known
     joints  whether joints can come apart, so that their gaps have a panel
+    taken   by error, the run to take for it, if there is one; it has a ring
     """
 
     name: str
@@ -77,6 +79,7 @@ class Diagram:
     floor: float
     energy: str
     joints: bool
+    taken: Mapping[float, Sequence[Work]] = field(default_factory=dict)
 
 
 def draw(diagram: Diagram, works: Sequence[Work]) -> Figure:
@@ -114,7 +117,7 @@ def draw(diagram: Diagram, works: Sequence[Work]) -> Figure:
         main.set_title("Error over the whole run, relative to the motion's own scale")
         for row, panel in enumerate(panels):
             panel(figure.add_subplot(grid[row, 1]))
-        _draw_legend(figure, works, top)
+        _draw_legend(figure, diagram, works, top)
     return figure
 
 
@@ -182,6 +185,14 @@ def _draw_errors(
         text.set_in_layout(False)
     axes.set_ylim(low, TOP)
     _ticks(axes)
+    for target, runs in diagram.taken.items() if spread else ():
+        for work in runs:
+            axes.plot(
+                cost(work), work.error, RING, color=INK, markerfacecolor="none", markersize=13
+            )
+            where = {"xytext": (-9, -9), "textcoords": "offset points", "ha": "right", "va": "top"}
+            at = (cost(work), work.error)
+            axes.annotate(f"{target:.0e}", at, size=8.5, color=INK, in_layout=False, **where)
 
 
 def _draw_method(
@@ -257,7 +268,7 @@ def _ticks(axes: Axes) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _draw_legend(figure: Figure, works: Sequence[Work], top: float) -> None:
+def _draw_legend(figure: Figure, diagram: Diagram, works: Sequence[Work], top: float) -> None:
     """Methods by kind, and the meaning of the marks, in their own column."""
     present = _by_method([work for work in works if work.status != "refused"])
     handles: list[Line2D] = []
@@ -288,16 +299,18 @@ def _draw_legend(figure: Figure, works: Sequence[Work], top: float) -> None:
     ]
     if any(work.at_most[0] for work in works):
         marks.append((AT_MOST, "at most"))
+    if any(diagram.taken.values()):
+        marks.append((RING, "the run to take\nfor this error"))
     if marks:
         heading("Marks")
         handles += [
             Line2D([], [], color=INK, linestyle="", marker=marker, label=words, markersize=6,
-                   markerfacecolor="white" if marker == AT_MOST else INK)
+                   markerfacecolor="white" if marker in (AT_MOST, RING) else INK)
             for marker, words in marks
         ]  # fmt: skip
     legend = figure.legend(
         handles=handles, loc="upper left", bbox_to_anchor=(BESIDE, top), borderaxespad=0,
-        handlelength=2.6, labelspacing=0.42, fontsize=8.8,
+        handlelength=2.6, labelspacing=0.3, fontsize=8.4,
     )  # fmt: skip
     for text, handle in zip(legend.get_texts(), handles, strict=True):
         text.set_text(plain(text.get_text()))

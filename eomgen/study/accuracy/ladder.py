@@ -61,8 +61,9 @@ class Work:
                        of effects does not explain, relative to the motion's energy
     joint_gap          greatest gap in a joint, m
     quaternion_defect  greatest difference of a quaternion's length from 1 before normalisation
-    seconds            least wall time of `repeats` runs; of a stopped run, the time until then
-    spread             median wall time less the least, s
+    seconds            least time of the processor of `repeats` runs; of a stopped run, that until
+                       then
+    spread             median time less the least, s
     units              counted work (see `study.accuracy.methods`): the same on every machine
     steps, derivatives, jacobians   counts of one run
     reason             why it is not "ok", and what to change; or an integrator's remark
