@@ -10,14 +10,13 @@ from dataclasses import replace
 
 from eomgen.base.errors import RunError
 from eomgen.study.accuracy.choosing import candidates
+from eomgen.study.accuracy.estimate import work_of_both
 from eomgen.study.accuracy.methods import method_of
 from eomgen.study.accuracy.search import Choice, Say, Search
 from eomgen.study.accuracy.trial import Case
 
 FULL = 0.7
 """A run and the one that estimates its error are planned for this share of the time left."""
-PAIR = 1.8
-"""Work of a run and of the one that estimates its error, relative to that of the run."""
 LEAST = 1e-14
 """Smallest error that is aimed at: rounding keeps most runs in doubles from a smaller one."""
 
@@ -42,15 +41,16 @@ def within(
             method = method_of(fresh[0])
             search.begin(method, search.still_cheapest(method, LEAST))
             continue
-        most = FULL * (budget - search.spent) / search.unit / PAIR
-        plans = [search.plan(method_of(name), LEAST, most) for name in names if most > 0]
+        if not search.trials:
+            break
+        most = FULL * (budget - search.spent) / search.unit
+        methods = [method_of(name) for name in names if most > 0]
+        plans = [search.plan(method, LEAST, most / work_of_both(method)) for method in methods]
         possible = [plan for plan in plans if plan]
         if possible:
             search.make(min(possible, key=lambda plan: (plan.error, plan.cost)))
-        elif search.trials:
-            return search.chosen(min(search.trials, key=search.error), True)
         else:
-            break
+            return search.chosen(min(search.trials, key=search.error), True)
     if any(tried.trajectory.finished for tried in search.out.values()):
         return replace(search.nothing(), met=True)
     if all(tried.cut for tried in search.out.values()):

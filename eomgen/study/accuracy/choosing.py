@@ -126,11 +126,12 @@ def _slowed(search: Search) -> bool:
 
 
 def _may_gain(search: Search, best: Trial, target: float) -> bool:
-    """Whether a method with less rounding may be better: methods keep their order, as the motion
-    has neither corners nor rigid contacts, and doubles can represent the target.
+    """Whether a method with less rounding may be better: methods keep their order, doubles can
+    represent the target, and the best run is not wrong, as one of chaotic motion is whatever its
+    method.
     """
-    problem, (floor, _) = search.case.problem, search.representable(best.run)
-    return not problem.corners and problem.contacts is None and floor <= ENOUGH * target
+    floor, _ = search.representable(best.run)
+    return search.smooth and floor <= ENOUGH * target and search.error(best) < CLEAR
 
 
 def _holds(search: Search, trial: Trial, error: float) -> bool:
@@ -140,16 +141,15 @@ def _holds(search: Search, trial: Trial, error: float) -> bool:
 
 
 def _towards(search: Search, name: str, target: float) -> Plan | None:
-    """A method's next run; None if it has none, or if rounding alone, as samples show, does not
-    allow the target.
+    """A method's next run; None if it has none, if its error no longer falls, or if rounding alone,
+    as samples show, does not allow the target.
     """
     method = method_of(name)
-    if any(CHANCE * search.rounded(trial) > target for trial in search.of(method)):
+    own = search.of(method)
+    if any(CHANCE * search.rounded(trial) > target for trial in own) or search.stands(method):
         return None
-    plan, own = search.plan(method, GOAL * target), search.of(method)
+    plan = search.plan(method, GOAL * target)
     if plan and name == PATIENT:
-        if len(own) > 1 and search.error(own[-1]) >= search.error(own[-2]):
-            return None
         others = [trial for trial in search.trials if trial.run.setting.integrator != PATIENT]
         return plan if plan.work <= LIMIT * max(trial.run.work for trial in others) else None
     return plan

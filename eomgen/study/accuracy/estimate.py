@@ -19,7 +19,7 @@ import numpy as np
 from eomgen.run.checks import longest_steps
 from eomgen.run.problem import FloatArray
 from eomgen.run.trajectory import Trajectory
-from eomgen.study.accuracy.methods import method_of
+from eomgen.study.accuracy.methods import Method, method_of
 from eomgen.study.accuracy.trial import Case, Setting, Tried, plain
 
 LAST = 0.1
@@ -106,6 +106,11 @@ def second_of(case: Case, run: Tried, factor: float = WIDER) -> tuple[Setting, C
         _, unchecked = longest_steps(None, case.t_end)
         return given, replace(case, kept={**case.kept, "max_step": unchecked / 2})
     return setting, case
+
+
+def work_of_both(method: Method) -> float:
+    """Work of a run and of the one that estimates its error, relative to that of the run."""
+    return 1 + (2.0 if method.equal_steps else math.pow(WIDER, -method.growth))
 
 
 def estimated(

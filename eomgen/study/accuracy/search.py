@@ -22,16 +22,14 @@ from eomgen.study.accuracy.methods import Method, method_of
 from eomgen.study.accuracy.trial import Case, Setting, Tried
 from eomgen.tables.integrators import INTEGRATORS
 
-FIRST, FIRST_STEPS = 1e-4, 64
-"""Relative tolerance of a method's first run, and its least number of equal steps."""
+FIRST = 1e-4
+"""Relative tolerance of a method's first run; equal steps are those of the rows."""
 MOST_STEPS = 2**20
 """Greatest number of equal steps in a run."""
 CLEAR = 0.3 * WRONG
 """Runs with larger errors show no convergence: errors of chaotic motion stay large."""
 TIGHTER, RUNG = 3.0, 1e4
 """The next run of a method is to reduce the error at least, and at most, by these factors."""
-MORE_STEPS = 10.0
-"""It has at most this many times as many equal steps."""
 LOOKS = 5
 """Number of states, from start to end of a motion, at which its fast components are determined."""
 LONGEST, GROWN = 8, 3.0
@@ -39,8 +37,6 @@ LONGEST, GROWN = 8, 3.0
 deviations grow by more than exp(`GROWN`) in the step."""
 SAMPLES = 2
 """Number of further runs that show the effect of rounding on the run that is chosen."""
-UNIT = 1e-6
-"""Time that a unit of work is assumed to take before the first run, s."""
 
 Say = Callable[[str], None]
 
@@ -130,10 +126,14 @@ class Search:
         return any(run.trajectory.outcome.reason.startswith(SLIDES) for run in self.out.values())
 
     @property
+    def smooth(self) -> bool:
+        """Whether methods keep their order: the motion has neither corners nor rigid contacts."""
+        return not self.case.problem.corners and self.case.problem.contacts is None
+
+    @property
     def unit(self) -> float:
         """Time that a unit of work takes on this machine, s, measured on all runs so far."""
-        work = sum(run.work for run in self._made)
-        return sum(run.seconds for run in self._made) / work if work else UNIT
+        return sum(run.seconds for run in self._made) / sum(run.work for run in self._made)
 
     @property
     def tightest_run(self) -> Tried | None:
@@ -197,8 +197,7 @@ class Search:
         """Make a method's first run, with at most `most` units of work. If it breaks off, tighten
         the tolerance and try again: a long step may be unstable.
         """
-        steps = max(FIRST_STEPS, self.case.rows - 1)
-        tolerance = self.case.t_end / steps if method.equal_steps else FIRST
+        tolerance = self.case.t_end / (self.case.rows - 1) if method.equal_steps else FIRST
         plan = Plan(method, tolerance, math.nan, math.nan, math.nan)
         while not self.make(plan, most) and not self.slides and not self.out[method.name].cut:
             if plan.tolerance <= self.tightest(method) or self.spent > self.budget:
@@ -286,6 +285,13 @@ class Search:
         """The error of a run's last state."""
         return self.estimate(trial).last
 
+    def stands(self, method: Method) -> bool:
+        """Whether a method's error no longer falls in smooth motion: then it consists of rounding.
+        Of runs that are wrong it is not known what tighter ones do.
+        """
+        errors = [self.error(trial) for trial in self.of(method)[-2:]]
+        return self.smooth and len(errors) > 1 and errors[0] <= errors[1] < CLEAR
+
     def rounded(self, trial: Trial) -> float:
         """How far rounding moves a run's end, relative to the scale, as its samples show."""
         found = [sample.trajectory for sample in trial.samples]
@@ -333,8 +339,6 @@ class Search:
 
 def rung(method: Method, errors: float) -> float:
     """Factor by which to tighten the tolerance so that the error falls `errors` times. Equal steps
-    are at least halved, and there are at most `MORE_STEPS` times as many.
+    are at least halved.
     """
-    if not method.equal_steps:
-        return errors
-    return min(max(2.0, math.pow(errors, 1 / method.exponent)), MORE_STEPS)
+    return errors if not method.equal_steps else max(2.0, math.pow(errors, 1 / method.exponent))
