@@ -26,12 +26,13 @@ from eomgen.study.diagnosis import problem_of
 
 if TYPE_CHECKING:
     from eomgen.run.problem import FloatArray
-    from eomgen.study.accuracy.ladder import Ladder, Rung, Work
+    from eomgen.study.accuracy.ladder import Ladder, Work
     from eomgen.study.accuracy.reference import Reference
+    from eomgen.study.accuracy.trial import Setting
     from eomgen.study.accuracy.work_precision import Bench
     from eomgen.study.cost.arithmetic import Arithmetic
 
-Notice = Callable[[int, float, "Rung"], None]
+Notice = Callable[[int, float, "Setting"], None]
 """Called before each run: number of runs so far, the time they took, s, and the next run."""
 
 
@@ -116,7 +117,7 @@ def measure(
     *,
     force: bool = False,
     name: str = "",
-    notice: Notice = lambda count, spent, rung: None,
+    notice: Notice = lambda count, spent, setting: None,
     reporter: Reporter = SILENT,
 ) -> Measurement:
     """Measure as planned; `name` is the name of the scene in messages."""
@@ -132,7 +133,7 @@ def measure(
     given = (dict(plan.parameters), dict(plan.inputs))
     place = plan.options.backend
     key = records.key(module.source, *given, t_end, plan.simulation.rest_speed, place)
-    done: Mapping[Rung, Work] = {}
+    done: Mapping[Setting, Work] = {}
     if table is not None and not plan.options.fresh:
         done, earlier = records.load(table, key)
         generation = earlier if generation is None else generation
@@ -147,7 +148,7 @@ def measure(
     ladder = _ladder(bench, plan)
     same = _columns(bench, costs, plan)
 
-    def keep(works: "Mapping[Rung, Work]") -> None:
+    def keep(works: "Mapping[Setting, Work]") -> None:
         if table is not None:
             every = works.values()
             records.save(table, key, every, generation=generation, same=same, force=force)
@@ -155,7 +156,9 @@ def measure(
     works = dict(done)
     made = _climb(bench, ladder, plan, works, keep, notice)
     keep(works)
-    shown = records.ordered(work for work in works.values() if work.rung.method in plan.methods)
+    shown = records.ordered(
+        work for work in works.values() if work.setting.integrator in plan.methods
+    )
     missing = tuple(left_out(ladder, plan.methods, works))
     found = Accuracy(tuple(shown), truth, costs, generation, t_end, made, missing)
     return Measurement(found, bench, plan.methods)
@@ -293,8 +296,8 @@ def _climb(
     bench: "Bench",
     ladder: "Ladder",
     plan: MeasurementPlan,
-    works: "dict[Rung, Work]",
-    keep: "Callable[[Mapping[Rung, Work]], None]",
+    works: "dict[Setting, Work]",
+    keep: "Callable[[Mapping[Setting, Work]], None]",
     notice: Notice,
 ) -> int:
     """Make the missing runs, write each to the table at once, and return their number."""
@@ -302,11 +305,11 @@ def _climb(
 
     begin, made = clock.perf_counter(), 0
 
-    def reported(rung: "Rung") -> None:
-        notice(len(works), clock.perf_counter() - begin, rung)
+    def reported(setting: "Setting") -> None:
+        notice(len(works), clock.perf_counter() - begin, setting)
 
     for work in sweep(bench, ladder, plan.methods, works, begin + plan.options.time, reported):
-        works[work.rung] = work
+        works[work.setting] = work
         made += 1
         keep(works)
     return made

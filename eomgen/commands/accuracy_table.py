@@ -66,11 +66,11 @@ def print_table(name: str, made: Measurement) -> None:
     )
     reasons: dict[tuple[str, str, str], list[Work]] = {}
     for method in methods:
-        own = [work for work in works if work.rung.method == method]
+        own = [work for work in works if work.setting.integrator == method]
         for work in own:
             cells = "".join(f"  {_small(value(work)):>10}" for _, value in extras)
             print(
-                f"    {method:<20}  {work.rung.setting:<12}  {_error(work):>10}{cells}  "
+                f"    {method:<20}  {work.setting.brief:<12}  {_error(work):>10}{cells}  "
                 f"{_time(work.seconds):>8}  {work.steps:>8}  {work.derivatives:>11}  "
                 f"{work.jacobians:>9}  {_share(bench, work, costs):>7}"
             )
@@ -115,9 +115,9 @@ def _print_troubles(reasons: Mapping[tuple[str, str, str], Sequence[Work]]) -> N
     if reasons:
         print("    failed or wrong:")
     for (method, status, cause), works in reasons.items():
-        settings = works[0].rung.setting
+        settings = works[0].setting.brief
         if len(works) > 1:
-            settings += f" to {works[-1].rung.setting.split()[1]}"
+            settings += f" to {works[-1].setting.brief.split()[1]}"
         if status == "wrong":
             worst = max(work.error for work in works)
             cause = f"reported success, but the error is up to {worst:.2g} of the motion's scale"
@@ -128,7 +128,7 @@ def _print_orders(methods: Sequence[str], works: Sequence[Work]) -> None:
     lines = []
     for method in methods:
         nominal = order(method)
-        own = [work for work in works if work.rung.method == method]
+        own = [work for work in works if work.setting.integrator == method]
         if nominal is None or all(work.status == "refused" for work in own):
             continue
         seen = observed_order(own)
@@ -152,9 +152,9 @@ def _print_reading(bench: Bench, works: Sequence[Work]) -> None:
             print(f"        {target:.0e}  none of these runs")
             continue
         first = best[0]
-        text = f"{first.rung.method} at {first.rung.setting}, {_time(first.seconds)}"
+        text = f"{first.setting.integrator} at {first.setting.brief}, {_time(first.seconds)}"
         others = [
-            f"{other.rung.method} {cost(other) / cost(first):.1f} times"
+            f"{other.setting.integrator} {cost(other) / cost(first):.1f} times"
             for other in best[1 : 1 + RUNNERS_UP]
         ]
         print(f"        {target:.0e}  {'; '.join([text, *others])}")

@@ -23,7 +23,8 @@ from eomgen.run.progress import terminal_line
 from eomgen.scene.schema import Simulation
 
 if TYPE_CHECKING:
-    from eomgen.study.accuracy.ladder import Rung, Work
+    from eomgen.study.accuracy.ladder import Work
+    from eomgen.study.accuracy.trial import Setting
     from eomgen.study.accuracy.work_precision import Bench
 
 
@@ -69,10 +70,10 @@ def _runs(
     for kind in ("csv", "npz"):
         check_writable(paths[kind], force=given.force)
 
-    def notice(count: int, spent: float, rung: "Rung") -> None:
+    def notice(count: int, spent: float, setting: "Setting") -> None:
         say(
             f"accuracy of {name}: {count} runs, {spent:.0f} s of at most {given.time:g} s; "
-            f"now {rung.method}, {rung.setting}"
+            f"now {setting.integrator}, {setting.brief}"
         )
 
     with terminal_line() as say:

@@ -150,7 +150,7 @@ def _line(method: str) -> dict[str, object]:
 def _by_method(works: Sequence[Work]) -> dict[str, list[Work]]:
     found: dict[str, list[Work]] = {method: [] for method in INTEGRATORS}
     for work in works:
-        found[work.rung.method].append(work)
+        found[work.setting.integrator].append(work)
     return {method: own for method, own in found.items() if own}
 
 
@@ -185,14 +185,26 @@ def _draw_errors(
         text.set_in_layout(False)
     axes.set_ylim(low, TOP)
     _ticks(axes)
-    for target, runs in diagram.taken.items() if spread else ():
+    if spread:
+        _mark(axes, diagram, cost)
+
+
+def _mark(axes: Axes, diagram: Diagram, cost: Value) -> None:
+    """Draw a ring about each run to take, with its error beside it."""
+    for target, runs in diagram.taken.items():
         for work in runs:
-            axes.plot(
-                cost(work), work.error, RING, color=INK, markerfacecolor="none", markersize=13
-            )
-            where = {"xytext": (-9, -9), "textcoords": "offset points", "ha": "right", "va": "top"}
             at = (cost(work), work.error)
-            axes.annotate(f"{target:.0e}", at, size=8.5, color=INK, in_layout=False, **where)
+            axes.plot(*at, RING, color=INK, markerfacecolor="none", markersize=13, zorder=5)
+            axes.annotate(
+                f"{target:.0e}",
+                at,
+                xytext=(-9, -9),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                size=8.5,
+                in_layout=False,
+            )
 
 
 def _draw_method(

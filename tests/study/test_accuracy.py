@@ -22,16 +22,16 @@ from eomgen.study.accuracy import records, work_precision
 from eomgen.study.accuracy import reference as truths
 from eomgen.study.accuracy.ladder import (
     Ladder,
-    Rung,
     Work,
     atol_scale,
     first_steps,
-    next_rung,
+    next_setting,
     order,
 )
 from eomgen.study.accuracy.measure import scales
 from eomgen.study.accuracy.reading import cheapest, observed_order, saved_by_jacobian
 from eomgen.study.accuracy.reference import Reference
+from eomgen.study.accuracy.trial import Setting
 from eomgen.study.accuracy.work_precision import Bench, errors, measure, sweep
 
 FAST = 3.0
@@ -87,7 +87,7 @@ def climbed(found: Bench, methods: Sequence[str], **options: int) -> dict[str, l
     """All runs of some methods."""
     works: dict[str, list[Work]] = {method: [] for method in methods}
     for work in sweep(found, ladder(found, **options), methods, {}):
-        works[work.rung.method].append(work)
+        works[work.setting.integrator].append(work)
     return works
 
 
@@ -123,7 +123,7 @@ def test_the_order_is_that_of_the_finest_even_stretch() -> None:
 
     def works(slopes: Sequence[float]) -> list[Work]:
         sizes = 1e-2 * 2.0 ** -np.cumsum([0.0, *slopes])
-        rungs = [Rung("rk4", dt=2.0**-k) for k in range(len(sizes))]
+        rungs = [Setting("rk4", dt=2.0**-k) for k in range(len(sizes))]
         return [Work(r, "ok", 1.0, 1, error=e) for r, e in zip(rungs, sizes.tolist(), strict=True)]
 
     seen = observed_order(works([4.8, 4.7, 4.75, 4.4, 4.05, 4.0, 3.95, 1.2, 0.1, 0.1]))
@@ -138,7 +138,7 @@ def test_errors_are_those_of_the_closed_form() -> None:
     found = bench()
     x, v, _ = found.reference.scale
     for steps in (50, 400, 3200):
-        work = measure(found, Rung("euler", dt=2.0 / steps), 60.0)
+        work = measure(found, Setting("euler", dt=2.0 / steps), 60.0)
         z = (1 + 3j * 2.0 / steps) ** steps
         end = max(abs(z.real - math.cos(6)) / x, 3 * abs(z.imag - math.sin(6)) / v)
         assert work.final_error == pytest.approx(end, rel=1e-9)
@@ -152,9 +152,9 @@ def test_tighter_tolerances_give_smaller_errors() -> None:
     found = bench()
     climb = ladder(found)
     for method in ADAPTIVE:
-        done: dict[Rung, Work] = {}
-        while (rung := next_rung(climb, method, done)) and (rung.rtol or 0) > 1e-7:
-            done[rung] = measure(found, rung, 60.0)
+        done: dict[Setting, Work] = {}
+        while (setting := next_setting(climb, method, done)) and (setting.rtol or 0) > 1e-7:
+            done[setting] = measure(found, setting, 60.0)
         loosest, *_, tightest = done.values()
         assert [r.rtol for r in done] == [1e-2, 1e-3, 1e-4, 1e-5, 1e-6]
         assert all(r.atol == pytest.approx(2e-3 * (r.rtol or 0), rel=2e-3) for r in done)
@@ -197,22 +197,22 @@ def test_a_run_over_its_time_ends_its_ladder() -> None:
     """It is kept as such, and made again only if it may now take longer."""
     found = bench()
     slow = replace(ladder(found, most_steps=25 * 2**14), run_time=0.3)
-    work = measure(found, Rung("implicit_midpoint", dt=1e-5), 0.3)
+    work = measure(found, Setting("implicit_midpoint", dt=1e-5), 0.3)
     assert work.status == "over" and 0.3 <= work.seconds < 3 and math.isnan(work.error)
-    first = Rung("Radau", rtol=1e-2, atol=2e-5)
-    over = replace(work, rung=first, seconds=0.31)
-    assert next_rung(slow, "Radau", {first: over}) is None
-    assert next_rung(replace(slow, run_time=1.0), "Radau", {first: over}) == first
+    first = Setting("Radau", rtol=1e-2, atol=2e-5)
+    over = replace(work, setting=first, seconds=0.31)
+    assert next_setting(slow, "Radau", {first: over}) is None
+    assert next_setting(replace(slow, run_time=1.0), "Radau", {first: over}) == first
 
 
 def test_rounding_ends_a_ladder() -> None:
     """Two finer runs that gain nothing are enough; far from rounding they are not."""
     whole = replace(ladder(bench()), most_steps=25 * 2**12)
     for smallest, expected in ((1e-12, 10), (1e-5, 13)):
-        done: dict[Rung, Work] = {}
-        while rung := next_rung(whole, "rk4", done):
-            assert rung.dt is not None
-            done[rung] = Work(rung, "ok", 0.0, 1, error=max(rung.dt**4, smallest))
+        done: dict[Setting, Work] = {}
+        while setting := next_setting(whole, "rk4", done):
+            assert setting.dt is not None
+            done[setting] = Work(setting, "ok", 0.0, 1, error=max(setting.dt**4, smallest))
         assert len(done) == expected
 
 
@@ -220,7 +220,7 @@ def test_rows_are_compared_at_their_own_times() -> None:
     """Coarser steps than rows have fewer of them; of two rows at an impact the later counts."""
     found = bench()
     truth = found.reference
-    works = [measure(found, Rung("rk4", dt=2.0 / n), 60.0) for n in (25, 50, 100, 200, 400)]
+    works = [measure(found, Setting("rk4", dt=2.0 / n), 60.0) for n in (25, 50, 100, 200, 400)]
     ratios = [a.error / b.error for a, b in pairwise(works)]
     assert min(ratios) > 12
 
@@ -256,18 +256,18 @@ def test_quaternions_are_measured_before_they_are_scaled() -> None:
     truth = replace(plain.reference, scale=np.ones(4))
     found = replace(plain, problem=problem, reference=truth, energy=None)
     for h in (0.02, 0.005):
-        work = measure(found, Rung("euler", dt=h), 60.0)
+        work = measure(found, Setting("euler", dt=h), 60.0)
         assert work.quaternion_defect == pytest.approx(math.hypot(1, 3 * h) - 1, rel=1e-9)
-    adaptive = measure(found, Rung("RK45", rtol=1e-6, atol=1e-9), 60.0)
+    adaptive = measure(found, Setting("RK45", rtol=1e-6, atol=1e-9), 60.0)
     assert 0 < adaptive.quaternion_defect < 1e-5
-    assert math.isnan(measure(bench(), Rung("euler", dt=0.02), 60.0).quaternion_defect)
+    assert math.isnan(measure(bench(), Setting("euler", dt=0.02), 60.0).quaternion_defect)
 
 
 def test_what_the_jacobian_saves() -> None:
     """The median over runs of the same tolerances that were both right."""
     times = {"Radau": (1.0, 2.0, 4.0), "Radau_differences": (3.0, 4.0, 20.0)}
     works = [
-        Work(Rung(method, rtol=10.0**-k, atol=1e-9), "ok", seconds, 3)
+        Work(Setting(method, rtol=10.0**-k, atol=1e-9), "ok", seconds, 3)
         for method, own in times.items()
         for k, seconds in enumerate(own)
     ]
@@ -280,12 +280,12 @@ def test_methods_are_ranked_by_counted_work(monkeypatch: pytest.MonkeyPatch) -> 
     """However long each took on a busy machine; that spreads from the least to the median."""
     monkeypatch.setattr(work_precision, "ONCE", 1.0)
     found = bench(error=1e-9)
-    slow = measure(found, Rung("euler", dt=0.001), 60.0)
-    works = [measure(found, Rung("DOP853", rtol=1e-9, atol=1e-12), 60.0), slow]
+    slow = measure(found, Setting("euler", dt=0.001), 60.0)
+    works = [measure(found, Setting("DOP853", rtol=1e-9, atol=1e-12), 60.0), slow]
     assert works[0].units < works[1].units and works[0].spread >= 0
     busy = [replace(works[0], seconds=1e3), works[1]]
-    assert [w.rung.method for w in cheapest(busy, 0.1)] == ["DOP853", "euler"]
-    again = measure(found, slow.rung, 60.0)
+    assert [w.setting.integrator for w in cheapest(busy, 0.1)] == ["DOP853", "euler"]
+    again = measure(found, slow.setting, 60.0)
     assert again.units == slow.units
 
 
@@ -309,8 +309,8 @@ def test_records_come_back_as_they_were(tmp_path: Path) -> None:
     records.save(path, "ab12", works, generation=1.25, same={"given": 'of an\n"oscillator"'})
     back, generation = records.load(path, "ab12")
     assert generation == 1.25
-    assert repr([back[work.rung] for work in works]) == repr(works)  # nan is not nan
-    assert list(back) == [work.rung for work in records.ordered(works)]
+    assert repr([back[work.setting] for work in works]) == repr(works)  # nan is not nan
+    assert list(back) == [work.setting for work in records.ordered(works)]
     whole = path.read_text()
     path.write_text(whole.rstrip().rpartition(",")[0])  # the last row breaks off
     assert records.load(path, "ab12") == ({}, None)
@@ -336,11 +336,11 @@ def test_what_was_interrupted_goes_on(
     assert "taken from the table" not in capsys.readouterr().out
     made = []
 
-    def interrupted(found: Bench, rung: Rung, run_time: float) -> Work:
+    def interrupted(found: Bench, setting: Setting, run_time: float) -> Work:
         if len(made) == 5:
             raise KeyboardInterrupt
-        made.append(rung)
-        return measure(found, rung, run_time)
+        made.append(setting)
+        return measure(found, setting, run_time)
 
     monkeypatch.setattr(work_precision, "measure", interrupted)
     assert main(["accuracy", "pendulum", *QUICK, "-o", str(parted)]) == 130
@@ -349,9 +349,9 @@ def test_what_was_interrupted_goes_on(
     kept = {row["method"] + row["dt_s"] + row["rtol"]: row for row in cells(table, times=True)}
     again = []
 
-    def counted(found: Bench, rung: Rung, run_time: float) -> Work:
-        again.append(rung)
-        return measure(found, rung, run_time)
+    def counted(found: Bench, setting: Setting, run_time: float) -> Work:
+        again.append(setting)
+        return measure(found, setting, run_time)
 
     monkeypatch.setattr(work_precision, "measure", counted)
     assert main(["accuracy", "pendulum", *QUICK, "-o", str(parted)]) == 0
@@ -448,15 +448,15 @@ def test_the_figure_has_a_line_a_method_and_every_run(tmp_path: Path) -> None:
     found = bench(error=1e-10)
     methods = ["euler", "rk4", "DOP853", "Radau"]
     works = [w for own in climbed(found, methods, most_steps=800).values() for w in own]
-    failed = Work(Rung("Radau", rtol=1e-13, atol=1e-16), "failed", 0.7, 1, derivatives=9)
-    over = Work(Rung("BDF", rtol=1e-2, atol=1e-5), "over", 3.0, 1, derivatives=99)
+    failed = Work(Setting("Radau", rtol=1e-13, atol=1e-16), "failed", 0.7, 1, derivatives=9)
+    over = Work(Setting("BDF", rtol=1e-2, atol=1e-5), "over", 3.0, 1, derivatives=99)
     works += [failed, over]
     figure = draw(Diagram("x", "about\nit", found.floors[0], "Energy", False), works)
     main_axes, evaluations, energy = figure.axes
     lines = {line.get_label(): line for line in main_axes.get_lines()}
     for method in methods:
         line = lines[method]
-        right = [w for w in works if w.rung.method == method and w.status == "ok"]
+        right = [w for w in works if w.setting.integrator == method and w.status == "ok"]
         assert np.allclose(line.get_ydata(), [w.error for w in right], rtol=0, atol=0)
         assert np.allclose(line.get_xdata(), [w.seconds for w in right], rtol=0, atol=0)
         assert same_color(line.get_color(), COLOURS[method])

@@ -25,7 +25,7 @@ from eomgen.study.accuracy import search, trial
 from eomgen.study.accuracy.budgeting import within
 from eomgen.study.accuracy.choosing import meet
 from eomgen.study.accuracy.estimate import second_of
-from eomgen.study.accuracy.ladder import Ladder, Rung, Work, next_rung
+from eomgen.study.accuracy.ladder import Ladder, Work, next_setting
 from eomgen.study.accuracy.measure import error
 from eomgen.study.accuracy.moved import moved
 from eomgen.study.accuracy.reference import reference
@@ -148,7 +148,8 @@ class Clock:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, tick: float) -> None:
         self.now, self._tick = 0.0, tick
         for module in (search, trial):
-            monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: self.now))
+            clock = SimpleNamespace(perf_counter=lambda: self.now, process_time=lambda: self.now)
+            monkeypatch.setattr(module, "time", clock)
 
     def counting(self, problem: Problem) -> Problem:
         """The problem, whose evaluations take time by this clock."""
@@ -199,7 +200,8 @@ def test_no_clock_has_a_say(monkeypatch: pytest.MonkeyPatch) -> None:
     for lags in ((0.0,), (1.0, 1e-6, 50.0), (1e-9,)):
         ticks = itertools.accumulate(itertools.cycle(lags))
         for module in (search, trial):
-            clock = SimpleNamespace(perf_counter=lambda ticks=ticks: next(ticks))
+            tick = lambda ticks=ticks: next(ticks)  # noqa: E731
+            clock = SimpleNamespace(perf_counter=tick, process_time=tick)
             monkeypatch.setattr(module, "time", clock)
         tried.append([])
         assert meet(case_of("two_body"), 1e-7).met
@@ -251,15 +253,15 @@ def test_steps_as_long_as_any_may_be() -> None:
 
 
 def test_the_study_asks_for_what_rounding_allows() -> None:
-    """No rung of `eomgen accuracy` has an atol below what rounding makes of a step."""
+    """No setting of `eomgen accuracy` has an atol below what rounding makes of a step."""
     noise = 1e-10
     quiet = Ladder(t_end=1.0, first=25, atol_scale=1e-11, quick=False, run_time=60.0)
     for method in ("LSODA", "DOP853", "Radau"):
         for ladder, least in ((quiet, 0.0), (replace(quiet, noise=noise), noise)):
-            done: dict[Rung, Work] = {}
-            while rung := next_rung(ladder, method, done):
-                assert rung.rtol is not None and rung.atol is not None
-                assert rung.atol == pytest.approx(1e-11 * rung.rtol) or least
-                assert rung.atol >= 10 * least
-                done[rung] = Work(rung, "ok", 0.0, 1, error=rung.rtol)
+            done: dict[Setting, Work] = {}
+            while setting := next_setting(ladder, method, done):
+                assert setting.rtol is not None and setting.atol is not None
+                assert setting.atol == pytest.approx(1e-11 * setting.rtol) or least
+                assert setting.atol >= 10 * least
+                done[setting] = Work(setting, "ok", 0.0, 1, error=setting.rtol)
             assert len(done) == 12

@@ -15,6 +15,7 @@ from eomgen.base.errors import RunError
 from eomgen.run.integrators import INTEGRATORS, FixedStep, find_integrator
 from eomgen.run.noise import least_tolerance
 from eomgen.run.problem import FloatArray, Problem
+from eomgen.study.accuracy.trial import Setting
 
 Status = Literal["ok", "wrong", "failed", "over", "refused"]
 """How a run went: "ok"; "wrong": it reported success but is wrong; "failed": it stopped before the
@@ -33,21 +34,6 @@ GAIN = 0.7
 """A finer run gains nothing if its error is not below this times the best one before …"""
 ROUNDING = 1e-6
 """… and errors as small as this then consist of rounding."""
-
-
-@dataclass(frozen=True)
-class Rung:
-    """The setting of one run: a method with equal steps `dt`, s, or with `rtol` and `atol`."""
-
-    method: str
-    dt: float | None = None
-    rtol: float | None = None
-    atol: float | None = None
-
-    @property
-    def setting(self) -> str:
-        """The step or tolerance as text."""
-        return f"dt {self.dt:.4g}" if self.rtol is None else f"rtol {self.rtol:.0e}"
 
 
 @dataclass(frozen=True)
@@ -70,7 +56,7 @@ class Work:
     stopped_at         the time at which a failed run stopped, s
     """
 
-    rung: Rung
+    setting: Setting
     status: Status
     seconds: float
     repeats: int
@@ -139,16 +125,16 @@ def atol_scale(y: FloatArray, scale: FloatArray) -> float:
     return ATOL_SHARE * float(np.min(moving, initial=np.max(scale)))
 
 
-def next_rung(ladder: Ladder, method: str, done: Mapping[Rung, Work]) -> Rung | None:
+def next_setting(ladder: Ladder, method: str, done: Mapping[Setting, Work]) -> Setting | None:
     """The next run of a method, given those made; None if its finest run was made."""
     fixed = isinstance(INTEGRATORS[method], FixedStep)
     climbed: list[Work] = []
-    for rung in _fixed(ladder, method) if fixed else _adaptive(ladder, method):
+    for setting in _fixed(ladder, method) if fixed else _adaptive(ladder, method):
         if climbed and _ends(ladder, climbed, fixed):
             return None
-        if rung not in done or stale(done[rung], ladder.run_time):
-            return rung
-        climbed.append(done[rung])
+        if setting not in done or stale(done[setting], ladder.run_time):
+            return setting
+        climbed.append(done[setting])
     return None
 
 
@@ -157,22 +143,22 @@ def stale(work: Work, run_time: float) -> bool:
     return work.status == "over" and run_time > 1.1 * work.seconds
 
 
-def _fixed(ladder: Ladder, method: str) -> list[Rung]:
-    factor, steps, rungs = 4 if ladder.quick else 2, ladder.first, []
+def _fixed(ladder: Ladder, method: str) -> list[Setting]:
+    factor, steps, found = 4 if ladder.quick else 2, ladder.first, []
     while steps <= ladder.most_steps:
-        rungs.append(Rung(method, dt=ladder.t_end / steps))
+        found.append(Setting(method, dt=ladder.t_end / steps))
         steps *= factor
-    return rungs
+    return found
 
 
-def _adaptive(ladder: Ladder, method: str) -> list[Rung]:
+def _adaptive(ladder: Ladder, method: str) -> list[Setting]:
     powers = range(LOOSEST, TIGHTEST + 1, 2 if ladder.quick else 1)
-    rungs = []
+    found = []
     for rtol in (float(f"1e-{power}") for power in powers):
         atol = max(rtol * ladder.atol_scale, least_tolerance(method, rtol) * ladder.noise)
         # With four digits a user can repeat it by hand.
-        rungs.append(Rung(method, rtol=rtol, atol=float(f"{atol:.3e}")))
-    return rungs
+        found.append(Setting(method, rtol=rtol, atol=float(f"{atol:.3e}")))
+    return found
 
 
 def _ends(ladder: Ladder, climbed: Sequence[Work], fixed: bool) -> bool:

@@ -39,7 +39,7 @@ def observed_order(works: Sequence[Work]) -> Order | None:
     usable = [
         work for work in works if work.status == "ok" and not work.at_most[0] and work.error > 0
     ]
-    steps = np.log([work.rung.dt or np.nan for work in usable])
+    steps = np.log([work.setting.dt or np.nan for work in usable])
     errors = np.log([work.error for work in usable])
     if len(usable) <= LEAST_SLOPES:
         return None
@@ -74,7 +74,7 @@ def cheapest(
     best: dict[str, Work] = {}
     for work in works:
         if work.status == "ok" and work.error <= target:
-            method = work.rung.method
+            method = work.setting.integrator
             if method not in best or cost(work) < cost(best[method]):
                 best[method] = work
     return sorted(best.values(), key=cost)
@@ -86,7 +86,7 @@ def saved_by_jacobian(works: Iterable[Work]) -> dict[str, float]:
     It is taken over runs with the same tolerances that are both "ok".
     """
     times = {
-        (work.rung.method, work.rung.rtol, work.rung.atol): work.seconds
+        (work.setting.integrator, work.setting.rtol, work.setting.atol): work.seconds
         for work in works
         if work.status == "ok"
     }

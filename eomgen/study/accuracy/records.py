@@ -10,47 +10,43 @@ import csv
 import hashlib
 import io
 import json
-import math
 import platform
 from collections.abc import Iterable, Mapping
+from math import isnan, nan
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any, get_args
 
 import numpy as np
 import scipy
 
 from eomgen.base.errors import RunError
 from eomgen.base.files import is_ours, marked, read_plain, write_whole
-from eomgen.study.accuracy.ladder import Rung, Status, Work, order
+from eomgen.study.accuracy.ladder import Status, Work, order
+from eomgen.study.accuracy.trial import Setting
 from eomgen.tables.integrators import INTEGRATORS
 
-STATUSES: tuple[Status, ...] = ("ok", "wrong", "failed", "over", "refused")
+STATUSES: tuple[Status, ...] = get_args(Status)
+MEASURES = {
+    "energy_drift": "energy_drift",
+    "joint_gap_m": "joint_gap",
+    "quaternion_defect": "quaternion_defect",
+    "time_s": "seconds",
+    "time_spread_s": "spread",
+    "work_units": "units",
+    "stopped_at_s": "stopped_at",
+}
+"""Columns with a number of `Work`, which may be nan: empty."""
+COUNTS = ("repeats", "steps", "derivatives", "jacobians")
+ERRORS = ("error", "final_error")
+"""Columns with an error; beside it stands whether it is one, or a bound. Errors and drifts have no
+unit: they are relative to the motion's own scale, or its energy."""
 COLUMNS = (
-    "method",
-    "kind",
-    "order",
-    "dt_s",
-    "rtol",
-    "atol",
-    "status",
-    "error",
-    "error_is",
-    "final_error",
-    "final_error_is",
-    "energy_drift",
-    "joint_gap_m",
-    "quaternion_defect",
-    "time_s",
-    "time_spread_s",
-    "repeats",
-    "work_units",
-    "steps",
-    "derivatives",
-    "jacobians",
-    "reason",
-    "stopped_at_s",
+    *("method", "kind", "order", "dt_s", "rtol", "atol", "status"),
+    *("error", "error_is", "final_error", "final_error_is"),
+    *("energy_drift", "joint_gap_m", "quaternion_defect", "time_s", "time_spread_s", "repeats"),
+    *("work_units", "steps", "derivatives", "jacobians", "reason", "stopped_at_s"),
 )
-"""Errors and drifts have no unit: they are relative to the motion's own scale, or its energy."""
 GENERATION, KEY = "generation_s", "eomgen_key"
 """Columns after these and those that the caller adds."""
 LARGEST = 100_000_000
@@ -91,20 +87,22 @@ def save(
     written.
     """
     buffer = io.StringIO()
-    table = csv.writer(buffer, lineterminator="\n")
-    table.writerow([*COLUMNS, *same, GENERATION, KEY])
-    rest = [*same.values(), _cell(generation), key]
-    table.writerows([*_row(work), *rest] for work in ordered(works))
+    table = csv.DictWriter(buffer, [*COLUMNS, *same, GENERATION, KEY], lineterminator="\n")
+    table.writeheader()
+    rest = {**same, GENERATION: _cell(generation), KEY: key}
+    table.writerows({**_row(work), **rest} for work in ordered(works))
     write_whole(path, marked(buffer.getvalue()), force=force)
 
 
 def ordered(works: Iterable[Work]) -> list[Work]:
     """The runs sorted by method, each method's from coarse to fine."""
     rank = {method: k for k, method in enumerate(INTEGRATORS)}
-    return sorted(works, key=lambda w: (rank[w.rung.method], -(w.rung.dt or w.rung.rtol or 0.0)))
+    return sorted(
+        works, key=lambda w: (rank[w.setting.integrator], -(w.setting.dt or w.setting.rtol or 0.0))
+    )
 
 
-def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:
+def load(path: Path, key: str) -> tuple[Mapping[Setting, Work], float | None]:
     """The runs in the table and the generation time, s; empty and None if there is no table, if its
     key differs, or if it is damaged.
     """
@@ -117,73 +115,47 @@ def load(path: Path, key: str) -> tuple[Mapping[Rung, Work], float | None]:
         works = [_work(row) for row in rows]
     except (RunError, ValueError, KeyError, TypeError, csv.Error):
         return {}, None
-    return {work.rung: work for work in works}, generation
+    return {work.setting: work for work in works}, generation
 
 
-def _row(work: Work) -> list[object]:
-    rung = work.rung
-    at_most = [AT_MOST if flag else MEASURED for flag in work.at_most]
-    return [
-        rung.method,
-        INTEGRATORS[rung.method].kind,
-        _cell(order(rung.method)),
-        _cell(rung.dt),
-        _cell(rung.rtol),
-        _cell(rung.atol),
-        work.status,
-        _cell(work.error),
-        "" if math.isnan(work.error) else at_most[0],
-        _cell(work.final_error),
-        "" if math.isnan(work.final_error) else at_most[1],
-        _cell(work.energy_drift),
-        _cell(work.joint_gap),
-        _cell(work.quaternion_defect),
-        repr(work.seconds),
-        _cell(work.spread),
-        work.repeats,
-        _cell(work.units),
-        work.steps,
-        work.derivatives,
-        work.jacobians,
-        " ".join(work.reason.split()),
-        _cell(work.stopped_at),
-    ]
+def _row(work: Work) -> dict[str, object]:
+    setting = work.setting
+    row: dict[str, object] = {
+        "method": setting.integrator,
+        "kind": INTEGRATORS[setting.integrator].kind,
+        "order": _cell(order(setting.integrator)),
+        "dt_s": _cell(setting.dt),
+        "rtol": _cell(setting.rtol),
+        "atol": _cell(setting.atol),
+        "status": work.status,
+        "reason": " ".join(work.reason.split()),
+    }
+    for name, at_most in zip(ERRORS, work.at_most, strict=True):
+        row[name] = _cell(getattr(work, name))
+        row[f"{name}_is"] = row[name] and (AT_MOST if at_most else MEASURED)
+    row |= {column: _cell(getattr(work, name)) for column, name in MEASURES.items()}
+    return row | {name: getattr(work, name) for name in COUNTS}
 
 
 def _cell(value: float | None) -> str:
     """The shortest text that reads back exactly; empty for None and nan."""
-    return "" if value is None or math.isnan(value) else repr(value)
+    return "" if value is None or isnan(value) else repr(value)
 
 
 def _work(row: Mapping[str, str]) -> Work:
     """The run in a row. Raises `ValueError` or `KeyError` if the row is malformed."""
-
-    def number(column: str) -> float:
-        return float(row[column]) if row[column] else math.nan
-
-    def optional(column: str) -> float | None:
-        return float(row[column]) if row[column] else None
-
     if row["method"] not in INTEGRATORS or row["status"] not in STATUSES:
         raise ValueError("no such method or status")
     if None in row.values():
         raise ValueError("a row is incomplete")
+    given = {"dt_s": "dt", "rtol": "rtol", "atol": "atol"}
+    found: dict[str, Any] = {name: float(row[c]) if row[c] else nan for c, name in MEASURES.items()}
+    found |= {name: float(row[name]) if row[name] else nan for name in ERRORS}
     return Work(
-        Rung(row["method"], optional("dt_s"), optional("rtol"), optional("atol")),
+        Setting(row["method"], **{name: float(row[c]) for c, name in given.items() if row[c]}),
         next(status for status in STATUSES if status == row["status"]),
-        float(row["time_s"]),
-        int(row["repeats"]),
-        error=number("error"),
-        final_error=number("final_error"),
         at_most=(row["error_is"] == AT_MOST, row["final_error_is"] == AT_MOST),
-        energy_drift=number("energy_drift"),
-        joint_gap=number("joint_gap_m"),
-        quaternion_defect=number("quaternion_defect"),
-        steps=int(row["steps"]),
-        derivatives=int(row["derivatives"]),
-        jacobians=int(row["jacobians"]),
         reason=row["reason"],
-        stopped_at=number("stopped_at_s"),
-        spread=number("time_spread_s"),
-        units=number("work_units"),
+        **found,
+        **{name: int(row[name]) for name in COUNTS},
     )

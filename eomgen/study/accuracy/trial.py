@@ -60,12 +60,18 @@ class Setting:
         given = [f"--{name} {value!r}" for name, value in {**self.tolerances, **steps}.items()]
         return " ".join([f"--integrator {self.integrator}", *given])
 
+    @property
+    def brief(self) -> str:
+        """The step or relative tolerance as text."""
+        return f"dt {self.dt:.4g}" if self.rtol is None else f"rtol {self.rtol:.0e}"
+
 
 @dataclass(frozen=True, eq=False)
 class Tried:
     """A run, and what it took.
 
     seconds  wall time
+    busy     time of the processor, s
     work     counted, in units of `methods`, by which methods are compared
     extent   (2, ny), the least and the greatest value of each state at the ends of steps
     steps    (2, n): of each part of its time, the longest step, s, and when it began, s
@@ -74,6 +80,7 @@ class Tried:
     setting: Setting
     trajectory: Trajectory
     seconds: float
+    busy: float
     work: float
     extent: FloatArray
     steps: FloatArray
@@ -172,7 +179,7 @@ class Case:
         limits = _Limits(spent, most, due, self.t_end)
         tally = Tally(limits.check, follow)
         with self.show_progress(f"simulating {problem.name}") as progress:
-            started = time.perf_counter()
+            started, busy = time.perf_counter(), time.process_time()
             trajectory = integrate(
                 problem,
                 setting.integrator,
@@ -184,11 +191,11 @@ class Case:
                 powers=powers,
                 tally=tally,
             )
-            seconds = time.perf_counter() - started
+            seconds, busy = time.perf_counter() - started, time.process_time() - busy
         extent = np.array([tally.low, tally.high])
         work = max(spent(tally), 1.0)
         steps = np.array(limits.longest).T
-        return Tried(setting, trajectory, max(seconds, LEAST), work, extent, steps)
+        return Tried(setting, trajectory, max(seconds, LEAST), busy, work, extent, steps)
 
 
 @dataclass

@@ -8,28 +8,27 @@ import math
 import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from eomgen.base.errors import RunError
-from eomgen.run.integrate import integrate
-from eomgen.run.integrators import EndedRunError, StepFailure
+from eomgen.run.failure import StepFailure
 from eomgen.run.problem import FloatArray, Problem
-from eomgen.run.tally import Tally
 from eomgen.run.trajectory import Trajectory
 from eomgen.run.works import Powers
-from eomgen.study.accuracy.ladder import Ladder, Rung, Work, next_rung
+from eomgen.study.accuracy.ladder import Ladder, Work, next_setting
 from eomgen.study.accuracy.measure import WRONG, error
-from eomgen.study.accuracy.methods import meter
 from eomgen.study.accuracy.reference import Reference
+from eomgen.study.accuracy.trial import Case, Setting, Tried
 from eomgen.study.timing import least_seconds
 
 TELLS_APART = 100
 """Errors below this many times the reference's own are not resolved."""
 ONCE = 0.25
 """A run that takes more than this part of the time allowed is made once."""
-REPEATS = 0.3
+REPEATS = 0.1
 """About how long the repeated runs of one setting take together, s …"""
 LEAST_REPEATS, MOST_REPEATS = 2, 20
 """… and how many there are."""
@@ -95,26 +94,13 @@ class _Watched(Problem):
         return super().unit(y)
 
 
-@dataclass(frozen=True)
-class _Run:
-    """A run: its trajectory (None if it was refused), its time of the processor, s, its counted
-    work, and how it ended.
-    """
-
-    trajectory: Trajectory | None
-    seconds: float
-    units: float
-    over: bool = False
-    refusal: str = ""
-
-
 def sweep(
     bench: Bench,
     ladder: Ladder,
     methods: Sequence[str],
-    done: Mapping[Rung, Work],
+    done: Mapping[Setting, Work],
     until: float = math.inf,
-    notice: Callable[[Rung], None] = lambda rung: None,
+    notice: Callable[[Setting], None] = lambda setting: None,
 ) -> Iterator[Work]:
     """Make the runs that are not yet `done`, the coarse ones of all methods first; yield each.
 
@@ -123,26 +109,27 @@ def sweep(
     known, climbing = dict(done), list(methods)
     while climbing:
         for method in tuple(climbing):
-            rung = next_rung(ladder, method, known)
-            if rung is None:
+            setting = next_setting(ladder, method, known)
+            if setting is None:
                 climbing.remove(method)
                 continue
             if time.perf_counter() > until:
                 return
-            notice(rung)
-            if bench.compiled and not any(other.method == method for other in known):
-                _run(bench, bench.problem, rung, math.inf, 2)  # which compiles its steps
-            work = measure(bench, rung, ladder.run_time)
-            known[rung] = work
+            notice(setting)
+            if bench.compiled and not any(other.integrator == method for other in known):
+                with suppress(RunError):
+                    _run(bench, setting, math.inf, 2)  # which compiles its steps
+            work = measure(bench, setting, ladder.run_time)
+            known[setting] = work
             yield work
 
 
-def left_out(ladder: Ladder, methods: Sequence[str], done: Mapping[Rung, Work]) -> list[str]:
+def left_out(ladder: Ladder, methods: Sequence[str], done: Mapping[Setting, Work]) -> list[str]:
     """The methods whose finest run has not been made."""
-    return [method for method in methods if next_rung(ladder, method, done) is not None]
+    return [method for method in methods if next_setting(ladder, method, done) is not None]
 
 
-def measure(bench: Bench, rung: Rung, run_time: float) -> Work:
+def measure(bench: Bench, setting: Setting, run_time: float) -> Work:
     """Make a run, repeat it for its time, and once more for its works; each within `run_time`, s.
 
     Raises `KeyboardInterrupt` if a run was interrupted.
@@ -151,55 +138,59 @@ def measure(bench: Bench, rung: Rung, run_time: float) -> Work:
     watched = bool(problem.quaternions) and not bench.compiled
     if watched:
         fields = {name: getattr(problem, name) for name in Problem.__dataclass_fields__}
-        problem = _Watched(**fields, defect=defect)
-    first = _run(bench, problem, rung, run_time, len(bench.reference.t))
-    if first.trajectory is None:
-        return Work(rung, "refused", first.seconds, 1, reason=first.refusal)
-    if first.over:
-        return _worked(Work(rung, "over", first.seconds, 1, reason=OVER), first)
+        bench = replace(bench, problem=_Watched(**fields, defect=defect))
+    begin = time.process_time()
+    try:
+        first = _run(bench, setting, run_time, len(bench.reference.t))
+    except StepFailure:
+        raise
+    except RunError as refusal:
+        return Work(setting, "refused", time.process_time() - begin, 1, reason=str(refusal))
+    if first.cut:
+        return _worked(Work(setting, "over", first.seconds, 1, reason=OVER), first)
     if not first.trajectory.finished:
         outcome, stopped_at = first.trajectory.outcome, float(first.trajectory.t[-1])
-        failed = Work(rung, "failed", first.seconds, 1, reason=str(outcome), stopped_at=stopped_at)
+        failed = Work(setting, "failed", first.busy, 1, reason=str(outcome), stopped_at=stopped_at)
         return _worked(failed, first)
     last = first
     times: list[float] = []
-    if first.seconds < ONCE * run_time:
+    if first.busy < ONCE * run_time:
         while len(times) < LEAST_REPEATS or (
             len(times) < MOST_REPEATS and sum(times) + times[-1] < REPEATS
         ):
             # Interpolated rows have defects of their own; only those of the steps count here.
             defect.largest = 0.0
-            last = _run(bench, problem, rung, math.inf, 2)
-            times.append(last.seconds)
+            last = _run(bench, setting, math.inf, 2)
+            times.append(last.busy)
     found, end = errors(first.trajectory, bench.reference)
     floors = bench.floors
     wrong = not found < WRONG
     reason = first.trajectory.message
     if wrong:
         reason = f"reported success, but is {found:.2g} of the motion's own scale off"
+    quaternion_defect = defect.largest if watched else math.nan
     work = Work(
-        rung,
+        setting,
         "wrong" if wrong else "ok",
-        min(times, default=first.seconds),
+        min(times, default=first.busy),
         max(1, len(times)),
         error=max(found, floors[0]),
         final_error=max(end, floors[1]),
         at_most=(found < floors[0], end < floors[1]),
-        energy_drift=_energy_drift(bench, rung, first, run_time),
+        energy_drift=_energy_drift(bench, first, run_time),
         joint_gap=_greatest(bench.gap, first.trajectory),
-        quaternion_defect=defect.largest if watched else math.nan,
+        quaternion_defect=quaternion_defect,
         reason=reason,
         spread=statistics.median(times) - min(times) if times else math.nan,
     )
     return _worked(work, last)
 
 
-def _worked(work: Work, run: _Run) -> Work:
-    assert run.trajectory is not None
+def _worked(work: Work, run: Tried) -> Work:
     counts = run.trajectory.counts
     return replace(
         work,
-        units=run.units,
+        units=run.work,
         steps=counts["steps"],
         derivatives=counts["derivatives"],
         jacobians=counts["jacobians"],
@@ -207,49 +198,18 @@ def _worked(work: Work, run: _Run) -> Work:
 
 
 def _run(
-    bench: Bench,
-    problem: Problem,
-    rung: Rung,
-    limit: float,
-    rows: int,
-    powers: Powers | None = None,
-) -> _Run:
-    t = bench.reference.t
-    over, tally = False, Tally()
-    begin = time.process_time()
-
-    def reported(fraction: float) -> None:
-        nonlocal over
-        if time.process_time() - begin > limit:
-            over = True
-            raise EndedRunError(OVER)
-
+    bench: Bench, setting: Setting, limit: float, rows: int, powers: Powers | None = None
+) -> Tried:
+    """A run that is ended after `limit`, s."""
+    t_end = float(bench.reference.t[-1])
     # If there are fewer steps than rows, all steps are kept.
-    few = rung.dt is not None and (t[-1] - t[0]) / rung.dt < rows
-    try:
-        trajectory = integrate(
-            problem,
-            rung.method,
-            float(t[-1]),
-            t_start=float(t[0]),
-            dt=rung.dt,
-            samples=None if few and rows > 2 else rows,
-            rest_speed=bench.rest_speed,
-            progress=reported,
-            powers=powers,
-            tally=tally,
-            rtol=rung.rtol or 1.0,  # equal steps ignore it
-            atol=rung.atol or 1.0,
-        )
-    except StepFailure:
-        raise
-    except RunError as refusal:
-        return _Run(None, time.process_time() - begin, math.nan, refusal=str(refusal))
-    seconds = time.process_time() - begin
-    if trajectory.outcome.kind == "interrupted":
+    few = setting.dt is not None and t_end / setting.dt < rows and rows > 2
+    kept = {"samples": None if few else rows, "rest_speed": bench.rest_speed}
+    due = time.perf_counter() + limit
+    tried = Case(bench.problem, t_end, {}, kept).run(setting, due=due, powers=powers)
+    if tried.interrupted:
         raise KeyboardInterrupt
-    units = meter(problem, rung.method)(tally)
-    return _Run(trajectory, seconds, units, over=over and not trajectory.finished)
+    return tried
 
 
 def errors(trajectory: Trajectory, reference: Reference) -> tuple[float, float]:
@@ -269,18 +229,17 @@ def _greatest(rows: Rows | None, trajectory: Trajectory) -> float:
     return math.nan if rows is None else float(np.max(rows(trajectory.t, trajectory.y)))
 
 
-def _energy_drift(bench: Bench, rung: Rung, first: _Run, run_time: float) -> float:
+def _energy_drift(bench: Bench, first: Tried, run_time: float) -> float:
     """See `Work`; nan if it is unknown, or would take too long to find."""
     trajectory = first.trajectory
-    assert trajectory is not None
     with np.errstate(all="ignore"):
         if bench.energy is not None:
             energy = bench.energy(trajectory.t, trajectory.y)
             return float(np.max(np.abs(energy - energy[0]))) / bench.energy_scale
-        if bench.powers is None or WORKS_COST * first.seconds > run_time:
+        if bench.powers is None or WORKS_COST * first.busy > run_time:
             return math.nan
-        booked = _run(bench, bench.problem, rung, run_time, 2, bench.powers).trajectory
-        if booked is None or not booked.finished or booked.works is None:
+        booked = _run(bench, first.setting, run_time, 2, bench.powers).trajectory
+        if not booked.finished or booked.works is None:
             return math.nan
         ends = bench.kinetic(booked.t[[0, -1]], booked.y[[0, -1]])
         return float(abs(ends[1] - ends[0] - booked.works[-1].sum())) / bench.energy_scale
