@@ -135,6 +135,9 @@ class LookedUp(dict[str, Any]):
         if name == "M" and free:
             rows = [[self._block(a, b) for b in free] for a in free]
             return np.block(rows)
+        if letter == "E" and rest in self._frames:
+            own = [v.name for v in self._frames[rest].v]
+            return np.array([[float(c.name == name) for c in velocities] for name in own])
         if letter == "J" and rest in ("d", "i"):
             dependent = [j for _, j in self.model.pivots]
             others = [j for j in range(len(velocities)) if j not in dependent]

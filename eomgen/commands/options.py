@@ -220,9 +220,9 @@ class Derivation(Forced):
     )
     method: str | None = option(
         None,
-        "how the equations are derived: from free bodies, from energies, or in the partial "
-        "velocities (by what suits the mechanism)",
-        choices=METHODS,
+        "how the equations are derived: from free bodies, from energies, in the partial "
+        "velocities, or by all of these side by side (by what suits the mechanism)",
+        choices=(*METHODS, "all"),
     )
     exercise: bool = option(
         False, "questions on the results, in HTML with fields that check answers"

@@ -56,7 +56,7 @@ def composite_steps(
     r = Recursion(model, frames, effects)
     yield from frame_steps(r, f"{ABOUT}\n\n{VECTORS[r.size]}{FRAMES}")
     order = range(len(frames))
-    lines = [line for k in order for line in (*velocities(r, k), *_acceleration(r, k))]
+    lines = [line for k in order for line in (*velocities(r, k), *acceleration(r, k))]
     yield Step(
         "algorithm", "Outwards: velocities and accelerations", outward_words(r), tuple(lines)
     )
@@ -75,7 +75,8 @@ def solved_algorithm(model: Model) -> Step:
     return Step("solution", "Solved", "The equations are M dv/dt + h_0 = 0.", (line,))
 
 
-def _acceleration(r: Recursion, k: int) -> Iterator[Equation]:
+def acceleration(r: Recursion, k: int) -> Iterator[Equation]:
+    """a of a frame where v̇ = 0."""
     frame = r.frames[k]
     base = sp.MatrixSymbol("a_world", r.size, 1)
     if k == 0:

@@ -302,7 +302,7 @@ def solved_for(names: Sequence[str], M: Expr, right: Expr) -> Iterator[Definitio
         yield real(names[0]), simplified(right[0] / M[0, 0])
         return
     M, right = sp.Matrix(M), sp.Matrix(right)
-    words = [name.removesuffix("_ddot") for name in names]
+    words = [name.removesuffix("_ddot").removesuffix("_dot") for name in names]
     for j in range(k - 1, 0, -1):
         pivot, own = real(f"d_{words[j]}"), real(f"b_{words[j]}")
         yield pivot, simplified(M[j, j])

@@ -78,8 +78,9 @@ def array(e: Expr, known: Numbers) -> Any:
         return np.block([[array(blocks[i, j], known) for j in range(blocks.cols)]
                          for i in range(blocks.rows)])  # fmt: skip
     if isinstance(e, MotionCross | ForceCross):
-        v, m = (array(x, known).ravel() for x in e.args)
-        return crossed(v, m, dual=isinstance(e, ForceCross)).reshape(-1, 1)
+        v, m = (array(x, known) for x in e.args)
+        dual = isinstance(e, ForceCross)
+        return np.column_stack([crossed(v.ravel(), column, dual=dual) for column in m.T])
     if e.is_MatAdd:
         return sum(array(x, known) for x in e.args)
     if e.is_MatMul:

@@ -8,7 +8,7 @@ forces are.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import sympy as sp
 
@@ -24,7 +24,8 @@ from eomgen.derivation.handout.closed import solved as solved_pins
 from eomgen.derivation.handout.elimination import symmetric
 from eomgen.derivation.handout.steps import handout_steps, readable
 from eomgen.derivation.impacts import impact_steps
-from eomgen.derivation.lagrange import lagrangian
+from eomgen.derivation.kane import kane_written
+from eomgen.derivation.lagrange import lagrange_written
 from eomgen.derivation.loops import (
     bias_of,
     constraint_steps,
@@ -33,8 +34,16 @@ from eomgen.derivation.loops import (
     freedom_steps,
     polygon_steps,
 )
-from eomgen.derivation.matrices import Matrices, of_pins, of_projected, projected_definitions
+from eomgen.derivation.matrices import (
+    Matrices,
+    of_pins,
+    of_projected,
+    over_coordinates,
+    projected_definitions,
+)
+from eomgen.derivation.newton_euler import has_named_accelerations, newton_euler_steps
 from eomgen.derivation.own_names import names_within, other_names, with_names_of_scene
+from eomgen.derivation.partial_motions import kane_steps, lagrange_steps
 from eomgen.derivation.poses import poses
 from eomgen.derivation.prescribed import (
     PRESCRIBED,
@@ -101,6 +110,13 @@ ELIMINATED = (
     "From the last velocity to the first each is eliminated: d is a pivot, and b what is left of "
     "F - V - G."
 )
+FREE = "Each body by itself, with its weight, the forces of the effects, and those of its joints."
+ALGORITHMS: dict[Method, Callable[..., Iterator[Step]]] = {
+    "newton-euler": composite_steps,
+    "lagrange": lagrange_steps,
+    "kane": kane_steps,
+}
+"""The steps to M and h_0 of a tree, frame by frame."""
 SYMMETRIC_TITLE = "The symmetric mass matrix, that of kinetic energy"
 
 
@@ -127,14 +143,19 @@ class Exposition:
 
 
 def exposition_of(
-    model: Model, form: Form | None = None, method: Method | None = None
+    model: Model,
+    form: Form | None = None,
+    method: Method | None = None,
+    *,
+    shared: Literal["", "written", "algorithm"] = "",
 ) -> Exposition:
     """Derive a model and explain it in a state form, by default the scene's, and by a method, by
-    default that which suits it.
+    default that which suits it. With `shared` it has steps in common with those by other methods,
+    written out where it is small or as an algorithm.
 
     Raises `SceneError` for a form or a method that the mechanism does not have.
     """
-    found = _explained(model, form, method)
+    found = _explained(model, form, method, shared)
     steps, matrices = list(found.steps), found.matrices
     if words := other_names(steps, model):
         place = _first(steps, "state")
@@ -145,7 +166,12 @@ def exposition_of(
     return replace(found, steps=tuple(steps), matrices=matrices)
 
 
-def _explained(model: Model, form: Form | None, method: Method | None) -> Exposition:
+def _explained(
+    model: Model,
+    form: Form | None,
+    method: Method | None,
+    shared: Literal["", "written", "algorithm"],
+) -> Exposition:
     form = form or model.form
     model = with_closed_form(model)
     effects, constraints = derived_effects(model), derived_constraints(model)
@@ -165,16 +191,13 @@ def _explained(model: Model, form: Form | None, method: Method | None) -> Exposi
         )
     if form != "velocity" and method not in (None, "newton-euler"):
         raise SceneError(f"method: the form '{form}' is derived by newton-euler, not by {method}")
-    if not why_not and method in (None, "newton-euler"):
+    if not why_not and method in (None, "newton-euler") and not shared:
         return _of_pins(model, bare, parts, form)
     written = why_not_closed(bare) or ("" if small else long)
-    if method in ("kane", "lagrange") and written:
-        raise SceneError(
-            f"method: {model.name} is derived by newton-euler, not by {method}: {written}"
-        )
-    if written or method == "newton-euler":
-        return _recursive(model, parts, method)
-    return _of_any(model, bare, parts, method or "kane")
+    found = None
+    if not written and shared != "algorithm":
+        found = _of_any(model, bare, parts, method, shared=bool(shared))
+    return found or _recursive(model, parts, method)
 
 
 def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
@@ -234,62 +257,81 @@ def _each(found: Any, change: Callable[[Expr], Expr]) -> Any:
     return replace(found, **{x: change(getattr(found, x)) for x in "MVGF"})
 
 
-def _of_any(model: Model, bare: Model, parts: Parts, method: Method) -> Exposition:
+def _of_any(
+    model: Model, bare: Model, parts: Parts, method: Method | None, *, shared: bool
+) -> Exposition | None:
+    """A small tree written out; None if its steps by this method would be too long to read.
+
+    With `shared` its steps from the equations of motion on are the same by all methods.
+    """
     equations = balanced(bare)
     equations = replace(equations, balance=_each(equations.balance, simplified))
-    tree, direct = of_projected(equations), None
-    if method == "lagrange":
-        tree, energies = lagrangian(bare, tree, equations.loads.uniform)
-    by_pivots = method == "lagrange" or bool(model.prescribed)
-    if not parts.constraints:
-        tree = left_free(model, tree) if model.prescribed else tree
-        direct = solved_directly(tree.M, tree.F - tree.V - tree.G)
-        if direct is None and not by_pivots:
-            equations = solved_projected(equations)
-            tree = replace(tree, definitions=projected_definitions(equations))
+    whole = tree = of_projected(equations)
+    if model.prescribed and not parts.constraints:
+        tree = left_free(model, whole)
+    direct = solved_directly(tree.M, tree.F - tree.V - tree.G) if not parts.constraints else None
+    by_gauss = direct is None and method in (None, "kane")
+    by_gauss = by_gauss and not (shared or parts.constraints or model.prescribed)
+    if by_gauss:
+        equations = solved_projected(equations)
+        tree = replace(tree, definitions=projected_definitions(equations))
     names = names_within(model)
-    said = {**names, **{s.name: text for s, text in tree.formulas.items()}}
-    told = projected_steps(equations)
-    solution = told[_first(told, "solution")]
-    found = [_renamed(step, names) for step in told]
-    joints = _first(found, "balance", "equations")
-    words = (
-        "Each body by itself, with its weight, the forces of the effects, and those of its joints."
-    )
-    if model.prescribed:
-        words += f" {PRESCRIBED}"
-    start = [
-        _renamed(_state(model), names) if model.prescribed else found[0],
-        Step("bodies", "Free bodies", words, ()),
-        *found[1:joints],
-    ]
+    said = {**names, **{s.name: text for s, text in tree.formulas.items()}, **_entries(model)}
+    found = projected_steps(equations)
+    joints, place = _first(found, "balance", "equations"), _first(found, "solution")
+    by_power = found[joints:place]
+    way: Sequence[Step] | None = by_power
     if method == "lagrange":
-        balance = [_renamed(step, said) for step in energies]
-    else:
-        balance = found[joints : _first(found, "solution")]
+        way = lagrange_written(bare, whole, equations.loads.uniform, equations.ledger.rates)
+    elif method == "newton-euler":
+        way = newton_euler_steps(equations)
+    elif method == "kane" and not has_named_accelerations(equations):
+        way = (*kane_written(equations), *by_power)
+    if way is None:
+        return None
+    way = [_renamed(step, said) for step in way]
+    start = [_renamed(step, names) for step in _start(model, found[:joints])]
     if parts.constraints:
-        return _of_tied(model, parts, start, balance, tree)
-    whole = _whole(tree, model, parts)
-    if direct is None and by_pivots:
-        lines = tuple(solved_for([x.name for x in tree.a], tree.M, tree.F - tree.V - tree.G))
-        solution = replace(_directly(solution, dict(lines)), words=f"{SOLVED} {ELIMINATED}")
-        whole = replace(whole, definitions=(*whole.definitions, *lines))
-    if direct:
-        solution = _directly(solution, dict(zip(tree.a, direct, strict=True)))
-        whole = _with(whole, direct)
-    ends = [
-        *_effect_steps(model, parts),
-        *([free_step(tree)] if model.prescribed else []),
-        solution,
-        *impact_steps(model, parts.effects),
-        _last(model, parts),
-    ]
-    steps = [*start, *balance, *(_renamed(step, said) for step in ends)]
-    return _told("", steps, whole, parts)
+        keep = shared or method in ("newton-euler", "kane")
+        return _of_tied(model, parts, start, way, over_coordinates(tree), keep_motion=keep)
+    solution, matrices = found[place], over_coordinates(tree)
+    if not by_gauss:
+        words, lines = SOLVED, dict(zip(tree.a, direct or (), strict=direct is not None))
+        if direct is None:
+            right = tree.F - tree.V - tree.G
+            lines = dict(solved_for([x.name for x in tree.a], tree.M, right))
+            words = f"{SOLVED} {ELIMINATED}"
+        solution = replace(_directly(solution, lines), words=words)
+        matrices = replace(matrices, definitions=(*matrices.definitions, *lines.items()))
+    left = [free_step(tree)] if model.prescribed else []
+    ends = [*impact_steps(model, parts.effects), _last(model, parts)]
+    effects = [_renamed(step, said) for step in _effect_steps(model, parts)]
+    ends = [_renamed(step, said) for step in (*left, solution, *ends)]
+    steps = [*start, *effects, *way, *ends]
+    return _told("", steps, _whole(matrices, model, parts), parts)
+
+
+def _start(model: Model, found: Sequence[Step]) -> list[Step]:
+    """The state, free bodies, and joints."""
+    words = f"{FREE} {PRESCRIBED}" if model.prescribed else FREE
+    state = _state(model) if model.prescribed else found[0]
+    return [state, Step("bodies", "Free bodies", words, ()), *found[1:]]
+
+
+def _entries(model: Model) -> dict[str, str]:
+    """How the entries of joints' rotations are read."""
+    both = [f"{i}{j}" for i in "xyz" for j in "xyz"]
+    return {f"R__{b.name}__{ij}": f"R_{b.name},{ij}" for b in model.bodies for ij in both}
 
 
 def _of_tied(
-    model: Model, parts: Parts, start: list[Step], balance: list[Step], tree: Matrices
+    model: Model,
+    parts: Parts,
+    start: list[Step],
+    balance: list[Step],
+    tree: Matrices,
+    *,
+    keep_motion: bool,
 ) -> Exposition:
     """A small mechanism with constraints: the tree, then what the constraints leave free."""
     matrices = None
@@ -298,13 +340,13 @@ def _of_tied(
         found = embedded(model, parts.constraints)
         solved, reduced = freedom_steps(found, tree, parts.constraints)
         matrices = _whole(reduced, model, parts, len(found.definitions))
-        before, ends = [*polygon_steps(model, found)], [*effects, *solved]
-        # Velocities and accelerations follow from the constraints, and so need not be read here.
-        start = [replace(x, kind="variant") if x.kind == "motion" else x for x in start]
+        before, ends = [*polygon_steps(model, found), *effects], [*solved]
+        if not keep_motion:  # velocities and accelerations follow from the constraints
+            start = [replace(x, kind="variant") if x.kind == "motion" else x for x in start]
     else:
         rest, following = of_freedoms(model, tree, parts.constraints)
         matrices = _whole(rest, model, parts, following)
-        before, ends = [], [*effects, *constraint_steps(model, parts.constraints)]
+        before, ends = [*effects], [*constraint_steps(model, parts.constraints)]
         ends += elimination_steps(model, parts.constraints, bias_of(len(model.velocities)))
     ends += [*impact_steps(model, parts.effects), _last(model, parts)]
     names = names_within(model)
@@ -317,19 +359,17 @@ def _recursive(model: Model, parts: Parts, method: Method | None) -> Exposition:
     frames = frames_of(model)
     steps = [_state(model), Step("bodies", "Free bodies", _free_words(model), ())]
     effects = _effect_steps(model, parts, every=True)
-    if not parts.constraints and method == "newton-euler":
-        steps += [*effects, *composite_steps(model, frames, parts.effects)]
-        steps.append(solved_algorithm(model))
-    elif not parts.constraints:
+    tree = ALGORITHMS[method or "newton-euler"](model, frames, parts.effects)
+    if not parts.constraints and method is None:
         steps += [*effects, *recursive_steps(model, frames, parts.effects)]
+    elif not parts.constraints:
+        steps += [*effects, *tree, solved_algorithm(model)]
     elif model.groups:
         found = embedded(model, parts.constraints)
-        steps += [*polygon_steps(model, found), *effects]
-        steps += composite_steps(model, frames, parts.effects)
+        steps += [*polygon_steps(model, found), *effects, *tree]
         steps += freedom_algorithm(found, parts.constraints)
     else:
-        steps += [*effects, *constraint_steps(model, parts.constraints)]
-        steps += composite_steps(model, frames, parts.effects)
+        steps += [*effects, *constraint_steps(model, parts.constraints), *tree]
         steps += elimination_steps(model, parts.constraints)
     steps += [*impact_steps(model, parts.effects), _last(model, parts)]
     names = names_within(model)

@@ -7,16 +7,17 @@ coordinates: ∂/∂q is then the derivative along a rotation about an axis of t
 ω × ∂T/∂ω beside the rest (Hamel's form of the equations).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import sympy as sp
 
-from eomgen.base.errors import SceneError
-from eomgen.derivation.constraints import coordinate_rates
-from eomgen.derivation.frames import frames_of
-from eomgen.derivation.linkage import quaternion_rates, rate
+from eomgen.derivation.frames import Frame, frames_of
+from eomgen.derivation.identity import identical
+from eomgen.derivation.linkage import rate
 from eomgen.derivation.matrices import Matrices, written_out
 from eomgen.derivation.poses import poses
+from eomgen.derivation.reading import short_name
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr, real
@@ -35,47 +36,62 @@ EQUATIONS = (
     "velocity. T is quadratic in v: M is the matrix of its second derivatives, V is what is left "
     "of the first two terms where dv/dt = 0, G is ∂U/∂q, and F is Q."
 )
+DERIVATIVES = "p_q is the momentum ∂T/∂v that belongs to a coordinate q, and T_q is ∂T/∂q."
 HAMEL = (
     " The components of a ball's ω are not derivatives of coordinates: ∂/∂q is the derivative "
     "along a rotation about an axis of the body, and V has ω × ∂T/∂ω beside the rest."
 )
 
 
-def lagrangian(model: Model, tree: Matrices, gravity: Expr) -> tuple[Matrices, list[Step]]:
-    """The equations with V and G from the energies, and their steps; `gravity` is the acceleration
-    of all bodies, with three components in world axes.
+def lagrange_written(
+    model: Model, tree: Matrices, gravity: Expr, rates: Mapping[Expr, Expr]
+) -> list[Step] | None:
+    """The steps to the equations of a tree with V and G from the energies; `gravity` is the
+    acceleration of all bodies, with three components in world axes, and `rates` has the time
+    derivatives of what is in M. None if the equations would be too long to read.
 
-    Raises `SceneError` for a mechanism whose equations would be too long.
+    V and G are written as those of the tree, to which they are identical. Raises `ArithmeticError`
+    if they are not.
     """
     if sum(map(size, tree.M)) > MOST:
-        raise SceneError(
-            f"method: Lagrange's equations of {model.name} written out would be too long to read; "
-            "use kane or newton-euler"
-        )
+        return None
     v = sp.Matrix(tree.v)
+    rates = {symbol: rate for symbol, rate in rates.items() if symbol not in tree.v}
     kinetic = (v.T * tree.M * v)[0] / 2
-    potential = _potential(model, tree, gravity)
+    potential = _potential(model, tree, gravity) if any(gravity) else sp.S.Zero
     momenta = tree.M * v
-    rates = dict(coordinate_rates(model))
-    V = rate(tree.M, rates) * v - _slopes(model, kinetic)
+    along = _slopes(tree, kinetic, rates)
+    V = rate(tree.M, rates) * v - along
     for spin in _spins(model):
         turning = sp.Matrix([tree.v[j] for j in spin])
         across = turning.cross(sp.Matrix([momenta[j] for j in spin]))
         for j, part in zip(spin, across, strict=True):
             V[j] += part
-    G = _slopes(model, potential) if any(gravity) else tree.G
-    found = Matrices(
-        *(tree.q, tree.v, tree.a, tree.M, simplified(V), simplified(G), tree.F),
-        *(tree.definitions, tree.formulas),
-    )
-    words = EQUATIONS + (HAMEL if any(_spins(model)) else "")
+    G = _slopes(tree, potential, rates) if any(gravity) else tree.G
+    pairs = [*zip(V, tree.V, strict=True), *zip(G, tree.G, strict=True)]
+    if not identical(pairs, tree.definitions):
+        raise ArithmeticError(f"Lagrange's equations of {model.name} are not those of the tree")
     energies = [Equation(sp.Symbol(x), e) for x, e in _energies(kinetic, potential)]
     steps = [Step("balance", "Energies", ENERGIES, tuple(energies))] if energies else []
-    steps.append(Step("equations", "Lagrange's equations", words, (_line("M", found.M),)))
+    steps += _derivatives(model, momenta, along)
+    words = EQUATIONS + (HAMEL if any(_spins(model)) else "")
+    steps.append(Step("equations", "Lagrange's equations", words, (_line("M", tree.M),)))
     for letter, title in (("V", "Velocity"), ("G", "Gravity"), ("F", "Applied")):
-        lines = (_line(letter, getattr(found, letter)),)
+        lines = (_line(letter, getattr(tree, letter)),)
         steps.append(Step("equations", f"{title} forces", "", lines))
-    return found, steps
+    return steps
+
+
+def _derivatives(model: Model, momenta: Expr, along: Expr) -> Iterator[Step]:
+    """∂T/∂v and ∂T/∂q, where they are short."""
+    lines = []
+    for letter, vector in (("p", momenta), ("T", along)):
+        for c, e in zip(model.velocities, vector, strict=True):
+            short, word = simplified(e), short_name(c.name)
+            if short != 0 and size(short) <= SHORT and f"{letter}_{word}" not in model.defaults:
+                lines.append(Equation(real(f"{letter}_{word}"), short))
+    if lines:
+        yield Step("balance", "The derivatives of the kinetic energy", DERIVATIVES, tuple(lines))
 
 
 def _line(letter: str, e: Expr) -> Equation:
@@ -91,9 +107,10 @@ def _energies(kinetic: Expr, potential: Expr) -> Iterator[tuple[str, Expr]]:
 def _potential(model: Model, tree: Matrices, gravity: Expr) -> Expr:
     """-Σ m g·x over coordinates."""
     known = {s.name: s for m in (tree.M, tree.G, gravity) for s in m.free_symbols}
-    bodies = [frame for frame in frames_of(model) if frame.body >= 0]
+    frames = [_with_entries(model, frame) for frame in frames_of(model)]
+    bodies = [frame for frame in frames if frame.body >= 0]
     names = [model.bodies[frame.body].name for frame in bodies]
-    definitions, _ = poses(model, frames_of(model), names)
+    definitions, _ = poses(model, frames, names)
     total = sp.S.Zero
     for frame, name in zip(bodies, names, strict=True):
         place = [real(f"{axis}_{name}") for axis in "xyz"[: model.dimensions]]
@@ -107,19 +124,20 @@ def _spins(model: Model) -> list[Sequence[int]]:
     return [index.spin for index in model.joint_indices if index.quaternion]
 
 
-def _slopes(model: Model, e: Expr) -> Expr:
-    """The derivative of an expression along each velocity."""
-    found = sp.zeros(len(model.velocities), 1)
-    for index in model.joint_indices:
-        body = index.body
-        for c, j in zip(body.positions[: body.plain], index.v, strict=False):
-            found[j] = sp.diff(e, real(c.name))
-        if not index.quaternion:
-            continue
-        q = [real(c.name) for c in body.positions[body.plain :]]
-        slopes = [sp.diff(e, x) for x in q]
-        for k, j in enumerate(index.spin):
-            unit = [int(i == k) for i in range(3)]
-            moved = quaternion_rates(q, unit)
-            found[j] = sum(a * b for a, b in zip(slopes, moved, strict=True))
-    return found
+def _with_entries(model: Model, frame: Frame) -> Frame:
+    """A frame with symbols for the entries of a ball's rotation."""
+    if frame.kind != "spherical":
+        return frame
+    fixed = frame.rotation.xreplace(dict(zip(frame.q, (1, 0, 0, 0), strict=True)))
+    name = model.bodies[frame.body].name
+    entries = sp.Matrix(3, 3, lambda i, j: real(f"R__{name}__{'xyz'[i]}{'xyz'[j]}"))
+    return replace(frame, rotation=fixed * entries)
+
+
+def _slopes(tree: Matrices, e: Expr, rates: Mapping[Expr, Expr]) -> Expr:
+    """The derivative of an expression along each velocity: of e' by it."""
+    found = []
+    for v in tree.v:
+        unit = {x: sp.Integer(int(x == v)) for x in tree.v}
+        found.append(rate(e, {symbol: x.xreplace(unit) for symbol, x in rates.items()}))
+    return sp.Matrix(found)

@@ -1,7 +1,7 @@
 """The derived equations as SymPy matrices over the names of a scene."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -11,6 +11,9 @@ from eomgen.derivation.projected.derive import ProjectedEquations
 from eomgen.derivation.state_forms import needed_by
 from eomgen.derivation.symbols import Expr
 from eomgen.language.formula import Formula, written
+
+ROTATIONS = ("R__", "k__")
+"""How names of entries of a joint's rotation begin."""
 
 
 @dataclass(frozen=True)
@@ -83,15 +86,26 @@ def _poses(equations: Equations) -> list[Definition]:
 
 
 def of_projected(equations: ProjectedEquations) -> Matrices:
-    """The matrices of the derivation by projected constraints."""
+    """The matrices of the derivation by projected constraints, over entries of rotations."""
     s, found = equations.symbols, equations.balance
     definitions = projected_definitions(equations)
-    motion = definitions[: equations.motion_definitions]
+    motion = [
+        pair
+        for pair in definitions[: equations.motion_definitions]
+        if not pair[0].name.startswith(ROTATIONS)
+    ]
     given = _given(equations)
     M, V, G, F = (
         written_out(m.xreplace(given), motion) for m in (found.M, found.V, found.G, found.F)
     )
     return Matrices(*(s.q, s.v, s.a, M, V, G, F), definitions, _formulas(s.formulas))
+
+
+def over_coordinates(found: Matrices) -> Matrices:
+    """The same over coordinates: entries of rotations by what they stand for."""
+    turns = [pair for pair in found.definitions if pair[0].name.startswith(ROTATIONS)]
+    letters = {x: written_out(getattr(found, x), turns) for x in "MVGF"}
+    return replace(found, **letters)
 
 
 def projected_definitions(equations: ProjectedEquations) -> tuple[Definition, ...]:

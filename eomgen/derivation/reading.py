@@ -106,6 +106,12 @@ def words_on_names(model: Model) -> str:
     return f"{words}\n\nGiven: {'; '.join(given)}."
 
 
+def short_name(velocity: str) -> str:
+    """A velocity as an index: its coordinate, or of a ball's the prefix and the axis."""
+    coordinate = velocity.removesuffix("_dot")
+    return coordinate if coordinate != velocity else ",".join(velocity.rsplit("_w", 1))
+
+
 def read(expression: Expr, names: Mapping[str, str]) -> Expr:
     """An expression with its symbols by the names that are read."""
     renamed = {}

@@ -130,9 +130,9 @@ def _applied(r: Recursion) -> Step:
     loaded: set[int] = set()
     for k in reversed(range(len(r.frames))):
         frame = r.frames[k]
-        applied = _wrench(r, frame, ["applied"])
+        applied = wrench(r, frame, ["applied"])
         terms = [r.vector("f", frame)] if applied else []
-        if len(applied) < len(_wrench(r, frame)):  # a weight that is given as a load
+        if len(applied) < len(wrench(r, frame)):  # a weight that is given as a load
             terms = [total(applied, r.size)] if applied else []
         for i, child in enumerate(r.frames):
             if child.parent == k and i in loaded:
@@ -274,7 +274,7 @@ def velocities(r: Recursion, k: int) -> Iterator[Equation]:
     if frame.given:
         c.append(sp.MatMul(subspace_of(r, frame), r.rate(frame, 2)))
     yield Equation(r.vector("zeta", frame), total(c, r.size))
-    loads = _wrench(r, frame)
+    loads = wrench(r, frame)
     if loads:
         yield Equation(r.vector("f", frame), total(loads, r.size))
     bias = []
@@ -292,7 +292,7 @@ def total(terms: Sequence[Expr], rows: int, columns: int = 1) -> Expr:
     return terms[0] if len(terms) == 1 else sp.MatAdd(*terms)
 
 
-def _wrench(r: Recursion, frame: Frame, kinds: Sequence[str] = KINDS) -> list[Expr]:
+def wrench(r: Recursion, frame: Frame, kinds: Sequence[str] = KINDS) -> list[Expr]:
     """The loads on a frame's body as spatial forces at its origin, in its axes."""
     if frame.body < 0:
         return []

@@ -14,12 +14,12 @@ PLANAR = (2, 3, 4)
 
 
 class MotionCross(sp.MatrixExpr):  # type: ignore[misc]
-    """v × m of two motions."""
+    """v × m of two motions, or of a motion and each column of m."""
 
     @property
     def shape(self) -> tuple[int, int]:
         """That of m."""
-        return (self.args[0].rows, 1)
+        return (self.args[0].rows, self.args[1].cols)
 
 
 class ForceCross(sp.MatrixExpr):  # type: ignore[misc]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from eomgen.derivation.symbols import Expr
-from eomgen.tables.details import Detail
+from eomgen.tables.details import Detail, Method
 
 Definition = tuple[Expr, Expr]
 """A symbol and what it stands for."""
@@ -47,7 +47,8 @@ class Equation:
 
 @dataclass(frozen=True)
 class Step:
-    """One step: what it is, a title, an explanation, its equations, its number in brackets.
+    """One step: what it is, a title, an explanation, its equations, its number in brackets, and the
+    method to which it belongs where several stand side by side.
 
     In the words, blank lines divide paragraphs and backquotes enclose what is code.
     """
@@ -57,6 +58,7 @@ class Step:
     words: str
     equations: tuple[Equation, ...]
     number: str = ""
+    way: Method | None = None
 
     @property
     def figure(self) -> str:

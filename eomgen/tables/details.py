@@ -15,3 +15,10 @@ lagrange      energies and their derivatives
 kane          loads and inertia in the partial velocities
 """
 METHODS: tuple[Method, ...] = get_args(Method)
+NAMES: dict[Method, str] = {
+    "newton-euler": "Newton and Euler",
+    "lagrange": "Lagrange",
+    "kane": "Kane",
+}
+All = Literal["all"]
+"""All methods, side by side."""

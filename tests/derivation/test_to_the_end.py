@@ -16,6 +16,7 @@ from followed import LookedUp, instant
 import eomgen
 from eomgen.api.derivation import Derivation
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.identity import identical
 from eomgen.derivation.symbols import names_of_scene
 from eomgen.dynamics.start.assembly import assembled
 from eomgen.dynamics.start.assur import with_closed_form
@@ -23,7 +24,7 @@ from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
 from eomgen.scene.built_in import built_in_names
 from eomgen.scene.reader import parse_scene, read_scene
-from eomgen.tables.details import METHODS, Method
+from eomgen.tables.details import METHODS, NAMES, All, Method
 
 ATWOOD = """
 name = "atwood"
@@ -107,18 +108,51 @@ def test_the_last_step_by_the_printed_equations(scene: str) -> None:
 
 @pytest.mark.every(2)
 @pytest.mark.usefixtures("deep")
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", (*METHODS, "all"))
 @pytest.mark.parametrize("scene", BY_METHOD)
-def test_the_same_by_each_method(scene: str, method: Method) -> None:
-    """Energies, partial velocities and free bodies give the derivative of the module; what cannot
-    be written out says so.
+def test_the_same_by_each_method(scene: str, method: Method | All) -> None:
+    """Energies, partial velocities, free bodies, and all of them side by side give the derivative
+    of the module.
     """
-    try:
-        found = eomgen.derive(scene, method=method)
-    except eomgen.SceneError as error:
-        assert method != "newton-euler" and "newton-euler" in str(error)
-        return
-    _follow(scene, found)
+    _follow(scene, eomgen.derive(scene, method=method))
+
+
+@pytest.mark.parametrize("scene", some(("cart_pole",), ("cart_pole", "four_bar", "chain")))
+def test_methods_side_by_side(scene: str) -> None:
+    """The same numbers in all columns, which end in the same equations; what all share stands once,
+    in three formats.
+    """
+    found = eomgen.derive(scene, method="all")
+    places = [[s.number.partition(".")[0].strip("()") for s in found.steps if s.way == way]
+              for way in METHODS]  # fmt: skip
+    assert all(set(x) == set(places[0]) and x == sorted(x, key=int) for x in places)
+    shared = [(s.title, s.equations) for s in found.steps if s.way is None]
+    assert len(shared) == len({title for title, _ in shared})
+    titles = [title for title, _ in shared]
+    assert titles.index("What agrees") < titles.index("What differs") < len(titles) - 1
+    text, paper, page = found.text(), found.latex(), found.html()
+    for name in (*NAMES.values(), "All methods"):
+        assert text.count(f"\n{name}\n{'-' * len(name)}\n") == 1
+        assert paper.count(rf"\section*{{{name}}}") == 1
+    assert page.count('<div class="ways"') == 1 and page.count("<h3") == sum(map(len, places))
+    ends = [s for s in found.steps if s.way and s.title == "Velocity forces"]
+    assert all(s.equations == ends[0].equations for s in ends)
+
+
+def test_identities_in_exact_arithmetic() -> None:
+    """What follows from sin² + cos² = 1 is the same, near misses are not."""
+    a, b, x, r = sp.symbols("a b x r")
+    sin, cos = sp.sin, sp.cos
+    same = [
+        (sin(a) ** 2 + cos(a) ** 2, sp.S.One),
+        (sin(a + 2 * b), sin(a) * (1 - 2 * sin(b) ** 2) + 2 * cos(a) * sin(b) * cos(b)),
+        ((x**2 - 1) / (x - 1), x + 1),
+        (sp.sqrt(x**2 * r), x * sp.sqrt(r)),
+    ]
+    assert identical(same) and identical([(r, sin(x))], [(r, sin(x))])
+    for left, right in same:
+        assert not identical([(left, right + sp.Rational(1, 10**6) * x)])
+        assert not identical([(left, -right)])
 
 
 LETTERS = (

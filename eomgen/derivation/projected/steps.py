@@ -23,29 +23,41 @@ SLACK = 2.5
 """How much longer than its shortest form a sum may be whose terms are to be seen."""
 Titled = tuple[Kind, str, str, Pairs]
 """Kind, title, words and lines of a step, these in the derivation's own symbols."""
+PARTS = "Parts of the motion"
+PARTS_ARE = (
+    "These parts have names, to keep what follows short. ω, u with a velocity as index are the "
+    "partial velocities: the motion of a body while this velocity is 1 and all others are 0. α^0, "
+    "a^0 are the accelerations that remain while all derivatives of velocities are 0. g is the "
+    "acceleration of gravity, and W rotates axes of a body into the world's."
+)
 ROTATIONS = ("R__", "k__")
 """How names of entries of rotations begin, which are shown with their joint."""
 
 
 def projected_steps(equations: ProjectedEquations) -> tuple[Step, ...]:
     """Every step from the state to the closed form, in symbols meant for reading."""
-    shown = _readable(equations)
+    joints = tuple(_joints(equations))
+    steps = []
+    for part in (*joints, *_balance(equations, joints), *_solution(equations)):
+        kind, title, words, pairs = part
+        lines = read_pairs(equations, pairs, moving=kind in ("state", "joint", "motion"))
+        steps.append(Step(kind, title, words, lines))
+    return tuple(steps)
+
+
+def read_pairs(
+    equations: ProjectedEquations, pairs: Pairs, *, moving: bool = False
+) -> tuple[Equation, ...]:
+    """Lines in symbols meant for reading, but for those that then say nothing. Where they are not
+    on a motion as a whole, α^0 and a^0 are its accelerations where v̇ = 0.
+    """
+    shown = readable_symbols(equations)
+    if not moving:
+        shown |= _without_rates(equations, shown)
     given = equations.symbols.numbers.items()
     numbers = {symbol: sp.Float(float(x), DIGITS) for x, symbol in given}
-
-    def read(expression: Expr, names: dict[Expr, Expr]) -> Expr:
-        return expression.xreplace(numbers).xreplace(names)
-
-    steps = []
-    joints = tuple(_joints(equations))
-    still = {**shown, **_without_rates(equations, shown)}
-    parts = (*joints, *_balance(equations, joints), *_solution(equations))
-    for kind, title, words, pairs in parts:
-        names = shown if kind in ("state", "joint", "motion") else still
-        lines = [Equation(read(left, names), read(right, names)) for left, right in pairs]
-        kept = tuple(line for line in lines if line.left != line.right)
-        steps.append(Step(kind, title, words, kept))
-    return tuple(steps)
+    lines = [Equation(*(x.xreplace(numbers).xreplace(shown) for x in pair)) for pair in pairs]
+    return tuple(line for line in lines if line.left != line.right)
 
 
 def _without_rates(equations: ProjectedEquations, shown: dict[Expr, Expr]) -> dict[Expr, Expr]:
@@ -74,7 +86,7 @@ def _joints(equations: ProjectedEquations) -> Iterator[Titled]:
         ],
     )
     definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
-    still = _zeros(equations)
+    still = still_symbols(equations)
     for body, c in zip(model.bodies, equations.constraints, strict=True):
         parent = WORLD if body.parent < 0 else model.bodies[body.parent].name
         own = [(symbol, e) for symbol, e in definitions if symbol.name.split("__")[1] == body.name]
@@ -138,7 +150,7 @@ def _differentiated(c: Constraint, still: dict[Expr, Expr]) -> Pairs:
     return pairs
 
 
-def _zeros(equations: ProjectedEquations) -> dict[Expr, Expr]:
+def still_symbols(equations: ProjectedEquations) -> dict[Expr, Expr]:
     """Components of motion that are always 0, such as those out of the plane."""
     zero = sp.Integer(0)
     found: dict[Expr, Expr] = {}
@@ -175,24 +187,10 @@ def _balance(equations: ProjectedEquations, before: Sequence[Titled]) -> Iterato
     said = {symbol for *_, pairs in before for symbol, _ in pairs}
     said = {symbol for symbol in said if symbol.name.startswith("omega__")}
     terms, model = equations.balance, equations.model
-    definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
-    needed = _needed(equations, [*terms.M, *terms.V, *terms.G, *terms.F])
-    named = [
-        (symbol, e)
-        for symbol, e in definitions
-        if symbol in needed and symbol not in said and not symbol.name.startswith(ROTATIONS)
-    ]
+    named = named_parts(equations, [*terms.M, *terms.V, *terms.G, *terms.F])
+    named = [pair for pair in named if pair[0] not in said]
     if named:
-        yield (
-            "balance",
-            "Parts of the motion",
-            "These parts have names, to keep what follows short. ω, u with a velocity as index are "
-            "the partial velocities: the motion of a body while this velocity is 1 and all others "
-            "are 0. α^0, a^0 are the accelerations that remain while all derivatives of velocities "
-            "are 0. g is the acceleration of gravity, and W rotates axes of a body into the "
-            "world's.",
-            named,
-        )
+        yield ("balance", PARTS, PARTS_ARE, named)
     weights = "" if model.dimensions == 2 else ", and I α + ω × I ω for its torque"
     yield (
         "equations",
@@ -206,6 +204,17 @@ def _balance(equations: ProjectedEquations, before: Sequence[Titled]) -> Iterato
     yield "equations", "Velocity forces", "", [(sp.Symbol("V"), terms.V)]
     yield "equations", "Gravity forces", "", [(sp.Symbol("G"), terms.G)]
     yield "equations", "Applied forces", "", [(sp.Symbol("F"), terms.F)]
+
+
+def named_parts(equations: ProjectedEquations, expressions: list[Expr]) -> Pairs:
+    """The parts of the motion that expressions need, by their names."""
+    definitions = [*equations.solution.definitions.items()][: equations.motion_definitions]
+    needed = _needed(equations, expressions)
+    return [
+        (symbol, e)
+        for symbol, e in definitions
+        if symbol in needed and not symbol.name.startswith(ROTATIONS)
+    ]
 
 
 def _solution(equations: ProjectedEquations) -> Iterator[Titled]:
@@ -259,7 +268,7 @@ KINDS = {
 """What the kinds of derived symbols are written with."""
 
 
-def _readable(equations: ProjectedEquations) -> dict[Expr, Expr]:
+def readable_symbols(equations: ProjectedEquations) -> dict[Expr, Expr]:
     """Symbols by ones whose names that printers know how to write."""
     s, model = equations.symbols, equations.model
     taken = {*s.parameters, *s.inputs}
