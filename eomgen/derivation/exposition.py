@@ -18,6 +18,7 @@ from eomgen.derivation.constraints import DerivedConstraint, derived_constraints
 from eomgen.derivation.dependent_velocities import of_freedoms
 from eomgen.derivation.effects import DerivedEffect, derived_effects, equations_of, with_symbols
 from eomgen.derivation.embedding import embedded, solved_for
+from eomgen.derivation.euler import euler_steps
 from eomgen.derivation.frames import frames_of
 from eomgen.derivation.handout.closed import Equations, collected_equations
 from eomgen.derivation.handout.closed import solved as solved_pins
@@ -305,6 +306,8 @@ def _of_any(
         matrices = replace(matrices, definitions=(*matrices.definitions, *lines.items()))
     left = [free_step(tree)] if model.prescribed else []
     ends = [*impact_steps(model, parts.effects), _last(model, parts)]
+    if shared or method == "lagrange":
+        ends[-1:-1] = euler_steps(bare, whole, equations.loads.uniform)
     effects = [_renamed(step, said) for step in _effect_steps(model, parts)]
     ends = [_renamed(step, said) for step in (*left, solution, *ends)]
     steps = [*start, *effects, *way, *ends]

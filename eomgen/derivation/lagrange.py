@@ -58,7 +58,7 @@ def lagrange_written(
     v = sp.Matrix(tree.v)
     rates = {symbol: rate for symbol, rate in rates.items() if symbol not in tree.v}
     kinetic = (v.T * tree.M * v)[0] / 2
-    potential = _potential(model, tree, gravity) if any(gravity) else sp.S.Zero
+    height = potential(model, tree, gravity) if any(gravity) else sp.S.Zero
     momenta = tree.M * v
     along = _slopes(tree, kinetic, rates)
     V = rate(tree.M, rates) * v - along
@@ -67,11 +67,11 @@ def lagrange_written(
         across = turning.cross(sp.Matrix([momenta[j] for j in spin]))
         for j, part in zip(spin, across, strict=True):
             V[j] += part
-    G = _slopes(tree, potential, rates) if any(gravity) else tree.G
+    G = _slopes(tree, height, rates) if any(gravity) else tree.G
     pairs = [*zip(V, tree.V, strict=True), *zip(G, tree.G, strict=True)]
     if not identical(pairs, tree.definitions):
         raise ArithmeticError(f"Lagrange's equations of {model.name} are not those of the tree")
-    energies = [Equation(sp.Symbol(x), e) for x, e in _energies(kinetic, potential)]
+    energies = [Equation(sp.Symbol(x), e) for x, e in _energies(kinetic, height)]
     steps = [Step("balance", "Energies", ENERGIES, tuple(energies))] if energies else []
     steps += _derivatives(model, momenta, along)
     words = EQUATIONS + (HAMEL if any(_spins(model)) else "")
@@ -104,8 +104,8 @@ def _energies(kinetic: Expr, potential: Expr) -> Iterator[tuple[str, Expr]]:
             yield letter, short
 
 
-def _potential(model: Model, tree: Matrices, gravity: Expr) -> Expr:
-    """-Σ m g·x over coordinates."""
+def potential(model: Model, tree: Matrices, gravity: Expr) -> Expr:
+    """U = -Σ m g·x over coordinates, and the entries of a ball's rotation."""
     known = {s.name: s for m in (tree.M, tree.G, gravity) for s in m.free_symbols}
     frames = [_with_entries(model, frame) for frame in frames_of(model)]
     bodies = [frame for frame in frames if frame.body >= 0]

@@ -16,6 +16,7 @@ from followed import LookedUp, instant
 import eomgen
 from eomgen.api.derivation import Derivation
 from eomgen.derivation.dots import dotted
+from eomgen.derivation.evaluate import number
 from eomgen.derivation.identity import identical
 from eomgen.derivation.symbols import names_of_scene
 from eomgen.dynamics.start.assembly import assembled
@@ -247,3 +248,74 @@ def test_no_multiplier_is_left_in_a_solution(scene: str) -> None:
     used = {s.name for line in solved.equations for s in line.right.free_symbols}
     assert not any(name.startswith("lambda") for name in used), used
     assert any(dotted("x", 2).partition("x")[2] in line.left.name for line in solved.equations)
+
+
+def test_a_top_in_euler_angles_as_in_textbooks() -> None:
+    """Goldstein, Classical Mechanics, section 5.7: energies, momenta, effective potential, and
+    steady precession, symbol by symbol; said where the angles are singular.
+    """
+    found = eomgen.derive("spinning_top", method="lagrange")
+    steps = [s for s in found.steps if s.title.startswith("In Euler angles")]
+    lines = {str(e.left): _plain(e.right) for s in steps for e in s.equations}
+    A, C, m, g, h, theta, T, U = sp.symbols("A I_3 m g h theta T U")
+    phi_dot, theta_dot, psi_dot = (sp.Symbol(dotted(x)) for x in ("phi", "theta", "psi"))
+    p_phi, p_psi = sp.symbols("p_phi p_psi")
+    sin, cos = sp.sin(theta), sp.cos(theta)
+    assert lines["A"] == sp.Symbol("I_1") + m * h**2
+    spin = psi_dot + phi_dot * cos
+    assert lines["T"] == A * (theta_dot**2 + phi_dot**2 * sin**2) / 2 + C * spin**2 / 2
+    assert lines["U"] == m * g * h * cos and lines["E"] == T + U
+    assert lines["p_psi"] == C * spin and lines["p_phi"] == A * phi_dot * sin**2 + p_psi * cos
+    assert lines[dotted("p_psi")] == lines[dotted("p_phi")] == 0
+    gyroscopic = A * phi_dot**2 * sin * cos - p_psi * phi_dot * sin + m * g * h * sin
+    assert lines[dotted("p_theta")] == gyroscopic
+    barrier = (p_phi - p_psi * cos) ** 2 / (2 * A * sin**2)
+    assert lines["U_e"] == barrier + p_psi**2 / (2 * C) + m * g * h * cos
+    steady = _plain(steps[-1].equations[-1].left)
+    assert steady == A * phi_dot**2 * cos - p_psi * phi_dot + m * g * h
+    assert "singular" in steps[0].words and "gyroscopic" in steps[1].words
+
+
+def _plain(e: Any) -> Any:
+    return e.xreplace({s: sp.Symbol(s.name) for s in e.free_symbols})
+
+
+@pytest.mark.parametrize("scene", ["spinning_top", "tumbling_body"])
+def test_euler_angles_beside_the_quaternion(scene: str) -> None:
+    """ω̇ by the equations in Euler angles is that of the module, at random angles and rates, and the
+    momenta that are said to be constant are.
+    """
+    found = eomgen.derive(scene, method="lagrange")
+    lines = [e for s in found.steps if s.title.startswith("In Euler angles") for e in s.equations]
+    module = eomgen.load(eomgen.generate(scene))
+    names = ("phi", "theta", "psi")
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        at = dict(zip(names, rng.uniform(0.3, 2.0, 3), strict=True)) | found.model.defaults
+        at |= dict(zip(map(dotted, names), rng.uniform(-2.0, 2.0, 3), strict=True))
+        for line in lines:  # the quaternion and ω by the angles, and the momenta in their order
+            if line.left.is_Symbol and line.left.name not in at:
+                at[line.left.name] = number(line.right, at)
+        y = np.array([at.get(_read(found.model, name), 0.3) for name in module.STATES])
+        rate = dict(zip(module.STATES, module.derivative(0.0, y), strict=True))
+        turned = [_read(found.model, c.name) for c in found.model.velocities[-3:]]
+        spin = [rate[c.name] for c in found.model.velocities[-3:]]
+        step = 1e-6
+        moved = dict(at)
+        for name in names:
+            moved[name] = at[name] + step * at[dotted(name)]
+        ahead = dict(zip(turned, [at[x] + step * w for x, w in zip(turned, spin, strict=True)],
+                         strict=True))  # fmt: skip
+        moved |= ahead
+        known = {**found.model.defaults, **{x: moved[x] for x in (*names, *turned)}}
+        known["A"] = at.get("A", 0.0)
+        for name in ("theta", "phi", "psi"):
+            known[dotted(name)] = number(_first_of(lines, dotted(name)), known)
+        for name in ("psi", "phi", "theta"):
+            known[f"p_{name}"] = number(_first_of(lines, f"p_{name}"), known)
+            slope = (known[f"p_{name}"] - at[f"p_{name}"]) / step
+            assert abs(slope - at[dotted(f"p_{name}")]) < 1e-4 * max(1.0, abs(slope))
+
+
+def _first_of(lines: list[Any], name: str) -> Any:
+    return next(e.right for e in lines if str(e.left) == name)
