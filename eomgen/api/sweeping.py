@@ -20,7 +20,6 @@ from eomgen.base.errors import RunError
 from eomgen.base.options import taking
 from eomgen.model.elaborate import in_order
 from eomgen.model.model import Model
-from eomgen.native import equal_steps
 from eomgen.results.design import Design, Law, grid, in_radians, listed, sampled
 from eomgen.results.ensemble import Ensemble
 from eomgen.results.module import Module
@@ -282,15 +281,14 @@ def _run_together(integrator: str, functions: Any) -> bool:
 
 def _mostly_in_c(integrator: str, functions: Any) -> bool:
     """Whether Python does so little in members that run one by one that threads serve them: if
-    compiled code makes almost all steps. For adaptive methods rigid contacts are held in Python,
-    and steps that pass over a corner are repeated there.
+    compiled code makes almost all steps. For adaptive methods, whose steps are few, Python begins
+    anew after each event of rigid contacts, and steps that pass over a corner are repeated there.
     """
     method = find_integrator(integrator)
+    if isinstance(method, FixedStep) or not method.compiled:
+        return bool(method.compiled)
     contacts: tuple[str, ...] = getattr(functions, "CONTACTS", ())
-    loops: tuple[str, ...] = getattr(functions, "CONSTRAINTS", ())
-    if not method.compiled or (contacts and (loops or method.compiled not in equal_steps.METHODS)):
-        return False
-    return isinstance(method, FixedStep) or not hasattr(functions, "switching_functions")
+    return not contacts and not hasattr(functions, "switching_functions")
 
 
 def _built(task: Task, plan: SweepPlan, reporter: Reporter) -> Task:

@@ -116,6 +116,7 @@ def test_members_that_run_together(asked: Any, tmp_path: Path) -> None:
         ("pendulum", "theta", {"integrator": "Rodas5P", "rtol": 1e-6}),
         ("four_bar", "theta_dot", {"integrator": "gauss_4", "dt": 0.01}),
         ("bouncing_two_body", "m_B", {"integrator": "rk4", "dt": 2e-3, "t_end": 0.9}),
+        ("bouncing_two_body", "m_B", {"integrator": "gauss_4", "dt": 2e-3, "t_end": 0.9}),
     ],
 )
 def test_compiled_members_run_in_threads(
