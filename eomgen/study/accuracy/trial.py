@@ -29,6 +29,8 @@ HARDLY = 0.3
 MARKS = 500
 """About how many parts of a run's time have their longest step recorded."""
 
+Clock = Callable[[], float]
+"""Tells the time, s."""
 ShowProgress = Callable[[str], AbstractContextManager[Progress]]
 """Shows which run is being made, and its progress."""
 
@@ -161,12 +163,13 @@ class Case:
         *,
         most: float = math.inf,
         due: float = math.inf,
+        clock: Clock | None = None,
         powers: Powers | None = None,
         moved: int | None = None,
         follow: Follow | None = None,
     ) -> Tried:
-        """Make a run. It stops early if it takes `most` units of work, and when
-        `time.perf_counter` reaches `due`.
+        """Make a run. It stops early if it takes `most` units of work, and when `clock` (by default
+        `time.perf_counter`) reaches `due`.
 
         powers  given to record the works of effects
         moved   number of the perturbation of constants, if those are possible
@@ -176,7 +179,7 @@ class Case:
         if moved is not None and self.problem.scrutiny:
             problem = replace(problem, scrutiny=replace(self.problem.scrutiny, seed=moved))
         spent = meter(problem, setting.integrator)
-        limits = _Limits(spent, most, due, self.t_end)
+        limits = _Limits(spent, most, due, clock or time.perf_counter, self.t_end)
         tally = Tally(limits.check, follow)
         with self.show_progress(f"simulating {problem.name}") as progress:
             started, busy = time.perf_counter(), time.process_time()
@@ -209,6 +212,7 @@ class _Limits:
     spent: Callable[[Tally], float]
     most: float
     due: float
+    clock: Clock
     t_end: float
     longest: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
     _t: float = 0.0
@@ -228,7 +232,7 @@ class _Limits:
             return
         if math.isfinite(self.most) and self.spent(tally) > self.most:
             raise EndedRunError(OVER)
-        if math.isfinite(self.due) and time.perf_counter() > self.due:
+        if math.isfinite(self.due) and self.clock() > self.due:
             raise EndedRunError(OVER)
 
 

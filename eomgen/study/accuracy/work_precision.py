@@ -147,7 +147,7 @@ def measure(bench: Bench, setting: Setting, run_time: float) -> Work:
     except RunError as refusal:
         return Work(setting, "refused", time.process_time() - begin, 1, reason=str(refusal))
     if first.cut:
-        return _worked(Work(setting, "over", first.seconds, 1, reason=OVER), first)
+        return _worked(Work(setting, "over", first.busy, 1, reason=OVER), first)
     if not first.trajectory.finished:
         outcome, stopped_at = first.trajectory.outcome, float(first.trajectory.t[-1])
         failed = Work(setting, "failed", first.busy, 1, reason=str(outcome), stopped_at=stopped_at)
@@ -200,13 +200,13 @@ def _worked(work: Work, run: Tried) -> Work:
 def _run(
     bench: Bench, setting: Setting, limit: float, rows: int, powers: Powers | None = None
 ) -> Tried:
-    """A run that is ended after `limit`, s."""
+    """A run that is ended after `limit`, s of the processor."""
     t_end = float(bench.reference.t[-1])
     # If there are fewer steps than rows, all steps are kept.
     few = setting.dt is not None and t_end / setting.dt < rows and rows > 2
     kept = {"samples": None if few else rows, "rest_speed": bench.rest_speed}
-    due = time.perf_counter() + limit
-    tried = Case(bench.problem, t_end, {}, kept).run(setting, due=due, powers=powers)
+    case, due = Case(bench.problem, t_end, {}, kept), time.process_time() + limit
+    tried = case.run(setting, due=due, clock=time.process_time, powers=powers)
     if tried.interrupted:
         raise KeyboardInterrupt
     return tried
