@@ -2,7 +2,7 @@
 
 import keyword
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import zip_longest
 from typing import Annotated, Any, ClassVar, Self, get_args
 
@@ -20,6 +20,7 @@ from pydantic_core import PydanticCustomError
 
 from eomgen.base.errors import nearest
 from eomgen.language.angles import by_unit, radians_of
+from eomgen.language.formula import Formula
 
 LONGEST_NAME = 100
 MOST_HINTS = 10
@@ -168,3 +169,17 @@ ByName = Annotated[
 """Numbers by coordinate; an angle with its unit becomes a number of rad, or `<name>_deg`."""
 Positive = Annotated[Number, Field(gt=0)]
 Text = Annotated[str, Field(max_length=400), AfterValidator(_line)]
+
+
+def formulas_in(value: object) -> Iterator[Formula]:
+    """The formulas in a table, a mapping or a list, and in those that it holds."""
+    if isinstance(value, Formula):
+        yield value
+    elif isinstance(value, Table):
+        for name in type(value).model_fields:
+            yield from formulas_in(getattr(value, name))
+    elif isinstance(value, Mapping):
+        yield from formulas_in(tuple(value.values()))
+    elif isinstance(value, list | tuple):
+        for part in value:
+            yield from formulas_in(part)

@@ -1,13 +1,13 @@
 """The localising functions of a model's derivative: see `run.localised`."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from eomgen.language.base import Table
-from eomgen.language.formula import Apply, names_in
+from eomgen.language.base import formulas_in
+from eomgen.language.formula import Apply, Formula, names_in
 from eomgen.model.model import Model
 from eomgen.program.kernel import Kernel, kernel
 from eomgen.program.localising import OF_STATE, OF_TIME, with_local_arguments
@@ -96,22 +96,14 @@ def divides_by_motion(model: Model) -> bool:
     return any(
         formula.operation == "/" and not set(names_in(formula.operands[1])) <= constant
         for effect in model.effects
-        for formula in _applied(effect)
+        for whole in formulas_in(effect)
+        for formula in _applied(whole)
     )
 
 
-def _applied(value: Any) -> Iterator[Apply]:
-    """All operations in the formulas of a value."""
-    if isinstance(value, Apply):
-        yield value
-        parts: Collection[Any] = value.operands
-    elif isinstance(value, Table):
-        parts = [getattr(value, name) for name in type(value).model_fields]
-    elif is_dataclass(value):
-        parts = [getattr(value, one.name) for one in fields(value)]
-    elif isinstance(value, Mapping):
-        parts = value.values()
-    else:
-        parts = value if isinstance(value, list | tuple) else ()
-    for part in parts:
-        yield from _applied(part)
+def _applied(formula: Formula) -> Iterator[Apply]:
+    """All operations in a formula."""
+    if isinstance(formula, Apply):
+        yield formula
+        for part in formula.operands:
+            yield from _applied(part)

@@ -11,6 +11,7 @@ from eomgen.codegen.system import System
 from eomgen.program.program import interpret
 from eomgen.program.tape import TIME
 from eomgen.run.problem import FloatArray
+from eomgen.scalars.floats import BY_NUMPY
 from eomgen.scalars.functions import FUNCTIONS
 from eomgen.scalars.protocol import Scalars
 
@@ -18,14 +19,7 @@ Singles = NDArray[np.float32]
 LEAST: np.float32 = np.finfo(np.float32).smallest_normal
 """Replaces values that underflow, such as small weights that keep a divisor from being 0."""
 
-_NUMPY: dict[str, Callable[..., Any]] = {
-    **{name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)},
-    **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan", "atan2")},
-    "min": np.minimum,
-    "max": np.maximum,
-    "step": lambda x: np.heaviside(x, np.float32(0.0)),
-    "select": lambda c, a, b: np.where(c > 0, a, b),
-}
+_NUMPY = {**BY_NUMPY, "step": lambda x: np.heaviside(x, np.float32(0.0))}
 
 
 class Single(Scalars):

@@ -2,11 +2,12 @@
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from itertools import chain
+from typing import Literal
 
 from eomgen.dynamics.start.assembly import assembled
-from eomgen.language.base import Table
-from eomgen.language.formula import Apply, Constant, Name, names_in
+from eomgen.language.base import formulas_in
+from eomgen.language.formula import names_in
 from eomgen.language.rates import with_rates
 from eomgen.model.elaborate import elaborate
 from eomgen.model.model import Model
@@ -118,16 +119,6 @@ def _label(group: Sequence[Effect]) -> str:
     return kind if name == kind else f"{kind} ({name})"
 
 
-def _names(value: Any) -> Iterator[str]:
-    """Every name in the formulas of a table and its nested tables."""
-    if isinstance(value, Constant | Name | Apply):
-        yield from names_in(value)
-    elif isinstance(value, Table):
-        for field in type(value).model_fields:
-            yield from _names(getattr(value, field))
-    elif isinstance(value, dict):
-        for part in value.values():
-            yield from _names(part)
-    elif isinstance(value, tuple):
-        for part in value:
-            yield from _names(part)
+def _names(effect: Effect) -> Iterator[str]:
+    """Every name in the formulas of an effect."""
+    return chain.from_iterable(map(names_in, formulas_in(effect)))
