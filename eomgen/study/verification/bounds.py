@@ -24,8 +24,9 @@
 - A short run conserves what exact motion conserves, to `RUN` times its tolerance for each step.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -36,6 +37,7 @@ from eomgen.study.verification.judging import Judged
 from eomgen.study.verification.laws import Broken
 from eomgen.study.verification.ulps import group_scales
 
+T = TypeVar("T")
 BOUND, IN_LINE, AMPLIFIED = 450.0, 450e3, 10.0
 """Ulps: 1e-13 and 1e-10; and a factor of the change by one ulp in the data."""
 OWN = "own run"
@@ -119,48 +121,36 @@ def forward_checks(
     nv     number of velocities
     bound  for the route taken, instead of the one that the data give
     """
-    checks = []
+    checks, asked = [], allowed_ulps(there, data)
+    condition = np.array([one.condition for one in there])
     for route, errors in ulps.items():
-        asked = allowed_ulps(there, data)
-        allowed = asked
-        if bound is not None and route == taken:
-            allowed = np.full_like(data, bound)
-        if route != taken:
-            condition = np.array([one.condition for one in there])
-            allowed = np.maximum(allowed, SOLVING * nv * condition)
-        k = _worst(errors, allowed)
-        words = f"median {np.median(errors):.1f}"
-        if route != taken and np.any(errors > asked):
-            words += "; loses digits"
-        what = f"forward error of v̇, {route}" + (" (taken)" if route == taken else "")
-        label = there[k].state.label
-        checks.append(
-            Check(
-                what,
-                float(errors[k]),
-                float(allowed[k]),
-                "ulp",
-                words,
-                label,
-                taken=route == taken,
-            )
-        )
+        what, words = f"forward error of v̇, {route}", ""
+        if route == taken:
+            what += " (taken)"
+            allowed = asked if bound is None else np.full_like(data, bound)
+        else:
+            words = "; loses digits" if np.any(errors > asked) else ""
+            allowed = np.maximum(asked, SOLVING * nv * condition)
+        found = _worst_state(what, there, errors, allowed)
+        checks.append(replace(found, words=found.words + words, taken=route == taken))
     if len(ulps) > 1:
-        spread = np.max(list(ulps.values()), axis=0)
-        k = int(np.argmax(spread))
-        checks.append(Check("routes apart", float(spread[k]), None, "ulp", at=there[k].state.label))
-    k = int(np.argmax(data))
-    checks.append(
-        Check(
-            "one ulp in the data",
-            float(data[k]),
-            None,
-            "ulp",
-            f"median {np.median(data):.1f}",
-            there[k].state.label,
-        )
-    )
-    return checks
+        spread = _worst_state("routes apart", there, np.max(list(ulps.values()), axis=0))
+        checks.append(replace(spread, words=""))
+    return [*checks, _worst_state("one ulp in the data", there, data)]
+
+
+def _worst_state(
+    what: str, there: Sequence[Judged], errors: FloatArray, allowed: FloatArray | None = None
+) -> Check:
+    """The state that exceeds its bound by most or, if none does, has the greatest error, ulps."""
+    k, bound = int(np.argmax(errors)), None
+    if allowed is not None:
+        with np.errstate(all="ignore"):
+            share = np.where(errors == 0.0, 0.0, errors / allowed)
+        k = int(np.argmax(share if np.max(share) > 1 else errors))
+        bound = float(allowed[k])
+    words = f"median {np.median(errors):.1f}"
+    return Check(what, float(errors[k]), bound, "ulp", words, there[k].state.label)
 
 
 def allowed_ulps(there: Sequence[Judged], data: FloatArray) -> FloatArray:
@@ -169,61 +159,44 @@ def allowed_ulps(there: Sequence[Judged], data: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(least, AMPLIFIED * data))
 
 
-def _worst(errors: FloatArray, allowed: FloatArray) -> int:
-    """The state that exceeds its bound by most or, if none does, has the greatest error."""
-    with np.errstate(all="ignore"):
-        share = np.where(errors == 0.0, 0.0, errors / allowed)
-    return int(np.argmax(share if np.max(share) > 1 else errors))
+def _greatest(found: Iterable[T], value: Callable[[T], float]) -> T:
+    """The one with the greatest value; nan counts as the greatest."""
+    return max(found, key=lambda one: ((x := value(one)) != x, x))
 
 
 def matrix_checks(there: Sequence[Judged]) -> list[Check]:
     """Condition and pivots of M, and the agreement of the two solutions in 60 digits."""
-    k = int(np.argmax([one.condition for one in there]))
-    least = int(np.argmin([one.pivot for one in there]))
-    agreed = int(np.argmin([one.agreed for one in there]))
+    one = _greatest(there, lambda one: one.condition)
+    least = _greatest(there, lambda one: -one.pivot)
+    other, agree = (
+        _greatest(there, lambda one: -one.agreed),
+        "virtual work against articulated bodies",
+    )
+    remark = "relative, in 60 digits"
     return [
-        Check("condition of M, scaled", there[k].condition, None, "", at=there[k].state.label),
+        Check("condition of M, scaled", one.condition, None, "", "", one.state.label),
         Check(
-            "smallest pivot of M, scaled",
-            there[least].pivot,
-            0.0,
-            "",
-            at=there[least].state.label,
-            above=True,
+            "smallest pivot of M, scaled", least.pivot, 0.0, "", "", least.state.label, above=True
         ),
-        Check(
-            "virtual work against articulated bodies",
-            10.0 ** -there[agreed].agreed,
-            10.0**-AGREED,
-            "",
-            "relative, in 60 digits",
-            there[agreed].state.label,
-        ),
+        Check(agree, 10.0**-other.agreed, 10.0**-AGREED, "", remark, other.state.label),
     ]
 
 
 def loss_checks(there: Sequence[Judged], taken: str) -> list[Check]:
     """The errors of everything else that the module of the route taken computes."""
-    checks = []
     losses = {"residual M v̇ + h - F": [one.residuals[taken] for one in there]}
     losses |= {what: [one.losses[what] for one in there] for what in there[0].losses}
+    checks = []
     for what, lost in losses.items():
-        errors = np.array([loss.error for loss in lost])
-        data = np.array([loss.data for loss in lost])
-        allowed = np.maximum(BOUND, AMPLIFIED * data)
-        k = _worst(errors, allowed)
-        words = f"median {np.median(errors):.1f}"
-        checks.append(
-            Check(what, float(errors[k]), float(allowed[k]), "ulp", words, there[k].state.label)
-        )
+        errors, data = np.array([(loss.error, loss.data) for loss in lost]).T
+        checks.append(_worst_state(what, there, errors, np.maximum(BOUND, AMPLIFIED * data)))
     return checks
 
 
 def part_checks(there: Sequence[Judged]) -> list[Check]:
     """The component of an output that is off by most in units of what rounding makes of it."""
     found = [(*part, name, one) for one in there for name, part in one.parts.items()]
-    # nan counts as the worst.
-    value, index, name, one = max(found, key=lambda part: (part[0] != part[0], part[0]))
+    value, index, name, one = _greatest(found, lambda part: part[0])
     words = f"{SPREADS}; entry {index} of {name}"
     return [Check("each component", value, PART, "", words, one.state.label)]
 
@@ -240,8 +213,7 @@ def law_checks(model: Model, laws: Sequence[Broken]) -> list[Check]:
     for what, (of, bound) in pick.items():
         values = [(value, law) for law in laws if (value := of(law)) is not None]
         if values:
-            # nan counts as the worst.
-            value, law = max(values, key=lambda pair: (pair[0] != pair[0], pair[0]))
+            value, law = _greatest(values, lambda pair: pair[0])
             unit, words = ("", SPREADS) if bound == PART else ("ulp", "")
             checks.append(Check(what, value, bound, unit, words, law.state.label))
     return checks
@@ -252,8 +224,7 @@ def slope_checks(slopes: Mapping[str, float | None]) -> list[Check]:
     found = [(value, label) for label, value in slopes.items() if value is not None]
     if not found:
         return []
-    # nan counts as the worst.
-    value, label = max(found, key=lambda pair: (pair[0] != pair[0], pair[0]))
+    value, label = _greatest(found, lambda pair: pair[0])
     return [Check("jacobian, each entry", value, PART, "", SPREADS, label)]
 
 

@@ -232,26 +232,36 @@ def _outputs(
             return np.nan
 
     found, parts = {}, {}
-    for name, (true, changes, scale) in _quantities(free, near).items():
-        given = asked(name) if name != "body_poses" else _matrices(asked(name), free.dimensions)
+
+    def weigh(
+        name: str,
+        given: Any,
+        values: Sequence[Array],
+        scale: Array,
+        *extra: Any,
+        output: str = "",
+        rows: Sequence[int] | None = None,
+    ) -> None:
+        """`values` are the true one, and those for the changed data."""
+        true, *changes = values
         found[name] = _loss(given, true, changes, scale)
-        change = _change(true, changes)
-        parts[name] = spreads.share(name, extended(given) - true, true, scale, change)
+        if rows is None or spreads.all_states:
+            error, change = extended(given) - true, _change(true, changes)
+            given_at = (error, true, scale, change, *extra)
+            parts[name] = spreads.share(output or name, *given_at, rows=rows)
+
+    for name, (values, scale) in _quantities(free, near).items():
+        given = asked(name) if name != "body_poses" else _matrices(asked(name), free.dimensions)
+        weigh(name, given, values, scale)
     # Beside the true accelerations, at which all terms of a row cancel.
     at = doubles(free.vd) * np.random.default_rng(1).uniform(0.5, 0.9, nv)
-    true, *changes = (_on_tree(f, extended(at)) for f in (free, *near))
+    needed = [_on_tree(f, extended(at)) for f in (free, *near)]
     scale = abs(free.mass_matrix) @ abs(extended(at)) + free.bias_sizes + free.applied_sizes
-    given = asked("inverse_dynamics", at)
-    found["inverse_dynamics"] = _loss(given, true, changes, scale)
-    error, change = extended(given) - true, _change(true, changes)
-    parts["inverse_dynamics"] = spreads.share("inverse_dynamics", error, true, scale, change, at)
+    weigh("inverse_dynamics", asked("inverse_dynamics", at), needed, scale, at)
     rest = [*range(nq), *range(nq + nv, len(state.y))]
-    true, *changes = (f.state_rates[rest] for f in (free, *near))
-    sizes = abs(true) + np.max(abs(true), initial=mpfr(0))
-    found["other rates"] = _loss(ydot[rest], true, changes, sizes)
-    if spreads.all_states:
-        error, change = extended(ydot[rest]) - true, _change(true, changes)
-        parts["other rates"] = spreads.share("derivative", error, true, sizes, change, rows=rest)
+    rates = [f.state_rates[rest] for f in (free, *near)]
+    sizes = abs(rates[0]) + np.max(abs(rates[0]), initial=mpfr(0))
+    weigh("other rates", ydot[rest], rates, sizes, output="derivative", rows=rest)
     return found, parts
 
 
@@ -312,8 +322,8 @@ class _Spreads:
 
 def _quantities(
     free: FreeBodies, near: Sequence[FreeBodies]
-) -> dict[str, tuple[Array, list[Array], Array]]:
-    """Of each output: its value, its values for the changed data, and its scale."""
+) -> dict[str, tuple[list[Array], Array]]:
+    """Of each output: its value and its values for the changed data, and its scale."""
     root = extended([_root(x) for x in np.diag(free.mass_matrix)])
     mass = sum((free.mass(name) for name in free.bodies), mpfr(0))
     potential = np.sum(abs(free.potential_energies), initial=mpfr(0))
@@ -347,7 +357,7 @@ def _quantities(
                 values.append(extended(value[0] if name == "effect_powers" else value))
         if name == "momentum" and free.dimensions == 2:
             values, scale = [x[[0, 1, 5]] for x in values], scale[[0, 1, 5]]
-        found[name] = (values[0], values[1:], extended(scale))
+        found[name] = (values, extended(scale))
     return found
 
 
