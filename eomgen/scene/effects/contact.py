@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -17,9 +17,10 @@ from eomgen.scalars.exact import direction
 from eomgen.scene.effects.base import Contact, Load, Mechanism, Scalar
 from eomgen.scene.effects.base import Vector as Components
 from eomgen.scene.effects.bodies import OnBodies, wrong
-from eomgen.scene.effects.contact_shapes import CORES, ContactShape
+from eomgen.scene.effects.contact_shapes import ContactShape, between_count
 from eomgen.scene.effects.elements import Element, Layout, Round, Touching
 from eomgen.scene.effects.elements import Plane as PlaneElement
+from eomgen.scene.effects.nearest import between
 from eomgen.scene.effects.touching import (
     Plane,
     Solid,
@@ -28,7 +29,6 @@ from eomgen.scene.effects.touching import (
     gap_rate_of,
     merged,
     normal_loads,
-    on_ball,
     on_plane,
     point_loads,
     tangents,
@@ -45,11 +45,12 @@ LAWS = {
 AGAINST = {
     "plane": ("normal", "offset", "corners", "other"),
     "ball": ("other_radius", "other_at", "other"),
-    "each_other": (),
+    "each_other": ("except_pairs",),
 }
 """The keys of contact with each of these, in addition to the common ones."""
 
 
+Of = TypeVar("Of")
 MOST_SHAPES = 1000
 MOST_CORNERS = 400
 """More corners of boxes in contact than these are not drawn."""
@@ -164,6 +165,9 @@ dissipation = 0.2
     shapes: Annotated[dict[Identifier, ContactShape], Field(max_length=MOST_SHAPES)] = Field(
         default={}, description="shapes that touch, by name, in place of bodies"
     )
+    except_pairs: tuple[tuple[Identifier, Identifier], ...] = Field(
+        default=(), description="pairs of bodies whose shapes do not touch each other"
+    )
 
     @model_validator(mode="after")
     def _keys_fit(self) -> Self:
@@ -193,8 +197,13 @@ dissipation = 0.2
             if shape.body == self.other and self.against != "each_other":
                 what = "does not move on" if self.other == WORLD else "cannot touch"
                 raise wrong(f"shapes.{name}.body", f"'{shape.body}' {what} itself; name another")
-            if self.against != "plane" and any(getattr(shape, key) for key in CORES):
-                raise wrong(f"shapes.{name}", f"touches no {self.against}; give against = 'plane'")
+            if self.against != "plane" and (shape.semi_axes or shape.vertices):
+                raise wrong(f"shapes.{name}", "touches planes only; give a sphere, capsule or box")
+        bodies = {shape.body for shape in self.shapes.values()}
+        for i, pair in enumerate(self.except_pairs):
+            for name in pair:
+                if name not in bodies:
+                    raise wrong(f"except_pairs[{i}]", f"'{name}' has no shape here; leave it out")
         return self
 
     @model_validator(mode="after")
@@ -247,6 +256,11 @@ dissipation = 0.2
                 yield can_meet(f"{location}.other_radius", (radius, self.other_radius))
         if self.against == "each_other":
             both = (*own, self.radius) if self.bodies == "all" else own
+            if self.shapes:
+                radii = {name: shape.radius for name, shape in self.shapes.items()}
+                for a, b in self._pairs(tuple(radii)):
+                    yield can_meet(f"{location}.shapes.{b}.radius", (radii[a], radii[b]))
+                return
             yield can_meet(f"{location}.radius", both)
 
     def loads(self, mechanism: Mechanism) -> Iterator[Load]:
@@ -254,7 +268,7 @@ dissipation = 0.2
         if self.law == "impact":
             return
         found: list[Load] = []
-        for touch in self._touches(mechanism):
+        for touch in self.touches(mechanism):
             if self.friction == ZERO:
                 force = self._named_force(mechanism, touch, gap_rate_of(mechanism, touch))
                 found += normal_loads(touch, force)
@@ -274,7 +288,7 @@ dissipation = 0.2
         if self.law == "impact":
             return total
         power = mechanism.number(2.0 if self.law == "spring_damper" else 2.5)
-        for touch in self._touches(mechanism):
+        for touch in self.touches(mechanism):
             force = self._elastic(mechanism, touch)
             d = mechanism.call("max", -touch.gap, mechanism.zero)
             part = force * d / power
@@ -357,7 +371,7 @@ dissipation = 0.2
         deepest = mechanism.zero
         if self.law == "impact":
             return deepest
-        for touch in self._touches(mechanism):
+        for touch in self.touches(mechanism):
             deepest = mechanism.call("max", deepest, -touch.gap)
         return deepest
 
@@ -368,14 +382,25 @@ dissipation = 0.2
         if self.law != "impact":
             return ()
         touching = self.points or tuple(self.shapes) or self._in_contact(bodies)
+        counts, n = dict[str, int](), len(self.normal)
         if self.against == "each_other":
-            return tuple(f"{self.name}_{a}_{b}" for a, b in combinations(touching, 2))
-        names, n = list[str](), len(self.normal)
-        for touched in touching:
-            count = self.shapes[touched].count(n) if self.shapes else 2 ** len(self.corners or ())
-            name = f"{self.name}_{touched}"
-            names += [f"{name}_{number + 1}" for number in range(count)] if count > 1 else [name]
-        return tuple(names)
+            for a, b in self._pairs(touching):
+                pair = (self.shapes[a], self.shapes[b]) if self.shapes else ()
+                counts[f"{a}_{b}"] = between_count(*pair, n) if pair else 1
+        else:
+            for name in touching:
+                own = self.shapes.get(name)
+                if own is None:
+                    counts[name] = 2 ** len(self.corners or ())
+                elif self.against == "ball":
+                    counts[name] = between_count(own, ContactShape(body=WORLD), n)
+                else:
+                    counts[name] = own.count(n)
+        return tuple(
+            f"{self.name}_{name}{f'_{k + 1}' * (count > 1)}"
+            for name, count in counts.items()
+            for k in range(count)
+        )
 
     def contacts(self, mechanism: Mechanism) -> tuple[Contact, ...]:
         """For law "impact" a contact for each point, sphere, corner or pair of spheres."""
@@ -393,7 +418,7 @@ dissipation = 0.2
                 mechanism.value(self.friction),
                 self._slip_speed(mechanism),
             )
-            for name, touch in zip(names, self._touches(mechanism), strict=True)
+            for name, touch in zip(names, self.touches(mechanism), strict=True)
         )
 
     def _elastic(self, mechanism: Mechanism, touch: Touch) -> Scalar:
@@ -449,15 +474,27 @@ dissipation = 0.2
                 radius = mechanism.value(self.radii.get(body, self.radius))
                 yield Solid(body, at, radius, edges=tuple(edges))
 
-    def _touches(self, mechanism: Mechanism) -> Iterator[Touch]:
+    def _pairs(self, touching: Sequence[Of]) -> Iterator[tuple[Of, Of]]:
+        """Every two of those that touch, but for shapes of one body, or of two that do not."""
+        bodies = [shape.body for shape in self.shapes.values()]
+        for i, j in combinations(range(len(touching)), 2):
+            pair = bodies[i : i + 1] + bodies[j : j + 1]
+            if not pair or (
+                pair[0] != pair[1] and not {*self.except_pairs} & {(*pair,), (*pair[::-1],)}
+            ):
+                yield touching[i], touching[j]
+
+    def touches(self, mechanism: Mechanism) -> Iterator[Touch]:
         solids = list(self._solids(mechanism))
         if self.against == "each_other":
-            yield from (on_ball(mechanism, *pair) for pair in combinations(solids, 2))
+            for pair in self._pairs(solids):
+                yield from between(mechanism, *pair)
             return
         if self.against == "ball":
             centre = tuple(mechanism.value(part) for part in self.other_at)
             ball = Solid(self.other, centre, mechanism.value(self.other_radius))
-            yield from (on_ball(mechanism, first, ball) for first in solids)
+            for solid in solids:
+                yield from between(mechanism, solid, ball)
             return
         zeros = (mechanism.zero,) * mechanism.dimensions
         normal = tuple(mechanism.number(x) for x in direction(self.normal))

@@ -106,32 +106,44 @@ def _lowest(mechanism: Mechanism, solid: Solid, normal: Vector) -> Iterator[tupl
             arm = add(arm, scale(part, edge))
         yield tuple(-(x / reach) for x in arm), -reach
     elif edges:
-        sums = _signed_sums([(*edge, dot(normal, edge)) for edge in edges])
+        sums = signed_sums([(*edge, dot(normal, edge)) for edge in edges])
         yield from ((x[:-1], x[-1]) for x in sums)
     for own in solid.arms if not edges else ():
         arm = mechanism.outward(solid.body, own) if own else ()
         yield arm, dot(normal, arm) if arm else mechanism.zero
 
 
-def on_ball(mechanism: Mechanism, first: Solid, second: Solid) -> Touch:
-    """The contact of two balls, at least one with a radius > 0.
+def on_ball(
+    mechanism: Mechanism, first: Solid, second: Solid, arms: tuple[Vector, Vector] = ((), ())
+) -> Touch:
+    """The contact of two solids at points of their cores, at least one with a radius > 0.
 
-    P divides the line between the centres in the ratio of the radii. It is one point of both bodies
-    at any depth, so the forces conserve angular momentum. If the centres are within ε = `NEAREST`
-    of each other, n is d/ε with the vector d from the second centre to the first, so it falls to 0.
+    The points are at `arms` from where each is `at`, world axes, m; without these they are there,
+    as the centres of balls. P divides the line between them in the ratio of the radii. It is one
+    point of both bodies at any depth, so the forces conserve angular momentum. If the points are
+    within ε = `NEAREST` of each other, n is d/ε with the vector d from the second to the first, so
+    it falls to 0.
     """
-    d = sub(mechanism.position(first.body, first.at), mechanism.position(second.body, second.at))
-    d = mechanism.called("d", *d)
+    if first.body == WORLD:
+        first, second, arms = second, first, arms[::-1]
+    ends = []
+    for solid, arm in zip((first, second), arms, strict=True):
+        place = mechanism.position(solid.body, solid.at)
+        ends.append(add(place, arm) if arm else place)
+    d = mechanism.called("d", *sub(*ends))
     square = dot(d, d)
     larger = mechanism.call("max", square, nearest_square(mechanism))
     (length,) = mechanism.called("l", mechanism.call("sqrt", larger))
     both = first.radius + second.radius
-    sides = [Side(first.body, first.at, (), -(length * (first.radius / both)))]
-    if second.body != WORLD:
-        sides.append(Side(second.body, second.at, (), length * (second.radius / both)))
+    reaches = -(length * (first.radius / both)), length * (second.radius / both)
+    sides = tuple(
+        Side(solid.body, solid.at, arm, reach)
+        for solid, arm, reach in zip((first, second), arms, reaches, strict=True)
+        if solid.body != WORLD
+    )
     normal = mechanism.called("n", *(x / length for x in d))
     (gap,) = mechanism.called("g", length - both)
-    return Touch(normal, gap, tuple(sides), (larger - square) / (length + length))
+    return Touch(normal, gap, sides, (larger - square) / (length + length))
 
 
 def gap_rate_of(mechanism: Mechanism, touch: Touch) -> Scalar:
@@ -224,7 +236,7 @@ def _relative(speeds: Sequence[Vector]) -> Vector:
     return sub(*speeds) if len(speeds) == 2 else speeds[0]
 
 
-def _signed_sums(parts: Sequence[Vector]) -> list[Vector]:
+def signed_sums(parts: Sequence[Vector]) -> list[Vector]:
     """All sums ±a ±b …; the sign of the first changes fastest."""
     first, *others = parts
     sums = [negative(first), first]
