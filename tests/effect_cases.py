@@ -117,6 +117,10 @@ SPRING = 'body_1 = "world"; body_2 = "c"; at_1 = <0.2 0.3 0.1>; at_2 = <0.1 0 0.
 FIELD = "center = <0.3 -0.2 0.1>; strength = 2.0; power = {}; softening = 0.4; "
 GROUND = 'bodies = ["a", "b", "c"]; stiffness = 300.0; offset = 0.4; '
 LOSSES = "friction = 0.4; slip_speed = 0.1; "
+SHAPES = (
+    'rod = { body = "a", at = <0.1 0 0>, end = <-0.3 0.2 0.1>, radius = 0.4 }, '
+    'crate = { body = "b", half_sizes = <0.2 0.3 0.1>, radius = 0.5 }'
+)
 SERVO = 'joint = "hinge"; target = "0.3*sin(t)"; target_rate = "0.3*cos(t)"; '
 GAINS = "stiffness = 8.0; damping = 1.3; "
 EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
@@ -195,8 +199,13 @@ EVERYWHERE: list[tuple[str, str, str, Mapping[str, float] | None]] = [
      'law = "spring_damper"; against = "each_other"; bodies = "all"; radius = 0.7; '
      "stiffness = -40.0; allow_active = true", CONSERVES),
     ("contact", "shapes",
-     'law = "spring_damper"; shapes = { rod = { body = "c", at = <0.1 0 0.1>, end = <-0.3 0.2 0>, '
-     "radius = 0.1 } }; stiffness = 300.0; offset = 0.4", CONSERVES),
+     f'law = "spring_damper"; offset = 0.4; stiffness = 300.0; {LOSSES}shapes = {{ {SHAPES}, '
+     'egg = { body = "c", semi_axes = <0.3 0.2 0.4> }, '
+     'hull = { body = "b", vertices = [<0.3 0.1 0>, <-0.2 0.3 0.1>, <0 -0.2 0.2>] } }',
+     damped("friction")),
+    ("contact", "shapes and shapes",
+     f'law = "spring_damper"; against = "each_other"; stiffness = 90.0; shapes = {{ {SHAPES}, '
+     'ball = { body = "c", radius = 0.9 } }; except_pairs = [["b", "c"]]', CONSERVES),
     ("contact", "impact", 'law = "impact"; bodies = "all"; restitution = 0.5', NO_ENERGY),
     ("external_force", "constant", 'body = "b"; force = <1 2 3>; at = <0.1 0 0.2>', NO_ENERGY),
     ("external_force", "formula", 'body = "b"; axes = "body"; force = <"sin(3*t)" "q_dot*s" 0>',
