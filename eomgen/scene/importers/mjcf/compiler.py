@@ -54,7 +54,7 @@ SINGLE = (
 )
 OPTIONS = (
     *("gravity", "density", "viscosity", "wind", "magnetic"),
-    *("disableflags", "disableactuator", "timestep"),
+    *("disableflags", "disableactuator", "timestep", "cone", "impratio"),
 )
 
 

@@ -5,7 +5,9 @@ for its force f (documentation, "Computation", section "Parameters"), where d is
 R = (1 - d)/d A with the inverse A of the mass that the body of the geom has there, and b and k
 follow from `solref`. Where a is small beside the right side, as at rest, this is the law
 f = -K g - C ġ with K = k d²/((1 - d) A). d depends on the depth (`solimp`); K is taken where it
-carries half of the weight of all bodies. C is such that K, C and the mass 1/A have the damping
+carries half of the weight of all bodies. A pyramid of friction has 2 (condim - 1) edges, each with
+A (1 + μ²) and R of 2 μ²/impratio times that, whose forces add up: K is the larger by
+impratio (condim - 1)/(μ² (1 + μ²)). C is such that K, C and the mass 1/A have the damping
 ratio of b and k.
 """
 
@@ -42,6 +44,8 @@ KINDS = {
     BOX: "box",
     MESH: "mesh",
 }
+PYRAMID = 0
+"""MuJoCo's pyramidal cone of friction (mjtCone)."""
 LEAST = 1e-4
 """MuJoCo's least impedance, mjMINIMP."""
 DIGITS = 6
@@ -121,8 +125,8 @@ def _law(model: Compiled, a: int, b: int, body: int) -> dict[str, float]:
 
     high = [g for g, priority in ((a, first), (b, second)) if priority == max(first, second)]
     friction = max(model["geom_friction"][g][0] for g in high)
-    if max(model["geom_condim"][g] for g in high) == 1:
-        friction = 0.0
+    condim = max(model["geom_condim"][g] for g in high)
+    friction = friction if condim > 1 else 0.0
     solimp = mixed("geom_solimp")
     most = min(max(solimp[1], LEAST), 1 - LEAST)
     time, ratio = mixed("geom_solref")
@@ -134,7 +138,10 @@ def _law(model: Compiled, a: int, b: int, body: int) -> dict[str, float]:
         ratio = -ratio / most / (2 * math.sqrt(k))
     mass = 1 / model["body_invweight0"][body][0]
     load = math.hypot(*model["opt_gravity"]) * sum(model["body_mass"]) / 2 or mass
-    stiffness = _stiffness(k * mass, solimp, load)
+    edges = 1.0
+    if friction and model["opt_cone"] == PYRAMID:
+        edges = model["opt_impratio"] * (condim - 1) / (friction**2 * (1 + friction**2))
+    stiffness = _stiffness(k * mass * edges, solimp, load)
     found = {"stiffness": stiffness, "damping": 2 * ratio * math.sqrt(stiffness * mass)}
     return {**{key: float(f"{x:.{DIGITS}g}") for key, x in found.items()}, "friction": friction}
 
