@@ -11,6 +11,7 @@
 const adaptive = (() => {
   const [RTOL, ATOL] = [1e-9, 1e-12];
   const MOST = 100000; // steps within one of the page's
+  const MOST_AHEAD = 100; // steps of the page that one is long at most where forces jump at given times
   const ROOM = 32; // for zeros in a step
   const SLOPES = 16; // of DOP853
   const numbers = (n) => new Float64Array(n);
@@ -90,7 +91,7 @@ const adaptive = (() => {
     const { ny, steps } = free;
     const run = steps.records.Bounds({ atol: numbers(ny).fill(ATOL), rtol: RTOL, longest: Infinity, until: Infinity });
     const [place, sizes] = [numbers(ny), numbers(ny).fill(1)];
-    let [path, of, given] = [[], null, []];
+    let [path, of, given, ahead] = [[], null, [], 0];
     let [method, watch, found, step] = [null, null, null, null];
     const system = {
       derivative: (t, y, out) => out.set(of.f(t, y)),
@@ -113,13 +114,17 @@ const adaptive = (() => {
       method = (maker === taylor && !of.series ? dormandPrince : maker)(free, system, run);
       return { t, end: t, last: y.slice(), ...method.first(t, y) };
     };
-    // The last number before the derivative changes whatever the state is, and the next one; null if it does not so soon.
-    const jump = (t) => {
-      let [low, high] = [t, t + run.longest];
-      if (!of.timed || !(high < Infinity)) return null;
+    // The last number before the derivative changes whatever the state is, and the next one; null if it does not within a
+    // length. It is looked for at the ends of the page's own steps.
+    const jump = (t, length) => {
+      if (!of.timed) return null;
       const signs = (time) => of.timed(time).map((x) => x > 0).join();
-      const [before, after] = [signs(low), signs(high)];
-      if (before === after) return null;
+      const before = signs(t);
+      let [low, high] = [t, t + ahead];
+      for (let k = 2; signs(high) === before; k += 1) {
+        if (!(high < t + length)) return null;
+        [low, high] = [high, t + k * ahead];
+      }
       for (let middle = low + (high - low) / 2; low < middle && middle < high; middle = low + (high - low) / 2) {
         if (signs(middle) === before) low = middle;
         else high = middle;
@@ -129,7 +134,7 @@ const adaptive = (() => {
     const go = () => {
       const now = path.at(-1);
       const { end: t, last: y } = now;
-      const at = jump(t);
+      const at = jump(t, now.length ?? run.longest);
       if (t >= run.until) run.until = Infinity;
       if (at) run.until = Math.min(run.until, at.low);
       for (;;) {
@@ -163,7 +168,7 @@ const adaptive = (() => {
     };
     const change = (problem, t, y, end) => {
       if (!goesOn(problem, t, y)) path = [first(t, y)];
-      if (problem.timed) run.longest = end - t;
+      if (problem.timed) [ahead, run.longest] = [end - t, MOST_AHEAD * (end - t)];
       for (let count = 0; !(path.at(-1).end >= end); count += 1) {
         if (count === MOST) throw new Error("the steps become too small: the motion is not smooth here");
         go();
