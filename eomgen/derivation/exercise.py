@@ -22,8 +22,8 @@ MOST_WRITTEN = 250
 """Symbols and numbers of a result, before it is simplified, up to which it is tried."""
 BLANK = sp.Symbol("…")
 ASKED = (
-    "Write each result as a formula of the symbols in the equations above it. M, V and G are those "
-    "of M dv/dt + V + G = F, with the symmetric M of kinetic energy."
+    "Write each result as a formula of the symbols in the equations above it. M, V, G and F are "
+    "those of M dv/dt + V + G = F, with the symmetric M of kinetic energy."
 )
 NUMBERS = "With these numbers, in SI units and radians:"
 FUNCTIONS = (sp.sin, sp.cos, sp.tan, sp.exp, sp.log, sp.Abs)
@@ -88,6 +88,7 @@ def exercise_of(model: Model, exposition: Exposition, seed: int = 0) -> Exercise
         )
     found, chance = exposition.matrices, random.Random(seed)
     known = {c.name for c in (*model.coordinates, *model.velocities)} | {*model.defaults}
+    known |= {i.name for i in model.inputs}
     asked = [q for q in _results(found) if {s.name for s in q.right.free_symbols} <= known]
     if not asked:
         raise SceneError(f"exercise: the equations of {model.name} are too long to ask for")
@@ -101,9 +102,9 @@ def exercise_of(model: Model, exposition: Exposition, seed: int = 0) -> Exercise
 
 
 def _results(found: Matrices) -> Iterator[Question]:
-    """Entries of M on and above its diagonal, of V and G, and accelerations, that are not 0."""
+    """Entries of M on and above its diagonal, of V, G and F, and accelerations, that are not 0."""
     several = len(found.a) > 1
-    for letter in "MVG":
+    for letter in "MVGF":
         whole = getattr(found, letter)
         for i in range(whole.rows):
             for j in range(i, whole.cols) if letter == "M" else (0,):

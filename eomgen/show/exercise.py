@@ -1,7 +1,8 @@
 """An exercise as a page: answers are typed as formulas and checked over many random states."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import sympy as sp
 from markupsafe import Markup
@@ -28,7 +29,10 @@ def as_page(exercise: Exercise) -> str:
     data = {
         "positive": sorted(model.defaults),
         "known": exercise.known,
-        "questions": [{"answer": str(q.right), "at": dict(q.at)} for q in exercise.questions],
+        "questions": [
+            {"program": [*_program(q.right, exercise.known)], "at": dict(q.at)}
+            for q in exercise.questions
+        ],
     }
     context = {
         "name": model.name,
@@ -40,6 +44,23 @@ def as_page(exercise: Exercise) -> str:
         "data": Markup(json.dumps(data, sort_keys=True).replace("<", "\\u003c")),
     }
     return render("derivation", "exercise.html.jinja", context, html=True)
+
+
+def _program(e: Any, known: Sequence[str]) -> Iterator[list[Any]]:
+    """A formula for the page, as operations on a stack: [0, number], [1, place of a name in
+    `known`], [2, terms], [3, factors], [4] power, [5, function].
+    """
+    if e.is_Symbol:
+        yield [1, known.index(e.name)]
+    elif e.is_number and not e.args:
+        yield [0, float(e)]
+    else:
+        for x in e.args:
+            yield from _program(x, known)
+        if e.is_Add or e.is_Mul:
+            yield [2 if e.is_Add else 3, len(e.args)]
+        else:
+            yield [4] if e.is_Pow else [5, e.func.__name__]
 
 
 def _number(name: str, x: float, names: dict[str, str]) -> str:

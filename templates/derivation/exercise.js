@@ -92,9 +92,25 @@ const formula = (text, known) => {
   return whole;
 };
 
+// A function of values by name, from operations on a stack.
+const followed = (program, known) => (values) => {
+  const stack = [];
+  for (const [kind, what] of program) {
+    if (kind === 0) stack.push(what);
+    else if (kind === 1) stack.push(values[known[what]]);
+    else if (kind === 2) stack.push(stack.splice(-what).reduce((a, b) => a + b));
+    else if (kind === 3) stack.push(stack.splice(-what).reduce((a, b) => a * b));
+    else if (kind === 4) {
+      const [base, exponent] = stack.splice(-2);
+      stack.push(base ** exponent);
+    } else stack.push(FUNCTIONS[what](stack.pop()));
+  }
+  return stack[0];
+};
+
 // What is said of an answer.
 const judged = (text, question, { known, positive }) => {
-  const [ours, theirs] = [formula(question.answer, known), formula(text, known)];
+  const [ours, theirs] = [followed(question.program, known), formula(text, known)];
   if (Object.keys(question.at).length) {
     const [want, found] = [ours(question.at), theirs(question.at)];
     return Math.abs(found - want) <= 0.01 * Math.abs(want);

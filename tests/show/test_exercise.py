@@ -61,7 +61,7 @@ def test_sheets_of_one_seed_are_the_same_and_others_differ(
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """The page of an exercise on the cart-pole, opened."""
     path = tmp_path_factory.mktemp("exercise") / "exercise.html"
-    path.write_text(as_page(eomgen.derive("cart_pole").exercise(3)), "utf-8")
+    path.write_text(as_page(eomgen.derive("cart_pole").exercise(9)), "utf-8")
     with chromium() as browser:
         opened = browser.new_page()
         opened.goto(path.as_uri())
@@ -74,7 +74,7 @@ def test_answers_in_any_form(page: Any) -> None:
     """Equal formulas are right, near misses are not, and nonsense is told so; hints open one after
     another.
     """
-    questions = eomgen.derive("cart_pole").exercise(3).questions
+    questions = eomgen.derive("cart_pole").exercise(9).questions
     place = [str(q.left) for q in questions].index("M_2,2")
 
     def said(answer: str, i: int = place) -> str:
@@ -95,3 +95,17 @@ def test_answers_in_any_form(page: Any) -> None:
     assert [hints.nth(i).is_visible() for i in (0, 1)] == [True, False]
     page.locator("details.hint > summary").nth(0).click()
     assert [hints.nth(i).is_visible() for i in (0, 1, 2)] == [True, True, False]
+
+
+def test_answers_do_not_stand_in_the_page() -> None:
+    """Neither an answer nor a long part of one can be read in the page's source; F is asked for."""
+    asked: set[str] = set()
+    for scene in ("cart_pole", "four_bar", "two_body_forced"):
+        exercises = [eomgen.derive(scene).exercise(seed) for seed in range(4)]
+        asked |= {str(q.left)[0] for x in exercises for q in x.questions}
+        for exercise in exercises[:2]:
+            data = as_page(exercise).split('id="data">')[1].split("</script>")[0]
+            for question in exercise.questions:
+                parts = (question.right, *question.right.args)
+                assert not any(str(x) in data for x in parts if x.args)
+    assert asked >= {*"MVGF"}
