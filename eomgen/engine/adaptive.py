@@ -34,8 +34,8 @@ one ends where rigid contacts close or open."""
 @dataclass(slots=True)
 class Bounds:
     """What steps are made with: tolerances, the longest step, s, the end of the last step, s,
-    whether the terms of each step are kept, and whether a step may end there that is shorter
-    because of that.
+    whether the terms of each step are kept, whether a step may end there that is shorter because of
+    that, and whether derivatives for terms that no row needs count.
     """
 
     atol: Annotated[Vector, "STATES"]
@@ -44,6 +44,7 @@ class Bounds:
     until: float = 0.0
     dense: bool = False
     reaches: bool = False
+    counts_terms: bool = True
 
 
 @dataclass(slots=True)

@@ -86,7 +86,7 @@ def steps(method: Method, of: Mechanism, stretch: Stretch) -> Stride:
     switches, margins = np.zeros(most, np.int64), made_margins(held, most)
     system = of.holding(ny, held, touched)
     bounds = stretch.atol, stretch.rtol, stretch.longest, stretch.until
-    run = filled(Bounds(*bounds, stretch.dense, stretch.reaches))
+    run = filled(Bounds(*bounds, stretch.dense, stretch.reaches, stretch.counts_terms))
     at = filled(Progress(solver.t, length=0.0 if method.follows else float(solver.h_abs)))
     checks = _Checks(
         *map(ctypes.addressof, (system, run, *seen[2:])),

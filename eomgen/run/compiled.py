@@ -110,6 +110,8 @@ class Stretch:
     rtol, atol  tolerances, atol (ny,)
     longest     the longest step, s
     dense       whether states within the steps are wanted
+    counts_terms  whether derivatives for them count in steps without rows, as they do where each
+                step is looked at within
     times       ascending times of the rows wanted, after t
     watched     given to make no step that may pass over a branch of the derivative
     touched     given for steps that end where rigid contacts close or open
@@ -125,6 +127,7 @@ class Stretch:
     longest: float
     most: int
     dense: bool
+    counts_terms: bool
     times: Array
     watched: Watched | None
     touched: "Touched | None"

@@ -26,6 +26,8 @@ from eomgen.scene.reader import read_scene
 
 SCENES = some(("bouncing_two_body",), ("bouncing_two_body", *built_in_names()))
 ENDS = {"ragdoll": 1.0, "walker_motors": 0.5, "stiff_beam": 0.2}
+WATCHED = ("bicycle",)
+"""Whose constraints are so near to being singular that Python looks at each step."""
 WHEEL = """
 name = "wheel"
 parameters = { a = 1.0, w = 0.1, k = 400.0, s = 1.0, m = 0.0, u = 1.0, f = 3.0 }
@@ -113,7 +115,7 @@ def alike(scene: str, **options: Any) -> Run:
 def test_the_bits_are_those_of_python(scene: str, rtol: float, made: list[int]) -> None:
     end = min(ENDS.get(scene, 2.0), read_scene(scene).simulation.t_end)
     run = alike(scene, t_end=end, rtol=rtol, samples=237)
-    assert sum(made) > 0.3 * run.trajectory.counts["steps"]
+    assert scene in WATCHED or sum(made) > 0.3 * run.trajectory.counts["steps"]
 
 
 @pytest.mark.parametrize(
@@ -209,7 +211,7 @@ def test_works_are_the_same(scene: str, made: list[int]) -> None:
         assert ours is None
     else:
         assert ours is not None and ours.tobytes() == theirs.tobytes()
-    assert sum(made) > 0.3 * compiled.trajectory.counts["steps"]
+    assert scene in WATCHED or sum(made) > 0.3 * compiled.trajectory.counts["steps"]
 
 
 @pytest.mark.parametrize("scene", [WHEEL, HELD])
@@ -242,8 +244,8 @@ def test_a_check_left_out_is_noticed(
     monkeypatch.setenv("EOMGEN_CACHE", str(tmp_path))
     of = text()
     for name in ("are_far", "cut"):
-        other = {**of.constants[name], fault: {"FAR": 0.0, "TOGETHER": 2.0}.get(fault)}
-        monkeypatch.setitem(of.constants, name, other)
+        other = {**of.modules[name], fault: {"FAR": 0.0, "TOGETHER": 2.0}.get(fault)}
+        monkeypatch.setitem(of.modules, name, other)
     if not fault:
         closes = deepcopy(of.functions["closing"])
         closes.body = ast.parse("return inf").body

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from eomgen.base.errors import RunError
 from eomgen.engine import contact_runs
 from eomgen.engine.contact_times import first_zero
-from eomgen.engine.contacts import TOLERANCE
+from eomgen.engine.contacts import TOLERANCE, Place
 from eomgen.engine.roots import Search
 from eomgen.run.integrate import integrate
 from eomgen.run.integrators import INTEGRATORS, FixedStep
@@ -393,8 +393,10 @@ def test_what_flies_off_is_not_struck_again_where_it_was():
         gaps = staticmethod(lambda t, y: np.array([gap(y[0])]))
         rates = staticmethod(lambda t, y: np.array([0.0032 - 10 * y[0]]))
 
-    given = (Falling, Falling, None, Search(), 0.0, 0, 0.0)
-    at = first_zero(*given, 0.0, 0.1, 1e-16, gap(0.1))
+    search = Search(here=0.1, at_before=1e-16, at_here=gap(0.1))
+    none = np.zeros(1, np.int64)
+    place = Place(0.0, np.zeros(1), none, none, 0.0, 0.0, 0)
+    at = first_zero(Falling, Falling, None, search, place)
     assert at == pytest.approx(0.00064, rel=1e-9)
 
 

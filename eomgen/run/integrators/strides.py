@@ -62,11 +62,12 @@ class Strides:
         # Where steps are looked at within, Python counts what that takes only if it is done.
         until = stepper.until, not looked
         along = solver, *until, bounds.rtol, self._atol, stepper.longest, most, self._dense
+        counts_terms = stepper.settings.dense
         held = constrained_by(stepper.problem.projection)
         times = stepper.times[stepper.sampled :]
         met = stepper.touched
         touched = met and met.copy(solver.t, solver.y, most)
-        stride = steps(Stretch(*along, times, watched, touched, bool(features), held))
+        stride = steps(Stretch(*along, counts_terms, times, watched, touched, bool(features), held))
         if not len(stride.ends):
             return None
         if branches and features and not self._size.fits(_are_tame(branches, solver, stride)):
