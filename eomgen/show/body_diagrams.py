@@ -13,6 +13,7 @@ from eomgen.derivation.symbols import OF_SCENE
 from eomgen.model.model import Model
 from eomgen.scene.effects.base import JointLoad, Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point, moved
+from eomgen.show.labels import with_clear_labels
 from eomgen.show.sketches import MARGIN, Fit, Pose, Shape, apart, numbers, skeleton
 
 Expr = Any
@@ -90,7 +91,7 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Draw
     items = [moved(item, depth) for item in items]
     items += _legend(numbers, panel, depth)
     title = f"Free-body diagram of {body.name} in {model.title}"
-    return Drawing(panel, panel + depth, title, tuple(items))
+    return with_clear_labels(Drawing(panel, panel + depth, title, tuple(items)))
 
 
 def _legend(numbers: Mapping[Expr, str], panel: float, depth: float) -> Iterator[Item]:

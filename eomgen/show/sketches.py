@@ -19,6 +19,7 @@ from eomgen.model.model import Body, Model
 from eomgen.scalars.floats import FloatScalars
 from eomgen.scene.effects.base import Load
 from eomgen.show.drawing import Arc, Dot, Drawing, Item, Label, Line, Point
+from eomgen.show.labels import with_clear_labels
 from eomgen.show.symbols import BASE, numbers_of
 
 Expr = Any
@@ -140,7 +141,8 @@ def mechanism_sketch(model: Model, effects: Sequence[DerivedEffect]) -> Drawing:
     for shape in shapes:
         items += _marks(shape, fit.at, model, few)
     items += _world_axes(pose)
-    return Drawing(WIDE, HIGH, f"{model.title}: the mechanism at its initial pose", tuple(items))
+    title = f"{model.title}: the mechanism at its initial pose"
+    return with_clear_labels(Drawing(WIDE, HIGH, title, tuple(items)))
 
 
 class Fit:

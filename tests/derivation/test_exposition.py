@@ -4,6 +4,7 @@ import re
 import unicodedata
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -38,6 +39,7 @@ from eomgen.show.derivation import as_html, as_latex, as_text
 from eomgen.show.drawing import Label, Line
 from eomgen.show.plain import printer
 from eomgen.show.prose import blocks, pieces
+from eomgen.show.sketches import mechanism_sketch
 from eomgen.show.terms import explained
 from eomgen.tables.details import DETAILS
 
@@ -589,3 +591,21 @@ def test_signs_and_factors_as_a_person_writes_them() -> None:
     }
     assert {text: pretty.doprint(e) for text, e in written.items()} == {x: x for x in written}
     assert simplified(2 * g / (-3 * R + 3 * r)) == sp.Rational(2, 3) * g / (r - R)
+
+
+@pytest.mark.parametrize("scene", ["cart_pole", "four_bar", "furuta_pendulum", "two_body_forced"])
+def test_labels_of_sketches_are_clear(scene: str) -> None:
+    """No label covers another, nor the middle of a line."""
+    model = model_of(scene)
+    effects = derived_effects(model)
+    for drawing in (mechanism_sketch(model, effects), *body_diagrams(model, effects)):
+        labels = [x for x in drawing.items if isinstance(x, Label)]
+        for i, one in enumerate(labels):
+            for other in labels[:i]:
+                apart = abs(one.at[0] - other.at[0]), abs(one.at[1] - other.at[1])
+                assert apart[0] > 9 or apart[1] > 9, (drawing.title, one.text, other.text)
+            for line in (x for x in drawing.items if isinstance(x, Line)):
+                ends = np.array(line.points)
+                points = np.vstack([np.linspace(a, b, 40) for a, b in pairwise(ends)])
+                away = np.abs(points - one.at)
+                assert not (away.max(axis=1) < 3).any(), (drawing.title, one.text)
