@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import sympy as sp
 from browser import chromium, missing
 
 import eomgen
@@ -109,3 +110,42 @@ def test_answers_do_not_stand_in_the_page() -> None:
                 parts = (question.right, *question.right.args)
                 assert not any(str(x) in data for x in parts if x.args)
     assert asked >= {*"MVGF"}
+
+
+@pytest.mark.apart
+@pytest.mark.skipif(bool(missing()), reason=missing())
+@pytest.mark.parametrize(
+    "scene", ["cart_pole", "four_bar", "differential", "furuta_pendulum", "two_body_forced"]
+)
+def test_equivalent_forms_of_every_answer(scene: str, tmp_path: Path) -> None:
+    """Five forms of each answer are right, four near misses are not, with loops, too."""
+    exercise = eomgen.derive(scene).exercise(1)
+    path = tmp_path / "exercise.html"
+    path.write_text(as_page(exercise), "utf-8")
+    with chromium() as browser:
+        page = browser.new_page()
+        page.goto(path.as_uri())
+
+        def said(i: int, answer: str) -> str:
+            form = page.locator("form").nth(i)
+            form.locator("input").fill(answer)
+            form.locator("button").click()
+            return str(form.locator("output").text_content())
+
+        for i, question in enumerate(q for q in exercise.questions if not q.at):
+            e, name = question.right, min(s.name for s in question.right.free_symbols)
+            right = (
+                str(e),
+                str(sp.expand(e)),
+                f"-(-({e}))",
+                f"({e})*(sin({name})^2 + cos({name})^2)",
+                f"1/(1/(2*({e})))/2",
+            )
+            assert [said(i, x) for x in right] == ["Right."] * len(right), (question.left, e)
+            wrong = (
+                f"-({e})",
+                f"1.000001*({e})",
+                f"({e}) + 1e-6*{name}",
+                f"({e})*cos(1e-3*{name})",
+            )
+            assert [said(i, x) for x in wrong] == ["Not the same."] * len(wrong), question.left
