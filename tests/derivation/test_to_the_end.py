@@ -183,7 +183,8 @@ def test_parameters_with_the_names_of_the_derivation(scene: str) -> None:
         lines = [e for step in found for line in step.equations for e in (line.left, line.right)]
         names |= {s.name for e in lines for s in e.free_symbols if s.name.isidentifier()}
     model = model_of(scene)
-    taken = {*names_of_scene(model), *(c.name for c in (*model.coordinates, *model.velocities))}
+    own = (c.name for body in model.bodies for c in (*body.positions, *body.velocities))
+    taken = {*names_of_scene(model), *own}
     ordered = sorted(names - taken - {"t"})
     for chosen in (ordered[k : k + 12] for k in range(0, len(ordered), 12)):
         text = with_names(scene, chosen)
