@@ -13,17 +13,17 @@ from typing import Any, Literal
 import sympy as sp
 
 from eomgen.base.errors import SceneError
+from eomgen.derivation.acting import Parts, effect_steps, used_bodies
 from eomgen.derivation.composite import composite_steps, solved_algorithm
-from eomgen.derivation.constraints import DerivedConstraint, derived_constraints, tree_of
+from eomgen.derivation.constraints import derived_constraints, tree_of
 from eomgen.derivation.dependent_velocities import of_freedoms
-from eomgen.derivation.effects import DerivedEffect, derived_effects, equations_of, with_symbols
+from eomgen.derivation.effects import DerivedEffect, derived_effects, with_symbols
 from eomgen.derivation.embedding import embedded, solved_for
 from eomgen.derivation.euler import euler_steps
 from eomgen.derivation.frames import frames_of
-from eomgen.derivation.handout.closed import Equations, collected_equations
+from eomgen.derivation.handout.closed import collected_equations
 from eomgen.derivation.handout.closed import solved as solved_pins
-from eomgen.derivation.handout.elimination import symmetric
-from eomgen.derivation.handout.steps import handout_steps, readable
+from eomgen.derivation.handout.steps import handout_steps, readable, symmetry_steps
 from eomgen.derivation.impacts import impact_steps
 from eomgen.derivation.kane import kane_written
 from eomgen.derivation.lagrange import lagrange_written
@@ -76,8 +76,6 @@ from eomgen.derivation.supported import (
 from eomgen.derivation.symbols import Expr, real
 from eomgen.dynamics.start.assur import with_closed_form
 from eomgen.model.model import Model
-from eomgen.scene.effects.base import Load
-from eomgen.scene.joints.base import WORLD
 from eomgen.scene.schema import Form
 from eomgen.tables.details import Method
 
@@ -96,16 +94,6 @@ RECURSIVE = (
     "They are M dv/dt + V + G = F, with the symmetric M that `mass_matrix()` of the generated "
     "module returns."
 )
-SYMMETRIC = (
-    "There are two ways to write (24). Its rows above are torques about the bodies' own centres "
-    "of mass, so M of (26) is not symmetric. A Lagrangian derivation has generalised forces as "
-    "rows, and its M is symmetric: ½ vᵀ M v is the kinetic energy. `mass_matrix()` of the "
-    "generated module returns that one, and `velocity_force()`, `gravity_force()`, "
-    "`applied_force()` the V, G, F that belong to it. The matrix T leads from one to the other: "
-    "to the torque of each body it adds the moment of the tree's total force, and then it sums "
-    "the rows of all bodies that a joint turns. T has an inverse, so both systems have the same "
-    "solution."
-)
 SOLVED = "The equations solved for the accelerations."
 ELIMINATED = (
     "From the last velocity to the first each is eliminated: d is a pivot, and b what is left of "
@@ -118,20 +106,6 @@ ALGORITHMS: dict[Method, Callable[..., Iterator[Step]]] = {
     "kane": kane_steps,
 }
 """The steps to M and h_0 of a tree, frame by frame."""
-SYMMETRIC_TITLE = "The symmetric mass matrix, that of kinetic energy"
-
-
-@dataclass(frozen=True)
-class Parts:
-    """What acts on a mechanism: its effects, and the constraints with their forces."""
-
-    effects: tuple[DerivedEffect, ...]
-    constraints: tuple[DerivedConstraint, ...]
-
-    @property
-    def loads(self) -> tuple[DerivedEffect, ...]:
-        """All that has loads."""
-        return (*self.effects, *(c.force for c in self.constraints))
 
 
 @dataclass(frozen=True)
@@ -222,8 +196,8 @@ def _of_pins(model: Model, bare: Model, parts: Parts, form: Form) -> Exposition:
     last = _last(model, parts)
     if form != "velocity":
         last = form_step(model, form, momentum_form(equations), parts.effects)
-    ends = [*_symmetry(equations), *impact_steps(model, parts.effects), last]
-    inner = _numbered_within(_effect_steps(model, parts), "36")
+    ends = [*symmetry_steps(equations), *impact_steps(model, parts.effects), last]
+    inner = _numbered_within(effect_steps(model, parts), "36")
     steps = [
         *steps[:place],
         *(_renamed(step, names) for step in inner),
@@ -308,7 +282,7 @@ def _of_any(
     ends = [*impact_steps(model, parts.effects), _last(model, parts)]
     if shared or method == "lagrange":
         ends[-1:-1] = euler_steps(bare, whole, equations.loads.uniform)
-    effects = [_renamed(step, said) for step in _effect_steps(model, parts)]
+    effects = [_renamed(step, said) for step in effect_steps(model, parts)]
     ends = [_renamed(step, said) for step in (*left, solution, *ends)]
     steps = [*start, *effects, *way, *ends]
     return _told("", steps, _whole(matrices, model, parts), parts)
@@ -338,7 +312,7 @@ def _of_tied(
 ) -> Exposition:
     """A small mechanism with constraints: the tree, then what the constraints leave free."""
     matrices = None
-    effects = _effect_steps(model, parts)
+    effects = effect_steps(model, parts)
     if model.groups:
         found = embedded(model, parts.constraints)
         solved, reduced = freedom_steps(found, tree, parts.constraints)
@@ -361,7 +335,7 @@ def _of_tied(
 def _recursive(model: Model, parts: Parts, method: Method | None) -> Exposition:
     frames = frames_of(model)
     steps = [_state(model), Step("bodies", "Free bodies", _free_words(model), ())]
-    effects = _effect_steps(model, parts, every=True)
+    effects = effect_steps(model, parts, every=True)
     tree = ALGORITHMS[method or "newton-euler"](model, frames, parts.effects)
     if not parts.constraints and method is None:
         steps += [*effects, *recursive_steps(model, frames, parts.effects)]
@@ -402,77 +376,6 @@ def _told(intro: str, steps: list[Step], matrices: Matrices | None, parts: Parts
     return Exposition((*first, *whole), matrices, parts.loads)
 
 
-def _effect_steps(model: Model, parts: Parts, *, every: bool = False) -> Iterator[Step]:
-    """Poses and motions that effects and constraints use, and each of them with its forces.
-
-    The recursion needs the poses of bodies with forces that no motion changes as well (`every`).
-    """
-    used = [t for t in parts.effects if every or not t.kept]
-    needed = dict.fromkeys(body for t in used for body in used_bodies(t))
-    if not model.groups:
-        needed |= dict.fromkeys(body for c in parts.constraints for body in c.bodies)
-    if needed:
-        words = (
-            "The forces below depend on where bodies are in the world and how they move. o is the "
-            "position "
-            "of a joint; "
-        )
-        words += (
-            "ψ is a body's angle from the world's x axis, ω its rate, x and y the position of its "
-            "centre of mass."
-            if model.dimensions == 2
-            else "W rotates a body's axes into the world's, Ω is its angular velocity in world "
-            "axes, "
-            "x, y, z the position of its centre of mass."
-        )
-        _, equations = poses(model, frames_of(model), needed)
-        yield Step("pose", "Where the bodies are, and how they move", words, tuple(equations))
-    for derived in parts.effects:
-        lines = equations_of(derived.definitions)
-        if derived.kept:
-            lines = _loads_as_they_are(derived)
-        lines += [Equation(symbol, rate) for symbol, rate in derived.rates]
-        yield Step(
-            "force" if derived.falls else "effect",
-            f"Effect `{derived.effect.name}` ({derived.effect.type.replace('_', ' ')})",
-            f"{derived.words}{_inputs_of(model, derived)}",
-            tuple(lines),
-        )
-
-
-def _inputs_of(model: Model, derived: DerivedEffect) -> str:
-    """Which names of an effect are inputs."""
-    names = [f"`{x.name}`" for x in derived.effect.inputs(model.dimensions)]
-    if not names:
-        return ""
-    return f" {' and '.join(names)} {'is an input' if len(names) == 1 else 'are inputs'}."
-
-
-def used_bodies(derived: DerivedEffect) -> Iterator[str]:
-    """The bodies whose pose or motion the formulas of an effect, or its use, need."""
-    yield from derived.bodies
-    loads = [*(() if derived.falls else derived.loads)]
-    for contact in derived.contacts:
-        loads += [*contact.normal, *(load for tangent in contact.tangents for load in tangent)]
-    yield from (load.body for load in loads if isinstance(load, Load) and load.body != WORLD)
-
-
-def _loads_as_they_are(derived: DerivedEffect) -> list[Equation]:
-    """The loads of an effect that no motion changes, with the names of the scene."""
-    lines = []
-    for load in derived.loads:
-        parts = load.force if isinstance(load, Load) else (load.force,)
-        if all(part == 0 or part.is_Symbol for part in parts):
-            continue  # inputs or parameters, which stand in F by their own names
-        if isinstance(load, Load):
-            lines.append(
-                Equation(real(f"f_{derived.effect.name},{load.body}"), sp.Matrix(load.force))
-            )
-        else:
-            lines.append(Equation(real(f"tau_{derived.effect.name}"), load.force))
-    return lines
-
-
 def _free_words(model: Model) -> str:
     words = (
         "Each body by itself, with its weight, the forces of the effects and those of its joints. "
@@ -480,23 +383,6 @@ def _free_words(model: Model) -> str:
         "forces of its effects, and in the other directions they do no work."
     )
     return words + (" " + PRESCRIBED if model.prescribed else "")
-
-
-def _symmetry(equations: Equations) -> Iterator[Step]:
-    """How the handout's M becomes the symmetric one of the generated module."""
-    n, s = len(equations.symbols.a), equations.symmetric
-    by = symmetric(equations.model, equations.symbols, equations.kinematics, sp.eye(n))
-    if by == sp.eye(n):
-        return
-    own = (("M", s.M), ("V", s.V), ("G", s.G), ("F", s.F))
-    lines = [Equation(sp.MatrixSymbol("T", n, n), by)]
-    transform = sp.MatrixSymbol("T", n, n)
-    for letter, whole in own:
-        columns = n if letter == "M" else 1
-        name = sp.MatrixSymbol(f"{letter}_sym", n, columns)
-        lines.append(Equation(name, sp.MatMul(transform, sp.MatrixSymbol(letter, n, columns))))
-        lines.append(Equation(name, whole))
-    yield Step("variant", SYMMETRIC_TITLE, SYMMETRIC, tuple(lines))
 
 
 def _names(model: Model, shown: dict[Expr, Expr]) -> dict[str, str]:

@@ -6,7 +6,7 @@ import sympy as sp
 
 from eomgen.derivation.dots import dotted
 from eomgen.derivation.handout.closed import Equations
-from eomgen.derivation.handout.elimination import rows_without_forces, trees
+from eomgen.derivation.handout.elimination import rows_without_forces, symmetric, trees
 from eomgen.derivation.reading import words_on_names
 from eomgen.derivation.steps import Equation, Kind, Pairs, Step
 from eomgen.derivation.symbols import Expr
@@ -291,3 +291,33 @@ def readable(equations: Equations) -> dict[Expr, Expr]:
             brief = f"{short[kind]}_{rest}"
             shown[symbol] = sp.Symbol(f"{kind}_{rest}" if brief in taken else brief)
     return shown
+
+
+SYMMETRIC = (
+    "There are two ways to write (24). Its rows above are torques about the bodies' own centres "
+    "of mass, so M of (26) is not symmetric. A Lagrangian derivation has generalised forces as "
+    "rows, and its M is symmetric: ½ vᵀ M v is the kinetic energy. `mass_matrix()` of the "
+    "generated module returns that one, and `velocity_force()`, `gravity_force()`, "
+    "`applied_force()` the V, G, F that belong to it. The matrix T leads from one to the other: "
+    "to the torque of each body it adds the moment of the tree's total force, and then it sums "
+    "the rows of all bodies that a joint turns. T has an inverse, so both systems have the same "
+    "solution."
+)
+SYMMETRIC_TITLE = "The symmetric mass matrix, that of kinetic energy"
+
+
+def symmetry_steps(equations: Equations) -> Iterator[Step]:
+    """How the handout's M becomes the symmetric one of the generated module."""
+    n, s = len(equations.symbols.a), equations.symmetric
+    by = symmetric(equations.model, equations.symbols, equations.kinematics, sp.eye(n))
+    if by == sp.eye(n):
+        return
+    own = (("M", s.M), ("V", s.V), ("G", s.G), ("F", s.F))
+    lines = [Equation(sp.MatrixSymbol("T", n, n), by)]
+    transform = sp.MatrixSymbol("T", n, n)
+    for letter, whole in own:
+        columns = n if letter == "M" else 1
+        name = sp.MatrixSymbol(f"{letter}_sym", n, columns)
+        lines.append(Equation(name, sp.MatMul(transform, sp.MatrixSymbol(letter, n, columns))))
+        lines.append(Equation(name, whole))
+    yield Step("variant", SYMMETRIC_TITLE, SYMMETRIC, tuple(lines))
