@@ -135,7 +135,8 @@ def read_all(equations: Sequence[Equation], names: Mapping[str, str]) -> tuple[E
 
 def brief(steps: Sequence[Step]) -> tuple[Step, ...]:
     """Steps in which poses and motions that are a number or one symbol, and forces that are 0, are
-    put in wherever a later line has them. A pose that is nothing else is no line of its own.
+    put in wherever a later line has them. A pose that is nothing else is no line of its own, nor is
+    a matrix without rows, as where no freedom is left.
     """
     found: list[Step] = []
     plain: dict[str, Expr] = {}
@@ -151,7 +152,8 @@ def brief(steps: Sequence[Step]) -> tuple[Step, ...]:
                 if step.kind == "pose" and pairs and len(short) == len(pairs) and not turn:
                     continue
             lines.append(Equation(e.left, right))
-        if lines or step.kind != "pose":
+        lines = [e for e in lines if step.kind == "form" or not _is_empty(e.right)]
+        if lines or step.kind not in ("pose", "equations", "solution"):
             found.append(replace(step, equations=tuple(lines)))
     return tuple(found)
 
@@ -163,6 +165,11 @@ def _entries(left: Expr, right: Expr) -> list[tuple[Expr, Expr]]:
     if isinstance(left, sp.MatrixSymbol) and right.shape == (3, 3):
         left = sp.Matrix(3, 3, lambda i, j: sp.Symbol(f"{left.name},{AXES[i]}{AXES[j]}"))
     return list(zip(left, right, strict=True)) if isinstance(left, sp.MatrixBase) else []
+
+
+def _is_empty(e: Expr) -> bool:
+    """Whether it is a matrix without rows, as where no freedom is left."""
+    return isinstance(e, sp.MatrixBase) and 0 in e.shape
 
 
 def _is_plain(symbol: Expr, value: Expr, *, pose: bool) -> bool:
