@@ -228,7 +228,9 @@ class Derivation(Forced):
         False, "questions on the results, in HTML with fields that check answers"
     )
     solutions: bool = option(False, "with --exercise: the answers")
-    seed: int = option(0, "with --exercise: chooses the questions and their numbers", value="N")
+    seed: int = option(
+        0, "with --exercise: chooses the questions, their numbers, and how arms lie", value="N"
+    )
     output: Path | None = _file("write it to a file")
 
 

@@ -2,17 +2,21 @@
 
 import random
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from eomgen.base.errors import SceneError
-from eomgen.derivation.exposition import Exposition
+from eomgen.derivation.exposition import Exposition, exposition_of
 from eomgen.derivation.matrices import Matrices, written_out, written_size
-from eomgen.derivation.reading import read, reading_names
+from eomgen.derivation.mechanism import NamingMechanism, Notes
+from eomgen.derivation.own_names import names_within
+from eomgen.derivation.reading import read, read_all, reading_names
 from eomgen.derivation.simplified import simplified, size
 from eomgen.derivation.steps import Equation, Step
 from eomgen.derivation.symbols import Expr
+from eomgen.language.formula import ZERO
+from eomgen.language.rewriting import times
 from eomgen.model.model import Model
 
 MOST_QUESTIONS = 5
@@ -25,6 +29,7 @@ ASKED = (
     "Write each result as a formula of the symbols in the equations above it. M, V, G and F are "
     "those of M dv/dt + V + G = F, with the symmetric M of kinetic energy."
 )
+ARMS = "In this variant arms lie as follows, from a body's centre of mass, in its axes:"
 NUMBERS = "With these numbers, in SI units and radians:"
 FUNCTIONS = (sp.sin, sp.cos, sp.tan, sp.exp, sp.log, sp.Abs)
 
@@ -50,19 +55,24 @@ class Question:
 
 @dataclass(frozen=True)
 class Exercise:
-    """Questions on a mechanism. `known` are the names that answers may use."""
+    """Questions on a mechanism. `known` are the names that answers may use, `arms` those that are
+    not as the scene has them.
+    """
 
     model: Model
     questions: tuple[Question, ...]
     known: tuple[str, ...]
     hints: tuple[Step, ...]
     exposition: Exposition
+    arms: tuple[Equation, ...] = ()
 
     def steps(self, *, solved: bool) -> tuple[Step, ...]:
         """The sheet: what is given, and the questions with blanks or with their answers."""
         names = reading_names(self.model)
         given = [s for s in self.exposition.steps if s.kind in ("state", "bodies")]
         found = [*given]
+        if self.arms:
+            found.append(Step("joint", "Arms", ARMS, read_all(self.arms, names_within(self.model))))
         for title, words, numeric in (("Questions", ASKED, False), ("Numbers", NUMBERS, True)):
             asked = [q for q in self.questions if bool(q.at) == numeric]
             lines = [
@@ -78,7 +88,8 @@ class Exercise:
 
 
 def exercise_of(model: Model, exposition: Exposition, seed: int = 0) -> Exercise:
-    """An exercise; the seed chooses what is asked for, and the numbers of the last question.
+    """An exercise; the seed chooses what is asked for, the numbers of the last question, and from 1
+    on how the arms of a tree in the plane lie in their bodies.
 
     Raises `SceneError` where no equation is written out, or none is short enough.
     """
@@ -86,7 +97,13 @@ def exercise_of(model: Model, exposition: Exposition, seed: int = 0) -> Exercise
         raise SceneError(
             f"exercise: the equations of {model.name} are an algorithm, with nothing to fill in"
         )
-    found, chance = exposition.matrices, random.Random(seed)
+    chance = random.Random(seed)
+    arms: tuple[Equation, ...] = ()
+    if seed and model.dimensions == 2 and not model.constraints:
+        model, arms = _with_turned_arms(model, chance)
+        exposition = exposition_of(model)
+    found = exposition.matrices
+    assert found is not None
     known = {c.name for c in (*model.coordinates, *model.velocities)} | {*model.defaults}
     known |= {i.name for i in model.inputs}
     asked = [q for q in _results(found) if {s.name for s in q.right.free_symbols} <= known]
@@ -98,7 +115,22 @@ def exercise_of(model: Model, exposition: Exposition, seed: int = 0) -> Exercise
     hints = tuple(
         s for s in exposition.steps if s.kind in ("joint", "motion", "constraint", "balance")
     )
-    return Exercise(model, tuple(questions), tuple(sorted(known)), hints, exposition)
+    return Exercise(model, tuple(questions), tuple(sorted(known)), hints, exposition, arms)
+
+
+def _with_turned_arms(model: Model, chance: random.Random) -> tuple[Model, tuple[Equation, ...]]:
+    """The model with the arms of bodies to their own joints turned by quarters, and these arms."""
+    names, bodies, arms = NamingMechanism(model, Notes()), [], []
+    for body in model.bodies:
+        arm, turns = body.joint.r_child, chance.randrange(4)
+        if body.joint.holds and turns and any(part != ZERO for part in arm):
+            for _ in range(turns):
+                arm = (ZERO if arm[1] == ZERO else times(-1.0, arm[1]), arm[0])
+            body = replace(body, joint=body.joint.replaced(r_child=arm))
+            left = sp.Symbol(f"r_{body.joint.name},child")
+            arms.append(Equation(left, sp.Matrix([names.value(part) for part in arm])))
+        bodies.append(body)
+    return replace(model, bodies=tuple(bodies)), tuple(arms)
 
 
 def _results(found: Matrices) -> Iterator[Question]:

@@ -73,7 +73,9 @@ def size_of(e: Any) -> float:
     """
     if isinstance(e, sp.MatrixBase):
         columns = range(e.cols)
-        return 2 + sum(2 + max((size_of(e[i, j]) for i in range(e.rows)), default=0.0) for j in columns)
+        return 2 + sum(
+            2 + max((size_of(e[i, j]) for i in range(e.rows)), default=0.0) for j in columns
+        )
     if isinstance(e, sp.BlockMatrix):
         return size_of(e.blocks)
     if e.is_Symbol or isinstance(e, sp.MatrixSymbol):

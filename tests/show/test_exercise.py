@@ -10,6 +10,8 @@ from browser import chromium, missing
 
 import eomgen
 from eomgen.commands.main import main
+from eomgen.derivation.exercise import Exercise
+from eomgen.scene.built_in import BUILT_IN
 from eomgen.show.exercise import as_page
 
 RIGHT = (
@@ -58,31 +60,54 @@ def test_sheets_of_one_seed_are_the_same_and_others_differ(
         assert capsys.readouterr().err == said
 
 
+def test_seeds_turn_arms() -> None:
+    """The answers are those of a scene whose arm points the other way, and the sheet says so."""
+    exercise = eomgen.derive("cart_pole").exercise(4)
+    text = (BUILT_IN / "cart_pole.toml").read_text()
+    turned = eomgen.derive(text.replace('r_child = [0, "l"]', 'r_child = [0, "-l"]'))
+    asked = {str(q.left): q.right for q in exercise.questions}
+    assert asked["V_1"] == turned.V[0] and asked["G_2"] == turned.G[1]
+    (arms,) = (step for step in exercise.steps(solved=False) if step.title == "Arms")
+    assert [str(x) for x in arms.equations[0].right] == ["0", "-l"]
+    assert not eomgen.derive("cart_pole").exercise(0).arms
+
+
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """The page of an exercise on the cart-pole, opened."""
-    path = tmp_path_factory.mktemp("exercise") / "exercise.html"
-    path.write_text(as_page(eomgen.derive("cart_pole").exercise(9)), "utf-8")
-    with chromium() as browser:
-        opened = browser.new_page()
-        opened.goto(path.as_uri())
+def browser() -> Iterator[Any]:
+    """A browser for all pages."""
+    with chromium() as opened:
         yield opened
+
+
+def opened(browser: Any, exercise: Exercise, folder: Path) -> Any:
+    """The page of an exercise."""
+    path = folder / "exercise.html"
+    path.write_text(as_page(exercise), "utf-8")
+    page = browser.new_page()
+    page.goto(path.as_uri())
+    return page
+
+
+def said_by(page: Any, i: int, answer: str) -> str:
+    """What the page says of an answer to a question."""
+    form = page.locator("form").nth(i)
+    form.locator("input").fill(answer)
+    form.locator("button").click()
+    return str(form.locator("output").text_content())
 
 
 @pytest.mark.apart
 @pytest.mark.skipif(bool(missing()), reason=missing())
-def test_answers_in_any_form(page: Any) -> None:
+def test_answers_in_any_form(browser: Any, tmp_path: Path) -> None:
     """Equal formulas are right, near misses are not, and nonsense is told so; hints open one after
     another.
     """
-    questions = eomgen.derive("cart_pole").exercise(9).questions
+    exercise = eomgen.derive("cart_pole").exercise(9)
+    questions, page = exercise.questions, opened(browser, exercise, tmp_path)
     place = [str(q.left) for q in questions].index("M_2,2")
 
     def said(answer: str, i: int = place) -> str:
-        form = page.locator("form").nth(i)
-        form.locator("input").fill(answer)
-        form.locator("button").click()
-        return str(form.locator("output").text_content())
+        return said_by(page, i, answer)
 
     assert [said(text) for text in RIGHT] == ["Right."] * len(RIGHT)
     assert [said(text) for text in WRONG] == ["Not the same."] * len(WRONG)
@@ -117,35 +142,21 @@ def test_answers_do_not_stand_in_the_page() -> None:
 @pytest.mark.parametrize(
     "scene", ["cart_pole", "four_bar", "differential", "furuta_pendulum", "two_body_forced"]
 )
-def test_equivalent_forms_of_every_answer(scene: str, tmp_path: Path) -> None:
+def test_equivalent_forms_of_every_answer(scene: str, browser: Any, tmp_path: Path) -> None:
     """Five forms of each answer are right, four near misses are not, with loops, too."""
     exercise = eomgen.derive(scene).exercise(1)
-    path = tmp_path / "exercise.html"
-    path.write_text(as_page(exercise), "utf-8")
-    with chromium() as browser:
-        page = browser.new_page()
-        page.goto(path.as_uri())
-
-        def said(i: int, answer: str) -> str:
-            form = page.locator("form").nth(i)
-            form.locator("input").fill(answer)
-            form.locator("button").click()
-            return str(form.locator("output").text_content())
-
-        for i, question in enumerate(q for q in exercise.questions if not q.at):
-            e, name = question.right, min(s.name for s in question.right.free_symbols)
-            right = (
-                str(e),
-                str(sp.expand(e)),
-                f"-(-({e}))",
-                f"({e})*(sin({name})^2 + cos({name})^2)",
-                f"1/(1/(2*({e})))/2",
-            )
-            assert [said(i, x) for x in right] == ["Right."] * len(right), (question.left, e)
-            wrong = (
-                f"-({e})",
-                f"1.000001*({e})",
-                f"({e}) + 1e-6*{name}",
-                f"({e})*cos(1e-3*{name})",
-            )
-            assert [said(i, x) for x in wrong] == ["Not the same."] * len(wrong), question.left
+    page = opened(browser, exercise, tmp_path)
+    for i, question in enumerate(q for q in exercise.questions if not q.at):
+        e, name = question.right, min(s.name for s in question.right.free_symbols)
+        right = (
+            str(e),
+            str(sp.expand(e)),
+            f"-(-({e}))",
+            f"({e})*(sin({name})^2 + cos({name})^2)",
+            f"1/(1/(2*({e})))/2",
+        )
+        assert [said_by(page, i, x) for x in right] == ["Right."] * len(right), question.left
+        near = f"({e})*cos(1e-3*{name})"
+        wrong = (f"-({e})", f"1.000001*({e})", f"({e}) + 1e-6*{name}", near)
+        said = [said_by(page, i, x) for x in wrong]
+        assert said == ["Not the same."] * len(wrong), question.left
