@@ -128,6 +128,7 @@ def test_contacts_are_held_in_c(method: str, rtol: float, made: list[int]) -> No
     assert sum(made) == run.trajectory.counts["steps"]
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("scene", [WHEEL, STOPPED])
 def test_stiff_steps_are_checked_in_c(scene: str, made: list[int]) -> None:
     """For branches and contacts, on constraints; works take the states within."""

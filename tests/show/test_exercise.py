@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 import sympy as sp
 from browser import chromium, missing
+from campaign import some
 
 import eomgen
 from eomgen.commands.main import main
@@ -126,7 +127,7 @@ def test_answers_in_any_form(browser: Any, tmp_path: Path) -> None:
 def test_answers_do_not_stand_in_the_page() -> None:
     """Neither an answer nor a long part of one can be read in the page's source; F is asked for."""
     asked: set[str] = set()
-    for scene in ("cart_pole", "four_bar", "two_body_forced"):
+    for scene in some(("cart_pole",), ("cart_pole", "four_bar", "two_body_forced")):
         exercises = [eomgen.derive(scene).exercise(seed) for seed in range(4)]
         asked |= {str(q.left)[0] for x in exercises for q in x.questions}
         for exercise in exercises[:2]:
