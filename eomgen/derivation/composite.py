@@ -56,14 +56,19 @@ def composite_steps(
     r = Recursion(model, frames, effects)
     yield from frame_steps(r, f"{ABOUT}\n\n{VECTORS[r.size]}{FRAMES}")
     order = range(len(frames))
-    lines = [line for k in order for line in (*velocities(r, k), *acceleration(r, k))]
-    yield Step(
-        "algorithm", "Outwards: velocities and accelerations", outward_words(r), tuple(lines)
-    )
+    yield outward_step(r)
     lines = [line for k in reversed(order) for line in _bias(r, k)]
     yield Step("algorithm", "Inwards: the bias force", BIAS, tuple(lines))
     lines = [line for k in reversed(order) for line in _mass(r, k)]
     yield Step("algorithm", "Inwards: the mass matrix M", MASS, tuple(lines))
+
+
+def outward_step(r: Recursion) -> Step:
+    """Velocities of all frames, and accelerations where v̇ = 0."""
+    order = range(len(r.frames))
+    lines = [line for k in order for line in (*velocities(r, k), *_acceleration(r, k))]
+    title = "Outwards: velocities and accelerations"
+    return Step("algorithm", title, outward_words(r), tuple(lines))
 
 
 def solved_algorithm(model: Model) -> Step:
@@ -75,7 +80,7 @@ def solved_algorithm(model: Model) -> Step:
     return Step("solution", "Solved", "The equations are M dv/dt + h_0 = 0.", (line,))
 
 
-def acceleration(r: Recursion, k: int) -> Iterator[Equation]:
+def _acceleration(r: Recursion, k: int) -> Iterator[Equation]:
     """a of a frame where v̇ = 0."""
     frame = r.frames[k]
     base = sp.MatrixSymbol("a_world", r.size, 1)

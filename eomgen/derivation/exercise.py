@@ -101,7 +101,7 @@ def exercise_of(model: Model, exposition: Exposition, seed: int = 0) -> Exercise
     arms: tuple[Equation, ...] = ()
     if seed and model.dimensions == 2 and not model.constraints:
         model, arms = _with_turned_arms(model, chance)
-        exposition = exposition_of(model)
+        exposition = exposition_of(model) if arms else exposition
     found = exposition.matrices
     assert found is not None
     known = {c.name for c in (*model.coordinates, *model.velocities)} | {*model.defaults}

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import sympy as sp
 
-from eomgen.derivation.composite import acceleration
+from eomgen.derivation.composite import outward_step
 from eomgen.derivation.effects import DerivedEffect
 from eomgen.derivation.frames import Frame
 from eomgen.derivation.linkage import hat
@@ -26,7 +26,6 @@ from eomgen.derivation.recursion import (
     frame_steps,
     joint_force,
     moves,
-    outward_words,
     subspace_of,
     total,
     velocities,
@@ -79,11 +78,7 @@ def kane_steps(
     """The steps to M and h_0 in partial velocities."""
     r = Recursion(model, frames, effects)
     yield from frame_steps(r, f"{BY_KANE}\n\n{VECTORS[r.size]}{FRAMES}")
-    order = range(len(frames))
-    lines = [line for k in order for line in (*velocities(r, k), *acceleration(r, k))]
-    yield Step(
-        "algorithm", "Outwards: velocities and accelerations", outward_words(r), tuple(lines)
-    )
+    yield outward_step(r)
     yield Step("algorithm", "Partial velocities", PARTIAL, tuple(_partial(r, f) for f in frames))
     needed = []
     for frame in frames:

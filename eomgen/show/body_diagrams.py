@@ -30,16 +30,18 @@ ROW = 15.0
 def body_diagrams(model: Model, effects: Sequence[DerivedEffect]) -> tuple[Drawing, ...]:
     """The free-body diagram of each body: every force with its name in the equations."""
     pose = Pose(model)
-    return tuple(_diagram(pose, shape, effects) for shape in pose.shapes(effects))
+    return tuple(with_clear_labels(_diagram(pose, x, effects)) for x in pose.shapes(effects))
 
 
 def named_loads(
     model: Model, effects: Sequence[DerivedEffect]
 ) -> Iterator[tuple[str, tuple[Expr, ...]]]:
     """Each body, and the names of the forces and torques in its diagram."""
-    for body, drawing in zip(model.bodies, body_diagrams(model, effects), strict=True):
-        labels = (x.text for x in drawing.items if isinstance(x, Label) and x.style == "force")
-        yield body.name, tuple(dict.fromkeys(x for x in labels if isinstance(x, sp.Expr)))
+    pose = Pose(model)
+    for shape in pose.shapes(effects):
+        items = _diagram(pose, shape, effects).items
+        labels = (x.text for x in items if isinstance(x, Label) and x.style == "force")
+        yield shape.body.name, tuple(dict.fromkeys(x for x in labels if isinstance(x, sp.Expr)))
 
 
 def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Drawing:
@@ -91,7 +93,7 @@ def _diagram(pose: Pose, shape: Shape, effects: Sequence[DerivedEffect]) -> Draw
     items = [moved(item, depth) for item in items]
     items += _legend(numbers, panel, depth)
     title = f"Free-body diagram of {body.name} in {model.title}"
-    return with_clear_labels(Drawing(panel, panel + depth, title, tuple(items)))
+    return Drawing(panel, panel + depth, title, tuple(items))
 
 
 def _legend(numbers: Mapping[Expr, str], panel: float, depth: float) -> Iterator[Item]:
